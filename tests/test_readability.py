@@ -167,3 +167,10 @@ def test_what_is_dense_is_found():
     assert beyond((nodes(many), len(local_names(many))), MOST_NODES, MOST_NAMES)
     assert len(local_names(packed)) == 0
     assert beyond((nodes(packed), 0), MOST_NODES, MOST_NAMES)
+
+
+def test_the_files_that_contributing_names_are_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = re.findall(r"`((?:[a-z_]+/)+[a-z_]+\.(?:pyx?|toml|txt|rst))`", text)
+    assert len(named) > 30
+    assert [name for name in named if not ((ROOT / name).is_file() or (ROOT / "wirebayes" / name).is_file())] == []

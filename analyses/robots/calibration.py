@@ -18,7 +18,7 @@ from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.estimate import calibrate, corrected
-from wirebayes.robot.self_calibration.session import Prior, Session, predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
 
 TENSION_SD_N, REFERENCE_SD_M, SPREAD, LOWEST_N = 0.02, 5e-3, 0.05, 2.5
 POSES, CANDIDATES, TESTS = 10, 200, 6
@@ -75,7 +75,7 @@ def study(name, line, count, rng):
     robot = schema.read(name)
     robot = replace(robot, rule=replace(robot.rule, lowest_N=LOWEST_N))
     session = plan(robot, line, rng)
-    prior = Prior(line, REFERENCE_SD_M, SPREAD)
+    prior = LengthPrior(line, REFERENCE_SD_M, SPREAD)
     hooke = replace(prior, creeps=False)
     mean, cov = prior.moments(robot.legs)
     truth = rng.multivariate_normal(mean, cov, count)

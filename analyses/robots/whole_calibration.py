@@ -59,7 +59,7 @@ def case(kind: str, mode: str, rng: np.random.Generator, anchor: float, stops: i
     if not tensions:  # what motors under torque control hold: no more than a few times what carries the platform
         robot = replace(robot, rule=replace(rule, highest_N=0.3 * rule.highest_N))
     true = replace(robot, exit_m=robot.exit_m + anchor * span * rng.normal(size=robot.exit_m.shape))
-    prior = session.Prior(made.line, 2e-3 * span)
+    prior = session.LengthPrior(made.line, 2e-3 * span)
     mean, cov = prior.moments(robot.legs)
     values = rng.multivariate_normal(mean, cov, 1)
     # two wires off their plane hold no pose that was chosen: commanded for the told robot, they hang where they hang
@@ -89,7 +89,7 @@ def case(kind: str, mode: str, rng: np.random.Generator, anchor: float, stops: i
 
 
 def _visited(
-    robot: Robot, prior: session.Prior, values: np.ndarray, rng: np.random.Generator, stops: int, share: float
+    robot: Robot, prior: session.LengthPrior, values: np.ndarray, rng: np.random.Generator, stops: int, share: float
 ) -> session.Session | None:
     """Poses of the true robot, each with tensions near others drawn from a share of the range that its file allows."""
     wires, error = prior.wires(robot, values)

@@ -322,7 +322,7 @@ def test_a_proposal_is_learned_as_a_close_one_of_few_points(monkeypatch: pytest.
             raise np.linalg.LinAlgError("no")
         return new
 
-    monkeypatch.setattr(proposal, "fit", fit)
+    monkeypatch.setattr(proposal, "fit_proposal", fit)
     begin, z, rng = start(0.0), Points.equal(np.zeros((4, D))), np.random.default_rng(0)
     before = proposal.Proposal(proposal.SHARES, None, begin, begin, begin, begin)  # type: ignore[arg-type]
     assert importance._learned(z, z, begin, ORDER, rng, begin) is new

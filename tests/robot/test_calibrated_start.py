@@ -27,7 +27,7 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion.creep import fresh
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.estimate import calibrate
-from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 HOLD_S, SOON_S = 40.0, 1e-3
 ERRORS = Uncertain(4e-3, 0.05, 0.01)
@@ -52,7 +52,7 @@ def case():
     session = Session(
         places, level, whole.joint_m[:-2:2], np.full(len(places), HOLD_S), np.ones(len(places), bool), 0.01
     )
-    prior = Prior(line, ERRORS.reference_m, ERRORS.spread)
+    prior = LengthPrior(line, ERRORS.reference_m, ERRORS.spread)
     known = calibrate(robot, prior, session, reads.ravel()[None] / 0.01)
     assert known.converged.all()
     start = calibrated(robot, prior, session, known)

@@ -8,7 +8,7 @@ from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.estimate import calibrate, corrected
-from wirebayes.robot.self_calibration.session import Prior, Session, predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
 from wirebayes.robot.self_calibration.start import start
 
 
@@ -60,7 +60,7 @@ def test_exact_readings_bring_back_the_lengths(rolling):
     rng = np.random.default_rng(2)
     line = _line()
     session = replace(_session(robot, line, 5, rng), tension_sd_N=1e-4)
-    prior = Prior(line, 5e-3, spread=1e-6)
+    prior = LengthPrior(line, 5e-3, spread=1e-6)
     mean, _ = prior.moments(robot.legs)
     truth = mean[None].copy()
     truth[:, : robot.legs] = 5e-3 * rng.normal(size=(1, robot.legs))
@@ -76,7 +76,7 @@ def test_slack_wires_do_not_mislead_the_calibration():
     rng = np.random.default_rng(3)
     line = _line()
     session = _session(robot, line, 6, rng)
-    prior = Prior(line, 14e-3, spread=1e-6)
+    prior = LengthPrior(line, 14e-3, spread=1e-6)
     mean, _ = prior.moments(robot.legs)
     truth = np.tile(mean, (4, 1))
     truth[:, : robot.legs] = 14e-3 * rng.normal(size=(4, robot.legs))
@@ -97,7 +97,7 @@ def test_biases_of_the_sensors_are_estimated_where_a_prior_allows_them(moving):
     session = _session(robot, line, 10, rng)
     if moving:
         session = replace(session, motion=rng.choice([-1.0, 1.0], session.joint_m.shape))
-    prior = Prior(line, 3e-3, spread=0.01, bias_sd_N=0.3)
+    prior = LengthPrior(line, 3e-3, spread=0.01, bias_sd_N=0.3)
     mean, cov = prior.moments(robot.legs)
     truth = rng.multivariate_normal(mean, cov, 6)
     bias = truth[:, -robot.legs :]
@@ -140,7 +140,7 @@ def test_intervals_cover_and_hooke_alone_does_not():
     rng = np.random.default_rng(4)
     line = _line()
     session = _session(robot, line, 6, rng)
-    prior = Prior(line, 5e-3, spread=0.05)
+    prior = LengthPrior(line, 5e-3, spread=0.05)
     mean, cov = prior.moments(robot.legs)
     truth = rng.multivariate_normal(mean, cov, 40)
     real = predict(robot, prior, session, truth)
@@ -168,7 +168,7 @@ def test_intervals_cover_and_hooke_alone_does_not():
 def test_an_inclinometer_helps():
     robot = schema.read("linear-7")
     line = _line()
-    prior = Prior(line, 5e-3)
+    prior = LengthPrior(line, 5e-3)
     sd = []
     for tilt in (None, 1e-4):
         session = _session(robot, line, 5, np.random.default_rng(6), tilt)

@@ -207,7 +207,7 @@ def session_csv(tmp_path):
     from wirebayes.robot.mechanics import draws, rotation, schema
     from wirebayes.robot.motion import inverse
     from wirebayes.robot.self_calibration import session_file
-    from wirebayes.robot.self_calibration.session import Prior, Session, predict
+    from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
 
     robot = schema.read("linear-7")
     line = draws.WireDraws({k: np.full(3, v) for k, v in
@@ -218,7 +218,7 @@ def session_csv(tmp_path):
     commanded = inverse.commands(robot, draws.for_robot(robot, line.centre()), x, R, tau)
     read = np.arange(len(x)) > 0
     session = Session(x, R, commanded.joint_m, np.full(len(x), 30.0), read, 0.02)
-    prior = Prior(line, 5e-3, 1e-6)
+    prior = LengthPrior(line, 5e-3, 1e-6)
     truth = prior.moments(robot.legs)[0][None].copy()
     truth[0, : robot.legs] = 1e-3 * np.array([3, -2, 1, 4, -5, 0, 2])
     real = predict(robot, prior, session, truth)

@@ -157,14 +157,14 @@ def test_smaller_errors_allowed_a_step_change_little():
 @pytest.fixture
 def tries(monkeypatch):
     """Steps that a walk tries; it is ended after a thousand."""
-    tried, once = [], drift.Walk._try
+    tried, once = [], drift.CreepingHold._try
 
     def counted(walk, time, least):
         assert len(tried) < 1000
         tried.append((time, least))
         return once(walk, time, least)
 
-    monkeypatch.setattr(drift.Walk, "_try", counted)
+    monkeypatch.setattr(drift.CreepingHold, "_try", counted)
     return tried
 
 
@@ -192,7 +192,7 @@ def test_nothing_is_followed_where_no_draw_hangs_in_balance(tries):
 @pytest.mark.parametrize("off", [-1e-9, 1e-9])
 def test_a_step_is_taken_whatever_its_error_where_creep_grows_by_a_ten_thousandth(off, monkeypatch):
     robot = schema.read("linear-7")
-    walk = drift.Walk(robot, draws.for_robot(robot, _line()), np.full(7, np.nan), (robot.home_m, np.eye(3)))
+    walk = drift.CreepingHold(robot, draws.for_robot(robot, _line()), np.full(7, np.nan), (robot.home_m, np.eye(3)))
     walk.live[:] = True
     seen = []
 

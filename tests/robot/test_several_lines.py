@@ -22,7 +22,7 @@ from wirebayes.robot.mechanics import draws, sag, schema
 from wirebayes.robot.mechanics.description import GivenWire
 from wirebayes.robot.mechanics.wires import tension
 from wirebayes.robot.motion import drift
-from wirebayes.robot.self_calibration.session import Prior
+from wirebayes.robot.self_calibration.session import LengthPrior
 
 THIN, THICK = ("default", "thick")
 
@@ -77,7 +77,7 @@ def test_unknowns_hold_the_parameters_of_every_line():
     robot = _mixed(schema.read("linear-6"), (1, 4))
     stiff = replace(_line(50, sd=0.1, seed=2, k1=3000.0), name=THICK)
     line = replace(_line(50, sd=0.1, seed=1), others={THICK: stiff})
-    prior = Prior(line, 1e-3)
+    prior = LengthPrior(line, 1e-3)
     assert prior.names == [*draws.CORE, *(f"thick {name}" for name in draws.CORE)]
     mean, cov = prior.moments(6)
     assert mean.shape == (6 + 10 + 18,)

@@ -12,7 +12,7 @@ from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import answer, session_file
 from wirebayes.robot.self_calibration.estimate import calibrate
-from wirebayes.robot.self_calibration.session import Prior, Session, predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
 from wirebayes.robot.self_calibration.trust import joint_test
 
 SPREAD = 1e-3  # from wire to wire: small, so that a session of eight stops is solved in a moment
@@ -31,7 +31,7 @@ def _session(seed, sd=0.02):
     held = np.full(len(good), 30.0)
     error = sd * float(tau[good].max())
     session = Session(x[good], R[good], joint, held, np.ones(len(good), bool), error)
-    return robot, Prior(one.line, 1e-3 * robot.span_m, SPREAD), session, rng
+    return robot, LengthPrior(one.line, 1e-3 * robot.span_m, SPREAD), session, rng
 
 
 def _read(robot, prior, session, rng):

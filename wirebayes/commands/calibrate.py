@@ -31,7 +31,7 @@ from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration import session_file, whole_answer
 from wirebayes.robot.self_calibration.answer import answer
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
-from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
 from wirebayes.strict.columns import as_csv, row_place
 from wirebayes.strict.files import PathLike
@@ -161,7 +161,7 @@ def calibrate(
     decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
-            prior = Prior(
+            prior = LengthPrior(
                 line, 1e-3 * max(reference_sd, _EXACT_MM), typical_spread(line, specimen_spread), bias_sd_N=bias
             )
             errors = _errors(machine, session, anchor_sd, platform_sd, pose_sd, drum_sd, joint_sd)

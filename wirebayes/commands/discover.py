@@ -139,7 +139,7 @@ def discover(
     return Findings(place, own)
 
 
-def write_findings(found: search.Findings, output: Path, own_effects: Path | None) -> None:
+def write_findings(found: search.Investigation, output: Path, own_effects: Path | None) -> None:
     """Beside the fits: what is undecided, pictures, and ``discovery.json`` with the final posteriors' amplitudes.
 
     Parameters
@@ -159,7 +159,7 @@ def write_findings(found: search.Findings, output: Path, own_effects: Path | Non
     write_json(output / "discovery.json", found.report)
 
 
-def jobs_of(found: search.Findings, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
+def jobs_of(found: search.Investigation, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
     """Plain fit of every experiment, and the final ones.
 
     Parameters
@@ -189,7 +189,7 @@ def jobs_of(found: search.Findings, law: ElasticLaw, history: History, own_effec
     return out
 
 
-def _others(found: search.Findings) -> list[tuple[int, JointModel]]:
+def _others(found: search.Investigation) -> list[tuple[int, JointModel]]:
     """The undecided models beside the final ones, each with its number among those of its experiments."""
     out, count = [], dict[str, int]()
     for models in alternative_models(found):
@@ -199,7 +199,7 @@ def _others(found: search.Findings) -> list[tuple[int, JointModel]]:
     return out
 
 
-def _mixtures(found: search.Findings, output: Path) -> None:
+def _mixtures(found: search.Investigation, output: Path) -> None:
     """Say beside each final posterior which other models it shares the probability with."""
     for block, others in zip(found.final, found.undecided, strict=True):
         for e in block.experiments if others else ():
@@ -209,7 +209,7 @@ def _mixtures(found: search.Findings, output: Path) -> None:
             write_mixture(output / e.name / "final", list(zip(folders, weights, keys, strict=True)))
 
 
-def _posterior_amplitudes(found: search.Findings, output: Path) -> None:
+def _posterior_amplitudes(found: search.Investigation, output: Path) -> None:
     """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
     for e in (e for block in found.final for e in block.experiments):
         summary: SummaryJson = read_json(output / e.name / "final" / "summary.json")
@@ -220,7 +220,7 @@ def _posterior_amplitudes(found: search.Findings, output: Path) -> None:
             amplitude |= {"mean": of_posterior["mean"], "q05": of_posterior["q05"], "q95": of_posterior["q95"]}
 
 
-def _parameters(found: search.Findings, output: Path) -> None:
+def _parameters(found: search.Investigation, output: Path) -> None:
     """Every parameter before and after, as the two posteriors have it."""
     for name, report in found.report["experiments"].items():
         plain, final = (read_json(output / name / model / "summary.json")["parameters"] for model in ("plain", "final"))
@@ -236,7 +236,7 @@ def _interval(entry: Parameter | None) -> Interval | None:
     return None if entry is None else {"mean": entry["mean"], "q05": entry["q05"], "q95": entry["q95"]}
 
 
-def _warnings(found: search.Findings, output: Path) -> None:
+def _warnings(found: search.Investigation, output: Path) -> None:
     """What the fits say against themselves joins what the search says; of the same readings it is said once."""
     reports = found.report["experiments"]
     for name, report in reports.items():
@@ -247,7 +247,7 @@ def _warnings(found: search.Findings, output: Path) -> None:
     found.report["warnings"] = named(reports)
 
 
-def _pictures(found: search.Findings, output: Path, own_effects: Path | None) -> None:
+def _pictures(found: search.Investigation, output: Path, own_effects: Path | None) -> None:
     """Before and after, hold by hold, and one of each finding."""
     from wirebayes.report.pictures.discover import (  # matplotlib only where it is needed
         before_and_after,

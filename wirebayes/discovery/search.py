@@ -62,7 +62,7 @@ _VISIBLE = 0.05  # p of a residual pattern that is reported of the remainder
 
 
 @dataclass(frozen=True)
-class Findings:
+class Investigation:
     """What was found in a file.
 
     Attributes
@@ -123,7 +123,7 @@ def investigate(
     seed: int = 0,
     report: Callable[[str, float, float], None] = lambda name, done, total: None,
     parallel_map: ParallelMap = map,
-) -> Findings:
+) -> Investigation:
     """Judge the experiments of one file together.
 
     Parameters
@@ -138,7 +138,7 @@ def investigate(
 
     Returns
     -------
-    Findings
+    Investigation
     """
     rng = np.random.default_rng(seed_of(seed, "discover"))
     groups: dict[str, list[Experiment]] = {}
@@ -177,7 +177,7 @@ def investigate(
         else []
         for i, (answer, last) in enumerate(zip(answers, final, strict=True))
     ]
-    return Findings({"version": 3, "experiments": out, "warnings": named(out)}, tuple(final), tuple(undecided))
+    return Investigation({"version": 3, "experiments": out, "warnings": named(out)}, tuple(final), tuple(undecided))
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ class JointModel:
     near: dict[str, float] | None = None
 
 
-def final_models(findings: Findings) -> list[JointModel]:
+def final_models(findings: Investigation) -> list[JointModel]:
     """The final model of every experiment.
 
     Samples of one material share what they are, and the amplitude of what was added. Where nothing was, each stands for
@@ -291,7 +291,7 @@ def final_models(findings: Findings) -> list[JointModel]:
     return out
 
 
-def alternative_models(findings: Findings) -> list[list[JointModel]]:
+def alternative_models(findings: Investigation) -> list[list[JointModel]]:
     """The other models that stay undecided beside the final ones, each as what is sampled for it."""
     return [_sampled(other.block, other.remains) for others in findings.undecided for other in others[1:]]
 

@@ -297,7 +297,7 @@ def _learned(
     shares = proposal.EXPLORING if known else proposal.ROUGH_SHARES
     try:
         # no walker is caught in a tail here, and a map for the middle leaves more effective draws
-        return proposal.fit(
+        return proposal.fit_proposal(
             hot, cold, start, order, rng, shares, most=_COMPONENTS, points=_LEARNED, before=known, along_tails=False
         )
     except np.linalg.LinAlgError:

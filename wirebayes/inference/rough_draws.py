@@ -65,7 +65,7 @@ def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n:
             return z[truncated_rows(log_weight, n, rng)]
         points = Points.weighted(z, _HOT * height - drawn_from).thinned(_LEARNED, rng)
         try:
-            proposals.append(mixture.fit(points, rng, most=_COMPONENTS))
+            proposals.append(mixture.fit_mixture(points, rng, most=_COMPONENTS))
         except np.linalg.LinAlgError:
             break
     return None

@@ -28,7 +28,7 @@ def learned() -> Proposal:
     rng = np.random.default_rng(0)
     start = Mixture(np.array([0.3, 0.7]), np.array([[0.0] * D, [6.0] * D]), np.repeat(np.eye(D)[None], 2, axis=0))
     points = Points.equal(bent(4000, rng))
-    known = proposal.fit(points, points, start, np.arange(D), rng, (0.3, 0.2, 0.2, 0.1, 0.2), most=3)
+    known = proposal.fit_proposal(points, points, start, np.arange(D), rng, (0.3, 0.2, 0.2, 0.1, 0.2), most=3)
     return replace(known, excess=Mixture(np.ones(1), np.full((1, D), 3.0), 0.5 * np.eye(D)[None]))
 
 

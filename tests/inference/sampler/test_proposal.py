@@ -27,7 +27,7 @@ def points():
 
 
 def test_a_crescent_becomes_a_heap_within_the_points_and_beyond(points):
-    straight = transport_map.fit(Points.equal(points), np.arange(3))
+    straight = transport_map.fit_map(Points.equal(points), np.arange(3))
     u, _ = straight.forward(crescent(6000, np.random.default_rng(2)))
     assert np.abs(np.cov(u.T) - np.eye(3)).max() < 0.1
     assert abs(np.corrcoef(u[:, 2], points[:, 0] ** 2)[0, 1]) < 0.05
@@ -37,7 +37,7 @@ def test_a_crescent_becomes_a_heap_within_the_points_and_beyond(points):
 
 @pytest.mark.parametrize("order", [[0, 1, 2], [1, 0, 2], [2, 0, 1]])
 def test_the_map_has_an_inverse_and_the_jacobian_it_says(points, order):
-    straight = transport_map.fit(Points.equal(points), np.array(order))
+    straight = transport_map.fit_map(Points.equal(points), np.array(order))
     x = np.vstack([points[:20], 3.0 * points[:20]])
     u, jacobian = straight.forward(x)
     assert straight.inverse(u) == pytest.approx(x, rel=1e-9, abs=1e-9)
@@ -47,7 +47,7 @@ def test_the_map_has_an_inverse_and_the_jacobian_it_says(points, order):
 
 
 def test_a_cloud_without_bends_gets_none():
-    straight = transport_map.fit(Points.equal(np.random.default_rng(3).normal(size=(4000, 6))), np.arange(6))
+    straight = transport_map.fit_map(Points.equal(np.random.default_rng(3).normal(size=(4000, 6))), np.arange(6))
     assert not straight.quadratic.any()
 
 
@@ -55,7 +55,7 @@ def test_what_is_skewed_becomes_even():
     rng = np.random.default_rng(6)
     own = 1.0 + 2.0 * np.sinh(np.arcsinh(rng.normal(size=20000)) + 0.7)
     x = np.column_stack([own, stats.gamma(2.0).rvs(20000, random_state=rng)])
-    u, _ = transport_map.fit(Points.equal(x), np.arange(2)).forward(x)
+    u, _ = transport_map.fit_map(Points.equal(x), np.arange(2)).forward(x)
     before, after = ([stats.kstest(c, "norm").statistic for c in p.T] for p in (stats.zscore(x), u))
     assert before[0] > 0.08 and after[0] < 0.015
     assert after[1] < 0.6 * before[1]  # a gamma is not of the family, and comes nearer all the same
@@ -72,7 +72,7 @@ def test_evolution_in_straight_coordinates_keeps_the_density():
     def log_density(z):
         return -0.5 * (z[:, 0] ** 2 + ((z[:, 1] - z[:, 0] ** 2) * np.exp(-0.5 * z[:, 0])) ** 2) - 0.5 * z[:, 0]
 
-    move = moves.EvolutionMove(4, transport_map.fit(Points.equal(draws(4000) * [1.2, 0.8]), np.arange(2)))
+    move = moves.EvolutionMove(4, transport_map.fit_map(Points.equal(draws(4000) * [1.2, 0.8]), np.arange(2)))
     found = []
     for seed in range(12):
         walkers = emcee.EnsembleSampler(400, 2, log_density, moves=[move], vectorize=True)
@@ -89,7 +89,7 @@ def test_evolution_in_straight_coordinates_keeps_the_density():
 def test_evolution_takes_its_differences_within_an_ensemble(mapped):
     """The second ensemble stands still wherever its own walkers do, whatever the first one does."""
     rng = np.random.default_rng(3)
-    straight = transport_map.fit(Points.equal(rng.normal(size=(500, 2))), np.arange(2)) if mapped else None
+    straight = transport_map.fit_map(Points.equal(rng.normal(size=(500, 2))), np.arange(2)) if mapped else None
     spread, still = rng.normal(size=(20, 2)), np.tile([1.0, 2.0], (20, 1))
     start = np.concatenate([spread, still])
     walkers = emcee.EnsembleSampler(
@@ -102,7 +102,7 @@ def test_evolution_takes_its_differences_within_an_ensemble(mapped):
 
 def test_points_that_do_not_span_their_space_are_refused():
     with pytest.raises(np.linalg.LinAlgError):
-        transport_map.fit(Points.equal(np.ones((100, 2))), np.arange(2))
+        transport_map.fit_map(Points.equal(np.ones((100, 2))), np.arange(2))
 
 
 @pytest.mark.parametrize(("wider", "along_tails", "before", "followed"), [
@@ -116,8 +116,8 @@ def test_the_map_follows_tails_that_belong_to_the_posterior(wider, along_tails, 
     hot = cold * [1.6, wider, 1.6]
     start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
     one, other = Points.equal(hot), Points.equal(cold)
-    known = proposal.fit(other, other, start, np.arange(3), rng, proposal.SHARES, most=2) if before else None
-    found = proposal.fit(
+    known = proposal.fit_proposal(other, other, start, np.arange(3), rng, proposal.SHARES, most=2) if before else None
+    found = proposal.fit_proposal(
         one, other, start, np.arange(3), rng, proposal.SHARES, most=2, before=known, along_tails=along_tails
     )
     points = {"hot": hot, "cold": cold}[followed]
@@ -131,13 +131,15 @@ def test_weights_count_as_often_as_points_repeat():
     repeated, order = np.repeat(x, often, axis=0), np.arange(3)
     points = Points(x, often.astype(float))
     assert Points.equal(repeated).weight.sum() == points.weight.sum() == often.sum()
-    one, other = (transport_map.fit(p, order) for p in (points, Points.equal(repeated)))
+    one, other = (transport_map.fit_map(p, order) for p in (points, Points.equal(repeated)))
     assert one.forward(x[:50])[0] == pytest.approx(other.forward(x[:50])[0], abs=1e-9)
-    plain = transport_map.fit(Points(repeated + 1e-12 * rng.normal(size=repeated.shape), np.ones(len(repeated))), order)
+    plain = transport_map.fit_map(
+        Points(repeated + 1e-12 * rng.normal(size=repeated.shape), np.ones(len(repeated))), order
+    )
     assert one.forward(x[:50])[0] == pytest.approx(plain.forward(x[:50])[0], abs=0.02)  # but for quantiles
     start = mixture.Mixture(np.array([0.5, 0.5]), x[:2], np.repeat(np.eye(3)[None], 2, axis=0), 40.0)
     one, other = (
-        mixture.fit(p, np.random.default_rng(1), most=2, degrees=40.0, before=start)
+        mixture.fit_mixture(p, np.random.default_rng(1), most=2, degrees=40.0, before=start)
         for p in (points, Points(repeated, np.ones(len(repeated))))
     )
     assert one.log_density(x) == pytest.approx(other.log_density(x), abs=2e-3)  # in single precision
@@ -146,7 +148,7 @@ def test_weights_count_as_often_as_points_repeat():
 def test_a_mixture_learns_in_single_precision_what_double_precision_says():
     rng = np.random.default_rng(3)
     x = np.concatenate([rng.normal(size=(3000, 4)), 3.0 + 0.3 * rng.normal(size=(1500, 4))])
-    found = mixture.fit(Points.equal(x), rng, most=2, degrees=40.0)
+    found = mixture.fit_mixture(Points.equal(x), rng, most=2, degrees=40.0)
     order = np.argsort(-found.weights)
     assert found.weights.sum() == pytest.approx(1.0, abs=1e-12)
     assert found.weights[order] == pytest.approx([2 / 3, 1 / 3], abs=0.01)
@@ -157,7 +159,9 @@ def test_the_density_of_a_proposal_is_that_of_its_draws(points):
     """The mean of 1/q over draws of q inside a box is the box's volume."""
     rng = np.random.default_rng(4)
     start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
-    q = proposal.fit(Points.equal(points), Points.equal(points), start, np.arange(3), rng, proposal.SHARES, most=3)
+    q = proposal.fit_proposal(
+        Points.equal(points), Points.equal(points), start, np.arange(3), rng, proposal.SHARES, most=3
+    )
     x = q.rvs(200000, rng)
     inside = (np.abs(x - [0.0, 0.0, 2.5]) < [1.0, 1.0, 1.0]).all(axis=1)
     weight = inside * np.exp(-q.log_density(x))
@@ -191,7 +195,7 @@ def test_points_that_a_map_has_sent_beyond_all_numbers_are_refused():
     z = np.random.default_rng(0).normal(size=(100, 3))
     z[:, 2] = np.nan
     with np.errstate(all="ignore"), pytest.raises(np.linalg.LinAlgError):
-        mixture.fit(Points.weighted(z, np.zeros(100)), np.random.default_rng(0))
+        mixture.fit_mixture(Points.weighted(z, np.zeros(100)), np.random.default_rng(0))
 
 
 def neck(n, rng):
@@ -205,7 +209,7 @@ def without_excess(points, rng):
     """A proposal that knows the hill alone."""
     hill = Points.equal(points[len(points) // 500 :])
     start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
-    return proposal.fit(hill, hill, start, np.arange(3), rng, proposal.SHARES, most=2)
+    return proposal.fit_proposal(hill, hill, start, np.arange(3), rng, proposal.SHARES, most=2)
 
 
 def log_neck(z):

@@ -296,7 +296,7 @@ def _fitted(
         hot, cold = before[0].joined(hot), before[1].joined(cold)
     components = policy.components * (_MORE_COMPONENTS if learned.again else 1)
     try:
-        new = proposal.fit(
+        new = proposal.fit_proposal(
             hot, cold, learned.start, target.coordinates.order, state.generator, shares,
             most=max(components, min(learned.modes, _MOST_COMPONENTS)), points=points,
             before=learned.proposal if isinstance(learned.proposal, Proposal) else None,

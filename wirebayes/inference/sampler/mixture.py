@@ -103,7 +103,7 @@ def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixtur
     return Mixture(weights / weights.sum(), centres, np.linalg.cholesky(covariances))
 
 
-def fit(
+def fit_mixture(
     points: Points,
     rng: np.random.Generator,
     *,

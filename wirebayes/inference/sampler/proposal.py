@@ -111,7 +111,7 @@ def components(of: Mixture | Proposal) -> Components:
     return Components(replace(of, degrees=np.full(len(of.weights), of.degrees)))
 
 
-def fit(
+def fit_proposal(
     hot: Points,
     cold: Points,
     start: Mixture,
@@ -158,14 +158,14 @@ def fit(
     """
     hot, cold = hot.thinned(points, rng), cold.thinned(points, rng)
     elsewhere = before is None or (hot.spread > _ELSEWHERE * cold.spread).any()
-    straight = transport_map.fit(hot if along_tails and not elsewhere else cold, order)
+    straight = transport_map.fit_map(hot if along_tails and not elsewhere else cold, order)
     near, far = (replace(each, z=straight.forward(each.z)[0]) for each in (cold, hot))
     far, plain = far.thinned(points // 2, rng), hot.thinned(points // 2, rng)
     return Proposal(
         shares, straight,
-        mixture.fit(near, rng, most=most, degrees=_LIGHT, before=before.close if before else None),
-        mixture.fit(far, rng, most=most // 2, before=before.wide if before else None),
-        mixture.fit(plain, rng, most=most // 2, before=before.plain if before else None),
+        mixture.fit_mixture(near, rng, most=most, degrees=_LIGHT, before=before.close if before else None),
+        mixture.fit_mixture(far, rng, most=most // 2, before=before.wide if before else None),
+        mixture.fit_mixture(plain, rng, most=most // 2, before=before.plain if before else None),
         start,
     )  # fmt: skip
 

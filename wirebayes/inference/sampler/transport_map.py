@@ -101,7 +101,7 @@ class Straight:
         return x
 
 
-def fit(points: Points, order: NDArray[np.int64]) -> Straight:
+def fit_map(points: Points, order: NDArray[np.int64]) -> Straight:
     """The map that straightens points: weighted regressions, coordinate by coordinate.
 
     Parameters

@@ -11,7 +11,7 @@ from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
-from wirebayes.robot.motion.drift import Walk
+from wirebayes.robot.motion.drift import CreepingHold
 
 # Share of the mean tension by which a command must change a wire's tension to restart the clocks. On the paper's
 # bench every step changed the tension by a tenth or more; of smaller changes the tests say nothing.
@@ -182,12 +182,12 @@ def refined(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
 def _begin(
     robot: Robot, wires: Wires, schedule: Callable[[float], Floats], since_s: float, start: tuple[Floats, Floats],
     carried: CreepState, error_m: Floats | float,
-) -> Walk:  # fmt: skip
+) -> CreepingHold:  # fmt: skip
     """A hold that begins at a time of the history."""
-    return Walk(robot, wires, lambda time_s: schedule(since_s + time_s), start, carried, error_m=error_m)
+    return CreepingHold(robot, wires, lambda time_s: schedule(since_s + time_s), start, carried, error_m=error_m)
 
 
-def _again(walk: Walk, schedule: Callable[[float], Floats], since_s: float) -> Walk:
+def _again(walk: CreepingHold, schedule: Callable[[float], Floats], since_s: float) -> CreepingHold:
     """The hold that follows one: from its pose, with its creep."""
     carried = _without_clocks(walk.creep.state(), walk.wires)
     return _begin(walk.robot, walk.wires, schedule, since_s, _pose(walk), carried, walk.error_m)
@@ -215,7 +215,7 @@ def _without_clocks(state: CreepState, wires: Wires) -> CreepState:
     return state if wires.effects else replace(state, past=())
 
 
-def _pose(walk: Walk) -> tuple[Floats, Floats]:
+def _pose(walk: CreepingHold) -> tuple[Floats, Floats]:
     """Where the next hold starts from; NaN where the platform has fallen, so that nothing more is solved there."""
     lost = ~walk.live[:, None]
     return np.where(lost, np.nan, walk.here.position_m), walk.here.rotation

@@ -13,7 +13,7 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
 from wirebayes.robot.self_calibration.calibrated import Calibrated
-from wirebayes.robot.self_calibration.session import Prior
+from wirebayes.robot.self_calibration.session import LengthPrior
 
 _STEP = 0.05  # of a prior sd: far above the solver's error, and poses are straight over it
 _EXACT_M = 1e-6  # a length that is said to be exact is known to a micrometre
@@ -51,7 +51,7 @@ class Unknowns:
     Attributes
     ----------
     robot : Robot
-    prior : Prior
+    prior : LengthPrior
     mean : (d,) array
     root : (d, d) array
         Cholesky factor of the prior covariance.
@@ -61,7 +61,7 @@ class Unknowns:
     """
 
     robot: Robot
-    prior: Prior
+    prior: LengthPrior
     mean: Floats
     root: Floats
     draws: Floats
@@ -112,7 +112,7 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Ge
     if known is not None:
         draws = even_normals(line.count, len(known.mean), rng)
         return Unknowns(robot, known.prior, known.mean, _root(known.covariance), draws, known)
-    prior = Prior(line, max(errors.reference_m, _EXACT_M), errors.spread)
+    prior = LengthPrior(line, max(errors.reference_m, _EXACT_M), errors.spread)
     mean, cov = prior.moments(robot.legs)
     root = np.asarray(np.linalg.cholesky(cov), np.float64)
     legs = robot.legs

@@ -129,7 +129,7 @@ def hold(
     Course
     """
     times = np.asarray(times_s, float)
-    walk = Walk(robot, wires, joint_m, (start_m, start_rotation), carried, follow, tolerance)
+    walk = CreepingHold(robot, wires, joint_m, (start_m, start_rotation), carried, follow, tolerance)
     n, legs = walk.n, robot.legs
     position, rotation = np.empty((n, len(times), 3)), np.empty((n, len(times), 3, 3))
     tension, status = np.empty((n, len(times), legs)), np.empty((n, len(times)), np.int64)
@@ -144,7 +144,7 @@ def hold(
     return Course(times, position, rotation, tension, status, walk.creep.state(), walk.falls())
 
 
-class Walk:
+class CreepingHold:
     """One hold on its way: creep's state, the pose of every draw, and which draws still have one.
 
     Parameters

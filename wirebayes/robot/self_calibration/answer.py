@@ -22,7 +22,7 @@ from wirebayes.robot.motion import control, hanging, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import Calibration, calibrate, corrected
-from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval
 
 CANDIDATES = 200  # in the workspace: the best of them come within a few percent of the best there are
@@ -32,14 +32,14 @@ _FAR = 10.0
 
 
 def answer(
-    robot: Robot, prior: Prior, session: Session, readings: Floats, seed: int = 0, visits: int = 5
+    robot: Robot, prior: LengthPrior, session: Session, readings: Floats, seed: int = 0, visits: int = 5
 ) -> tuple[CalibrateJson, Calibrated]:
     """Calibrate one robot and say how far the answer can be trusted.
 
     Parameters
     ----------
     robot : Robot
-    prior : Prior
+    prior : LengthPrior
     session : Session
     readings : (r,) array
         Standardised, as `session.Prediction.readings`.
@@ -93,7 +93,7 @@ def usable(known: Calibration) -> bool:
     return bool(known.converged[0] and known.p_joint[0] >= SIGNIFICANT)
 
 
-def _named(robot: Robot, prior: Prior, session: Session, known: Calibration) -> NamedEstimates:
+def _named(robot: Robot, prior: LengthPrior, session: Session, known: Calibration) -> NamedEstimates:
     """Estimates in the words of a whole robot's calibration; its geometry is exact here."""
     half = float(norm.ppf(0.95))
     zero = np.zeros((robot.legs, 3))
@@ -114,7 +114,7 @@ def _named(robot: Robot, prior: Prior, session: Session, known: Calibration) -> 
     }
 
 
-def _poses(robot: Robot, prior: Prior, known: Calibration) -> CalibratedPoses:
+def _poses(robot: Robot, prior: LengthPrior, known: Calibration) -> CalibratedPoses:
     """Where the robot is, and the joint values of its home; none where nothing holds it or nothing was found."""
     if not known.converged[0]:  # nobody should send the robot anywhere by it
         return {"pose_now": None, "joint_values_for_home_m": None}
@@ -149,7 +149,7 @@ def _unsure(known: Calibration, plain: Calibration) -> list[Notice]:
     return [Notice("misfit", text)]
 
 
-def _contradicted(robot: Robot, prior: Prior, session: Session, known: Calibration) -> list[Notice]:
+def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: Calibration) -> list[Notice]:
     """A warning for each hold whose requested pose is not where the joint values lead, for any plausible lengths."""
     if not known.converged[0]:
         return []
@@ -166,7 +166,7 @@ def _contradicted(robot: Robot, prior: Prior, session: Session, known: Calibrati
     return [Notice("misfit", text) for text in texts]
 
 
-def _lengths(robot: Robot, prior: Prior, known: Calibration) -> EstimatedLengths:
+def _lengths(robot: Robot, prior: LengthPrior, known: Calibration) -> EstimatedLengths:
     half = float(norm.ppf(0.95)) * known.length_sd_m[0]
     sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
     found: EstimatedLengths = {
@@ -188,7 +188,7 @@ def _lengths(robot: Robot, prior: Prior, known: Calibration) -> EstimatedLengths
     return found
 
 
-def _observed(robot: Robot, prior: Prior, session: Session, rng: np.random.Generator, visits: int) -> Observed:
+def _observed(robot: Robot, prior: LengthPrior, session: Session, rng: np.random.Generator, visits: int) -> Observed:
     """Rank and sentence for the poses that were read; poses worth reading next."""
     wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
     wires = control.known(wires)

@@ -13,7 +13,7 @@ from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion.creep import CreepState
 from wirebayes.robot.self_calibration import session as sessions
 from wirebayes.robot.self_calibration.estimate import Calibration
-from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 
 @dataclass(frozen=True)
@@ -23,16 +23,16 @@ class Calibrated:
     Attributes
     ----------
     robot : Robot
-    prior : Prior
+    prior : LengthPrior
         Says what the unknowns are.
     session : Session
     mean : (d,) array
-        Reference errors, parameters and specimens' deviations in the order of `Prior.moments`, without biases.
+        Reference errors, parameters and specimens' deviations in the order of `LengthPrior.moments`, without biases.
     covariance : (d, d) array
     """
 
     robot: Robot
-    prior: Prior
+    prior: LengthPrior
     session: Session
     mean: Floats
     covariance: Floats
@@ -47,13 +47,13 @@ class Calibrated:
         return sessions.carried(self.robot, self.prior, self.session, unknowns)
 
 
-def calibrated(robot: Robot, prior: Prior, session: Session, known: Calibration) -> Calibrated:
+def calibrated(robot: Robot, prior: LengthPrior, session: Session, known: Calibration) -> Calibrated:
     """What the calibration of one robot leaves known.
 
     Parameters
     ----------
     robot : Robot
-    prior : Prior
+    prior : LengthPrior
     session : Session
     known : estimate.Calibration
         Of one robot. Biases of its sensors are averaged over.
@@ -97,7 +97,7 @@ def from_dict(values: Any, robot: Robot, line: WireDraws) -> Calibrated:
     ValueError
         The values are not those of such a robot and line.
     """
-    prior = Prior(line, 1e-3 * float(values["reference_sd_mm"]), float(values["specimen_spread"]))
+    prior = LengthPrior(line, 1e-3 * float(values["reference_sd_mm"]), float(values["specimen_spread"]))
     mean, covariance = np.array(values["mean"], float), np.array(values["covariance"], float)
     d = len(prior.moments(robot.legs)[0])
     if list(values["line"]) != prior.names or mean.shape != (d,) or covariance.shape != (d, d):

@@ -16,7 +16,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.session import Prediction, Prior, Session, predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Prediction, Session, predict
 from wirebayes.robot.self_calibration.start import start
 from wirebayes.robot.self_calibration.trust import joint_test
 
@@ -69,13 +69,15 @@ class Calibration:
         return self.length_m - half, self.length_m + half
 
 
-def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, iterations: int = 40) -> Calibration:
+def calibrate(
+    robot: Robot, prior: LengthPrior, session: Session, readings: Floats, iterations: int = 40
+) -> Calibration:
     """Posterior of the wires' lengths from standardised readings of one session on ``m`` robots.
 
     Parameters
     ----------
     robot : Robot
-    prior : Prior
+    prior : LengthPrior
     session : Session
     readings : (m, r) array
         In the order and the units of `Prediction.readings`.
@@ -131,13 +133,13 @@ def calibrate(robot: Robot, prior: Prior, session: Session, readings: Floats, it
     )  # fmt: skip
 
 
-def corrected(robot: Robot, prior: Prior, known: Calibration, position_m: Floats, rotation: Floats) -> Floats:
+def corrected(robot: Robot, prior: LengthPrior, known: Calibration, position_m: Floats, rotation: Floats) -> Floats:
     """Joint values that bring every calibrated robot to one pose, the creep so far included.
 
     Parameters
     ----------
     robot : Robot
-    prior : Prior
+    prior : LengthPrior
     known : Calibration
         Of m robots.
     position_m : (3,) array
@@ -156,7 +158,7 @@ def corrected(robot: Robot, prior: Prior, known: Calibration, position_m: Floats
 
 
 def derivatives(
-    robot: Robot, prior: Prior, session: Session, mean: Floats, root: Floats, white: Floats, at: Prediction
+    robot: Robot, prior: LengthPrior, session: Session, mean: Floats, root: Floats, white: Floats, at: Prediction
 ) -> tuple[Floats, Floats, Floats]:
     """Derivatives of readings, final lengths and final poses by the unknowns in units of their prior.
 
@@ -166,7 +168,7 @@ def derivatives(
     Parameters
     ----------
     robot : Robot
-    prior : Prior
+    prior : LengthPrior
     session : Session
         Commands and durations of m robots.
     mean : (d,) array

@@ -76,7 +76,7 @@ class Session:
 
 
 @dataclass(frozen=True)
-class Prior:
+class LengthPrior:
     """What is known before: the line's posterior, the spread of specimens, the error of the reference lengths.
 
     Attributes
@@ -207,7 +207,7 @@ class Prediction:
 
 def predict(
     robot: Robot,
-    prior: Prior,
+    prior: LengthPrior,
     session: Session,
     unknowns: Floats,
     longest_step: float = _LONGEST,
@@ -218,7 +218,7 @@ def predict(
     Parameters
     ----------
     robot : Robot
-    prior : Prior
+    prior : LengthPrior
     session : Session
     unknowns : (n, d) array
     longest_step : float
@@ -254,13 +254,13 @@ def predict(
     )  # fmt: skip
 
 
-def carried(robot: Robot, prior: Prior, session: Session, unknowns: Floats) -> CreepState:
+def carried(robot: Robot, prior: LengthPrior, session: Session, unknowns: Floats) -> CreepState:
     """What the wires of every row of unknowns ``(n, d)`` carry out of the session.
 
     Parameters
     ----------
     robot : Robot
-    prior : Prior
+    prior : LengthPrior
     session : Session
     unknowns : (n, d) array
 

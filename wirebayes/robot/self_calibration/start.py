@@ -14,7 +14,7 @@ from wirebayes.robot.mechanics import rotation, statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import stretched_length
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.session import Prediction, Prior, Session, predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Prediction, Session, predict
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class _Equations:
     by_length: Floats
 
 
-def start(robot: Robot, prior: Prior, session: Session, readings: Floats, iterations: int = 12) -> Floats:
+def start(robot: Robot, prior: LengthPrior, session: Session, readings: Floats, iterations: int = 12) -> Floats:
     """Reference errors ``(m, w)``, m, from closed loops and balance, creep taken as the prior expects it.
 
     Parameters
@@ -94,7 +94,7 @@ def _scale(robot: Robot) -> Floats:
     return np.where(np.arange(robot.degrees) < 3, 1.0, 1.0 / robot.size_m)[:, None]
 
 
-def _loops(robot: Robot, prior: Prior, session: Session, readings: Floats, expected: Prediction) -> _Loops:
+def _loops(robot: Robot, prior: LengthPrior, session: Session, readings: Floats, expected: Prediction) -> _Loops:
     wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
     m, q = len(readings), expected.position_m.shape[1]
     tau = readings[:, : q * robot.legs].reshape(m * q, robot.legs) * session.tension_sd_N

@@ -10,7 +10,7 @@ import numpy as np
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.self_calibration.session import Prior
+from wirebayes.robot.self_calibration.session import LengthPrior
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Parts:
     drum : (w,) array
         Relative error of every drum's radius.
     wires : (d,) array
-        A row of unknowns as `Prior.wires` takes it.
+        A row of unknowns as `LengthPrior.wires` takes it.
     level_N : (w,) array
         What tensions that nobody read are on average beyond what is usual.
     """
@@ -74,13 +74,13 @@ class Unknowns:
     ----------
     robot : Robot
         As its file says: the mean of the geometry's prior.
-    prior : Prior
+    prior : LengthPrior
         Of reference lengths, wires and sensors.
     errors : StatedErrors
     """
 
     robot: Robot
-    prior: Prior
+    prior: LengthPrior
     errors: StatedErrors
 
     @cached_property

@@ -25,7 +25,7 @@ from wirebayes.robot.self_calibration.equations import Holds, moved
 from wirebayes.robot.self_calibration.identified import Identified, identified
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.seeds import best
-from wirebayes.robot.self_calibration.session import Prior, Session
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
@@ -67,7 +67,7 @@ def holds_of(robot: Robot, session: Session, readings: Floats) -> Holds:
 
 def answer(
     robot: Robot,
-    prior: Prior,
+    prior: LengthPrior,
     errors: StatedErrors,
     session: Session,
     readings: Floats,
@@ -81,7 +81,7 @@ def answer(
     ----------
     robot : Robot
         As its file says.
-    prior : Prior
+    prior : LengthPrior
         Of references, wires and sensors.
     errors : StatedErrors
         Of geometry and poses.
@@ -175,7 +175,7 @@ def _too_good(found: Whole) -> bool:
     return bool(seen.any() and chi2.cdf(float(deviations @ deviations), int(seen.sum())) < _CHANCE)
 
 
-def _prior(robot: Robot, prior: Prior, errors: StatedErrors, session: Session) -> CalibrationPrior:
+def _prior(robot: Robot, prior: LengthPrior, errors: StatedErrors, session: Session) -> CalibrationPrior:
     given: CalibrationPrior = {
         "reference_sd_mm": 1e3 * prior.reference_sd_m,
         "specimen_spread": prior.spread,
