@@ -59,7 +59,7 @@ def reduced(uses: dict[str, set[str]]) -> list[tuple[str, str]]:
 ACROSS = {
     "paper": -2.3, "report": 0.9, "planning": 2.6, "comparison": -2.3, "discovery": 1.3, "prediction": -0.6,
     "inference": -1.9, "simulation": 2.9, "effects": -1.9, "io": 1.9, "robot": 4.6, "strict": 0.5, "numeric": -1.2,
-    "processes": 3.2,
+    "processes": 3.2, "views": 3.6,
 }  # fmt: skip
 layers = [[name for name in sorted(layer) if name in ABOUT] for layer in LAYERS]
 layers = [layer for layer in layers if layer]
