@@ -417,7 +417,7 @@ def test_the_proposal_is_fitted_to_this_round_and_the_one_before(monkeypatch: py
             raise np.linalg.LinAlgError("points do not span their space")
         return new
 
-    monkeypatch.setattr(burn_in.proposal, "fit", fit)
+    monkeypatch.setattr(burn_in.proposal, "fit_proposal", fit)
     target, rows = gaussian(1), [Points.equal(np.full((1, 1), float(i))) for i in range(6)]
     state = burning()
     for modes, (hot, cold) in zip((7, 2, 99), zip(rows[::2], rows[1::2], strict=True), strict=True):
@@ -443,7 +443,7 @@ def test_known_modes_are_widened_and_rough_draws_teach_the_first_proposal(monkey
         taught.append((hot.z.tolist(), cold.z.tolist(), given[2]))
         return "proposal"
 
-    monkeypatch.setattr(burn_in.proposal, "fit", fit)
+    monkeypatch.setattr(burn_in.proposal, "fit_proposal", fit)
     evidence = np.array([0.0, np.log(3.0)])
     curvature = np.stack([np.eye(D), 0.5 * np.eye(D)])
     height = evidence + 0.5 * np.linalg.slogdet(curvature)[1]
