@@ -76,7 +76,7 @@ def _four_figures(kept: dict[str, Any]) -> str:
     coverage, robots = kept["coverage"]["result"], kept["robot_agreement"]["result"]
     inside, later = (100 * coverage[f"{of}_coverage"] for of in ("interval", "held_out"))
     wire = kept["real_wires"]["result"]["first holds to the rest"]["roc-line-1m"]
-    table = (DOCS / "discover-table.inc").read_text(encoding="utf-8")
+    table = (DOCS / "discover-clean.inc").read_text(encoding="utf-8")
     alarms = re.search(r"\* - false alarms on clean files\n.*\n\s+- (.*)", table)
     assert alarms is not None
     return (
