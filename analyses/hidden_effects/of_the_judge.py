@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from .rates import Row, rate, share_of
-from .rows import accepted_of_group, visible_beside
+from .rows import accepted_of_group, unknown_or_its_group, visible_beside
 from .target import Target, at_least, at_most, number
 
 WANTED = 0.90  # of the judge's rate
@@ -31,15 +31,11 @@ def shares(rows: list[Row]) -> Iterator[Target]:
     yield _share("beside a foreign effect: a remainder is likely", of["mixed"], _remainder_is_likely, "remains")
     for kind, label in (("without", "effect removed"), ("foreign", "effect in no catalogue")):
         seen = [r for r in of[kind] if r["delta"] >= 8 and r["detected"]]
-        yield _share(f"{label}: unknown or its group", seen, _unknown_or_its_group, "right")
+        yield _share(f"{label}: unknown or its group", seen, unknown_or_its_group, "right")
 
 
 def _remainder_is_likely(row: Row) -> bool:
     return (row["remainder"] or 0.0) > 0.5
-
-
-def _unknown_or_its_group(row: Row) -> bool:
-    return row["chosen"] == "unknown" or bool(row["right_group"])
 
 
 def _share(name: str, rows: list[Row], right: Callable[[Row], bool], key: str) -> Target:

@@ -114,6 +114,11 @@ def accepted_of_group(row: Row) -> list[bool]:
     return [any(name in group for name in row["accepted"]) for group in row["groups"]]
 
 
+def unknown_or_its_group(row: Row) -> bool:
+    """Whether an effect without a name was called unknown, or by a name whose signature is nearly the same."""
+    return row["chosen"] == "unknown" or bool(row["right_group"])
+
+
 def visible_beside(row: Row) -> list[bool]:
     """For each hidden effect whether enough of it is left beside the others for it to be named."""
     return [d is not None and d >= CONDITIONAL for d in row["conditional"]]

@@ -8,7 +8,7 @@ from typing import Any
 from .cases import TOGETHER
 from .of_the_judge import alarms_on_clean, families, shares
 from .rates import Row, against_optimal, closed_of_oracle, pooled, rate, rmse_ratio
-from .rows import accepted_of_group, false_names, visible_beside
+from .rows import accepted_of_group, false_names, unknown_or_its_group, visible_beside
 from .target import Target, at_least, at_most, mean, number, row
 
 ALPHA = 0.04
@@ -49,7 +49,7 @@ def targets(rows: list[Row]) -> list[Target]:
     table.append(_set_size(seen))
     for kind, label in (("without", "removed from the catalogue"), ("foreign", "in no catalogue")):
         part = [r for r in foreign if r["kind"] == kind]
-        found = rate(r["chosen"] == "unknown" or r["right_group"] for r in part)
+        found = rate(map(unknown_or_its_group, part))
         table.append(at_least(f"effect {label}: unknown or its group", found, 0.90))
         table.append(_no_more(f"its group, or seen beside the best name ({kind})", [_seen_alone(r) for r in part]))
         table.append(_no_more(f"{BLIND} ({kind})", [r["blind"].get("right") for r in part]))
