@@ -47,6 +47,16 @@ def test_reading_a_bench_file_loads_no_library_of_posteriors(tmp_path):
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_what_fits_load_holds_no_library_of_posteriors():
+    """Pandas and xarray would take a third of a fit's time, in the process of the command and in those of its check."""
+    code = (
+        "import sys; import wirebayes.commands.fit, wirebayes.preloaded, wirebayes.report.pages.fit\n"
+        "print([m for m in ('pandas', 'xarray', 'arviz_base', 'arviz_stats') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 @pytest.mark.parametrize("columns", [50, 80, 200])
 def test_help_is_what_typer_would_say(columns, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", str(columns))

@@ -69,7 +69,8 @@ for user, used, _ in imports():
     if user in uses and used in uses:
         uses[user].add(used)
 
-figure, axes = plt.subplots(figsize=(7.6, 9.0))
+figure = plt.figure(figsize=(7.6, 9.0), dpi=72)  # as an SVG is drawn: the boxes are where they were measured
+axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
 place = {name: (ACROSS.get(name, 0.0), 1.5 * row) for row, layer in enumerate(layers) for name in layer}
 boxes = {}
 for name, (x, y) in place.items():
@@ -82,6 +83,12 @@ axes.axis("off")
 figure.canvas.draw()  # the boxes have their size only then, and arrows end at them
 for user, used in reduced(uses):
     ends = {"patchA": boxes[user].get_bbox_patch(), "patchB": boxes[used].get_bbox_patch()}
-    arrow = {"arrowstyle": "-|>", "color": "0.45", "lw": 1.0, "shrinkA": 0, "shrinkB": 1, **ends}
-    axes.annotate("", place[used], place[user], arrowprops=arrow)
-figure.savefig(OUT, bbox_inches="tight", metadata={"Date": None, "Creator": None})
+    arrow = {
+        "arrowstyle": "-|>,head_width=0.25,head_length=0.6",
+        "color": "0.35",
+        "lw": 1.0,
+        "shrinkA": 0,
+        "shrinkB": 2,
+    }
+    axes.annotate("", place[used], place[user], arrowprops=arrow | ends, zorder=4)
+figure.savefig(OUT, metadata={"Date": None, "Creator": None})

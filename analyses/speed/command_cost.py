@@ -1,13 +1,16 @@
-"""How long a whole command takes, from its start to its end, beside the same command of another checkout.
+"""What a whole command costs, from its start to its end, beside the same command of another checkout.
 
-Each command runs on each of the paper's four wires in both checkouts in turn, a few times; the shortest time of each
-counts, because whatever else the machine does only adds to it.
+Each command runs on each of the paper's four wires in both checkouts in turn, a few times; the least of each counts,
+because whatever else the machine does only adds to it. Processor time (user and system, of all processes that the
+command starts) says the same beside other work; time by the clock only on an idle machine.
 
     python -m analyses.speed.command_cost --against ../before --commands fit discover
 """
 
 import argparse
+import ctypes
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -18,18 +21,36 @@ import numpy as np
 
 from wirebayes.io import paper
 
+_ADOPT_ORPHANS = 36  # PR_SET_CHILD_SUBREAPER of Linux's <sys/prctl.h>
 DATA = paper.FOLDER / "experiments.toml"
 
 
-def seconds(command: list[str], tree: Path) -> float:
-    """Seconds until the command of a checkout has ended and left its results in a new folder."""
+def seconds(command: list[str], tree: Path) -> tuple[float, float]:
+    """Processor time and time by the clock of a command of a checkout, which leaves its results in a new folder."""
     environment = os.environ | {"PYTHONPATH": str(tree.resolve())}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # an installed program has its modules compiled
     with TemporaryDirectory() as folder:
-        begin = time.perf_counter()
+        begin, before = time.perf_counter(), processor_seconds()
         line = [sys.executable, "-m", "wirebayes", *command, "--output", f"{folder}/out", "--quiet"]
         subprocess.run(line, check=True, env=environment, cwd=tree, stderr=subprocess.DEVNULL)
-        return time.perf_counter() - begin
+        elapsed = time.perf_counter() - begin
+        wait_for_orphans()
+        return processor_seconds() - before, elapsed
+
+
+def processor_seconds() -> float:
+    """User and system time of all processes that have ended and were waited for."""
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
+
+
+def wait_for_orphans() -> None:
+    """Wait for what a command started and did not wait for itself, such as the process that others are forked from."""
+    try:
+        while True:
+            os.waitpid(-1, 0)
+    except ChildProcessError:
+        return
 
 
 def main() -> None:
@@ -38,18 +59,24 @@ def main() -> None:
     parser.add_argument("--against", type=Path, required=True, help="checkout to compare with")
     parser.add_argument("--commands", nargs="+", default=["fit", "discover"], help="quote one that has options")
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--wires", nargs="+", default=[e.name for e in paper.experiments()])
     options = parser.parse_args()
+    ctypes.CDLL(None).prctl(_ADOPT_ORPHANS, 1)
     trees = [Path(__file__).parents[2], options.against]
     seconds(["fit", str(DATA), "--experiment", "nylon-1.5m"], trees[0])  # files are read from the disk once
     for command in options.commands:
         ratios = []
-        for wire in (e.name for e in paper.experiments()):
+        for wire in options.wires:
             name, *given = command.split()
             line = [name, str(DATA), "--experiment", wire, *given]
             times = np.array([[seconds(line, tree) for tree in trees] for _ in range(options.repeats)])
-            new, old = times.min(axis=0)
+            (new, by_clock), (old, _) = times.min(axis=0)
             ratios.append(old / new)
-            print(f"{command:20} {wire:15} {new:6.1f} s, before {old:6.1f} s, ratio {ratios[-1]:.2f}", flush=True)
+            print(
+                f"{command:20} {wire:15} {new:6.2f} s of processor time, before {old:6.2f}, ratio {ratios[-1]:.2f}; "
+                f"{by_clock:.1f} s by the clock",
+                flush=True,
+            )
         print(f"{command}: ratio {np.median(ratios):.2f} in the median, {min(ratios):.2f} at worst", flush=True)
 
 

@@ -202,15 +202,15 @@ def test_a_tail_that_is_nowhere_is_no_number_and_the_lighter_estimate_counts(mon
     asked: list[tuple[list[float], float]] = []
     answers: dict[float, float] = {}
 
-    def psislw(values: np.ndarray, r_eff: float) -> tuple[None, float]:
-        asked.append((values.tolist(), r_eff))
-        return None, answers[r_eff]
+    def smoothed(log_ratio: np.ndarray, independent: float) -> tuple[None, float]:
+        asked.append((log_ratio.tolist(), independent))
+        return None, answers[independent]
 
-    monkeypatch.setattr(importance, "array_statistics", lambda: SimpleNamespace(psislw=psislw))
+    monkeypatch.setattr(importance, "pareto_smoothed", smoothed)
     for first, second, found in ((0.9, 0.4, 0.4), (0.4, 0.9, 0.4), (np.nan, 0.8, 0.8), (0.8, np.nan, 0.8)):
         answers.update({1.0: first, 9.0: second})
         assert tail(np.array([1.0, -np.inf, 3.0])) == found
-    assert asked[:2] == [([-1.0, -3.0], 1.0), ([-1.0, -3.0], 9.0)]
+    assert asked[:2] == [([1.0, 3.0], 1.0), ([1.0, 3.0], 9.0)]
 
 
 def weighted(log_density: np.ndarray, log_proposal: np.ndarray) -> Weighted:

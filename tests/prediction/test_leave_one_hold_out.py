@@ -39,7 +39,7 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
     log_p, without = rng.normal(size=(4, 500)), rng.normal(size=500)
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.vstack([log_p, without])])
-    monkeypatch.setattr(module, "array_statistics", lambda: SimpleNamespace(psislw=lambda values: (-values, tail)))
+    monkeypatch.setattr(module, "pareto_smoothed", lambda log_ratio: (log_ratio, tail))
     known = np.log(stats.hmean(np.exp(log_p), axis=1))  # weights 1/p: the harmonic mean
 
     def ratios(problem: Problem, holds: list, draws: np.ndarray, seed: int, doubtful: np.ndarray) -> tuple:
@@ -67,9 +67,7 @@ def test_where_one_hold_s_tail_is_heavy_all_are_sampled_together(monkeypatch: py
     problem, asked = build([experiments()[1].train(4)]), []
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.ones((4, 500)) * np.arange(500)])
     tails = iter([0.1, 0.6, 0.2, 0.3])
-    monkeypatch.setattr(
-        module, "array_statistics", lambda: SimpleNamespace(psislw=lambda values: (-values, next(tails)))
-    )
+    monkeypatch.setattr(module, "pareto_smoothed", lambda log_ratio: (log_ratio, next(tails)))
 
     def together(problem: Problem, holds: list, draws: np.ndarray, seed: int, doubtful: np.ndarray) -> tuple:
         asked.append(doubtful.tolist())
@@ -87,8 +85,7 @@ def test_weights_that_are_no_numbers_ask_for_sampling(monkeypatch: pytest.Monkey
     problem = build([experiments()[1].train(4)])
     log_p = np.random.default_rng(0).normal(size=(4, 500))
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
-    smoothed = SimpleNamespace(psislw=lambda values: (np.nan * values, 0.1))
-    monkeypatch.setattr(module, "array_statistics", lambda: smoothed)
+    monkeypatch.setattr(module, "pareto_smoothed", lambda log_ratio: (np.nan * log_ratio, 0.1))
     monkeypatch.setattr(module, "log_densities", lambda *given: (np.arange(4.0), np.ones(4, bool)))
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
@@ -239,7 +236,7 @@ def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.
     """One for each hold, or one for all that are sampled together; zero where none is given."""
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.ones((4, 500)) * np.arange(500)])
-    monkeypatch.setattr(module, "array_statistics", lambda: SimpleNamespace(psislw=lambda values: (-values, 0.9)))
+    monkeypatch.setattr(module, "pareto_smoothed", lambda log_ratio: (log_ratio, 0.9))
     monkeypatch.setattr(module, "log_mean", lambda low, high: (2.0, 1e3))
     asked: list[tuple[int, object]] = []
 

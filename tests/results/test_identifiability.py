@@ -199,20 +199,18 @@ def test_the_prior_of_a_positive_parameter_is_that_of_its_logarithm() -> None:
 def test_sensitivity_is_the_distance_over_powers_a_tenth_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[float] = []
 
-    def weights(component: np.ndarray, alpha: float) -> np.ndarray:
-        asked.append(alpha)
-        return alpha * component
+    def weights(component: np.ndarray, power: float) -> np.ndarray:
+        asked.append(power)
+        return power * component
 
-    def distance(values: np.ndarray, low: np.ndarray, high: np.ndarray, *powers: float) -> float:
-        assert values.tolist() == [[1.0, 2.0, 4.0]] and list(powers) == asked
-        assert low == pytest.approx(np.exp(component / 1.1)[None]) and high == pytest.approx(
-            np.exp(component * 1.1)[None]
-        )
+    def distance(values: np.ndarray, low: np.ndarray, high: np.ndarray, powers: tuple[float, float]) -> float:
+        assert values.tolist() == [1.0, 2.0, 4.0] and list(powers) == asked
+        assert low == pytest.approx(np.exp(component / 1.1)) and high == pytest.approx(np.exp(component * 1.1))
         return 0.25
 
     component = np.array([0.1, -0.2, 0.3])
-    statistics = SimpleNamespace(power_scale_lw=weights, power_scale_sense=distance)
-    monkeypatch.setattr(module, "array_statistics", lambda: statistics)
+    monkeypatch.setattr(module, "power_scaled", weights)
+    monkeypatch.setattr(module, "power_sensitivity", distance)
     assert sensitivity(np.array([1.0, 2.0, 4.0]), component) == 0.25
     assert asked == pytest.approx([1.0 / 1.1, 1.1])
 

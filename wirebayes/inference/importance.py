@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from wirebayes.inference.array_statistics import array_statistics
+from wirebayes.inference.chain_statistics import pareto_smoothed
 from wirebayes.inference.modes import Optimum, climb, distinct
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
@@ -277,11 +277,12 @@ def tail(log_weight: Array) -> float:
     The smaller of two estimates, from the largest 3 √n weights and from the largest √n. Where a hill of the density is
     drawn too seldom, its weights lie above a plateau of others, and a tail that holds both looks heavy.
     """
-    values = -log_weight[np.isfinite(log_weight)]
+    values = log_weight[np.isfinite(log_weight)]
     if not len(values):
         return np.nan
     with np.errstate(all="ignore"):
-        return float(np.fmin(*(array_statistics().psislw(values, r_eff=share)[1] for share in (1.0, 9.0))))
+        all_of_it, largest = (pareto_smoothed(values, share)[1] for share in (1.0, 9.0))
+    return float(np.fmin(all_of_it, largest))
 
 
 def _learned(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import expit, logsumexp
 
-from wirebayes.inference.array_statistics import array_statistics
+from wirebayes.inference.chain_statistics import pareto_smoothed
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.weighted_posterior import Posterior
@@ -122,7 +122,7 @@ def smoothed_leave_one_hold_out(
     for i, (s, j) in enumerate(where):
         log_p = conditional[s][j]
         # A lone first reading is given hold by hold: nothing is left to predict, and no parameter matters.
-        log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else array_statistics().psislw(log_p)
+        log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else pareto_smoothed(-log_p)
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
     # smoothing can fail where draws repeat, with a k that looks well
     refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K) | ~np.isfinite(elpd), True

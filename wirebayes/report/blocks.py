@@ -12,6 +12,7 @@ from urllib.parse import quote
 
 import matplotlib
 import numpy as np
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
@@ -222,12 +223,26 @@ def svg(figure: Figure) -> bytes:
     stream = io.BytesIO()
     style: Any = {"svg.hashsalt": "wirebayes", "svg.fonttype": "none"}
     with matplotlib.rc_context(style):
+        _lay_out(figure)
         figure.savefig(stream, format="svg", dpi=_DPI, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     text = stream.getvalue().decode("utf-8")
     text = text[text.index("<svg") :].replace("<svg", f'<svg font-family="{_FONTS}"', 1)
     for pattern, instead in _SHORTER:
         text = pattern.sub(instead, text)
     return _COORDINATES.sub(lambda path: _LONG.sub(_tenth, path[0]).replace(" L ", " "), text).encode("utf-8")
+
+
+def _lay_out(figure: Figure) -> None:
+    """Place the axes for SVG, once: `savefig` would draw the whole figure to place them, and then draw it again."""
+    engine = figure.get_layout_engine()
+    if engine is None:
+        return
+    FigureCanvasSVG(figure)  # letters are measured as this one draws them
+    dpi = figure.dpi
+    figure.dpi = FigureCanvasSVG.fixed_dpi
+    engine.execute(figure)
+    figure.dpi = dpi
+    figure.set_layout_engine(None)
 
 
 def _tenth(digits: re.Match[str]) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.inference.array_statistics import array_statistics
+from wirebayes.inference.chain_statistics import pareto_smoothed, power_scaled, power_sensitivity
 from wirebayes.inference.fit import Fit
 from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability, IdentifiabilityFigures
 from wirebayes.model.prior import fast_logpdf
@@ -94,9 +94,8 @@ def sensitivity(values: Array, log_component: Array) -> float:
     """Distance the distribution of (n,) `values` moves for each doubling of a component's power."""
     if np.ptp(log_component) < _NOTHING:
         return 0.0
-    statistics = array_statistics()
-    weights = [np.exp(statistics.power_scale_lw(log_component, alpha=alpha))[None] for alpha in _POWERS]
-    return float(statistics.power_scale_sense(values[None], *weights, *_POWERS))
+    below, above = (np.exp(power_scaled(log_component, power)) for power in _POWERS)
+    return power_sensitivity(values, below, above, _POWERS)
 
 
 def log_priors(fitted: Fit, theta: Array) -> Array:
@@ -202,7 +201,7 @@ def extrapolation(fitted: Fit, tension_N: float, times_s: Array = TIMES_S, sampl
     here = problem.samples[sample]
     theta = _thinned(fitted.flat)
     # the prior to the power of a half: weights are its inverse root
-    log_weight, k = array_statistics().psislw(0.5 * log_priors(fitted, theta).sum(axis=1))
+    log_weight, k = pareto_smoothed(-0.5 * log_priors(fitted, theta).sum(axis=1))
     weight = np.exp(log_weight - log_weight.max())
 
     def creep(rows: Array) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wirebayes._version import __version__
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
-from wirebayes.inference.array_statistics import array_statistics
+from wirebayes.inference.chain_statistics import bulk_ess, r_hat, tail_ess
 from wirebayes.inference.fit import Fit
 from wirebayes.io.readings import READ, SET, UNIT
 from wirebayes.io.run_folder import read_json, stored_results, write_bytes, write_json
@@ -613,14 +613,13 @@ def band(values: Array) -> Statistics | None:
 def statistics(values: Array) -> Mixed:
     """Mean, sd, quantiles, effective sample sizes and R-hat of (chains, draws)."""
     q05, q50, q95 = np.quantile(values, [0.05, 0.5, 0.95])
-    of_chains = array_statistics()
     with np.errstate(invalid="ignore"):
         return {
             "mean": float(values.mean()), "sd": float(values.std(ddof=1)),
             "q05": float(q05), "q50": float(q50), "q95": float(q95),
-            "ess_bulk": float(of_chains.ess(values, method="bulk")),
-            "ess_tail": float(of_chains.ess(values, method="tail", prob=(0.05, 0.95))),
-            "r_hat": float(of_chains.rhat(values)),
+            "ess_bulk": bulk_ess(values),
+            "ess_tail": tail_ess(values),
+            "r_hat": r_hat(values),
         }  # fmt: skip
 
 

@@ -1,0 +1,205 @@
+"""Statistics of draws: effective sample sizes, R-hat, Pareto-smoothed weights and power scaling, in numpy alone.
+
+They are ArviZ's, to rounding (tests compare them): importing it takes pandas and xarray along, which would be a third
+of the time of a fit, in every process that takes part.
+
+References
+----------
+A. Vehtari, A. Gelman, D. Simpson, B. Carpenter and P.-C. Bürkner, Rank-normalization, folding, and localization: an
+improved R-hat for assessing convergence of MCMC, Bayesian Analysis 16 (2021);
+A. Vehtari, D. Simpson, A. Gelman, Y. Yao and J. Gabry, Pareto smoothed importance sampling, JMLR 25 (2024);
+J. Zhang and M. A. Stephens, A new and efficient estimation method for the generalized Pareto distribution,
+Technometrics 51 (2009);
+N. Kallioinen, T. Paananen, P.-C. Bürkner and A. Vehtari, Detecting and diagnosing prior and likelihood sensitivity with
+power-scaling, Statistics and Computing 34 (2024).
+"""
+
+import numpy as np
+from scipy.special import logsumexp, ndtri
+
+from wirebayes.numeric.typing import Array
+
+
+def bulk_ess(values: Array) -> float:
+    """Effective number of draws in the bulk, of (chains, draws): that of their normal scores."""
+    return _ess(_normal_scores(_split(values)))
+
+
+def tail_ess(values: Array) -> float:
+    """Effective number of draws in the worse of the two 5 % tails, of (chains, draws)."""
+    return min(_ess(_split((values <= np.quantile(values, level)).astype(float))) for level in _TAILS)
+
+
+def r_hat(values: Array) -> float:
+    """Rank-normalised split R-hat of (chains, draws): the larger of those of location and of spread."""
+    halves = _split(values)
+    folded = np.abs(halves - np.median(halves))
+    return max(_between_over_within(_normal_scores(part)) for part in (halves, folded))
+
+
+def pareto_smoothed(log_ratio: Array, independent: float = 1.0) -> tuple[Array, float]:
+    """Logarithms of weights that sum to one, their largest replaced by quantiles of a generalised Pareto distribution.
+
+    Parameters
+    ----------
+    log_ratio : (n,) array
+        Logarithms of density over what the draws are of.
+    independent : float
+        Share of the draws that are worth an independent one; the tail has 3 √(n / share) draws, or a fifth of few.
+
+    Returns
+    -------
+    log_weight : (n,) array
+    k : float
+        Shape of the tail: above 0.7, no number of draws is enough. NaN, and nothing is replaced, where the tail has
+        fewer than five draws or only one value.
+    """
+    n = len(log_ratio)
+    size = int(3.0 * np.sqrt(n / independent)) if n * independent > _FEW else n // 5
+    return _smoothed(log_ratio, size)
+
+
+def power_scaled(log_component: Array, power: float) -> Array:
+    """(n,) logarithms of the weights of draws for a posterior one component of which is raised to a power.
+
+    Parameters
+    ----------
+    log_component : (n,) array
+        Log density of the component, such as the prior, at the draws.
+    power : float
+    """
+    independent = tail_ess(log_component[None]) / log_component.size
+    n = log_component.size
+    size = int(3.0 * np.sqrt(n / independent)) if n * independent > _FEW else n // 5
+    size = max(min(size, n // 2), _LEAST_TAIL)
+    return _smoothed((power - 1.0) * log_component, size)[0]
+
+
+def power_sensitivity(values: Array, below: Array, above: Array, powers: tuple[float, float]) -> float:
+    """How far a distribution moves for each doubling of a component's power, from one power below 1 and one above.
+
+    Parameters
+    ----------
+    values, below, above : (n,) arrays
+        Draws, and their weights at either power.
+    powers : (float, float)
+    """
+    moved = [
+        max(cumulative_distance(values, weight), cumulative_distance(-values, weight)) for weight in (below, above)
+    ]
+    slopes = moved / np.abs(np.log2(powers))
+    return float(slopes.mean())
+
+
+def cumulative_distance(values: Array, weight: Array) -> float:
+    """Cumulative Jensen-Shannon distance between (n,) draws and the same draws with weights, from 0 to 1."""
+    order = np.argsort(values)
+    widths = np.diff(values[order])
+    n = len(values)
+    plain = np.linspace(1.0 / n, 1.0 - 1.0 / n, n - 1)
+    weighted = np.cumsum(weight[order] / weight.sum())[:-1]
+    middle = 0.5 * (plain + weighted)
+    areas = np.array([plain @ widths, weighted @ widths])
+    diverged = 0.0
+    for share, excess in ((plain, areas[1] - areas[0]), (weighted, areas[0] - areas[1])):
+        integral = widths @ (share * (_log2(share) - _log2(middle)))
+        diverged += max(0.0, float(integral + 0.5 / np.log(2.0) * excess))
+    return float(np.sqrt(diverged / areas.sum()))
+
+
+def _log2(share: Array) -> Array:
+    """Logarithms of shares, 0 where there is none."""
+    return np.log2(share, out=np.zeros_like(share), where=share != 0.0)
+
+
+def _split(values: Array) -> Array:
+    """The two halves of (chains, draws) as chains of their own; without the middle draw of an odd number."""
+    half = values.shape[1] // 2
+    return np.vstack([values[:, :half], values[:, -half:]])
+
+
+def _normal_scores(values: Array) -> Array:
+    """Normal quantiles of the ranks of all values; equal ones share the mean of their ranks."""
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    rank = np.cumsum(count) - 0.5 * (count - 1.0)
+    scores: Array = ndtri((rank - 0.375) / (values.size + 0.25))  # Blom's
+    return scores[place.reshape(values.shape)]
+
+
+def _between_over_within(chains: Array) -> float:
+    """R-hat of (chains, draws) as they are."""
+    n = chains.shape[1]
+    between = n * chains.mean(axis=1).var(ddof=1)
+    within = chains.var(axis=1, ddof=1).mean()
+    return float(np.sqrt((between / within + n - 1.0) / n))
+
+
+def _ess(chains: Array) -> float:
+    """Effective number of draws of the mean of (chains, draws), by Geyer's initial monotone sequence."""
+    m, n = chains.shape
+    if np.ptp(chains) < _SAME:
+        return float(chains.size)
+    covariance = _autocovariance(chains).mean(axis=0)
+    between = chains.mean(axis=1).var(ddof=1) if m > 1 else 0.0
+    within = covariance[0] * n / (n - 1.0)
+    correlation = 1.0 - (within - covariance) / (covariance[0] + between)
+    correlation[0] = 1.0
+    pairs = correlation[: 2 * max((n - 1) // 2, 1)].reshape(-1, 2).sum(axis=1)
+    ends = np.flatnonzero(pairs <= 0.0)
+    last = int(ends[0]) if len(ends) else len(pairs) - 1  # of this pair only the first correlation counts, and once
+    rest = float(correlation[2 * last]) if pairs[last] >= 0.0 else max(float(correlation[2 * last]), 0.0)
+    time = -1.0 + 2.0 * float(np.minimum.accumulate(pairs[:last]).sum()) + rest
+    return float(chains.size / max(time, 1.0 / np.log10(chains.size)))
+
+
+def _autocovariance(chains: Array) -> Array:
+    """(chains, lags) autocovariance of (chains, draws), each about the mean of its chain."""
+    n = chains.shape[1]
+    padded = 1 << (2 * n - 1).bit_length()  # so that the ends do not meet
+    spectrum = np.fft.rfft(chains - chains.mean(axis=1, keepdims=True), padded, axis=1)
+    return np.fft.irfft(spectrum * spectrum.conj(), padded, axis=1)[:, :n] / n
+
+
+def _smoothed(log_ratio: Array, size: int) -> tuple[Array, float]:
+    """Weights whose `size` largest are those of a generalised Pareto distribution, and its shape."""
+    log_weight = log_ratio - log_ratio.max()
+    order = np.argsort(log_weight)
+    largest = order[-size:]
+    threshold = float(np.exp(log_weight[order[-size - 1]]))
+    excess = np.exp(log_weight[largest]) - threshold
+    shape, scale = pareto_fit(excess) if size >= _LEAST_TAIL and np.ptp(excess) > 0.0 else (np.nan, np.nan)
+    if np.isfinite(shape):
+        level = (np.arange(size) + 0.5) / size
+        quantile = np.expm1(-shape * np.log1p(-level)) / shape if shape else -np.log1p(-level)
+        log_weight[largest] = np.minimum(np.log(threshold + scale * quantile), 0.0)
+    return log_weight - logsumexp(log_weight), shape
+
+
+def pareto_fit(excess: Array) -> tuple[float, float]:
+    """Shape and scale of a generalised Pareto distribution, by Zhang and Stephens' posterior mean on a grid.
+
+    The shape is drawn towards a half, as ten more values would draw it.
+
+    Parameters
+    ----------
+    excess : (n,) array
+        Values above the threshold, in ascending order.
+    """
+    n = len(excess)
+    steps = 30 + int(np.sqrt(n))
+    quartile = excess[int(n / 4 + 0.5) - 1]
+    rate = (1.0 - np.sqrt(steps / (np.arange(steps) + 0.5))) / (3.0 * quartile) + 1.0 / excess[-1]
+    shape = np.log1p(-rate[:, None] * excess).mean(axis=1)
+    log_likelihood = n * (np.log(-rate / shape) - shape - 1.0)
+    weight = np.exp(log_likelihood - logsumexp(log_likelihood))
+    weight = np.where(weight < _NEGLIGIBLE, 0.0, weight)
+    best = float(rate @ weight / weight.sum())
+    raw = float(np.log1p(-best * excess).mean())
+    return (n * raw + 5.0) / (n + 10.0), -raw / best
+
+
+_TAILS = (0.05, 0.95)  # the ends of a 90 % interval
+_FEW = 225  # independent draws, up to which the tail is a fifth of all
+_LEAST_TAIL = 5  # draws that a tail is fitted to
+_SAME = 1e-15  # range of values that do not vary
+_NEGLIGIBLE = 10.0 * float(np.finfo(float).eps)  # weight of a point of the grid
