@@ -31,7 +31,6 @@ class _Form:
     places: tuple[_Place, ...]
     linear: tuple[float, ...]
     candidates: tuple[Candidate, ...]
-    promise: float
 
 
 @dataclass(frozen=True)
@@ -49,12 +48,15 @@ class NameEvidence:
         Probability that the effect is present in each block, given that it is missing at all.
     reach : mapping of (effect key, blocks) to float
         Where priors of amplitudes end, in every set the same.
+    tried : mapping of name to float
+        Log Bayes factor of each name where it was refitted last: here, or beside fewer effects.
     """
 
     log_bayes: dict[str, float]
     winners: dict[str, list[Refit]]
     presence: dict[str, Array]
     reach: Mapping[_Place, float] = field(default_factory=dict)
+    tried: Mapping[str, float] = field(default_factory=dict)
 
     def amplitudes(self, name: str) -> dict[int, Refit]:
         """Refit of a name by block."""
@@ -66,13 +68,15 @@ def weigh_names(
     trials: Sequence[Probe],
     candidates: Sequence[Candidate],
     scans: Sequence[Scan],
-    further: Mapping[Candidate, float] = {},
     parallel_map: ParallelMap = map,
     reach: Mapping[_Place, float] = {},
-    most: int = 16,
+    before: Mapping[str, float] = {},
+    most: int | None = None,
     forms_a_name: int = 3,
 ) -> NameEvidence:
-    """Evidence of every name, refitted where the scan, or the test from larger effects, gives it a chance.
+    """Evidence of every name, refitted where the scan, or what it was beside fewer effects, gives it a chance.
+
+    The scan sees small amplitudes: it never takes a name off the list that has not been refitted.
 
     Parameters
     ----------
@@ -81,20 +85,23 @@ def weigh_names(
         See `wirebayes.discovery.screening.candidate_probes`.
     scans : sequence of Scan
         Of the readings, a block each.
-    further : mapping of Candidate to float
-        Log Bayes factors of the effects that were tried from larger amplitudes.
     parallel_map : function, optional
         The built-in `map`, or one over processes: refits are independent of each other.
     reach : mapping of (effect key, blocks) to float
         Where the prior of its amplitude ends (see `reaches`).
+    before : mapping of name to float
+        Log Bayes factors of the names as refitted beside fewer effects, if they were.
     most, forms_a_name : int
-        Names that are refitted at the most, those not counted that came out hopeless, and forms of one name.
+        Names that are refitted at the most (all, if None), those not counted that came out hopeless, and forms of one
+        name.
     """
-    forms = _forms(trials, candidates, scans, further)
+    forms = _forms(trials, candidates, scans)
     by_name: dict[str, list[_Form]] = {}
-    for form in sorted(forms, key=lambda f: -f.promise):
+    for form in sorted(forms, key=lambda f: -max(f.linear)):
         by_name.setdefault(form.effect.name, []).append(form)
-    waiting = list(by_name)  # the most promising first
+    promise = {name: max(*own[0].linear, before.get(name, np.inf)) for name, own in by_name.items()}
+    waiting = sorted(by_name, key=lambda name: -promise[name])  # of names never refitted the scan's first
+    room = len(waiting) if most is None else most
     found: dict[_Place, Refit] = {}
     values: list[float] = []  # of the names refitted so far
     while waiting:
@@ -102,7 +109,7 @@ def weigh_names(
         top = max(values, default=-np.inf)
         least = top - _MARGIN - _SHARE * max(top, 0.0)
         stood = sum(value >= least for value in values)
-        wave = [n for n in waiting[:_WAVE] if by_name[n][0].promise >= least][: max(most - stood, 0)]
+        wave = [n for n in waiting[:_WAVE] if promise[n] >= least][: max(room - stood, 0)]
         if not wave:
             break
         waiting = waiting[len(wave) :]
@@ -111,7 +118,9 @@ def weigh_names(
         found |= zip(tasks, done, strict=True)
         summed = _summed([form for n in wave for form in by_name[n]], found, len(blocks))
         values += [summed.log_bayes[n] for n in wave]
-    return replace(_summed(forms, found, len(blocks)), reach=reach)
+    weighed = _summed(forms, found, len(blocks))
+    tried = {name: weighed.log_bayes[name] for name in by_name if name not in waiting}
+    return replace(weighed, reach=reach, tried={**before, **tried})
 
 
 def _tasks(
@@ -122,7 +131,7 @@ def _tasks(
     for form in forms:
         best = max(form.linear)
         for place, value, candidate in zip(form.places, form.linear, form.candidates, strict=True):
-            if value in (best,) or value > _HOPELESS or form.promise > sum(form.linear) + 1e-9:
+            if value == best or value > _HOPELESS or best <= _HOPELESS:  # where the scan sees nothing, it may be blind
                 _, guess, per_delta = log_bayes(candidate, scans)
                 chosen = best_probes(candidate, scans)
                 own: list[Mapping[str, float]] = [trials[int(number[0])].own for number in chosen]
@@ -130,18 +139,14 @@ def _tasks(
     return tasks
 
 
-def _forms(
-    trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan], further: Mapping[Candidate, float]
-) -> list[_Form]:
+def _forms(trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan]) -> list[_Form]:
     """The variants of every effect, each place with the probe that the linear scan likes best there."""
     best: dict[_Place, tuple[float, Candidate]] = {}
     effects: dict[str, Effect] = {}
-    promise: dict[str, float] = {}
     for c in candidates:
         effect = trials[c.probe].effect
         effects[effect.key] = effect
         value = float(log_bayes(c, scans)[0][0])
-        promise[effect.key] = max(promise.get(effect.key, -np.inf), value, further.get(c, -np.inf))
         if c.shared:
             place = effect.key, c.blocks
             best[place] = max(best.get(place, (-np.inf, c)), (value, c), key=lambda item: item[0])
@@ -149,7 +154,7 @@ def _forms(
     for key, effect in effects.items():
         places = [place for place in best if place[0] == key]
         values, which = zip(*(best[place] for place in places), strict=True)
-        out.append(_Form(effect, tuple(places), values, which, promise[key]))
+        out.append(_Form(effect, tuple(places), values, which))
     return out
 
 

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.discovery.sharing import alike
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
@@ -23,8 +24,10 @@ LARGEST = 40.0
 _OUTWARD = 6  # times that the grid may grow outwards, by up to 2.3 each: 150-fold in all
 _ROUNDING = 1e-9  # of a reach, which a grid may end on
 _TOP = 1.0  # nats; neighbours alone may lie so close that their values' last digits decide
-# δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice
-_DELTAS = np.array([2.0, 5.0, 10.0, 20.0, 40.0])
+# δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice. The scan's unit
+# may be too large where the parameters bend themselves to the effect, so that it begins below what could be seen.
+_DELTAS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
+_SWEEPS = 2  # times that climbs begin once more where their neighbour nearer to neutral has ended
 
 
 @dataclass(frozen=True)
@@ -132,7 +135,12 @@ def refit(
     grid = main.neutral + (steps if one_sided else np.concatenate([steps, -steps]))
     grid = np.unique(np.clip(grid, low, high))
     starts = [p.starts(own) for p, own in zip(pinned, shapes or [{}] * len(pinned), strict=True)]
-    profile = _climbed(pinned, added, grid, [np.tile(start, (len(grid), 1)) for start in starts]).known()
+    profile = _climbed(pinned, added, grid, [np.tile(start, (len(grid), 1)) for start in starts])
+    inner = _inner(grid, main.neutral)
+    for _ in range(_SWEEPS):
+        # A climb from the fit without the effect may end nowhere, or in a lesser mode: the next one shows the way.
+        profile = _climbed(pinned, added, grid, [_interleaved(e, e[inner]) for e in profile.ends])
+    profile = profile.known()
     outward = refined = 0
     while refined < 2:
         at = float(profile.amplitude[profile.best])
@@ -147,6 +155,20 @@ def refit(
         begin = [_between(profile.amplitude, e, profile.best, finer) for e in profile.ends]
         profile = profile.joined(_climbed(pinned, added, finer, begin)).known()
     return _summary(effect, which, pinned, profile, per_delta)
+
+
+def _inner(grid: Array, neutral: float) -> NDArray[np.int64]:
+    """(a,) number of the next amplitude towards neutral on the same side; its own of the nearest one."""
+    number = np.arange(len(grid))
+    towards = number - np.sign(grid - neutral).astype(np.int64)
+    inside = np.clip(towards, 0, len(grid) - 1)
+    same_side = np.sign(grid[inside] - neutral) == np.sign(grid - neutral)
+    return np.where(same_side, inside, number)
+
+
+def _interleaved(first: Array, second: Array) -> Array:
+    """(2 a, d) rows of two arrays (a, d), in turn."""
+    return np.stack([first, second], axis=1).reshape(-1, first.shape[1])
 
 
 def within(prior: Any, neutral: float, reach: float) -> Callable[[Array], Array]:

@@ -199,7 +199,7 @@ def _named(
 ) -> _Named:
     """The sets of effects that were looked at, past the global test, and what they say."""
     reach = reaches(gate.blocks, gate.trials, gate.candidates)
-    found = weigh_names(gate.blocks, gate.trials, gate.candidates, gate.data, gate.further, parallel_map, reach)
+    found = weigh_names(gate.blocks, gate.trials, gate.candidates, gate.data, parallel_map, reach)
     alike = _families_of_singles(gate.blocks, found)
     explored = explore(gate.blocks, found, expansions, gate.trials, alike, settings, rng, parallel_map)
     families = _families(gate.blocks, explored)

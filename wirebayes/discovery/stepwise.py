@@ -370,7 +370,8 @@ def _fit(
     further = None
     if max((float(screening.log_bayes(c, scans)[0][0]) for c in candidates), default=-np.inf) >= WORTH_A_REFIT:
         further = weigh_names(
-            blocks, trials, candidates, scans, reach=parent.further.reach, most=MOST_BESIDE, forms_a_name=1,
+            blocks, trials, candidates, scans, reach=parent.further.reach, before=parent.further.tried,
+            most=MOST_BESIDE, forms_a_name=1,
         )  # fmt: skip
         if max((further.log_bayes[n] for n in further.winners), default=-np.inf) < WORTH_ADDING:
             further = None
