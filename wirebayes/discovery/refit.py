@@ -27,7 +27,8 @@ _TOP = 1.0  # nats; neighbours alone may lie so close that their values' last di
 # δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice. The scan's unit
 # may be too large where the parameters bend themselves to the effect, so that it begins below what could be seen.
 _DELTAS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
-_SWEEPS = 2  # times that climbs begin once more where their neighbour nearer to neutral has ended
+_SWEEPS = 3  # times that climbs may begin once more where their neighbour nearer to neutral has ended
+_NEWS = 0.1  # nats that such a climb must gain to be followed further
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,14 @@ class _Profile:
         ends = [np.concatenate(pair)[order] for pair in zip(self.ends, other.ends, strict=True)]
         return _Profile(amplitude, np.concatenate([self.value, other.value])[order], ends)
 
+    def with_rows(self, rows: NDArray[np.int64], other: "_Profile", which: NDArray[np.bool_]) -> "_Profile":
+        """With some rows of another profile in place of its own."""
+        value, ends = self.value.copy(), [own.copy() for own in self.ends]
+        value[rows] = other.value[which]
+        for own, new in zip(ends, other.ends, strict=True):
+            own[rows] = new[which]
+        return _Profile(self.amplitude, value, ends)
+
     def known(self) -> "_Profile":
         """Without the amplitudes at which no climb converged, where there are others."""
         rows = np.isfinite(self.value)
@@ -136,11 +145,7 @@ def refit(
     grid = np.unique(np.clip(grid, low, high))
     starts = [p.starts(own) for p, own in zip(pinned, shapes or [{}] * len(pinned), strict=True)]
     profile = _climbed(pinned, added, grid, [np.tile(start, (len(grid), 1)) for start in starts])
-    inner = _inner(grid, main.neutral)
-    for _ in range(_SWEEPS):
-        # A climb from the fit without the effect may end nowhere, or in a lesser mode: the next one shows the way.
-        profile = _climbed(pinned, added, grid, [_interleaved(e, e[inner]) for e in profile.ends])
-    profile = profile.known()
+    profile = _followed(pinned, added, profile, main.neutral).known()
     outward = refined = 0
     while refined < 2:
         at = float(profile.amplitude[profile.best])
@@ -157,18 +162,27 @@ def refit(
     return _summary(effect, which, pinned, profile, per_delta)
 
 
-def _inner(grid: Array, neutral: float) -> NDArray[np.int64]:
-    """(a,) number of the next amplitude towards neutral on the same side; its own of the nearest one."""
-    number = np.arange(len(grid))
-    towards = number - np.sign(grid - neutral).astype(np.int64)
-    inside = np.clip(towards, 0, len(grid) - 1)
-    same_side = np.sign(grid[inside] - neutral) == np.sign(grid - neutral)
-    return np.where(same_side, inside, number)
+def _followed(
+    pinned: Sequence[Pinned], added: Callable[[Array], Array], profile: _Profile, neutral: float
+) -> _Profile:
+    """The profile with climbs that begin where the next amplitude towards neutral has ended, where these are better.
 
-
-def _interleaved(first: Array, second: Array) -> Array:
-    """(2 a, d) rows of two arrays (a, d), in turn."""
-    return np.stack([first, second], axis=1).reshape(-1, first.shape[1])
+    A climb from the fit without the effect may end nowhere, or in a lesser mode.
+    """
+    number = np.arange(len(profile.amplitude))
+    side = np.sign(profile.amplitude - neutral)
+    towards = np.clip(number - side.astype(np.int64), 0, len(number) - 1)
+    inner = np.where(side[towards] == side, towards, number)
+    news = np.isfinite(profile.value)
+    for _ in range(_SWEEPS):
+        rows = np.flatnonzero(news[inner] & (inner != number))
+        if not len(rows):
+            break
+        tried = _climbed(pinned, added, profile.amplitude[rows], [ends[inner[rows]] for ends in profile.ends])
+        better = tried.value > profile.value[rows] + _NEWS
+        profile = profile.with_rows(rows[better], tried, better)
+        news = np.isin(number, rows[better])
+    return profile
 
 
 def within(prior: Any, neutral: float, reach: float) -> Callable[[Array], Array]:
