@@ -115,33 +115,46 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
     assert found.winners["grip_slip"][0].effect.hold == 7 and found.presence["grip_slip"] == pytest.approx([1.0])
 
 
-def test_an_absurd_value_of_the_scan_takes_no_other_name_off_the_list(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The path to larger effects gives drift 60 nats, its refit none: toe, at 8, is refitted, and stays."""
-    names = ("sensor_drift", "toe", "strain_stiffening")
+@pytest.mark.parametrize(
+    ("before", "refitted"),
+    [
+        ({}, ["sensor_drift", "toe", "superposition"]),
+        ({"sensor_drift": 9.0, "toe": 8.0, "superposition": -1.6}, ["sensor_drift", "toe"]),
+        ({"sensor_drift": 9.0, "toe": 8.0, "superposition": -1.4}, ["sensor_drift", "toe", "superposition"]),
+        ({"sensor_drift": -9.0, "toe": 8.0, "superposition": 9.0}, ["sensor_drift", "superposition", "toe"]),
+    ],
+)
+def test_a_value_of_the_scan_takes_no_name_off_the_list(
+    before: dict[str, float], refitted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The scan gives drift 60 nats, its refit none, and superposition nothing, whose refit is the best.
+
+    Refitted first are the names that promise most, by the scan or by what they were beside fewer effects; one that has
+    been refitted before is not once more where it promises less than toe's 7 allows: 7 less 5 and half of it.
+    """
+    names = ("sensor_drift", "toe", "superposition")
     trials = [probes(named(name))[0] for name in names]
     candidates = [Candidate(k, name, (0,), True) for k, name in enumerate(names)]
-    own = {"sensor_drift": -3.0, "toe": 7.0, "strain_stiffening": -1.0}
+    own = {"sensor_drift": -3.0, "toe": 7.0, "superposition": 12.0}
     asked: list[str] = []
 
-    def refitted(
+    def climbed(
         blocks: Any, which: Any, effect: Any, per_delta: float, guess: float, reach: float, shapes: Any
     ) -> refit.Refit:
         asked.append(effect.name)
         return refit.Refit(effect, tuple(which), own[effect.name], 8.0, 1.0, ())
 
-    monkeypatch.setattr(name_evidence, "refit", refitted)
+    monkeypatch.setattr(name_evidence, "refit", climbed)
     monkeypatch.setattr(name_evidence, "_WAVE", 1)
     pieces = scan_of(np.array([8.0]), False)
-    effects = np.array([[4.0, 12.0, -9.0]])
+    effects = np.array([[60.0, 12.0, -9.0]])
     data = Scan(
         effects, pieces.flexible, np.full((1, 3), 8.0 / NORM), np.full((1, 3), NORM),
         Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(3, bool)})),
     )  # fmt: skip
-    further = {candidates[0]: 60.0}
-    found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data], further)  # type: ignore[list-item]
-    # the cut is toe's 7 less 5 and half of it: stiffening, at -12, is below it
-    assert asked == ["sensor_drift", "toe"] and set(found.winners) == {"sensor_drift", "toe"}
-    assert found.log_bayes["toe"] == pytest.approx(7.0) and found.log_bayes["sensor_drift"] == pytest.approx(-3.0)
+    found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data], before=before)  # type: ignore[list-item]
+    assert asked == refitted and set(found.winners) == set(refitted)
+    assert dict(found.tried) == {**before, **{name: own[name] for name in refitted}}
 
 
 def test_a_form_that_was_not_refitted_counts_for_no_more_than_one_that_was(monkeypatch: pytest.MonkeyPatch) -> None:

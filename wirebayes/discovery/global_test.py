@@ -24,7 +24,6 @@ from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
 
 Report = Callable[[str, float, float], None]
-PLAIN_TO_SEE = 0.002  # p of the linear scan at which naming needs no look from larger effects either
 CLOSE = 0.00135  # risk on either side that a p on the level itself gives so few, or so many, exceedances
 MOST_TIMES = 4  # as many simulations at most, in units of the requested number
 
@@ -46,8 +45,6 @@ class Gate:
     expansions, data, nulls : list of Expansion, Scan and Scan
         Of the readings, and of the simulations, a block each.
     test : GlobalTest
-    further : dict of Candidate to float
-        Log Bayes factors of the effects that were tried from larger amplitudes.
     """
 
     blocks: list[LaplaceFit]
@@ -59,7 +56,6 @@ class Gate:
     data: list[Scan]
     nulls: list[Scan]
     test: GlobalTest
-    further: dict[Candidate, float]
 
 
 def examine(
@@ -120,20 +116,17 @@ def examine(
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
         by_larger = 1.0
-        beyond_linear = test.p > max(PLAIN_TO_SEE, 1.0 / (1 + len(test.null)))
-        if beyond_linear:
+        # They only make p smaller: nothing is gained where it is below the level beyond doubt.
+        if test.p > alpha or is_close(test.p, alpha, len(test.null)):
             report("larger effects", 0, 1)
             larger = larger or Continuation(blocks, trials, candidates, data, parallel_map)
-            # They only make p smaller: nothing is gained where it is below the level beyond doubt.
-            if test.p > alpha or is_close(test.p, alpha, len(test.null)):
-                test = larger.test(simulated, test)
-                by_larger = larger.p
+            test = larger.test(simulated, test)
+            by_larger = larger.p
             report("larger effects", 1, 1)
         if not is_open(test, alpha, by_larger, total, simulations):
             break
     report("simulations", len(blocks), len(blocks))
-    further = larger.log_bayes if larger is not None and beyond_linear else {}
-    return Gate(blocks, struck, trials, candidates, patterns, expansions, data, nulls, test, further)
+    return Gate(blocks, struck, trials, candidates, patterns, expansions, data, nulls, test)
 
 
 def _next_total(made: int, simulations: int) -> int:

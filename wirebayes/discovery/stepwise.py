@@ -8,7 +8,7 @@ amplitude is the same in every set, so the order of the chain does not matter.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import repeat
 
 import numpy as np
@@ -83,6 +83,10 @@ class FittedSet:
     accepted: tuple[Accepted, ...]
     further: NameEvidence | None
     probed: tuple[list[Probe], list[Candidate]]
+
+    def weighing(self, log_bayes: float) -> "FittedSet":
+        """The same with another log Bayes factor."""
+        return replace(self, effects=replace(self.effects, log_bayes=log_bayes))
 
 
 @dataclass(frozen=True)
@@ -201,8 +205,13 @@ class _Frontier:
         """
         key = parent.key | {name}
         value = parent.log_bayes + found.log_bayes[name]
-        if key not in self.fitted:
-            known = self.known.get(key)
+        known = self.known.get(key)
+        if key in self.fitted:  # its fit searched from many starts; of what its refits found, the better counts
+            assert known is not None
+            if value > known.log_bayes + SAME_EVIDENCE:
+                self.fitted[key] = self.fitted[key].weighing(value)
+                self.known[key] = self.fitted[key].effects
+        else:
             ahead = np.inf if known is None else value - known.log_bayes
             if abs(ahead) < SAME_EVIDENCE:
                 ahead = parent.log_bayes - self.known[self.parents[key][0]].log_bayes
@@ -245,6 +254,19 @@ class _Frontier:
         # as many at once whatever the number of cores, so that the sets are the same
         wave = list(dict.fromkeys([*waiting, *near]))[:most]
         return wave or [k for k in near if promises[k] == best][:1]  # the best set is always fitted
+
+    def step_aside(self, key: Key) -> None:
+        """From the best set, go towards one where each of its names may give way to another of its family.
+
+        A look-alike that explains little by itself is not met beside the others of the set.
+        """
+        if key != max(self.known, key=self.promise):
+            return
+        for name in sorted(key):
+            rest = key - {name}
+            others = [rest | {other} for other in family_of(name, self.families) if other not in key]
+            if rest in self.known and rest not in self.fitted and not all(k in self.known for k in others):
+                self.towards.append(rest)
 
     def step_back(self, key: Key) -> None:
         """Go towards the sets that lack one effect of a fitted set and that no step forward has met."""
@@ -297,7 +319,8 @@ def explore(
             break
         parents = [done.get(frontier.parents[k][0], start) for k in wave]
         names = [frontier.parents[k][1] for k in wave]
-        fitted_sets = parallel_map(_fit, parents, names, repeat(references), repeat(settings), rng.spawn(len(wave)))
+        common = repeat(families), repeat(references), repeat(settings)
+        fitted_sets = parallel_map(_fit, parents, names, *common, rng.spawn(len(wave)))
         for key, new in zip(wave, fitted_sets, strict=True):
             known = frontier.known[key]
             beside = float(np.maximum(new.effects.remainder, 0.0).sum())
@@ -308,6 +331,7 @@ def explore(
             frontier.known[key] = done[key].effects
             frontier.credit[key] = known.log_bayes + beside
             frontier.step_back(key)
+            frontier.step_aside(key)
             if new.further is None or len(key) >= MOST_EFFECTS:
                 continue
             for further in new.further.winners:
@@ -360,7 +384,12 @@ def added(
 
 
 def _fit(
-    parent: FittedSet, name: str, references: Sequence[Reference], settings: Settings, rng: np.random.Generator
+    parent: FittedSet,
+    name: str,
+    families: Sequence[Family],
+    references: Sequence[Reference],
+    settings: Settings,
+    rng: np.random.Generator,
 ) -> FittedSet:
     """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
     assert parent.further is not None
@@ -368,9 +397,13 @@ def _fit(
     trials, candidates = screening.candidate_probes(blocks, settings.kinds)
     scans = [scan(expand(block.target, block.modes.z[:1], trials)) for block in blocks]
     further = None
-    if max((float(screening.log_bayes(c, scans)[0][0]) for c in candidates), default=-np.inf) >= WORTH_A_REFIT:
+    names = (*parent.effects.names, name)
+    explained = {other for own in names for other in family_of(own, families)}  # what they were, they are no more
+    before = {n: -np.inf if n in explained else value for n, value in parent.further.tried.items()}
+    by_scan = (float(screening.log_bayes(c, scans)[0][0]) for c in candidates)
+    if candidates and max(*by_scan, *before.values()) >= WORTH_A_REFIT:
         further = weigh_names(
-            blocks, trials, candidates, scans, reach=parent.further.reach, before=parent.further.tried,
+            blocks, trials, candidates, scans, reach=parent.further.reach, before=before,
             most=MOST_BESIDE, forms_a_name=1,
         )  # fmt: skip
         if max((further.log_bayes[n] for n in further.winners), default=-np.inf) < WORTH_ADDING:
@@ -378,6 +411,6 @@ def _fit(
     remainder = np.array([remainder_evidence(b, r) for b, r in zip(blocks, references, strict=True)])
     accepted = (*parent.accepted, Accepted(name, tuple(effects), effects))
     return FittedSet(
-        EffectSet((*parent.effects.names, name), 0.0, {}, remainder), blocks, accepted, further,
+        EffectSet(names, 0.0, {}, remainder), blocks, accepted, further,
         (trials, candidates),
     )  # fmt: skip
