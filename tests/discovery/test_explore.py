@@ -140,6 +140,20 @@ def test_a_step_back_finds_a_set_whose_names_are_little_one_by_one(monkeypatch: 
     assert found.fitted[frozenset("bc")].effects.log_bayes == 43.0
 
 
+def test_a_look_alike_is_tried_in_the_place_of_one_of_the_best_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By itself x explains little, and a, which it resembles, much; beside b it is the better one.
+
+    On the way the set of a and b is met in the other order, with more evidence, though it has been fitted.
+    """
+    singles, chain = {"a": 20.0, "b": 8.0, "x": 7.0}, {"a": {"b": 12.0}, "b": {"a": 25.0, "x": 30.0}}
+    found, order = explored(monkeypatch, singles, chain, families=(("a", "x"),))
+    assert order == ["a", "ab", "b", "bx"]
+    assert found.fitted[frozenset("bx")].effects.log_bayes == 38.0
+    assert found.fitted[frozenset("ab")].effects.log_bayes == 33.0
+    assert [s.log_bayes for s in found.sets if s.key == frozenset("ab")] == [33.0]
+    assert explored(monkeypatch, singles, chain)[1] == ["a", "ab"]
+
+
 def test_a_step_back_goes_no_way_that_was_gone_before(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside b, c was found to explain nothing, so the set of both is not looked for again."""
     singles, chain = {"a": 20.0, "b": 19.0, "c": 7.0}, {"a": {"b": 12.0}, "ab": {"c": 12.0}, "b": {"d": 1.0}}
@@ -188,6 +202,7 @@ class Fits:
         monkeypatch: pytest.MonkeyPatch,
         *,
         scanned: float = 0.0,
+        tried: dict[str, float] | None = None,
         refitted: dict[str, float] | None = None,
         on: tuple[int, ...] = (0, 1),
         shared: bool = False,
@@ -209,7 +224,7 @@ class Fits:
             for b, place in zip(on, places, strict=True)
         }
         self.evidence = None if refitted is None else evidence(refitted)
-        further = SimpleNamespace(amplitudes=lambda name: refits, reach={})
+        further = SimpleNamespace(amplitudes=lambda name: refits, reach={}, tried=tried or {})
         self.parent: Any = stepwise.FittedSet(
             EffectSet(("a",), 7.0, {}, None), self.blocks, ("first",), further, ([], [], [])  # type: ignore[arg-type]
         )  # fmt: skip
@@ -224,8 +239,9 @@ class Fits:
             self.did.append(("informed", effects))
             return blocks
 
-        def weighed(blocks: Any, *given: Any, reach: Any, most: int, forms_a_name: int) -> Any:
+        def weighed(blocks: Any, *given: Any, reach: Any, before: Any, most: int, forms_a_name: int) -> Any:
             self.did.append(("weighed", most, forms_a_name))
+            self.before = before
             return self.evidence
 
         remainders = {"e0": 3.0, "e1": 4.0, 0: 5.0, 1: 6.0}
@@ -239,7 +255,7 @@ class Fits:
         monkeypatch.setattr(stepwise.screening, "log_bayes", lambda c, scans: [[scanned]])
 
     def fit(self) -> stepwise.FittedSet:
-        return stepwise._fit(self.parent, "b", [[], []], self.settings, np.random.default_rng(0))
+        return stepwise._fit(self.parent, "b", [("b", "twin")], [[], []], self.settings, np.random.default_rng(0))
 
 
 def test_one_more_effect_is_fitted_from_where_its_refit_ended(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,18 +279,26 @@ def test_materials_inform_each_other_of_an_amplitude_that_they_share(
 
 
 @pytest.mark.parametrize(
-    ("scanned", "refitted", "weighed", "further"),
+    ("scanned", "tried", "refitted", "weighed", "further"),
     [
-        (1.29, {"c": 9.0}, False, False),  # by the scan not worth a refit
-        (1.3, {"c": 1.9, "d": 2.0}, True, True),
-        (9.0, {"c": 1.99}, True, False),  # refitted not worth adding
-        (9.0, {}, True, False),
+        (1.29, {}, {"c": 9.0}, False, False),  # by the scan not worth a refit
+        (1.3, {}, {"c": 1.9, "d": 2.0}, True, True),
+        (9.0, {}, {"c": 1.99}, True, False),  # refitted not worth adding
+        (9.0, {}, {}, True, False),
+        (-2.0, {"c": 1.3}, {"c": 9.0}, True, True),  # the scan may be blind: without b it was worth a refit
+        (-2.0, {"c": 1.29}, {"c": 9.0}, False, False),
+        (-2.0, {"b": 9.0, "twin": 9.0}, {"twin": 9.0}, False, False),  # what b explains as well
     ],
 )
 def test_a_further_effect_is_refitted_and_added_where_that_is_worth_it(
-    scanned: float, refitted: dict[str, float], weighed: bool, further: bool, monkeypatch: pytest.MonkeyPatch
+    scanned: float,
+    tried: dict[str, float],
+    refitted: dict[str, float],
+    weighed: bool,
+    further: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    fits = Fits(monkeypatch, scanned=scanned, refitted=refitted)
+    fits = Fits(monkeypatch, scanned=scanned, tried=tried, refitted=refitted)
     found = fits.fit()
     assert (("weighed", 6, 1) in fits.did) is weighed
     assert found.further is (fits.evidence if further else None)

@@ -116,8 +116,9 @@ def examine(
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
         by_larger = 1.0
-        # They only make p smaller: nothing is gained where it is below the level beyond doubt.
-        if test.p > alpha or is_close(test.p, alpha, len(test.null)):
+        # They only make p smaller: nothing is gained where it is as small as it can be, or below the level beyond doubt.
+        could_be_smaller = test.p > 1.0 / (1 + len(test.null))
+        if could_be_smaller and (test.p > alpha or is_close(test.p, alpha, len(test.null))):
             report("larger effects", 0, 1)
             larger = larger or Continuation(blocks, trials, candidates, data, parallel_map)
             test = larger.test(simulated, test)

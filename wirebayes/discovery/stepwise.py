@@ -400,8 +400,8 @@ def _fit(
     names = (*parent.effects.names, name)
     explained = {other for own in names for other in family_of(own, families)}  # what they were, they are no more
     before = {n: -np.inf if n in explained else value for n, value in parent.further.tried.items()}
-    by_scan = (float(screening.log_bayes(c, scans)[0][0]) for c in candidates)
-    if candidates and max(*by_scan, *before.values()) >= WORTH_A_REFIT:
+    by_scan = [float(screening.log_bayes(c, scans)[0][0]) for c in candidates]
+    if candidates and max([*by_scan, *before.values()]) >= WORTH_A_REFIT:
         further = weigh_names(
             blocks, trials, candidates, scans, reach=parent.further.reach, before=before,
             most=MOST_BESIDE, forms_a_name=1,
