@@ -256,11 +256,11 @@ class _Frontier:
         return wave or [k for k in near if promises[k] == best][:1]  # the best set is always fitted
 
     def step_aside(self, key: Key) -> None:
-        """From the best set, go towards one where each of its names may give way to another of its family.
+        """From a set close to the best, go towards one where a name of it may give way to another of its family.
 
         A look-alike that explains little by itself is not met beside the others of the set.
         """
-        if key != max(self.known, key=self.promise):
+        if self.promise(key) < max(map(self.promise, self.known)) - REACH:
             return
         for name in sorted(key):
             rest = key - {name}
