@@ -165,11 +165,19 @@ def _with_directions(
     z = signature(geo, [list(case.hidden)])[0]
     removed = case.spec.names if case.spec.kind == "without" else ()
     few = max(1, draws // 4)  # data sets for the judge who does not know the noise: a tenth of a second each
-    said = answers(geo, directions.without(removed), z, rng, few)
-    if case.spec.kind == "single":  # small ones are not always seen, and are easier to name where they are
-        seen = said.above(float(np.quantile(answers(geo, directions, 0.0 * z, rng, few).odds, 1 - ALPHA)))
-        return {"blind": seen.rates(groups)} if seen.names else {}
-    result: dict[str, Any] = {"blind": said.rates(groups)}
+    known = directions.without(removed)
+    said = answers(geo, known, z, rng, few)
+    # Names follow a test that sees something: of the judge as of everybody, at the same level.
+    seen = said.above(float(np.quantile(answers(geo, known, 0.0 * z, rng, few).odds, 1 - ALPHA)))
+    if not seen.names:
+        return {"blind": {}} if case.spec.kind not in TOGETHER else {"blind": dict.fromkeys(said.rates(groups), 0.0)}
+    if case.spec.kind not in TOGETHER:  # compared where something was seen: small ones are easier to name there
+        result: dict[str, Any] = {"blind": seen.rates(groups)}
+    else:
+        share = len(seen.names) / len(said.names)
+        result = {"blind": {what: share * rate for what, rate in seen.rates(groups).items()}}
+    if case.spec.kind == "single":
+        return result
     if case.spec.kind in ("two", "three", "periodic"):
         number = "three" if case.spec.kind == "three" else "two"
         return result | {f"optimal_{number}": optimal_names(geo, directions, z, groups, rng, draws)}

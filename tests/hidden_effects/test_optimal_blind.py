@@ -116,6 +116,22 @@ def test_a_single_effect_is_judged_where_it_is_seen(monkeypatch):
     assert seen["named"] > judge(case, draws=120)["blind"]["named"] + 0.1
 
 
+@pytest.mark.parametrize(("kind", "names", "share"), [("two", ["toe", "ageing"], 0.5), ("without", ["toe"], 1.0)])
+def test_the_judge_names_what_the_test_sees(kind, names, share, monkeypatch):
+    """Half of the data sets speak for something; files of several effects count whether it is seen or not."""
+
+    def half(geo, directions, z, rng, draws):
+        odds = np.full(draws, 2.0) if not z.any() else np.resize([5.0, 1.0], draws)
+        return Answers([names] * draws, np.ones(draws, bool), odds)
+
+    monkeypatch.setattr(optimal, "answers", half)
+    found = judge(build(Spec(kind, "paper", tuple(names), 10.0, 0)), draws=16)["blind"]
+    assert found["remains"] == share
+    monkeypatch.setattr(optimal, "answers", lambda *given: Answers([names], np.ones(1, bool), np.zeros(1)))
+    unseen = judge(build(Spec(kind, "paper", tuple(names), 10.0, 0)), draws=16)["blind"]
+    assert unseen.get("remains", 0.0) == 0.0
+
+
 def test_a_slip_may_be_a_setting_error_where_its_size_is_unknown():
     found = judge(build(Spec("two", "dense", ("grip_slip", "sensor_drift"), 10.0, 3)), draws=120)
     assert found["optimal_two"]["group"] > found["blind"]["all"] + 0.1
