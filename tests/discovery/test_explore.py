@@ -125,11 +125,11 @@ def test_the_promise_of_a_fitted_set_is_what_its_fit_found(monkeypatch: pytest.M
 
 
 def test_what_further_effects_explain_may_be_a_remainder_that_is_not_smooth(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is as likely as one further effect, and explains no more than its bound."""
+    """It is a tenth as likely as one further effect, and explains no more than its bound."""
     for value in (5.0, 20.0):
         found, _ = explored(monkeypatch, {"a": 20.0, "b": 18.0}, {"a": {"c": value, "d": 1.0}})
         # the remainder's weight of a half comes on top
-        assert found.left_over == {frozenset("a"): pytest.approx(np.log(1.0 / MORE) + PAIR + min(value, LEFT_OVER))}
+        assert found.left_over == {frozenset("a"): pytest.approx(np.log(0.1 / MORE) + PAIR + min(value, LEFT_OVER))}
 
 
 def test_a_step_back_finds_a_set_whose_names_are_little_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -93,8 +93,35 @@ def test_the_top_is_found_within_and_far_beyond_the_first_amplitudes(
 
 def test_where_climbs_from_afar_end_nowhere_nearer_ones_lead_on(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the effect the other parameters are so different that only the least amplitude is reached from there."""
-    found = refitted(monkeypatch, [15.0], leap=4.0)
+    found = refitted(monkeypatch, [15.0], leap=5.0)
     assert found.amplitude / 1e-3 == pytest.approx(15.0, abs=0.3) and found.sd == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_an_amplitude_out_of_reach_from_neutral_is_reached_from_the_next_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From there the climbs of one sign end nowhere but at the least, and those of the other lead to a lesser top."""
+    profile = Profiles(monkeypatch, reached=[-0.5, 0.5, 1.0, 2.0, 3.0]).tried()
+    assert profile.amplitude[np.isfinite(profile.value)].tolist() == [-3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0]
+    assert profile.value[np.isfinite(profile.value)] == pytest.approx([9.0, 4.0, 1.0, 0.25, 0.5, 1.0, 2.0, 3.0])
+
+
+class Profiles:
+    """Climbs that reach one amplitude more each time, and from neutral some alone; a mode for each sign."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, reached: list[float]) -> None:
+        self.reached = reached
+        monkeypatch.setattr(refit, "_climbed", self.climbed)
+        self.rounds = 0
+
+    def climbed(self, pinned: Any, added: Any, amplitudes: np.ndarray, begin: Any) -> Any:
+        near = np.isin(amplitudes, self.reached) if self.rounds == 0 else np.ones(len(amplitudes), bool)
+        self.rounds += 1
+        value = np.where(amplitudes < 0, amplitudes**2, amplitudes)
+        return refit._Profile(amplitudes, np.where(near, value, -np.inf), [amplitudes[:, None]])
+
+    def tried(self) -> Any:
+        grid = np.array([-20.0, -10.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0])
+        first = refit._climbed([], lambda a: a, grid, [])
+        return refit._followed([], lambda a: a, first, 0.0)
 
 
 def test_blocks_that_share_an_amplitude_add_their_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,20 +206,22 @@ def tried(monkeypatch: pytest.MonkeyPatch, top: float, effect: Any = TWO_SIDED, 
     return rounds
 
 
-def test_amplitudes_from_two_to_forty_and_the_scan_s_guess_are_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_amplitudes_from_a_half_to_forty_and_the_scan_s_guess_are_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """On both sides, or on the one that the prior allows; a guess next to nothing counts as three tenths."""
-    steps = [2.0, 3.0, 5.0, 10.0, 20.0, 40.0]
+    steps = [0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 40.0]
     assert tried(monkeypatch, 9.0)[0] == pytest.approx([-s for s in reversed(steps)] + steps)
     assert tried(monkeypatch, 9.0, guess=-3.0)[0] == pytest.approx([-s for s in reversed(steps)] + steps)
     assert tried(monkeypatch, 9.0, named("toe"))[0] == pytest.approx(steps)
-    assert tried(monkeypatch, 9.0, named("toe"), guess=0.1)[0] == pytest.approx([0.3, 2.0, 5.0, 10.0, 20.0, 40.0])
+    assert tried(monkeypatch, 9.0, named("toe"), guess=0.1)[0] == pytest.approx([0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
     # no farther than the prior reaches
     bounded = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(-0.004, 0.016), neutral=0.0)])
-    assert tried(monkeypatch, 9.0, bounded)[0] == pytest.approx([-4.0, -3.0, -2.0, 2.0, 3.0, 5.0, 10.0, 12.0])
+    assert tried(monkeypatch, 9.0, bounded)[0] == pytest.approx(
+        [-4.0, -3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 12.0]
+    )
 
 
 def test_a_top_within_is_looked_at_twice_more_closely(monkeypatch: pytest.MonkeyPatch) -> None:
-    first, second, third = tried(monkeypatch, 9.0, named("toe"))
+    first, _, second, third = tried(monkeypatch, 9.0, named("toe"))
     assert second == pytest.approx(np.linspace(5.0, 20.0, 8)[1:-1])
     best = max(first.tolist() + second.tolist(), key=lambda a: -abs(a - 9.0))
     every = np.sort(np.concatenate([first, second]))
@@ -204,17 +233,17 @@ def test_a_top_outside_is_followed_outwards_six_times_at_most(monkeypatch: pytes
     """By 1.3, 1.7 and 2.3 from the end where it lies; within the bounds of the prior."""
     for side in (1.0, -1.0):
         rounds = tried(monkeypatch, side * 1e9)
-        assert len(rounds) == 1 + 6 + 2
+        assert len(rounds) == 2 + 6 + 2
         for n in range(6):
-            assert rounds[1 + n] == pytest.approx(side * 40.0 * 2.3**n * np.array([1.3, 1.7, 2.3]))
+            assert rounds[2 + n] == pytest.approx(side * 40.0 * 2.3**n * np.array([1.3, 1.7, 2.3]))
     few = tried(monkeypatch, 150.0)
-    assert [len(r) for r in few] == [12, 3, 3, 6, 6]  # 92, then 211.6, then back between them
+    assert [len(r) for r in few] == [16, 14, 3, 3, 6, 6]  # 92, then 211.6, then back between them
     bounded = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(-0.1, 0.2), neutral=0.0)])
     rounds = tried(monkeypatch, 1e9, bounded)
-    assert [len(r) for r in rounds] == [12, 3, 3, 6, 6]
-    assert rounds[1] == pytest.approx([52.0, 68.0, 92.0]) and rounds[2] == pytest.approx([100.0] * 3)
+    assert [len(r) for r in rounds] == [16, 14, 3, 3, 6, 6]
+    assert rounds[2] == pytest.approx([52.0, 68.0, 92.0]) and rounds[3] == pytest.approx([100.0] * 3)
     at_end = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(-0.04, 0.08), neutral=0.0)])
-    assert [len(r) for r in tried(monkeypatch, 1e9, at_end)] == [12, 6, 6]  # the end of the prior is the end
+    assert [len(r) for r in tried(monkeypatch, 1e9, at_end)] == [16, 14, 6, 6]  # the end of the prior is the end
 
 
 def test_around_the_best_lie_six_between_its_neighbours_or_beyond_an_end() -> None:

@@ -125,10 +125,10 @@ def test_the_judge_names_what_the_test_sees(kind, names, share, monkeypatch):
         return Answers([names] * draws, np.ones(draws, bool), odds)
 
     monkeypatch.setattr(optimal, "answers", half)
-    found = judge(build(Spec(kind, "paper", tuple(names), 10.0, 0)), draws=16)["blind"]
+    found = judge(build(Spec(kind, "unloading", tuple(names), 10.0, 0)), draws=16)["blind"]
     assert found["remains"] == share
     monkeypatch.setattr(optimal, "answers", lambda *given: Answers([names], np.ones(1, bool), np.zeros(1)))
-    unseen = judge(build(Spec(kind, "paper", tuple(names), 10.0, 0)), draws=16)["blind"]
+    unseen = judge(build(Spec(kind, "unloading", tuple(names), 10.0, 0)), draws=16)["blind"]
     assert unseen.get("remains", 0.0) == 0.0
 
 

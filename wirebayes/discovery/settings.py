@@ -36,7 +36,7 @@ FIRST_LOOK, MOST_LOOKS = 3, 7  # sets fitted in full: at first, and in all
 
 # A remainder that is not smooth, seen by what further effects, or the global test, find beside an effect.
 LEFT_OVER = 8.0  # nats: the most that a further effect may explain of what one unknown form leaves over beside a name
-LEFT_OVER_WEIGHT = 1.0  # of such a remainder, to a further effect
+LEFT_OVER_WEIGHT = 0.1  # of such a remainder, to a further effect
 RETESTS = 299  # simulations of the second global test
 ALPHA_AFTER = 0.03  # its p at which a remainder is as likely as none
 GIVE_WAY, MOST_RETESTS = (
