@@ -116,7 +116,7 @@ def examine(
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
         by_larger = 1.0
-        # They only make p smaller: nothing is gained where it is as small as it can be, or below the level beyond doubt.
+        # They only make p smaller: nothing is gained where it can be no smaller, or is below the level beyond doubt.
         could_be_smaller = test.p > 1.0 / (1 + len(test.null))
         if could_be_smaller and (test.p > alpha or is_close(test.p, alpha, len(test.null))):
             report("larger effects", 0, 1)
