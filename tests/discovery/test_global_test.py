@@ -184,9 +184,7 @@ def test_of_few_readings_one_may_be_struck_out(monkeypatch: pytest.MonkeyPatch) 
     assert gross_errors.readings_of(found.experiments) == gross_errors.readings_of([one]) - 1
 
 
-@pytest.mark.parametrize(
-    ("linear", "p"), [(0.002, 0.002), (8 / 501, 8 / 501), (9 / 501, 0.9)]
-)
+@pytest.mark.parametrize(("linear", "p"), [(0.002, 0.002), (8 / 501, 8 / 501), (9 / 501, 0.9)])
 def test_larger_effects_are_led_through_the_simulations_only_where_they_could_change_the_verdict(
     linear: float, p: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -162,9 +162,7 @@ def refit(
     return _summary(effect, which, pinned, profile, per_delta)
 
 
-def _followed(
-    pinned: Sequence[Pinned], added: Callable[[Array], Array], profile: _Profile, neutral: float
-) -> _Profile:
+def _followed(pinned: Sequence[Pinned], added: Callable[[Array], Array], profile: _Profile, neutral: float) -> _Profile:
     """The profile with climbs that begin where the next amplitude towards neutral has ended, where these are better.
 
     A climb from the fit without the effect may end nowhere, or in a lesser mode.
