@@ -58,9 +58,8 @@ def cost_of(case: str, seed: int, simulations: int) -> dict[str, Any]:
     gate = examine(blocks, CATALOGUE, simulations, rng)
     cpu = time.process_time() - begin
     surprises = gate.test.surprises
-    further = {f"{c.name} {c.probe} {c.blocks} {c.shared}": v for c, v in gate.further.items()}
     return {"cpu_s": cpu, "p": gate.test.p, "first": max(surprises, key=lambda n: surprises[n]),
-            "simulations": len(gate.test.null), "surprises": surprises, "further": further}  # fmt: skip
+            "simulations": len(gate.test.null), "surprises": surprises}  # fmt: skip
 
 
 def main() -> None:
