@@ -89,7 +89,16 @@ class _Profile:
         return _Profile(amplitude, np.concatenate([self.value, other.value])[order], ends)
 
     def with_rows(self, rows: NDArray[np.int64], other: "_Profile", which: NDArray[np.bool_]) -> "_Profile":
-        """With some rows of another profile in place of its own."""
+        """With some rows of another profile in place of its own.
+
+        Parameters
+        ----------
+        rows : (r,) array
+            Which are replaced.
+        other : _Profile
+        which : (n,) bool array
+            Its rows, of which r are true.
+        """
         value, ends = self.value.copy(), [own.copy() for own in self.ends]
         value[rows] = other.value[which]
         for own, new in zip(ends, other.ends, strict=True):
