@@ -96,31 +96,41 @@ def weigh_names(
         name.
     """
     forms = _forms(trials, candidates, scans)
-    by_name: dict[str, list[_Form]] = {}
-    for form in sorted(forms, key=lambda f: -max(f.linear)):
-        by_name.setdefault(form.effect.name, []).append(form)
+    by_name = _by_name(forms)
     promise = {name: max(*own[0].linear, before.get(name, np.inf)) for name, own in by_name.items()}
     waiting = sorted(by_name, key=lambda name: -promise[name])  # of names never refitted the scan's first
     room = len(waiting) if most is None else most
     found: dict[_Place, Refit] = {}
-    values: list[float] = []  # of the names refitted so far
-    while waiting:
-        # Refitted values alone set the cut: one that the scan has wrong would take every other name off the list.
-        top = max(values, default=-np.inf)
-        least = top - _MARGIN - _SHARE * max(top, 0.0)
-        stood = sum(value >= least for value in values)
-        wave = [n for n in waiting[:_WAVE] if promise[n] >= least][: max(room - stood, 0)]
-        if not wave:
-            break
+    refitted: dict[str, float] = {}
+    while wave := _next_wave(waiting, promise, list(refitted.values()), room):
         waiting = waiting[len(wave) :]
         tasks = _tasks([form for n in wave for form in by_name[n][:forms_a_name]], trials, scans, reach)
         done = parallel_map(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
         found |= zip(tasks, done, strict=True)
         summed = _summed([form for n in wave for form in by_name[n]], found, len(blocks))
-        values += [summed.log_bayes[n] for n in wave]
-    weighed = _summed(forms, found, len(blocks))
-    tried = {name: weighed.log_bayes[name] for name in by_name if name not in waiting}
-    return replace(weighed, reach=reach, tried={**before, **tried})
+        refitted |= {name: summed.log_bayes[name] for name in wave}
+    return replace(_summed(forms, found, len(blocks)), reach=reach, tried={**before, **refitted})
+
+
+def _by_name(forms: Sequence[_Form]) -> dict[str, list[_Form]]:
+    """The forms of each name, those first that the scan likes best."""
+    out: dict[str, list[_Form]] = {}
+    for form in sorted(forms, key=lambda form: -max(form.linear)):
+        out.setdefault(form.effect.name, []).append(form)
+    return out
+
+
+def _next_wave(
+    waiting: Sequence[str], promise: Mapping[str, float], refitted: Sequence[float], room: int
+) -> Sequence[str]:
+    """Names to be refitted next: those that promise enough beside the best, as long as not too many have stood.
+
+    Refitted values alone set the cut: one that the scan has wrong would take every other name off the list.
+    """
+    top = max(refitted, default=-np.inf)
+    least = top - _MARGIN - _SHARE * max(top, 0.0)
+    stood = sum(value >= least for value in refitted)
+    return [name for name in waiting[:_WAVE] if promise[name] >= least][: max(room - stood, 0)]
 
 
 def _tasks(
