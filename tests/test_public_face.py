@@ -270,10 +270,10 @@ def test_a_data_frame_is_taken_as_it_is(folders):
 def test_a_session_in_memory_is_checked_by_row_and_column(folders):
     frame = pandas.read_csv(DOCS / "example" / "linear-7-session.csv")
     frame.loc[2, "duration_s"] = 0.0
-    message = r"^readings: row 2 \(from 0\), column duration_s: found '0'; expected a number above 0"
+    message = r"^readings: row 2 \(from 0\), column duration_s: found '0', expected a number above 0"
     with pytest.raises(wb.InputError, match=message):
         wb.calibrate("linear-7", frame, folders / "fit" / "wire")
-    with pytest.raises(wb.InputError, match="^readings: columns: found hold; expected the header hold,x_m"):
+    with pytest.raises(wb.InputError, match="^readings: columns: found hold, expected the header hold,x_m"):
         wb.calibrate("linear-7", {"hold": [1]}, folders / "fit" / "wire")
 
 

@@ -144,8 +144,8 @@ def test_findings_that_could_not_decide_say_what_to_tell_apart(fitted, tmp_path)
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"aim": "fame"}, "--aim: found fame; expected parameters, creep, or two different effects"),
-        ({"aim": ["toe", "toe"]}, "--aim: found toe, toe; expected parameters, creep, or two different effects"),
+        ({"aim": "fame"}, "--aim: found fame, expected parameters, creep, or two different effects"),
+        ({"aim": ["toe", "toe"]}, "--aim: found toe, toe, expected parameters, creep, or two different effects"),
         ({"budget_min": 0.0}, "--budget-min"),
         ({"tests": 1}, "tests: found 1, expected a whole number, 2 or more"),
         ({"robot": "nobody"}, "nobody"),
@@ -164,7 +164,7 @@ def test_files_that_cannot_be_planned_with_are_refused(plan_file, experiment_fil
     two = experiment_file().read_text()
     path = tmp_path / "two.toml"
     path.write_text(two + two.replace("wire-a", "wire-b"))
-    with pytest.raises(wb.InputError, match="found the experiments wire-a, wire-b; expected one of them"):
+    with pytest.raises(wb.InputError, match="found the experiments wire-a, wire-b, expected one of them"):
         wb.plan(path)
     with pytest.raises(wb.InputError, match=r"found no posterior\.nc"):
         wb.plan(tmp_path)

@@ -100,7 +100,7 @@ def test_a_coarse_load_cell_that_shows_no_relaxation_is_no_weight(tmp_path):
 
 def test_where_both_drift_it_is_asked_and_an_answer_settles_it(tmp_path):
     path = steps(tmp_path / "raw.csv", 0.001, 0.05, drifts=0.15)
-    with pytest.raises(Undecided, match="displacement and tension that both drift within holds; expected --control"):
+    with pytest.raises(Undecided, match="displacement and tension that both drift within holds, expected --control"):
         read(path)
     made = read(path, control="displacement")
     assert any("displacements drift by up to" in note for note in made.notes)

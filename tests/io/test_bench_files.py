@@ -97,7 +97,7 @@ def test_a_labview_measurement_is_read_with_the_units_of_its_preamble(tmp_path, 
 def test_a_labview_measurement_without_units_asks_for_them(tmp_path):
     path = tmp_path / "raw.lvm"
     path.write_text(measurement(units=""))
-    with pytest.raises(Undecided, match=r"line 16, column 2 \(Position\): found no unit; expected --map"):
+    with pytest.raises(Undecided, match=r"line 16, column 2 \(Position\): found no unit, expected --map"):
         read(path)
     assert read(path, mapping=("Position=displacement [mm]", "Force=tension [N]")).rows
 

@@ -66,7 +66,7 @@ def read(folder, text, **choices):
     ids=["force unit", "time unit", "two forces", "comma", "point", "clock", "times run on", "machine position"],
 )
 def test_two_readings_are_refused_and_an_answer_settles_it(tmp_path, text, message, answers):
-    with pytest.raises(Undecided, match=f"raw.csv, {message}.*; expected --") as refused:
+    with pytest.raises(Undecided, match=f"raw.csv, {message}.*, expected --") as refused:
         read(tmp_path, text)
     assert answers in refused.value.answers
     before = len(refused.value.answers)

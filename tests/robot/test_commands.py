@@ -108,8 +108,8 @@ def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys):
         (["linear-6", "--times", "a"], "--times"),
         (["linear-6", "--tolerance", "0"], "--tolerance"),
         (["linear-6", "--tolerance-tilt", "nan"], "--tolerance-tilt"),
-        (["linear-6", "--specimen-spread", "0"], "found 0; expected a number above 0 and below 1, 0.05 for 5 %"),
-        (["linear-6", "--specimen-spread", "1"], "found 1; expected a number above 0 and below 1, 0.05 for 5 %"),
+        (["linear-6", "--specimen-spread", "0"], "found 0, expected a number above 0 and below 1, 0.05 for 5 %"),
+        (["linear-6", "--specimen-spread", "1"], "found 1, expected a number above 0 and below 1, 0.05 for 5 %"),
         (["linear-6", "--specimen-spread", "nan"], "found nan"),
     ],
 )
@@ -290,7 +290,7 @@ def test_the_documented_session_is_one():
         (",30.0,", ",", "line 2"),
         (",,,,,,,\n", ",1.0,,,,,,\n", "line 2"),
         ("\n1,", "\n\nx,", "line 3, column hold"),  # an empty line counts
-        ("\n3,", "\n1,", "line 4, column hold: found 1 once more; expected a row for each hold"),
+        ("\n3,", "\n1,", "line 4, column hold: found 1 once more, expected a row for each hold"),
     ],
 )
 def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, capsys, old, new, message):
@@ -358,7 +358,7 @@ def test_a_bias_is_estimated_on_request_and_its_sign_may_follow_the_motion(fitte
     lines[2][-1] = "2"
     file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
     assert main([*arguments, "--tension-bias", "0.2", "--output", str(tmp_path / "o")]) == 2
-    assert "line 3, column motion_7: found '2'; expected 1 (pulled in last)" in capsys.readouterr().err
+    assert "line 3, column motion_7: found '2', expected 1 (pulled in last)" in capsys.readouterr().err
 
 
 def test_an_inclinometer_joins_in_and_is_checked(fitted, session_csv, tmp_path, capsys):
@@ -373,7 +373,7 @@ def test_an_inclinometer_joins_in_and_is_checked(fitted, session_csv, tmp_path, 
     file.write_text("\n".join(level).replace(",0.0,0.0\n", ",0.0,1.5\n", 1) + "\n")
     capsys.readouterr()
     assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(tmp_path / "o")]) == 2
-    assert "column normal_y: found '1.5'; expected a component of a unit vector" in capsys.readouterr().err
+    assert "column normal_y: found '1.5', expected a component of a unit vector" in capsys.readouterr().err
 
 
 def test_export_speaks_the_firmwares_units(fitted, tmp_path):

@@ -170,7 +170,7 @@ def test_what_is_given_beside_the_files_counts(tmp_path):
     assert np.isfinite(inverse.tensions(got, got.home_m[None], np.eye(3)[None])).all()
     with pytest.raises(InputError, match="at least two"):
         import_robot(bodies, tmp_path / "b.toml", cable_set="few")
-    with pytest.raises(InputError, match="no cable set 'none'; expected one of few, original"):
+    with pytest.raises(InputError, match="no cable set 'none', expected one of few, original"):
         import_robot(bodies, tmp_path / "b.toml", cable_set="none")
     with pytest.raises(InputError, match="nothing is overwritten"):
         import_robot(bodies, tmp_path / "a.toml")
@@ -199,19 +199,19 @@ def test_a_robot_of_wirex_is_read(name, pattern, tmp_path):
     [
         ("bodies", "<mass>", "<mass>x", "line 8: <mass>: found 'x"),
         ("bodies", "</mass>", "", "mismatched tag"),
-        ("bodies", "SPATIAL_EULER_XYZ", "R_X", "line 6: <joint>: found the type 'R_X'; expected a free platform"),
-        ("bodies", "<num>0", "<num>1", "<num>: found '1'; expected 0, the base"),
-        ("bodies", "</links>", '<link_rigid num="2"/></links>', "found 2 links; expected one <link_rigid>"),
+        ("bodies", "SPATIAL_EULER_XYZ", "R_X", "line 6: <joint>: found the type 'R_X', expected a free platform"),
+        ("bodies", "<num>0", "<num>1", "<num>: found '1', expected 0, the base"),
+        ("bodies", "</links>", '<link_rigid num="2"/></links>', "found 2 links, expected one <link_rigid>"),
         ("bodies", "<com_location>", "<com_location>1 ", "expected 3 numbers with spaces"),
         ("bodies", 'q_initial="', 'q_initial="1 ', "expected 6 numbers"),
         ("bodies", "bodies_system>", "system>", "found this root"),
         ("bodies", "<!DOCTYPE bodies_system SYSTEM \"../../../../templates/bodies.dtd\">",
          '<!DOCTYPE b [<!ENTITY a "aaaa">]>', "found an entity"),
         ("bodies", "utf-8", "no-such", "expected XML"),
-        ("cables", "<link>0</link>", "<link>2</link>", "found link 2; expected link 0"),
-        ("cables", "force_max>", "most>", "found 0 elements <force_max>; expected one"),
+        ("cables", "<link>0</link>", "<link>2</link>", "found link 2, expected link 0"),
+        ("cables", "force_max>", "most>", "found 0 elements <force_max>, expected one"),
         ("cables", 'attachment_reference="joint"', "", "no attribute attachment_reference"),
-        ("cables", "</attachments>", "<attachment/></attachments>", "found 3 attachments; expected two"),
+        ("cables", "</attachments>", "<attachment/></attachments>", "found 3 attachments, expected two"),
         ("cables", "<location>", "<location>nan ", "<location>: found"),
         ("cables", "<attachment><link>0", "<screw_base_rotating_pulley/><attachment><link>0", "found 3 attachments"),
     ],

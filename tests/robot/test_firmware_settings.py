@@ -44,7 +44,7 @@ def test_a_config_by_hand(tmp_path):
     ("change", "message"),
     [
         (("D0:0:2350", ""), "found no M669 D"),
-        (("D0:0:2350", "D0:2350"), "line 2, M669 D: found 2 numbers; expected x:y:z"),
+        (("D0:0:2350", "D0:2350"), "line 2, M669 D: found 2 numbers, expected x:y:z"),
         (("W2.5", ""), "found no weight of the mover"),
         (("U2:2:2:4", "U2:2:4"), "line 3, lines: found 3 numbers"),
     ],

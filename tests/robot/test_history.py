@@ -445,30 +445,30 @@ HEAD = "time_s,joint_1_m,joint_2_m,joint_3_m,joint_4_m"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "line 1: found nothing; expected the header time_s,joint_1_m"),
+        ("", "line 1: found nothing, expected the header time_s,joint_1_m"),
         (HEAD.replace("joint_4", "joint_5") + "\n", "line 1: found the column 'joint_5_m'"),
-        ("time_s,joint_1_m,joint_2_m,joint_3_m\n", "line 1: found no column joint_4_m; expected time_s"),
+        ("time_s,joint_1_m,joint_2_m,joint_3_m\n", "line 1: found no column joint_4_m, expected time_s"),
         (HEAD + ",x_m\n", "line 1: found no column y_m"),
         (HEAD + ",time_s\n", "line 1: found the column time_s twice"),
-        (HEAD + "\n0,1,1,1,1\n", "found 1 row of values; expected two or more"),
-        (HEAD + "\n0,1,1,1,1\n\n0,1,1,1,1\n", "line 4, column time_s: found 0; expected a time after 0 s"),
-        (HEAD + "\n0,1,1,1,1\n9,1,1,1\n", "line 3: found 4 cells; expected 5"),
+        (HEAD + "\n0,1,1,1,1\n", "found 1 row of values, expected two or more"),
+        (HEAD + "\n0,1,1,1,1\n\n0,1,1,1,1\n", "line 4, column time_s: found 0, expected a time after 0 s"),
+        (HEAD + "\n0,1,1,1,1\n9,1,1,1\n", "line 3: found 4 cells, expected 5"),
         (
             HEAD + "\n0,1,1,,1\n9,1,1,1,1\n",
-            "line 2, column joint_3_m: found ''; expected a number of at most 1e+09 in size",
+            "line 2, column joint_3_m: found '', expected a number of at most 1e+09 in size",
         ),
         (HEAD + "\n0,1,inf,1,1\n9,1,1,1,1\n", "line 2, column joint_2_m: found 'inf'"),
         (
             HEAD + ",payload_kg\n0,1,1,1,1,-1\n9,1,1,1,1,1\n",
-            "line 2, column payload_kg: found '-1'; expected a number from 0 to 1e+09",
+            "line 2, column payload_kg: found '-1', expected a number from 0 to 1e+09",
         ),
-        (HEAD + "\n0,1,1,1,1\n60,-1,1,1,1\n", "line 3, column joint_1_m: found '-1'; expected a length above 0"),
-        (HEAD + "\n0,1,1,0.0,1\n60,1,1,1,1\n", "line 2, column joint_3_m: found '0.0'; expected a length above 0"),
+        (HEAD + "\n0,1,1,1,1\n60,-1,1,1,1\n", "line 3, column joint_1_m: found '-1', expected a length above 0"),
+        (HEAD + "\n0,1,1,0.0,1\n60,1,1,1,1\n", "line 2, column joint_3_m: found '0.0', expected a length above 0"),
         (
             HEAD + "\n0,1,1,1,1\n60,1,1776,1,1\n",
-            "line 3, column joint_2_m: found '1776'; expected metres, at most 115, 10 times the robot's size",
+            "line 3, column joint_2_m: found '1776', expected metres, at most 115, 10 times the robot's size",
         ),
-        (HEAD + ",hold\n0,1,1,1,1,1.5\n9,1,1,1,1,1\n", "line 2, column hold: found '1.5'; expected a whole number"),
+        (HEAD + ",hold\n0,1,1,1,1,1.5\n9,1,1,1,1,1\n", "line 2, column hold: found '1.5', expected a whole number"),
     ],
 )
 def test_a_mistake_in_a_history_is_named_by_line_and_column(text, message):
@@ -488,7 +488,7 @@ def test_motor_angles_may_be_negative_but_not_the_lengths_they_pay_out():
     assert table.parse("log.csv", good, robot, table.measured).joint_m[0, 3] == pytest.approx(8.0)
     with pytest.raises(InputError) as caught:
         table.parse("log.csv", good.replace("9,-125", "9,125"), robot, table.measured)
-    wrong = "line 3, column motor_1_rad: found '125', which pays out -6.25 m; expected a length above 0"
+    wrong = "line 3, column motor_1_rad: found '125', which pays out -6.25 m, expected a length above 0"
     assert str(caught.value) == f"log.csv: {wrong}"
 
 
@@ -531,7 +531,7 @@ def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  
         (["--trajectory", str(tmp_path / "log.csv")], "line 1: found the column 'joint_1_m'"),
         (["--joints", str(tmp_path / "none.csv")], "found no such file"),
         (["--joints", str(tmp_path / "log.csv"), "--times", "0,9"], "--times"),
-        (["--payload", "-1"], "--payload: found -1; expected kilograms, 0 or more"),
+        (["--payload", "-1"], "--payload: found -1, expected kilograms, 0 or more"),
     ]
     for options, message in refused:
         assert main([*both, *options, "--output", str(tmp_path / "no")]) == 2

@@ -159,24 +159,24 @@ NAN4, INF4 = np.array([0, np.nan, 0, 0]), np.array([0, 0, np.inf, 0])
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (lambda j: {"joint_m": j + NAN4}, "joint_m[1]: found nan; expected a finite length above 0"),
-        (lambda j: {"joint_m": j + INF4}, "joint_m[2]: found inf; expected a finite length above 0"),
-        (lambda j: {"joint_m": j * [1, 1, 1, 0]}, "joint_m[3]: found 0; expected a finite length above 0"),
-        (lambda j: {"joint_m": -1.5 * np.ones(4)}, "joint_m[0]: found -1.5; expected a finite length above 0"),
-        (lambda j: {"joint_m": 6.2}, "joint_m: found a single number; expected 4 numbers"),
-        (lambda j: {"joint_m": [6.2]}, "joint_m: found 1 in a list; expected 4 numbers"),
-        (lambda j: {"joint_m": j[:3]}, "joint_m: found 3 in a list; expected 4 numbers"),
-        (lambda j: {"joint_m": np.tile(j, (5, 1))}, "joint_m: found an array (5, 4); expected 4 numbers"),
-        (lambda j: {"joint_m": ["a"] * 4}, "joint_m: found what is not numbers; expected 4 numbers"),
-        (lambda j: {"nominal_m": 6.2}, "nominal_m: found a single number; expected 4 numbers"),
-        (lambda j: {"nominal_m": j + NAN4}, "nominal_m[1]: found nan; expected a finite length above 0"),
-        (lambda j: {"tension_N": 5.0}, "tension_N: found a single number; expected 4 numbers"),
-        (lambda j: {"tension_N": INF4}, "tension_N[2]: found inf; expected a finite number, or NaN where nothing was"),
-        (lambda j: {"tilt_rad": [0.1]}, "tilt_rad: found 1 in a list; expected 2 numbers"),
-        (lambda j: {"time_s": np.inf}, "time_s: found inf; expected a finite time"),
+        (lambda j: {"joint_m": j + NAN4}, "joint_m[1]: found nan, expected a finite length above 0"),
+        (lambda j: {"joint_m": j + INF4}, "joint_m[2]: found inf, expected a finite length above 0"),
+        (lambda j: {"joint_m": j * [1, 1, 1, 0]}, "joint_m[3]: found 0, expected a finite length above 0"),
+        (lambda j: {"joint_m": -1.5 * np.ones(4)}, "joint_m[0]: found -1.5, expected a finite length above 0"),
+        (lambda j: {"joint_m": 6.2}, "joint_m: found a single number, expected 4 numbers"),
+        (lambda j: {"joint_m": [6.2]}, "joint_m: found 1 in a list, expected 4 numbers"),
+        (lambda j: {"joint_m": j[:3]}, "joint_m: found 3 in a list, expected 4 numbers"),
+        (lambda j: {"joint_m": np.tile(j, (5, 1))}, "joint_m: found an array (5, 4), expected 4 numbers"),
+        (lambda j: {"joint_m": ["a"] * 4}, "joint_m: found what is not numbers, expected 4 numbers"),
+        (lambda j: {"nominal_m": 6.2}, "nominal_m: found a single number, expected 4 numbers"),
+        (lambda j: {"nominal_m": j + NAN4}, "nominal_m[1]: found nan, expected a finite length above 0"),
+        (lambda j: {"tension_N": 5.0}, "tension_N: found a single number, expected 4 numbers"),
+        (lambda j: {"tension_N": INF4}, "tension_N[2]: found inf, expected a finite number, or NaN where nothing was"),
+        (lambda j: {"tilt_rad": [0.1]}, "tilt_rad: found 1 in a list, expected 2 numbers"),
+        (lambda j: {"time_s": np.inf}, "time_s: found inf, expected a finite time"),
         (lambda j: {"time_s": np.nan}, "time_s: found nan after 0, expected a later time"),
         (lambda j: {"time_s": -1.0}, "time_s: found -1 after 0, expected a later time"),
-        (lambda j: {"time_s": "now"}, "time_s: found 'now'; expected a number"),
+        (lambda j: {"time_s": "now"}, "time_s: found 'now', expected a number"),
     ],
 )
 def test_a_wrong_step_is_named_and_leaves_no_trace(given, message):
@@ -196,11 +196,11 @@ def test_a_wrong_step_is_named_and_leaves_no_trace(given, message):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ((-5,), "mass_kg: found -5; expected kilograms, 0 or more"),
-        ((np.nan,), "mass_kg: found nan; expected kilograms, 0 or more"),
-        ((np.inf,), "mass_kg: found inf; expected kilograms, 0 or more"),
-        ((1.0, [1, 2]), "centre_m: found 2 in a list; expected 3 numbers"),
-        ((1.0, [1, 2, np.nan]), "centre_m[2]: found nan; expected a finite number"),
+        ((-5,), "mass_kg: found -5, expected kilograms, 0 or more"),
+        ((np.nan,), "mass_kg: found nan, expected kilograms, 0 or more"),
+        ((np.inf,), "mass_kg: found inf, expected kilograms, 0 or more"),
+        ((1.0, [1, 2]), "centre_m: found 2 in a list, expected 3 numbers"),
+        ((1.0, [1, 2, np.nan]), "centre_m[2]: found nan, expected a finite number"),
     ],
 )
 def test_a_load_that_cannot_be_is_refused_and_changes_nothing(given, message):
@@ -222,7 +222,7 @@ def test_a_linear_actuator_may_stand_at_zero_or_below():
     assert live.step(0.0, joint).held == 1
     shift = np.where(np.arange(7) == 0, joint, 0.0)
     assert np.isfinite(live._joints("joint_m", joint - 2 * shift)).all()
-    with pytest.raises(InputError, match=r"joint_m\[0\]: found nan; expected a finite number$"):
+    with pytest.raises(InputError, match=r"joint_m\[0\]: found nan, expected a finite number$"):
         live.step(1.0, joint + np.where(shift > 0, np.nan, 0.0))
 
 

@@ -66,7 +66,7 @@ def test_heights_and_rotations_that_mean_nothing_are_refused():
     assert _slices(linear, "0.8,0.5,0.5", ["0,0.1,0"]).heights_m.tolist() == [0.5, 0.8]
     for robot, heights, turns, message in (
         (linear, "a", None, "--map-heights: found 'a'"),
-        (linear, None, ["0,1"], "--map-rotation: found '0,1'; expected 3 finite numbers"),
+        (linear, None, ["0,1"], "--map-rotation: found '0,1', expected 3 finite numbers"),
         (printer, None, ["0,0,1"], "--map-rotation: found one for a robot whose lines keep"),
     ):
         with pytest.raises(InputError, match=message):

@@ -101,5 +101,5 @@ def test_millimetres_and_straight_lengths_are_refused_with_their_place(tmp_path)
                 continue
             changed = [[*row[:8], *(scale * straight), *row[8 + robot.legs :]] for row in rows]
             text = "\n".join([",".join(session_file.columns(robot, False)), *(",".join(map(str, r)) for r in changed)])
-            with pytest.raises(InputError, match=rf"line 2, column joint_\d_m: found .*; expected .*{reason}"):
+            with pytest.raises(InputError, match=rf"line 2, column joint_\d_m: found .*, expected .*{reason}"):
                 session_file.parse("session.csv", text, robot, 0.02, 1e-3)

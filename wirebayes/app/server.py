@@ -79,7 +79,7 @@ def _bound(port: int | None) -> socket.socket:
             return listening
         except (OSError, OverflowError) as error:
             reason = error
-    raise InputError(f"--port: found {port}, which cannot be used ({reason}); expected a free port, or 0 for any")
+    raise InputError(f"--port: found {port}, which cannot be used ({reason}), expected a free port, or 0 for any")
 
 
 class _Own:

@@ -138,11 +138,11 @@ def calibrate(
         ("--pose-sd", pose_sd or 0.0), ("--drum-sd", drum_sd), ("--joint-sd", joint_sd or 0.0),
     )  # fmt: skip
     if not 0 <= next_poses <= _MOST_VISITS:
-        raise InputError(f"--next-poses: found {next_poses}; expected a number from 0 to {_MOST_VISITS}")
+        raise InputError(f"--next-poses: found {next_poses}, expected a number from 0 to {_MOST_VISITS}")
     machine = robot_of(robot)
     bias = machine.tension_bias_N if tension_bias is None else float(tension_bias)
     if not 0 <= bias < math.inf:
-        raise InputError(f"--tension-bias: found {bias:g}; expected a number of at least 0")
+        raise InputError(f"--tension-bias: found {bias:g}, expected a number of at least 0")
     if isinstance(readings, str | os.PathLike):
         session, values = session_file.read(Path(readings), machine, tension_sd, tilt_sd, bias > 0)
         read = content(Path(readings))

@@ -73,7 +73,7 @@ def export(
     machine = robot_of(robot)
     loads, moments = numbers("--tensions", tensions), rising_times(times)
     if loads.min() <= 0:
-        raise InputError(f"--tensions: found {text_of(tensions)!r}; expected numbers above 0")
+        raise InputError(f"--tensions: found {text_of(tensions)!r}, expected numbers above 0")
     line = draws_for(machine, wires, draws, experiment, own)
     contents: dict[str, str] = {}
     if files.is_hangprinter(machine):

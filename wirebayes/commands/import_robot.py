@@ -70,11 +70,11 @@ def import_robot(
     where = found.home_m if position is None else numbers("--position", position, 3)
     first = names[0]
     if bounds is None:
-        raise InputError(f"{first}: found no bounds of the tensions; expected --tension LOWEST,HIGHEST in newtons")
+        raise InputError(f"{first}: found no bounds of the tensions, expected --tension LOWEST,HIGHEST in newtons")
     if where is None:
-        raise InputError(f"{first}: found no pose; expected --position X,Y,Z of the home pose in metres")
+        raise InputError(f"{first}: found no pose, expected --position X,Y,Z of the home pose in metres")
     if not 0 <= bounds[0] < bounds[1]:
-        raise InputError(f"--tension: found {bounds[0]:g},{bounds[1]:g}; expected 0 <= LOWEST < HIGHEST in newtons")
+        raise InputError(f"--tension: found {bounds[0]:g},{bounds[1]:g}, expected 0 <= LOWEST < HIGHEST in newtons")
     target = Path(output)
     if target.exists():
         raise InputError(f"{target}: found a file of this name, expected none; nothing is overwritten")
@@ -103,7 +103,7 @@ def _read(paths: list[Path], cable_set: str | None, pulleys: bool) -> ImportedRo
     settings = [path for path in paths if path.suffix in firmware.SUFFIXES]
     if settings:
         if len(paths) > 1 or cable_set is not None:
-            raise InputError(f"{settings[0]}: found files or a cable set beside it; expected these settings alone")
+            raise InputError(f"{settings[0]}: found files or a cable set beside it, expected these settings alone")
         return firmware.robot(settings[0])
     parts: dict[str, Element] = {}
     for path in paths:
@@ -131,7 +131,7 @@ def _beside(path: Path, here: str, other: str) -> Path:
     """CASPR's other file, by its name."""
     beside = path.with_name(path.name.replace(f"_{here}.", f"_{other}."))
     if beside == path or not beside.is_file():
-        raise InputError(f"{path}: found {here} only; expected a file with the {other} too, as CASPR has both")
+        raise InputError(f"{path}: found {here} only, expected a file with the {other} too, as CASPR has both")
     return beside
 
 

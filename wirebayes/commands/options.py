@@ -177,7 +177,7 @@ def numbers(option: str, values: Numbers, count: int | None = None) -> Any:
     except ValueError:
         found = np.array([np.nan])
     if not np.isfinite(found).all() or (count is not None and len(found) != count):
-        raise InputError(f"{option}: found {text!r}; expected {count or 'some'} finite numbers separated by commas")
+        raise InputError(f"{option}: found {text!r}, expected {count or 'some'} finite numbers separated by commas")
     return found
 
 
@@ -185,7 +185,7 @@ def rising_times(values: Numbers) -> Any:
     """Seconds that rise, from ``times``."""
     found = numbers("--times", values)
     if found[0] < 0 or np.any(np.diff(found) <= 0):
-        raise InputError(f"--times: found {text_of(values)!r}; expected rising times from 0 on")
+        raise InputError(f"--times: found {text_of(values)!r}, expected rising times from 0 on")
     return found
 
 
@@ -194,7 +194,7 @@ def check_spread(value: float, *, alike: bool = True) -> float:
     value = float(value)
     if not 0.0 <= value < 1.0 or (value == 0.0 and not alike):
         above = "from 0" if alike else "above 0"
-        raise InputError(f"--specimen-spread: found {value:g}; expected a number {above} and below 1, 0.05 for 5 %")
+        raise InputError(f"--specimen-spread: found {value:g}, expected a number {above} and below 1, 0.05 for 5 %")
     return value
 
 
@@ -202,11 +202,11 @@ def above_zero(*options: tuple[str, float]) -> None:
     """Refuse what is not a finite number above zero."""
     for name, value in options:
         if not 0 < value < float("inf"):
-            raise InputError(f"{name}: found {value:g}; expected a finite number above 0")
+            raise InputError(f"{name}: found {value:g}, expected a finite number above 0")
 
 
 def from_zero(*options: tuple[str, float]) -> None:
     """Refuse what is not a finite number of at least zero."""
     for name, value in options:
         if not 0 <= value < float("inf"):
-            raise InputError(f"{name}: found {value:g}; expected a finite number of at least 0")
+            raise InputError(f"{name}: found {value:g}, expected a finite number of at least 0")

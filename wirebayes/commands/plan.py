@@ -202,7 +202,7 @@ def _request(
     experiments = [source] if isinstance(source, Experiment) else select(read_experiments(Path(source)), name)
     if len(experiments) > 1:
         names = ", ".join(e.name for e in experiments)
-        raise InputError(f"{source}: found the experiments {names}; expected one of them as --experiment")
+        raise InputError(f"{source}: found the experiments {names}, expected one of them as --experiment")
     (measured,) = experiments
     build([measured], law=law, history=history)  # checks priors
     guess = from_readings(measured, n, rng, law, history)
@@ -246,7 +246,7 @@ def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tupl
     which, place = find_posterior(folder, name, "plain" if discovered else None)
     stored = store.load(place, which, own)
     if stored.likelihood == "hold":
-        message = "found a fit with --likelihood hold, which knows no preload and no setting error; expected a chain"
+        message = "found a fit with --likelihood hold, which knows no preload and no setting error, expected a chain"
         raise InputError(f"{folder}: {message}")
     sample = stored.sample
     source = f"the posterior of {sample.name} in {folder.name}"
@@ -296,7 +296,7 @@ def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:
     if words in (("parameters",), ("creep",)) or (len(set(words)) == len(words) == 2 and set(words) <= set(effects)):
         return words
     expected = "parameters, creep, or two different effects of the catalogue"
-    raise InputError(f"--aim: found {', '.join(map(str, words))}; expected {expected}")
+    raise InputError(f"--aim: found {', '.join(map(str, words))}, expected {expected}")
 
 
 def _row(

@@ -240,7 +240,7 @@ def asked_rotation(rotation: Numbers | None) -> Floats | None:
     except ValueError:
         found = np.array([np.inf])
     if len(found) != 3 or np.isinf(found).any():
-        raise InputError(f"--rotation: found {text!r}; expected three finite numbers or free, separated by commas")
+        raise InputError(f"--rotation: found {text!r}, expected three finite numbers or free, separated by commas")
     return found if np.isfinite(found).any() else None
 
 
@@ -249,7 +249,7 @@ def _refuse_off_plane(robot: Robot, position_m: Floats, rotation: Floats) -> Non
     if robot.plane is not None and far > OFF_PLANE * robot.span_m:
         home, normal = (", ".join(f"{v:g}" for v in values) for values in (robot.home_m, robot.plane.normal))
         raise InputError(
-            f"--position, --rotation: found a pose {far:.3g} m off the plane; expected one in the plane through the "
+            f"--position, --rotation: found a pose {far:.3g} m off the plane, expected one in the plane through the "
             f"home position ({home}) with the normal ({normal}), turned about it only"
         )
 
@@ -263,28 +263,28 @@ def _start(robot: Robot, asked_rad: Floats | None) -> Floats:
 def _loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:
     """The robot with a payload, at its own centre of mass where no other place is given."""
     if not 0 <= payload_kg < math.inf:
-        raise InputError(f"--payload: found {payload_kg:g}; expected kilograms, 0 or more")
+        raise InputError(f"--payload: found {payload_kg:g}, expected kilograms, 0 or more")
     return with_payload(robot, payload_kg, robot.centre_of_mass_m if at is None else numbers("--payload-at", at, 3))
 
 
 def _refuse_beside_history(options: str, given: bool) -> None:
     if given:
-        raise InputError(f"{options}: found beside a history; expected them for a single pose only")
+        raise InputError(f"{options}: found beside a history, expected them for a single pose only")
 
 
 def _refuse_calibration(alone: bool) -> None:
     if alone:
-        raise InputError("--calibration: found beside a single pose; expected it beside --joints or --trajectory")
+        raise InputError("--calibration: found beside a single pose, expected it beside --joints or --trajectory")
 
 
 def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:
     """The requested slices; refused where the robot has only one height or one orientation."""
     if heights is not None and robot.plane is not None:
-        raise InputError("--map-heights: found heights for a robot in a plane; expected none")
+        raise InputError("--map-heights: found heights for a robot in a plane, expected none")
     if heights is not None and (robot.upper_m[:2] == robot.lower_m[:2]).any():
-        raise InputError("--map-heights: found heights for a workspace in a vertical plane; expected none")
+        raise InputError("--map-heights: found heights for a workspace in a vertical plane, expected none")
     if rotations is not None and robot.degrees == 3:
-        raise InputError("--map-rotation: found one for a robot whose lines keep the orientation; expected none")
+        raise InputError("--map-rotation: found one for a robot whose lines keep the orientation, expected none")
     if heights is None and rotations is None:
         return LEVEL
     levels = None if heights is None else np.unique(numbers("--map-heights", heights))

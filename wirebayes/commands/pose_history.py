@@ -57,7 +57,7 @@ def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: floa
     reference_sd, tension_sd, tilt_sd = float(reference_sd), float(tension_sd), float(tilt_sd)
     above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd))
     if not 0 <= reference_sd < np.inf:
-        raise InputError(f"--reference-sd: found {reference_sd:g}; expected millimetres, 0 or more")
+        raise InputError(f"--reference-sd: found {reference_sd:g}, expected millimetres, 0 or more")
     return Uncertain(1e-3 * reference_sd, float(specimen_spread), tension_sd, tilt_sd)
 
 
@@ -95,7 +95,7 @@ def calibrated_errors(
     if calibration is None:
         return errors
     if errors.reference_m:
-        raise InputError("--reference-sd: found beside --calibration, which knows the lengths; expected one of them")
+        raise InputError("--reference-sd: found beside --calibration, which knows the lengths, expected one of them")
     known = calibrated_of(calibration, robot, line, wires, experiment)
     return replace(errors, spread=known.prior.spread, calibrated=known)
 
@@ -144,7 +144,7 @@ def pose_history(
         Both were given, or a table is wrong (line and column).
     """
     if joints is not None and trajectory is not None:
-        raise InputError("--joints and --trajectory: found both; expected one (a file of --joints may hold poses too)")
+        raise InputError("--joints and --trajectory: found both, expected one (a file of --joints may hold poses too)")
     option, given = ("--joints", joints) if joints is not None else ("--trajectory", trajectory)
     columns = table.measured if joints is not None else table.commanded
     if isinstance(given, str | os.PathLike):
@@ -187,4 +187,4 @@ def _refuse_off_plane(robot: Robot, option: str, history: History) -> None:
     far = plane.off(robot, history.position_m, history.rotation)
     if far.max() > _OFF_PLANE * robot.span_m:
         when = history.times_s[int(far.argmax())]
-        raise InputError(f"{option}: found a pose {far.max():.3g} m off the robot's plane at {when:g} s; expected none")
+        raise InputError(f"{option}: found a pose {far.max():.3g} m off the robot's plane at {when:g} s, expected none")

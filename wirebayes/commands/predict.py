@@ -235,7 +235,7 @@ def find_posterior(folder: Path, experiment: str | None = None, model: str | Non
     if not found:
         raise InputError(f"{folder}: found no posterior.nc in it, expected a folder written by fit or discover")
     if experiment is None and len(found) > 1:
-        raise InputError(f"{folder}: found {', '.join(sorted(found))}; expected one of them as --experiment")
+        raise InputError(f"{folder}: found {', '.join(sorted(found))}, expected one of them as --experiment")
     name = experiment or next(iter(found))
     if name not in found:
         raise InputError(f"--experiment {name}: not in {folder}, expected one of {', '.join(sorted(found))}")

@@ -182,7 +182,7 @@ def _together(lines: dict[str, WireDraws]) -> WireDraws:
         for what, a, b in (("elastic-law", first.law, line.law), ("history", first.history, line.history)):
             if a != b:
                 raise InputError(
-                    f"--wires: found {name} fitted with --{what} {a} and {other} with {b}; expected one for all wires"
+                    f"--wires: found {name} fitted with --{what} {a} and {other} with {b}, expected one for all wires"
                 )
         order = slice(0, count) if line is first else rng.permutation(line.count)[:count]
         lines[other] = replace(line.part(order), name=other)
@@ -236,10 +236,10 @@ def named_lines(texts: Sequence[str]) -> Wires:
         return _folders(texts[0])
     for text, (name, sign, folder) in zip(texts, pairs, strict=True):
         if not (name and sign and folder):
-            raise InputError(f"--wires: found {text!r} beside others; expected NAME=FOLDER for each")
+            raise InputError(f"--wires: found {text!r} beside others, expected NAME=FOLDER for each")
     names = [name for name, _, _ in pairs]
     if len(set(names)) < len(names):
-        raise InputError(f"--wires: found {', '.join(names)}; expected each name once")
+        raise InputError(f"--wires: found {', '.join(names)}, expected each name once")
     return {name: _folders(folder) for name, _, folder in pairs}
 
 
@@ -283,7 +283,7 @@ def _usable(stored: Stored, where: str, count: int) -> WireDraws:
     """Draws of a posterior that knows the stiffness."""
     if stored.likelihood == "hold":
         raise InputError(
-            f"{where}: found a fit with --likelihood hold, which does not determine the stiffness k1; expected one "
+            f"{where}: found a fit with --likelihood hold, which does not determine the stiffness k1, expected one "
             "with --likelihood chain, for a robot needs k1"
         )
     return wire_draws(stored, count)

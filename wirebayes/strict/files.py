@@ -76,5 +76,5 @@ def csv_rows(source: str, text: str, place: Callable[[int], str]) -> list[tuple[
         return [(lines.line_num, row) for row in lines if row]
     except csv.Error as error:
         raise InputError(
-            f"{source}: {place(lines.line_num)}: found no CSV ({error}); expected cells with commas"
+            f"{source}: {place(lines.line_num)}: found no CSV ({error}), expected cells with commas"
         ) from None

@@ -35,7 +35,7 @@ class Element:
 
     def fail(self, found: str, expected: str) -> InputError:
         """An error about this element."""
-        return InputError(f"{self.file}, line {self.line}: <{self.tag}>: found {found}; expected {expected}")
+        return InputError(f"{self.file}, line {self.line}: <{self.tag}>: found {found}, expected {expected}")
 
     def all(self, tag: str) -> list["Element"]:
         """Children of a tag."""
@@ -111,7 +111,7 @@ def read(path: Path) -> Element:
             inside[-1].text += data
 
     def entity(*declared: Any) -> None:  # a few of them can unfold to any size
-        raise InputError(f"{name}, line {parser.CurrentLineNumber}: found an entity; expected XML without entities")
+        raise InputError(f"{name}, line {parser.CurrentLineNumber}: found an entity, expected XML without entities")
 
     parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, text
     parser.EntityDeclHandler = entity
@@ -119,9 +119,9 @@ def read(path: Path) -> Element:
         parser.Parse(raw, True)
     except expat.ExpatError as error:
         message = expat.errors.messages[error.code]
-        raise InputError(f"{name}, line {error.lineno}: found no well-formed XML ({message}); expected XML") from None
+        raise InputError(f"{name}, line {error.lineno}: found no well-formed XML ({message}), expected XML") from None
     except (ValueError, LookupError) as error:  # an encoding that is not known
-        raise InputError(f"{name}: found no readable XML ({error}); expected XML") from None
+        raise InputError(f"{name}: found no readable XML ({error}), expected XML") from None
     return root[0]
 
 

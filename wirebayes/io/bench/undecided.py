@@ -77,7 +77,7 @@ class Undecided(InputError):
         path = found.partition(", ")[0] + ", "
         more = "; ".join(other.found.removeprefix(path) for other in others)
         besides = f"; besides, undecided: {more}" if more else ""
-        super().__init__(message or f"{found}; expected {options} to say {question}{besides}")
+        super().__init__(message or f"{found}, expected {options} to say {question}{besides}")
         self.found: str = found
         self.question, self.answers = question, dict(answers)
         self.others: tuple[Undecided, ...] = tuple(others)

@@ -48,7 +48,7 @@ class _Settings:
         try:
             self.values[name] = [float(part) for part in parts]
         except ValueError:
-            raise InputError(f"{where}, line {line}, {name}: found {text!r}; expected numbers") from None
+            raise InputError(f"{where}, line {line}, {name}: found {text!r}, expected numbers") from None
         self.line[name] = line
 
 
@@ -114,22 +114,22 @@ def _klipper(text: str, where: str) -> tuple[list[list[float]], _Settings]:
             break
         missing = [name for name in names if name not in found.values]
         if missing:
-            raise InputError(f"{where}: found no {missing[0]}; expected the anchor's three coordinates in mm")
+            raise InputError(f"{where}: found no {missing[0]}, expected the anchor's three coordinates in mm")
         anchors.append([found.values[name][0] for name in names])
     if len(anchors) < 2:
-        raise InputError(f"{where}: found {len(anchors)} anchors; expected [stepper_a] with anchor_x and so on")
+        raise InputError(f"{where}: found {len(anchors)} anchors, expected [stepper_a] with anchor_x and so on")
     return anchors, found
 
 
 def _anchors(found: _Settings, names: list[str], where: str, expected: str) -> list[list[float]]:
     missing = [name for name in names if name not in found.values]
     if missing:
-        raise InputError(f"{where}: found no {missing[0]}; expected {expected}")
+        raise InputError(f"{where}: found no {missing[0]}, expected {expected}")
     out = [found.values[name] for name in names]
     for name, value in zip(names, out, strict=True):
         if len(value) != 3:
             line = found.line[name]
-            raise InputError(f"{where}, line {line}, {name}: found {len(value)} numbers; expected x:y:z in mm")
+            raise InputError(f"{where}, line {line}, {name}: found {len(value)} numbers, expected x:y:z in mm")
     return out
 
 
@@ -140,13 +140,13 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
         value = found.values.get(name, [missing])
         if len(value) not in (1, legs):
             raise InputError(
-                f"{path}, line {found.line[name]}, {name}: found {len(value)} numbers; expected one, or one of each of "
+                f"{path}, line {found.line[name]}, {name}: found {len(value)} numbers, expected one, or one of each of "
                 f"{legs} wires"
             )
         return np.broadcast_to(np.array(value, float), legs).copy()
 
     if "mass" not in found.values:
-        raise InputError(f"{path}: found no weight of the mover; expected M666 W or winch_mover_weight in kg")
+        raise InputError(f"{path}: found no weight of the mover, expected M666 W or winch_mover_weight in kg")
     bounds = None
     if "least" in found.values and "most" in found.values:
         bounds = float(each("least", 0.0).max()), float(each("most", 0.0).min())

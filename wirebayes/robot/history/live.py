@@ -157,7 +157,7 @@ class LiveEstimator:
             A leg has a linear actuator, whose joint value is no length.
         """
         if self.robot.is_linear.any():
-            raise InputError(f"straight_m: found lengths; expected displacements of the actuators of {self.robot.name}")
+            raise InputError(f"straight_m: found lengths, expected displacements of the actuators of {self.robot.name}")
         return firmware.wire_of(self.robot, _vector("straight_m", straight_m, self.robot.legs))
 
     def load(self, mass_kg: float, centre_m: ArrayLike | None = None) -> None:
@@ -176,7 +176,7 @@ class LiveEstimator:
         """
         mass, centre = _number("mass_kg", mass_kg), self._bare.centre_of_mass_m
         if not 0 <= mass < np.inf:
-            raise InputError(f"mass_kg: found {mass:g}; expected kilograms, 0 or more")
+            raise InputError(f"mass_kg: found {mass:g}, expected kilograms, 0 or more")
         if centre_m is not None:
             centre = _vector("centre_m", centre_m, 3)
             _check("centre_m", centre, np.isfinite(centre), "a finite number")
@@ -220,7 +220,7 @@ class LiveEstimator:
         if not time > self._last:
             raise InputError(f"time_s: found {time:g} after {self._last:g}, expected a later time")
         if time == np.inf:
-            raise InputError("time_s: found inf; expected a finite time")
+            raise InputError("time_s: found inf, expected a finite time")
         if (tension_N is not None or tilt_rad is not None) and not self._reads:
             raise InputError("readings: found some, expected none; make the estimator with reads=True")
         joint = self._joints("joint_m", joint_m)
@@ -238,7 +238,7 @@ class LiveEstimator:
         unlikely = plausible.wrong(self.robot, given[None]) if self._leaps(given) else None
         if unlikely is not None:
             (_, leg), expected = unlikely
-            raise InputError(f"{name}[{leg}]: found {given[leg]:g}; expected {expected}; wire_m() turns straight ones")
+            raise InputError(f"{name}[{leg}]: found {given[leg]:g}, expected {expected}; wire_m() turns straight ones")
         return given
 
     def _leaps(self, given: Floats) -> bool:
@@ -375,7 +375,7 @@ def _number(name: str, value: float) -> float:
     try:
         return float(value)
     except (TypeError, ValueError):
-        raise InputError(f"{name}: found {value!r:.60}; expected a number") from None
+        raise InputError(f"{name}: found {value!r:.60}, expected a number") from None
 
 
 def _vector(name: str, values: ArrayLike, count: int) -> Floats:
@@ -383,10 +383,10 @@ def _vector(name: str, values: ArrayLike, count: int) -> Floats:
     try:
         given = np.asarray(values, float)
     except (TypeError, ValueError):
-        raise InputError(f"{name}: found what is not numbers; expected {count} numbers") from None
+        raise InputError(f"{name}: found what is not numbers, expected {count} numbers") from None
     if given.shape != (count,):
         found = {0: "a single number", 1: f"{given.size} in a list"}.get(given.ndim, f"an array {given.shape}")
-        raise InputError(f"{name}: found {found}; expected {count} numbers")
+        raise InputError(f"{name}: found {found}, expected {count} numbers")
     return given
 
 
@@ -401,7 +401,7 @@ def _check(name: str, given: Floats, good: NDArray[np.bool_], expected: str) -> 
     """Refuse the first number that is not good."""
     if not good.all():
         i = int(np.argmin(good))
-        raise InputError(f"{name}[{i}]: found {given[i]:g}; expected {expected}")
+        raise InputError(f"{name}[{i}]: found {given[i]:g}, expected {expected}")
 
 
 def _beside(first: Wires, other: Wires) -> Wires:

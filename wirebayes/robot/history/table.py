@@ -117,16 +117,16 @@ def parse(
     names = [cell.strip() for cell in header]
     columns = columns_of(robot, any(name.startswith("motor_") for name in names))
     if not numbered:
-        raise InputError(f"{source}: {place(1)}: found nothing; expected the header {','.join(columns.needed)}")
+        raise InputError(f"{source}: {place(1)}: found nothing, expected the header {','.join(columns.needed)}")
     _check_header(f"{source}: {place(first)}", names, columns)
     cells = np.array([_row(f"{source}: {place(line)}", row, names) for line, row in numbered[1:]])
     if len(cells) < 2:
-        raise InputError(f"{source}: found {len(cells)} row{'s' * (len(cells) != 1)} of values; expected two or more")
+        raise InputError(f"{source}: found {len(cells)} row{'s' * (len(cells) != 1)} of values, expected two or more")
     late = np.flatnonzero(np.diff(cells[:, names.index("time_s")]) <= 0)
     if len(late):
         line, time = numbered[late[0] + 2][0], cells[:, names.index("time_s")]
         found, before = f"{time[late[0] + 1]:.10g}", f"{time[late[0]]:.10g}"
-        raise InputError(f"{source}: {place(line)}, column time_s: found {found}; expected a time after {before} s")
+        raise InputError(f"{source}: {place(line)}, column time_s: found {found}, expected a time after {before} s")
     history = _history(robot, columns, names, cells)
     if history.joint_m is not None:
         wrong = plausible.wrong(robot, history.joint_m)
@@ -136,7 +136,7 @@ def parse(
             found = repr(texts[names.index(name)].strip()[:60])
             if name.startswith("motor_"):
                 found += f", which pays out {history.joint_m[row, leg]:.4g} m"
-            raise InputError(f"{source}: {place(line)}, column {name}: found {found}; expected {expected}")
+            raise InputError(f"{source}: {place(line)}, column {name}: found {found}, expected {expected}")
     return history
 
 
@@ -144,13 +144,13 @@ def _check_header(where: str, names: Sequence[str], columns: Columns) -> None:
     known = columns.known
     for i, name in enumerate(names):
         if name not in known:
-            raise InputError(f"{where}: found the column {name[:60]!r}{hint(name, known)}; expected {_short(columns)}")
+            raise InputError(f"{where}: found the column {name[:60]!r}{hint(name, known)}, expected {_short(columns)}")
         if name in names[:i]:
-            raise InputError(f"{where}: found the column {name} twice; expected it once")
+            raise InputError(f"{where}: found the column {name} twice, expected it once")
     for group in (columns.needed, *columns.groups):
         missing = [name for name in group if name not in names]
         if missing and (group is columns.needed or len(missing) < len(group)):
-            raise InputError(f"{where}: found no column {missing[0]}; expected {_short(columns)}")
+            raise InputError(f"{where}: found no column {missing[0]}, expected {_short(columns)}")
 
 
 def _short(columns: Columns) -> str:
@@ -160,7 +160,7 @@ def _short(columns: Columns) -> str:
 
 def _row(where: str, row: Sequence[str], names: Sequence[str]) -> list[float]:
     if len(row) != len(names):
-        raise InputError(f"{where}: found {len(row)} cells; expected {len(names)}")
+        raise InputError(f"{where}: found {len(row)} cells, expected {len(names)}")
     out = []
     for name, cell in zip(names, row, strict=True):
         if not cell.strip() and (name.startswith("tension_") or name in TILT):
@@ -172,7 +172,7 @@ def _row(where: str, row: Sequence[str], names: Sequence[str]) -> list[float]:
             value = math.nan
         low, high, kind = _bounds(name)
         if not low <= value <= high or (name == "hold" and value != int(value)):
-            raise InputError(f"{where}, column {name}: found {cell.strip()[:60]!r}; expected {kind}")
+            raise InputError(f"{where}, column {name}: found {cell.strip()[:60]!r}, expected {kind}")
         out.append(value)
     return out
 

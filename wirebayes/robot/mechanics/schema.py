@@ -98,7 +98,7 @@ class _Table:
             As the message shows them.
         """
         path = f"{self.path}.{key}" if self.path else key
-        return InputError(f"{self.where}: {path}: {found}; expected {expected}")
+        return InputError(f"{self.where}: {path}: {found}, expected {expected}")
 
     def take(self, key: str, expected: str, default: Any = None) -> Any:
         """The value of a key, which counts as known from then on.

@@ -132,21 +132,21 @@ def parse(
     wanted = columns(robot, tilted, motors, moved)
     if not rows or rows[0] != wanted:
         found = ",".join(rows[0])[:200] if rows else "nothing"
-        raise InputError(f"{source}: {place(1)}: found {found}; expected the header {','.join(wanted)}")
+        raise InputError(f"{source}: {place(1)}: found {found}, expected the header {','.join(wanted)}")
     if moved and not biased:
         raise InputError(
-            f"{source}: {place(1)}: found directions of motion, but the sensors have no bias; expected "
+            f"{source}: {place(1)}: found directions of motion, but the sensors have no bias, expected "
             "--tension-bias N, or tension_bias_N under [sensors] in the robot's file"
         )
     cells = [_row(f"{source}: {place(line)}", row, wanted, biased) for line, row in numbered[1:]]
     table = np.array(cells).reshape(-1, len(wanted))
     if not len(table):
-        raise InputError(f"{source}: found no holds; expected at least one row")
+        raise InputError(f"{source}: found no holds, expected at least one row")
     numbers = table[:, 0].tolist()
     for i, number in enumerate(numbers):
         if number in numbers[:i]:
             again = f"{source}: {place(numbered[i + 1][0])}, column hold: found {number:g} once more"
-            raise InputError(f"{again}; expected a row for each hold")
+            raise InputError(f"{again}, expected a row for each hold")
     w = robot.legs
     joint, tension = table[:, 8 : 8 + w], table[:, 8 + w : 8 + 2 * w]
     if motors and robot.drums is not None:
@@ -155,14 +155,14 @@ def parse(
     if unlikely is not None:
         (row, leg), expected = unlikely
         where = f"{source}: {place(numbered[row + 1][0])}, column {wanted[8 + leg]}"
-        raise InputError(f"{where}: found {table[row, 8 + leg]:.10g}; expected {expected}")
+        raise InputError(f"{where}: found {table[row, 8 + leg]:.10g}, expected {expected}")
     motion = table[:, 8 + 2 * w : 8 + 3 * w] if moved else None
     measured = np.delete(table[:, 8 + w :], np.s_[w : 2 * w], axis=1) if moved else table[:, 8 + w :]
     read_here = np.isfinite(measured).all(1)
     half = ~read_here & np.isfinite(measured).any(1)
     if half.any():
         raise InputError(
-            f"{source}: {place(numbered[int(np.argmax(half)) + 1][0])}: found some readings empty; expected all or none"
+            f"{source}: {place(numbered[int(np.argmax(half)) + 1][0])}: found some readings empty, expected all or none"
         )
     _refuse_half(source, place, numbered, table[:, 1:4], "the position")
     _refuse_half(source, place, numbered, table[:, 4:7], "the rotation")
@@ -193,7 +193,7 @@ def _refuse_half(
     half = given.any(1) & ~given.all(1)
     if half.any():
         line = numbered[int(np.argmax(half)) + 1][0]
-        raise InputError(f"{source}: {place(line)}: found some cells of {name} empty; expected all or none")
+        raise InputError(f"{source}: {place(line)}: found some cells of {name} empty, expected all or none")
 
 
 _LARGEST = 1e9  # metres, seconds, newtons: nothing that is measured comes near
@@ -201,7 +201,7 @@ _LARGEST = 1e9  # metres, seconds, newtons: nothing that is measured comes near
 
 def _row(place: str, row: list[str], names: list[str], biased: bool) -> list[float]:
     if len(row) != len(names):
-        raise InputError(f"{place}: found {len(row)} cells; expected {len(names)}")
+        raise InputError(f"{place}: found {len(row)} cells, expected {len(names)}")
     out = []
     for name, cell in zip(names, row, strict=True):
         optional = name.startswith(("tension_", "normal_")) or name in POSE
@@ -222,6 +222,6 @@ def _row(place: str, row: list[str], names: list[str], biased: bool) -> list[flo
         elif name in NORMAL:
             allowed, kind = abs(value) <= 1, "a component of a unit vector, from -1 to 1"
         if not np.isfinite(value) or not allowed:
-            raise InputError(f"{place}, column {name}: found {cell[:60]!r}; expected {kind}")
+            raise InputError(f"{place}, column {name}: found {cell[:60]!r}, expected {kind}")
         out.append(value)
     return out
