@@ -18,6 +18,7 @@ import pytest
 from wirebayes.cli import COMMANDS, main
 from wirebayes.io.experiment import read_experiments
 from wirebayes.robot.mechanics import schema
+from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire import compiled
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
@@ -223,13 +224,13 @@ def test_the_page_on_robots_has_every_option(command):
 
 def test_the_page_on_robots_has_every_key_of_a_robots_file(monkeypatch):
     """The keys that the reader asks for, of robots with everything that a robot can have."""
-    asked, take = set(), schema._Table.take
+    asked, value = set(), Keys.value
 
     def noted(self, key, *rest):
-        asked.add(re.sub(r"\[\d+\]", "", f"{self.path}.{key}"))
-        return take(self, key, *rest)
+        asked.add(re.sub(r"\[\d+\]", "", f"{self.prefix}{key}"))
+        return value(self, key, *rest)
 
-    monkeypatch.setattr(schema._Table, "take", noted)
+    monkeypatch.setattr(Keys, "value", noted)
     text = (Path(schema.__file__).parents[2] / "data" / "robots" / "hangprinter-4.toml").read_text()
     drum = "drum_radius_m = 0.03\ndrum_layer_turns = 20\ndrum_layer_height_m = 1e-3\nwire_length_m = 9.0\n"
     leg = "[[leg]]\nwire = 'own'\npulley_radius_m = 0.01\nswivel_axis = [0, 0, 1]\n" + drum

@@ -111,9 +111,9 @@ def test_a_wrong_argument_is_named(about, message):
 
 
 def test_a_table_without_a_column_is_refused():
-    with pytest.raises(wb.InputError, match="found no column time_s, expected hold, displacement_mm, time_s"):
+    with pytest.raises(wb.InputError, match="found no column time_s, expected a header of hold,displacement_mm,time_s"):
         wb.from_arrays({k: v for k, v in GOOD.items() if k != "time_s"}, **ABOUT)
-    with pytest.raises(wb.InputError, match=r"found the column 'force', expected hold"):
+    with pytest.raises(wb.InputError, match=r"found 'force', expected a header of hold"):
         wb.from_arrays(GOOD | {"force": [1] * 5}, **ABOUT)
 
 
@@ -270,10 +270,10 @@ def test_a_data_frame_is_taken_as_it_is(folders):
 def test_a_session_in_memory_is_checked_by_row_and_column(folders):
     frame = pandas.read_csv(DOCS / "example" / "linear-7-session.csv")
     frame.loc[2, "duration_s"] = 0.0
-    message = r"^readings: row 2 \(from 0\), column duration_s: found '0', expected a number above 0"
+    message = r"^readings, row 2 \(from 0\), column duration_s: found '0', expected a number above 0"
     with pytest.raises(wb.InputError, match=message):
         wb.calibrate("linear-7", frame, folders / "fit" / "wire")
-    with pytest.raises(wb.InputError, match="^readings: columns: found hold, expected the header hold,x_m"):
+    with pytest.raises(wb.InputError, match="^readings, columns: found no column x_m, expected a header of hold,x_m"):
         wb.calibrate("linear-7", {"hold": [1]}, folders / "fit" / "wire")
 
 

@@ -223,7 +223,7 @@ def session_csv(tmp_path):
     truth[0, : robot.legs] = 1e-3 * np.array([3, -2, 1, 4, -5, 0, 2])
     real = predict(robot, prior, session, truth)
     tension = iter(real.readings.reshape(-1, robot.legs) * 0.02)
-    rows = [session_file.columns(robot, False)]
+    rows = [[*session_file.columns(robot).required]]
     for k in range(len(x)):
         cells = [str(v) for v in (k + 1, *x[k], 0, 0, 0, 30.0, *commanded.joint_m[k])]
         rows.append([*cells, *([str(v) for v in next(tension)] if read[k] else [""] * robot.legs)])
@@ -285,12 +285,12 @@ def test_the_documented_session_is_one():
     ("old", "new", "message"),
     [
         ("hold,", "holds,", "line 1"),
-        (",30.0,", ",-30.0,", "line 2, column duration_s"),
-        (",30.0,", ",nan,", "line 2, column duration_s"),
+        (",30.0,", ",-30.0,", "line 2, column 8 (duration_s)"),
+        (",30.0,", ",nan,", "line 2, column 8 (duration_s)"),
         (",30.0,", ",", "line 2"),
         (",,,,,,,\n", ",1.0,,,,,,\n", "line 2"),
-        ("\n1,", "\n\nx,", "line 3, column hold"),  # an empty line counts
-        ("\n3,", "\n1,", "line 4, column hold: found 1 once more, expected a row for each hold"),
+        ("\n1,", "\n\nx,", "line 3, column 1 (hold)"),  # an empty line counts
+        ("\n3,", "\n1,", "line 4, column 1 (hold): found 1 once more, expected a row for each hold"),
     ],
 )
 def test_a_wrong_session_names_line_and_column(fitted, session_csv, tmp_path, capsys, old, new, message):
@@ -344,7 +344,7 @@ def test_a_bias_is_estimated_on_request_and_its_sign_may_follow_the_motion(fitte
     file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
     arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted)]
     assert main([*arguments, "--output", str(tmp_path / "o")]) == 2
-    assert "session.csv: line 1: found directions of motion, but the sensors have no bias" in capsys.readouterr().err
+    assert "session.csv, line 1: found directions of motion, but the sensors have no bias" in capsys.readouterr().err
     assert main([*arguments, "--tension-bias", "-1", "--output", str(tmp_path / "o")]) == 2
     out = tmp_path / "out"
     assert main([*arguments, "--tension-bias", "0.2", "--output", str(out)]) == 0
@@ -358,7 +358,7 @@ def test_a_bias_is_estimated_on_request_and_its_sign_may_follow_the_motion(fitte
     lines[2][-1] = "2"
     file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
     assert main([*arguments, "--tension-bias", "0.2", "--output", str(tmp_path / "o")]) == 2
-    assert "line 3, column motion_7: found '2', expected 1 (pulled in last)" in capsys.readouterr().err
+    assert "line 3, column 29 (motion_7): found '2', expected 1 (pulled in last)" in capsys.readouterr().err
 
 
 def test_an_inclinometer_joins_in_and_is_checked(fitted, session_csv, tmp_path, capsys):
@@ -373,7 +373,7 @@ def test_an_inclinometer_joins_in_and_is_checked(fitted, session_csv, tmp_path, 
     file.write_text("\n".join(level).replace(",0.0,0.0\n", ",0.0,1.5\n", 1) + "\n")
     capsys.readouterr()
     assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(tmp_path / "o")]) == 2
-    assert "column normal_y: found '1.5', expected a component of a unit vector" in capsys.readouterr().err
+    assert "(normal_y): found '1.5', expected a component of a unit vector" in capsys.readouterr().err
 
 
 def test_export_speaks_the_firmwares_units(fitted, tmp_path):

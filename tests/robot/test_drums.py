@@ -100,13 +100,13 @@ def test_a_session_may_give_motor_angles(tmp_path):
     for name, motors, values in (("a", False, joint), ("b", True, angle)):
         with (tmp_path / name).open("w", newline="") as file:
             rows = csv.writer(file)
-            rows.writerow(session_file.columns(robot, False, motors))
+            rows.writerow(session_file.columns(robot, motors).required)
             rows.writerow([1, *robot.home_m, 0, 0, 0, 60, *map(float, values), *[2.0] * 8])
         sessions.append(session_file.read(tmp_path / name, robot, 0.02, 1e-3)[0])
-    assert "joint_3_m" in session_file.columns(robot, False, True)
-    assert "motor_4_rad" in session_file.columns(robot, False, True)
+    assert "joint_3_m" in session_file.columns(robot, True).required
+    assert "motor_4_rad" in session_file.columns(robot, True).required
     np.testing.assert_allclose(sessions[1].joint_m, sessions[0].joint_m, atol=1e-13)
-    with pytest.raises(InputError, match="expected the header hold,.*joint_1_m"):
+    with pytest.raises(InputError, match="expected a header of hold,.*joint_1_m"):
         session_file.read(tmp_path / "b", schema.read("cogiro-desk"), 0.02, 1e-3)
 
 

@@ -95,7 +95,7 @@ def test_lengths_alone_are_an_answer_that_says_what_it_does_not_know(run):
 def test_millimetres_are_refused(run):
     code, said, found, _ = run("calibrate", ANCHORS / "hp4.toml", FIELD / "calibrate-mm" / "t1-inmm.csv")
     assert code == 2 and found is None
-    assert "line 2, column joint_1_m: found 3164.85, expected metres" in said
+    assert "(joint_1_m): found '3164.85', expected metres" in said
 
 
 def test_a_home_pose_that_nothing_holds_has_no_joint_values(run):

@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from wirebayes.robot.history.unknowns import Uncertain, Unknowns, even_normals, 
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.mechanics.description import Drums
 from wirebayes.robot.motion import inverse
+from wirebayes.strict.table import csv_table
 
 CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
 
@@ -445,37 +447,37 @@ HEAD = "time_s,joint_1_m,joint_2_m,joint_3_m,joint_4_m"
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "line 1: found nothing, expected the header time_s,joint_1_m"),
-        (HEAD.replace("joint_4", "joint_5") + "\n", "line 1: found the column 'joint_5_m'"),
-        ("time_s,joint_1_m,joint_2_m,joint_3_m\n", "line 1: found no column joint_4_m, expected time_s"),
+        (",,\n", "line 1: found nothing, expected a header"),
+        (HEAD.replace("joint_4", "joint_5") + "\n", "line 1, column 5: found 'joint_5_m'"),
+        ("time_s,joint_1_m,joint_2_m,joint_3_m\n", "line 1: found no column joint_4_m, expected a header of time_s"),
         (HEAD + ",x_m\n", "line 1: found no column y_m"),
-        (HEAD + ",time_s\n", "line 1: found the column time_s twice"),
+        (HEAD + ",time_s\n", "line 1, column 6: found time_s a second time"),
         (HEAD + "\n0,1,1,1,1\n", "found 1 row of values, expected two or more"),
-        (HEAD + "\n0,1,1,1,1\n\n0,1,1,1,1\n", "line 4, column time_s: found 0, expected a time after 0 s"),
-        (HEAD + "\n0,1,1,1,1\n9,1,1,1\n", "line 3: found 4 cells, expected 5"),
+        (HEAD + "\n0,1,1,1,1\n\n0,1,1,1,1\n", "line 4, column 1 (time_s): found 0, expected a time after 0 s"),
+        (HEAD + "\n0,1,1,1,1\n9,1,1,1\n", "line 3, column 4: found 4 fields, expected 5 fields"),
         (
             HEAD + "\n0,1,1,,1\n9,1,1,1,1\n",
-            "line 2, column joint_3_m: found '', expected a number of at most 1e+09 in size",
+            "line 2, column 4 (joint_3_m): found an empty cell, expected a number of at most 1e+09 in size",
         ),
-        (HEAD + "\n0,1,inf,1,1\n9,1,1,1,1\n", "line 2, column joint_2_m: found 'inf'"),
+        (HEAD + "\n0,1,inf,1,1\n9,1,1,1,1\n", "line 2, column 3 (joint_2_m): found 'inf'"),
         (
             HEAD + ",payload_kg\n0,1,1,1,1,-1\n9,1,1,1,1,1\n",
-            "line 2, column payload_kg: found '-1', expected a number from 0 to 1e+09",
+            "line 2, column 6 (payload_kg): found '-1', expected a number from 0 to 1e+09",
         ),
-        (HEAD + "\n0,1,1,1,1\n60,-1,1,1,1\n", "line 3, column joint_1_m: found '-1', expected a length above 0"),
-        (HEAD + "\n0,1,1,0.0,1\n60,1,1,1,1\n", "line 2, column joint_3_m: found '0.0', expected a length above 0"),
+        (HEAD + "\n0,1,1,1,1\n60,-1,1,1,1\n", "line 3, column 2 (joint_1_m): found '-1', expected a length above 0"),
+        (HEAD + "\n0,1,1,0.0,1\n60,1,1,1,1\n", "line 2, column 4 (joint_3_m): found '0.0', expected a length above 0"),
         (
             HEAD + "\n0,1,1,1,1\n60,1,1776,1,1\n",
-            "line 3, column joint_2_m: found '1776', expected metres, at most 115, 10 times the robot's size",
+            "line 3, column 3 (joint_2_m): found '1776', expected metres, at most 115, 10 times the robot's size",
         ),
-        (HEAD + ",hold\n0,1,1,1,1,1.5\n9,1,1,1,1,1\n", "line 2, column hold: found '1.5', expected a whole number"),
+        (HEAD + ",hold\n0,1,1,1,1,1.5\n9,1,1,1,1,1\n", "line 2, column 6 (hold): found '1.5', expected a whole number"),
     ],
 )
 def test_a_mistake_in_a_history_is_named_by_line_and_column(text, message):
     robot = schema.read("hangprinter-4")
     with pytest.raises(InputError) as caught:
-        table.parse("log.csv", text, robot, table.measured)
-    assert str(caught.value).startswith(f"log.csv: {message}")
+        table.parse(csv_table(Path("log.csv"), text), robot, table.measured)
+    assert str(caught.value).startswith((f"log.csv, {message}", f"log.csv: {message}"))
     assert "\n" not in str(caught.value)
 
 
@@ -485,18 +487,18 @@ def test_motor_angles_may_be_negative_but_not_the_lengths_they_pay_out():
     robot = replace(robot, drums=Drums(zeros + 0.05, zeros, zeros + np.inf, zeros, zeros, zeros - 1.0))
     head = ",".join(["time_s", *(f"motor_{i}_rad" for i in range(1, 5))])
     good = f"{head}\n0,-125,-136,-124,-160\n9,-125,-136,-124,-160\n"
-    assert table.parse("log.csv", good, robot, table.measured).joint_m[0, 3] == pytest.approx(8.0)
+    assert table.parse(csv_table(Path("log.csv"), good), robot, table.measured).joint_m[0, 3] == pytest.approx(8.0)
     with pytest.raises(InputError) as caught:
-        table.parse("log.csv", good.replace("9,-125", "9,125"), robot, table.measured)
-    wrong = "line 3, column motor_1_rad: found '125', which pays out -6.25 m, expected a length above 0"
-    assert str(caught.value) == f"log.csv: {wrong}"
+        table.parse(csv_table(Path("log.csv"), good.replace("9,-125", "9,125")), robot, table.measured)
+    wrong = "line 3, column 2 (motor_1_rad): found '125', which pays out -6.25 m, expected a length above 0"
+    assert str(caught.value) == f"log.csv, {wrong}"
 
 
 def test_a_linear_actuator_may_stand_at_zero_or_below():
     robot = schema.read("linear-7")
     text = ",".join(["time_s", *(f"joint_{i}_m" for i in range(1, 8))])
     text += "\n0,-0.1,0,0.1,0.1,0.1,0.1,0.1\n9,-0.1,0,0.1,0.1,0.1,0.1,0.1\n"
-    assert table.parse("log.csv", text, robot, table.measured).joint_m[0, :2].tolist() == [-0.1, 0.0]
+    assert table.parse(csv_table(Path("log.csv"), text), robot, table.measured).joint_m[0, :2].tolist() == [-0.1, 0.0]
 
 
 def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  # noqa: F811
@@ -528,7 +530,7 @@ def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  
         assert "<td>" in page
     refused = [
         (["--joints", str(tmp_path / "log.csv"), "--trajectory", str(tmp_path / "way.csv")], "found both"),
-        (["--trajectory", str(tmp_path / "log.csv")], "line 1: found the column 'joint_1_m'"),
+        (["--trajectory", str(tmp_path / "log.csv")], "line 1, column 2: found 'joint_1_m'"),
         (["--joints", str(tmp_path / "none.csv")], "found no such file"),
         (["--joints", str(tmp_path / "log.csv"), "--times", "0,9"], "--times"),
         (["--payload", "-1"], "--payload: found -1, expected kilograms, 0 or more"),

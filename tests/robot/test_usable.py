@@ -1,6 +1,7 @@
 """When lengths of a calibration may be set: the joint test at its threshold, and drawn robots with wrong anchors."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from wirebayes.robot.self_calibration import answer, session_file
 from wirebayes.robot.self_calibration.estimate import calibrate
 from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
 from wirebayes.robot.self_calibration.trust import joint_test
+from wirebayes.strict.table import csv_table
 
 SPREAD = 1e-3  # from wire to wire: small, so that a session of eight stops is solved in a moment
 
@@ -100,6 +102,8 @@ def test_millimetres_and_straight_lengths_are_refused_with_their_place(tmp_path)
             if scale == 1.0 and robot.beyond_m.any():
                 continue
             changed = [[*row[:8], *(scale * straight), *row[8 + robot.legs :]] for row in rows]
-            text = "\n".join([",".join(session_file.columns(robot, False)), *(",".join(map(str, r)) for r in changed)])
-            with pytest.raises(InputError, match=rf"line 2, column joint_\d_m: found .*, expected .*{reason}"):
-                session_file.parse("session.csv", text, robot, 0.02, 1e-3)
+            text = "\n".join(
+                [",".join(session_file.columns(robot).required), *(",".join(map(str, r)) for r in changed)]
+            )
+            with pytest.raises(InputError, match=rf"line 2, column \d+ \(joint_\d_m\): found .*, expected .*{reason}"):
+                session_file.parse(csv_table(Path("session.csv"), text), robot, 0.02, 1e-3)

@@ -33,7 +33,7 @@ from wirebayes.robot.self_calibration.answer import answer
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
-from wirebayes.strict.columns import as_csv, row_place
+from wirebayes.strict.columns import columns_table
 from wirebayes.strict.files import PathLike
 from wirebayes.views.calibration import Calibration
 from wirebayes.views.result import ResultFolder
@@ -147,9 +147,9 @@ def calibrate(
         session, values = session_file.read(Path(readings), machine, tension_sd, tilt_sd, bias > 0)
         read = content(Path(readings))
     else:
-        text = _as_csv(readings, machine)
-        session, values = session_file.parse("readings", text, machine, tension_sd, tilt_sd, row_place, bias > 0)
-        read = hash_of({"readings": text})
+        table = columns_table(readings, Path("readings"), session_file.may_be_empty)
+        session, values = session_file.parse(table, machine, tension_sd, tilt_sd, bias > 0)
+        read = hash_of({"readings": [table.header, *table.rows]})
     line = draws_for(machine, wires, draws, experiment, own)
     options = {
         "--experiment": experiment, "--tension-sd": tension_sd, "--tilt-sd": tilt_sd, "--reference-sd": reference_sd,
@@ -285,15 +285,3 @@ def _belongs_to(robot: Robot, wires: Wires, experiment: str | None) -> BelongsTo
     posterior = posterior_of(wires, experiment)
     kept = posterior if isinstance(posterior, str) else content(posterior)
     return {"robot": hash_of(asdict(robot)), "wires": kept}
-
-
-def _as_csv(columns: Any, robot: Robot) -> str:
-    """Columns in memory, in any order, as the text that the reader checks."""
-
-    def ordered(names: list[str]) -> list[str]:
-        wanted = session_file.columns(
-            robot, session_file.NORMAL[0] in names, session_file.has_motors(names), session_file.has_motion(names)
-        )
-        return wanted if sorted(names) == sorted(wanted) else names
-
-    return as_csv("readings", columns, ordered)

@@ -22,7 +22,7 @@ from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.self_calibration.calibrated import to_dict
-from wirebayes.strict.columns import as_csv, row_place
+from wirebayes.strict.columns import columns_table
 from wirebayes.strict.files import PathLike
 from wirebayes.views.calibration import Calibration
 from wirebayes.views.pose import Pose
@@ -151,9 +151,9 @@ def pose_history(
         history = table.read(Path(given), robot, columns)
         read = content(Path(given))
     else:
-        text = as_csv(option[2:], given)
-        history = table.parse(option[2:], text, robot, columns, row_place)
-        read = hash_of({option: text})
+        cells = columns_table(given, Path(option[2:]), table.may_be_empty)
+        history = table.parse(cells, robot, columns)
+        read = hash_of({option: [cells.header, *cells.rows]})
     _refuse_off_plane(robot, option, history)
     lasting = {  # in a fixed order, as in `wires.configuration`
         "of": option[2:],

@@ -1,19 +1,16 @@
 """Tests and protocols that stand in memory: columns of numbers, checked as the reader of files checks its own."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.errors import InputError, shown
+from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment, experiment_of
 from wirebayes.io.readings import OPTIONAL, READ, REQUIRED, protocol_columns
-from wirebayes.strict.columns import is_table
-from wirebayes.strict.hint import hint
-from wirebayes.strict.table import Table
+from wirebayes.strict.columns import columns_table, is_table, names_of
+from wirebayes.strict.table import Header, Table
 from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control
 
@@ -95,7 +92,7 @@ def from_arrays(
     elif any(values is not None for values in (displacement_mm, time_s, tension_N)):
         raise InputError(f"{SOURCE}: found a table and single columns, expected one or the other")
     if temperature_C is not None:
-        columns = {column: columns[column] for column in _names(columns)} | {"temperature_C": temperature_C}
+        columns = {column: columns[column] for column in names_of(columns)} | {"temperature_C": temperature_C}
     about: dict[str, Any] = {"name": name, "material": material, "length_mm": length_mm, "control": control}
     stated = {"resolution_N": resolution_N or None, "resolution_mm": resolution_mm or None, "preload_mm": preload_mm}
     about |= {key: value for key, value in stated.items() if value is not None}
@@ -131,36 +128,11 @@ def table_of(
     InputError
         A column is missing or unknown, is not one value a row, or there are no rows.
     """
-    names = _names(columns)
-    known = (*required, *optional)
-    for name in names:
-        if name not in known:
-            raise InputError(
-                f"{source}: found the column {shown(name)}{hint(str(name), known)}, expected {', '.join(known)}"
-            )
-    for name in required:
-        if name not in names:
-            raise InputError(f"{source}: found no column {name}, expected {', '.join(required)}")
-    header = [name for name in known if name in names]
-    texts: list[list[str]] = []
-    for name in header:
-        values = _objects(columns[name])
-        if values.ndim != 1 or (texts and len(values) != len(texts[0])):
-            found = f"an array of shape {values.shape}" if values.ndim != 1 else f"{len(values)} values"
-            expected = f"{len(texts[0])} as in {header[0]}" if texts else "one value for each reading"
-            raise InputError(f"{source}, column {name}: found {found}, expected {expected}")
-        texts.append([_text(value, empty=name in may_be_empty) for value in values])
-    if not texts[0]:
+    table = columns_table(columns, source, lambda name: name in may_be_empty)
+    table.check_header(Header(tuple(required), tuple((name,) for name in optional)))
+    if not table.rows:
         raise InputError(f"{source}: found no readings, expected at least one")
-    return _Columns(source, header, [list(row) for row in zip(*texts, strict=True)])
-
-
-@dataclass(frozen=True)
-class _Columns(Table):
-    """A table without lines: its rows are counted from 0, as indices are."""
-
-    def place(self, row: int, column: str) -> str:
-        return f"row {row} (from 0), column {column}" if column in self.header else f"column {column}"
+    return table
 
 
 class _Arguments(Keys):
@@ -171,17 +143,6 @@ class _Arguments(Keys):
         return InputError(f"{self.source}{place}: found {found}, expected {expected}")
 
 
-def _names(columns: Any) -> list[Any]:
-    return list(columns.columns) if hasattr(columns, "columns") else list(columns)
-
-
-def _objects(values: Any) -> NDArray[np.object_]:
-    """Values of a column, those that a mask hides as NaN."""
-    if np.ma.isMaskedArray(values):
-        values = np.ma.filled(values.astype(object), np.nan)
-    return np.asarray(list(values) if isinstance(values, Iterator) else values, dtype=object)
-
-
 def _plain(value: Any) -> Any:
     """Numbers of numpy's as Python's, so that the same checks hold."""
     if isinstance(value, dict):
@@ -189,13 +150,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list):
         return [_plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _text(value: Any, *, empty: bool) -> str:
-    """A value as a file would spell it; a whole number without a point, because columns with gaps are floats."""
-    value = value.item() if isinstance(value, np.generic) else value
-    if value is None or str(value) in ("nan", "<NA>", "NaT"):
-        return "" if empty else "nan"
-    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
-        return str(int(value))
-    return value.strip() if isinstance(value, str) else repr(value)

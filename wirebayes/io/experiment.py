@@ -19,7 +19,7 @@ from wirebayes.sentences import counted
 from wirebayes.strict.files import read_text
 from wirebayes.strict.hint import hint
 from wirebayes.strict.table import LARGEST, Table
-from wirebayes.strict.toml_keys import Keys, read_toml
+from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control, Protocol
 
 __all__ = ["Experiment", "Hold", "protocol_of", "read_experiments", "select"]
@@ -297,19 +297,13 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     """
     source = Path(path)
     text = read_text(source, "TOML with at least one [[experiment]]")
-    document = read_toml(source, text)
-    top = Keys(source, text, None, document)
+    top = Keys.of_file(source, text)
     top.only(("experiment", "prior"))
-    tables = document.get("experiment")
-    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
-        found = "nothing" if tables is None else "a single table" if isinstance(tables, dict) else shown(tables)
-        raise top.complain("experiment", found, "at least one [[experiment]]")
+    tables = top.tables("experiment")
     shared = top.priors()
     lines = {name: top.line(f"prior.{name}") for name in shared}
     experiments: list[Experiment] = []
-    for index, table in enumerate(tables):
-        name = table.get("name")
-        keys = Keys(source, text, index, table, name if isinstance(name, str) else "")
+    for keys in tables:
         experiment = _read_one(keys, shared, lines)
         if any(experiment.name == other.name for other in experiments):
             raise keys.complain("name", shown(experiment.name) + " a second time", "a name used once in the file")
@@ -419,35 +413,44 @@ def _readings_path(keys: Keys) -> Path:
 
 def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float, control: Control) -> tuple[Hold, ...]:
     """Insert the unrecorded holds, each before the first recorded hold whose number reaches its `before_hold`."""
-    entries = keys.value("unrecorded_holds", "") if "unrecorded_holds" in keys.table else []
-    expected = f"a list of {{ before_hold, {SET[control]}, duration_s }}"
-    if not isinstance(entries, list):
-        raise keys.complain("unrecorded_holds", shown(entries), expected)
-    recorded = [place for place, hold in enumerate(holds) if hold.number is not None]
-    numbers = [int(holds[place].number or 0) for place in recorded]
-    placed: list[tuple[int, Hold]] = []
+    entries = keys.elements("unrecorded_holds", f"a list of {{ before_hold, {SET[control]}, duration_s }}")
+    recorded = [(place, int(hold.number)) for place, hold in enumerate(holds) if hold.number is not None]
+    last = recorded[-1][1]
+    placed: dict[int, list[Hold]] = {}
     for index, entry in enumerate(entries):
-        if not isinstance(entry, dict):
-            raise keys.complain(f"unrecorded_holds[{index}]", shown(entry), expected)
-        inner = replace(keys, table=entry, prefix=f"unrecorded_holds[{index}].")
-        inner.only(("before_hold", SET[control], "duration_s"))
-        reach = f"a hold number from 0 to {numbers[-1]}, the last in {keys.table.get('readings', 'the readings')}"
-        before = inner.value("before_hold", reach)
-        if isinstance(before, bool) or not isinstance(before, int) or not 0 <= before <= numbers[-1]:
-            raise inner.complain("before_hold", shown(before), reach)
-        setting = _unrecorded_setting(inner, length_mm, control)
-        longest = LARGEST["time_s"]
-        duration = inner.number(
-            "duration_s", f"a duration of 0 s or more, at most {longest:.0e} s", least=0.0, most=longest
+        before, unrecorded = _unrecorded(
+            entry, last, str(keys.table.get("readings", "the readings")), length_mm, control
         )
-        if index and entry == entries[index - 1]:
+        if index and entry.table == entries[index - 1].table:
             raise keys.complain(f"unrecorded_holds[{index}]", "the hold before it once more", "each hold once")
-        place = next(place for place, number in zip(recorded, numbers, strict=True) if number >= before)
-        placed.append((place, Hold(None, setting, duration, frozen([]), frozen([]), control=control)))
+        place = next(place for place, number in recorded if number >= before)
+        placed.setdefault(place, []).append(unrecorded)
     ordered = []
     for place, hold in enumerate(holds):
-        ordered += [unrecorded for at, unrecorded in placed if at == place] + [hold]
+        ordered += [*placed.get(place, []), hold]
     return _in_sequence(tuple(ordered))
+
+
+def _unrecorded(keys: Keys, last: int, where: str, length_mm: float, control: Control) -> tuple[int, Hold]:
+    """One unrecorded hold, and the number of the hold that it came before.
+
+    Parameters
+    ----------
+    keys : Keys
+    last : int
+        Number of the last recorded hold.
+    where : str
+        What errors call the readings.
+    length_mm : float
+    control : {"displacement", "force"}
+    """
+    keys.only(("before_hold", SET[control], "duration_s"))
+    before = keys.whole("before_hold", f"a hold number from 0 to {last}, the last in {where}", 0, last)
+    setting = _unrecorded_setting(keys, length_mm, control)
+    longest = LARGEST["time_s"]
+    expected = f"a duration of 0 s or more, at most {longest:.0e} s"
+    duration = keys.number("duration_s", expected, least=0.0, most=longest)
+    return before, Hold(None, setting, duration, frozen([]), frozen([]), control=control)
 
 
 def _unrecorded_setting(keys: Keys, length_mm: float, control: Control) -> float:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -115,17 +115,10 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
         On anything wrong, with the file, the line, the key, what was found and what was expected.
     """
     text = read_text(path, "TOML with [[protocol]] tables")
-    document = read_toml(path, text)
-    top = Keys(path, text, None, document, kind=KIND)
+    top = Keys.of_file(path, text)
     top.only(_TOP)
-    tables = document.get(KIND, [])
-    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
-        found = "nothing" if KIND not in document else "a single table" if isinstance(tables, dict) else shown(tables)
-        raise top.complain(KIND, found, "at least one [[protocol]]")
     tests: list[PlannedTest] = []
-    for index, table in enumerate(tables):
-        name = table.get("name", f"protocol-{index + 1}")
-        keys = Keys(path, text, index, table, name if isinstance(name, str) else "", kind=KIND)
+    for index, keys in enumerate(top.tables(KIND)):
         test = _planned(keys, index)
         if any(test.name == other.name for other in tests):
             raise keys.complain("name", shown(test.name) + " a second time", "a name used once in the file")
@@ -135,11 +128,11 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
     if posterior is not None and guess:
         raise top.complain("posterior", "a posterior beside a [guess]", "one of them")
     expected = "a time budget above 0 min"
-    budget = top.number("budget_min", expected, above=0.0) if "budget_min" in document else None
-    robot = top.string("robot", "a robot's name or file") if "robot" in document else None
+    budget = top.number("budget_min", expected, above=0.0) if "budget_min" in top.table else None
+    robot = top.string("robot", "a robot's name or file") if "robot" in top.table else None
     if robot is not None and os.path.isfile(path.parent / robot):
         robot = str(path.parent / robot)
-    material = top.string("material", "a name") if "material" in document else "line"
+    material = top.string("material", "a name", "line")
     priors = top.priors()
     return PlanFile(
         path, tuple(tests), material, guess, {n: top.line(f"guess.{n}") for n in guess}, posterior, priors,
@@ -151,7 +144,7 @@ def _planned(keys: Keys, index: int) -> PlannedTest:
     control = control_of(keys)
     of_settings, step, of_resolution = _SET[control]
     keys.only((*_KEYS, of_settings, step, of_resolution))
-    name = keys.string("name", "a name") if "name" in keys.table else f"protocol-{index + 1}"
+    name = keys.string("name", "a name", f"protocol-{index + 1}")
     expected = f"a length above 0 mm, from {SHORTEST:.0e} to {LARGEST['displacement_mm']:.0e} mm"
     length = keys.number("length_mm", expected, least=SHORTEST, most=LARGEST["displacement_mm"])
     resolution = 0.01
@@ -161,7 +154,7 @@ def _planned(keys: Keys, index: int) -> PlannedTest:
     path = _weights(keys) if control == "force" else _displacements(keys, length)
     if "unload" in keys.table:
         expected = f"a whole number of holds on the way back, 0 to {len(path) - 1}"
-        back = _whole(keys, "unload", expected, 0, len(path) - 1)
+        back = keys.whole("unload", expected, 0, len(path) - 1)
         path += path[-2 : -2 - back : -1]
     times = _times(keys)
     if len(path) * len(times) < LEAST_READINGS:
@@ -175,14 +168,14 @@ def _planned(keys: Keys, index: int) -> PlannedTest:
         )  # fmt: skip
     warmth: list[float] = []
     if "temperatures_C" in keys.table:
-        warmth = _numbers(keys, "temperatures_C", "a list of temperatures above -273.15 °C")
+        warmth = keys.numbers("temperatures_C", "a list of temperatures above -273.15 °C")
         if not warmth or min(warmth) <= -273.15:
             raise keys.complain("temperatures_C", shown(warmth), "a list of temperatures above -273.15 °C")
     return PlannedTest(name, length, control, tuple(path), resolution, tuple(times), tuple(warmth))
 
 
 def _displacements(keys: Keys, length: float) -> list[float]:
-    expected = f"displacements above -{length:g} mm, the wire's length, and of at most {STRETCH:g} times it"
+    expected = f"a list of displacements above -{length:g} mm, the wire's length, and of at most {STRETCH:g} times it"
     path, key = _settings(keys, "displacement", expected)
     if not path or min(path) <= -length or max(path) > STRETCH * length:
         raise keys.complain(key, shown(keys.table[key]), expected)
@@ -190,7 +183,7 @@ def _displacements(keys: Keys, length: float) -> list[float]:
 
 
 def _weights(keys: Keys) -> list[float]:
-    expected = f"weights above 0 N, of at most {LARGEST['tension_N']:.0e} N"
+    expected = f"a list of weights above 0 N, of at most {LARGEST['tension_N']:.0e} N"
     path, key = _settings(keys, "force", expected)
     if not path or min(path) <= 0 or max(path) > LARGEST["tension_N"]:
         raise keys.complain(key, shown(keys.table[key]), expected)
@@ -204,12 +197,12 @@ def _settings(keys: Keys, control: Control, expected: str) -> tuple[list[float],
         for other in (of_step, "holds"):
             if other in keys.table:
                 raise keys.complain(other, f"{other} beside {of_settings}", "one way to say it")
-        return _numbers(keys, of_settings, expected), of_settings
+        return keys.numbers(of_settings, expected), of_settings
     unit = SET_UNIT[control]
     step = keys.number(of_step, f"a step other than 0 {unit}, or {of_settings}")
     if step == 0:
         raise keys.complain(of_step, "0", f"a step other than 0 {unit}")
-    count = _whole(keys, "holds", "a whole number of holds, 1 or more", 1, MOST_READINGS)
+    count = keys.whole("holds", "a whole number of holds, 1 or more", 1, MOST_READINGS)
     return [step * (i + 1) for i in range(count)], of_step
 
 
@@ -218,8 +211,8 @@ def _times(keys: Keys) -> list[float]:
         for other in ("hold_s", "readings"):
             if other in keys.table:
                 raise keys.complain(other, f"{other} beside times_s", "one way to say it")
-        expected = "rising times from 0 s on"
-        times = _numbers(keys, "times_s", expected)
+        expected = "a list of rising times from 0 s on"
+        times = keys.numbers("times_s", expected)
         if not times or times[0] < 0 or times[-1] > LARGEST["time_s"] or (np.diff(times) <= 0).any():
             raise keys.complain("times_s", shown(keys.table["times_s"]), expected)
         return times
@@ -227,38 +220,18 @@ def _times(keys: Keys) -> list[float]:
     duration = keys.number("hold_s", expected, above=0.0, most=LARGEST["time_s"])
     count = 5  # the paper's
     if "readings" in keys.table:
-        count = _whole(keys, "readings", "a whole number of readings in a hold, 2 or more", 2, MOST_READINGS)
+        count = keys.whole("readings", "a whole number of readings in a hold, 2 or more", 2, MOST_READINGS)
     return [float(t) for t in np.linspace(0.0, duration, count)]
 
 
-def _whole(keys: Keys, key: str, expected: str, least: int, most: int) -> int:
-    value = keys.value(key, expected)
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise keys.complain(key, shown(value), expected)
-    return value
-
-
-def _numbers(keys: Keys, key: str, expected: str) -> list[float]:
-    values = keys.value(key, expected)
-    if not isinstance(values, list):
-        raise keys.complain(key, shown(values), f"a list of {expected}")
-    for value in values:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < np.inf:
-            raise keys.complain(key, shown(value), expected)
-    return [float(value) for value in values]
-
-
 def _guess(top: Keys) -> dict[str, Any]:
-    table = top.table.get("guess", {})
-    if not isinstance(table, dict):
-        raise top.complain("guess", shown(table), "a table of parameters")
-    inner = replace(top, table=table, prefix="guess.")
-    for name, value in table.items():
+    inner = top.inside("guess", {}, "a table of parameters")
+    for name, value in inner.table.items():
         if name not in GUESSED:
             raise inner.complain(name, f"an unknown parameter{hint(name, GUESSED)}", ", ".join(GUESSED))
         if isinstance(value, bool) or not isinstance(value, int | float | dict):
             raise inner.complain(name, shown(value), 'a number, or a table such as { distribution = "normal", … }')
-    return table
+    return inner.table
 
 
 def _path(top: Keys, key: str, expected: str) -> Path | None:

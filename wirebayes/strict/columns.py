@@ -1,58 +1,80 @@
-"""A robot's tables that are given in memory, as the text of the file that would hold them: one reader checks both."""
+"""Columns in memory as the table that the readers of files check: a DataFrame, or a mapping of name to values."""
 
-import csv
-import io
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from wirebayes.errors import InputError
-from wirebayes.json_files.plain import plain
-
-
-def names_of(source: str, columns: Any) -> list[str]:
-    """Names of the columns of a DataFrame or mapping; errors call it `source`."""
-    if not is_table(columns):
-        raise InputError(f"{source}: found {type(columns).__name__}, expected a file, a DataFrame or columns by name")
-    return [str(name) for name in (columns.columns if hasattr(columns, "columns") else columns)]
-
-
-def as_csv(source: str, columns: Any, order: Callable[[list[str]], list[str]] = lambda names: names) -> str:
-    """Columns as CSV, in an order made of their names.
-
-    Raises
-    ------
-    InputError
-        They are no table, or of different lengths.
-
-    Parameters
-    ----------
-    source : str
-        What errors call the table.
-    columns : mapping of name to values, or DataFrame
-    order : callable
-        Of the list of names to the list in the order that the file has.
-
-    Returns
-    -------
-    str
-    """
-    names = order(names_of(source, columns))
-    values = [plain(list(columns[name])) for name in names]
-    rows = sorted({len(column) for column in values})
-    if len(rows) > 1:
-        raise InputError(f"{source}: found columns of {rows} rows, expected as many in each")
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows(["" if value is None else value for value in row] for row in zip(*values, strict=True))
-    return text.getvalue()
-
-
-def row_place(line: int) -> str:
-    """Where a line of `as_csv` stands in the columns."""
-    return "columns" if line == 1 else f"row {line - 2} (from 0)"
+from wirebayes.strict.table import Table
 
 
 def is_table(value: Any) -> bool:
     """Whether something is a mapping of columns or a DataFrame."""
     return isinstance(value, Mapping) or hasattr(value, "columns")
+
+
+def names_of(columns: Any) -> list[Any]:
+    """Names of the columns of a DataFrame or mapping."""
+    return list(columns.columns) if hasattr(columns, "columns") else list(columns)
+
+
+def columns_table(columns: Any, source: Path, may_be_empty: Callable[[str], bool]) -> Table:
+    """Columns as a table whose header is not checked yet.
+
+    Parameters
+    ----------
+    columns : DataFrame, or mapping of name to (r,) array
+    source : Path
+        What errors call it.
+    may_be_empty : callable
+        Of a column's name to whether NaN or None means there that there is nothing.
+
+    Raises
+    ------
+    InputError
+        It is no table, or a column is not one value a row.
+    """
+    if not is_table(columns):
+        raise InputError(f"{source}: found {type(columns).__name__}, expected a file, a DataFrame or columns by name")
+    header = [str(name) for name in names_of(columns)]
+    texts: list[list[str]] = []
+    for name, key in zip(header, names_of(columns), strict=True):
+        values = _objects(columns[key])
+        if values.ndim != 1 or (texts and len(values) != len(texts[0])):
+            found = f"an array of shape {values.shape}" if values.ndim != 1 else f"{len(values)} values"
+            expected = f"{len(texts[0])} as in {header[0]}" if texts else "one value for each row"
+            raise InputError(f"{source}, column {name}: found {found}, expected {expected}")
+        texts.append([_text(value, empty=may_be_empty(name)) for value in values])
+    return _Columns(source, header, [list(row) for row in zip(*texts, strict=True)])
+
+
+@dataclass(frozen=True)
+class _Columns(Table):
+    """A table without lines: its rows are counted from 0, as indices are."""
+
+    def place(self, row: int, column: str) -> str:
+        return f"row {row} (from 0), column {column}" if column in self.header else f"column {column}"
+
+    def header_place(self, column: int | None = None) -> str:
+        return "columns"
+
+
+def _objects(values: Any) -> NDArray[np.object_]:
+    """Values of a column, those that a mask hides as NaN."""
+    if np.ma.isMaskedArray(values):
+        values = np.ma.filled(values.astype(object), np.nan)
+    return np.asarray(list(values) if isinstance(values, Iterator) else values, dtype=object)
+
+
+def _text(value: Any, *, empty: bool) -> str:
+    """A value as a file would spell it; a whole number without a point, because columns with gaps are floats."""
+    value = value.item() if isinstance(value, np.generic) else value
+    if value is None or str(value) in ("nan", "<NA>", "NaT"):
+        return "" if empty else "nan"
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return str(int(value))
+    return value.strip() if isinstance(value, str) else repr(value)

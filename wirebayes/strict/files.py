@@ -5,7 +5,6 @@ import io
 import os
 import re
 import stat
-from collections.abc import Callable
 from pathlib import Path
 
 from wirebayes.errors import InputError
@@ -55,16 +54,8 @@ def read_text(path: Path, expected: str = "text") -> str:
     return text
 
 
-def csv_rows(source: str, text: str, place: Callable[[int], str]) -> list[tuple[int, list[str]]]:
+def csv_rows(source: Path, text: str) -> list[tuple[int, list[str]]]:
     """The rows of a CSV that are not empty, each with the number of its last line.
-
-    Parameters
-    ----------
-    source : str
-        What errors call the file.
-    text : str
-    place : callable
-        Of a line's number, counted from 1, to what errors call it.
 
     Raises
     ------
@@ -76,5 +67,5 @@ def csv_rows(source: str, text: str, place: Callable[[int], str]) -> list[tuple[
         return [(lines.line_num, row) for row in lines if row]
     except csv.Error as error:
         raise InputError(
-            f"{source}: {place(lines.line_num)}: found no CSV ({error}), expected cells with commas"
+            f"{source}, line {lines.line_num}: found no CSV ({error}), expected cells with commas"
         ) from None

@@ -1,13 +1,21 @@
-"""A CSV of plain numbers, split into cells: every complaint names the file, the line and the column."""
+"""A CSV of plain numbers, split into cells: every complaint names the file, the line and the column.
 
+Readings, protocols, histories of robots and calibration sessions are all read so; columns in memory become the same
+table (`wirebayes.strict.columns`). What a column means is known to whoever asks for it.
+"""
+
+import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from wirebayes.errors import InputError, shown
+from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import counted
-from wirebayes.strict.files import read_text
+from wirebayes.strict.files import csv_rows, read_text
 from wirebayes.strict.hint import hint
 
 # No bench comes near these: beyond them numbers are typing mistakes, and soon their squares overflow.
@@ -17,9 +25,61 @@ LARGEST = {
     "tension_N": 1e9,  # 100,000 t, several times the largest bridge's main cable
     "temperature_C": 1e4,  # above the boiling point of every wire
 }
+LARGEST_READING = 1e9  # metres, seconds, newtons of a robot: nothing that is measured comes near
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"\d{1,9}", re.ASCII)
 _NEWLINE = re.compile(r"\r\n|\n|\r")
+
+
+@dataclass(frozen=True)
+class Header:
+    """Which columns a table must and may have; groups come whole or not at all.
+
+    Attributes
+    ----------
+    required : tuple of str
+    groups : tuple of tuple of str
+    """
+
+    required: tuple[str, ...]
+    groups: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """Every name."""
+        return (*self.required, *(name for group in self.groups for name in group))
+
+    def __str__(self) -> str:
+        optional = [group[0] if len(group) == 1 else f"{group[0]}…{group[-1]}" for group in self.groups]
+        return ",".join(self.required) + (f" (and optionally {', '.join(optional)})" if optional else "")
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What the cells of a column may hold.
+
+    Attributes
+    ----------
+    expected : str
+        As a message says it.
+    least, most : float
+    above : float
+        The number must be greater.
+    whole : bool
+    empty : bool
+        An empty cell is NaN.
+    """
+
+    expected: str = f"a number of at most {LARGEST_READING:.0e} in size"
+    least: float = -LARGEST_READING
+    most: float = LARGEST_READING
+    above: float = -math.inf
+    whole: bool = False
+    empty: bool = False
+
+    def hold(self, value: float) -> bool:
+        """Whether a number may stand there; NaN never."""
+        return self.least <= value <= self.most and self.above < value and not (self.whole and value != int(value))
 
 
 @dataclass(frozen=True)
@@ -31,17 +91,45 @@ class Table:
     path : Path
     header : list of str
     rows : list of list of str
+    header_line : int
+    lines : sequence of int
+        On which line of the file each row stands; empty where none is left out.
     """
 
     path: Path
     header: list[str]
     rows: list[list[str]]
+    header_line: int = field(default=1, kw_only=True)
+    lines: Sequence[int] = field(default=(), kw_only=True)
+
+    def line(self, row: int) -> int:
+        """The line of the file on which a row stands."""
+        return self.lines[row] if self.lines else row + 2
 
     def place(self, row: int, column: str) -> str:
         """Where a cell stands; the header where there is no such column."""
         if column not in self.header:
-            return "line 1, header"
-        return f"line {row + 2}, column {self.header.index(column) + 1} ({column})"
+            return f"line {self.header_line}, header"
+        return f"line {self.line(row)}, column {self.header.index(column) + 1} ({column})"
+
+    def header_place(self, column: int | None = None) -> str:
+        """Where the header stands, or one of its names, counted from 0."""
+        return f"line {self.header_line}" + ("" if column is None else f", column {column + 1}")
+
+    def check_header(self, header: Header) -> None:
+        """Refuse columns that are not known, twice there or missing."""
+        for at, name in enumerate(self.header):
+            where = f"{self.path}, {self.header_place(at)}"
+            if name not in header.known:
+                meant = hint(name, header.known)
+                raise InputError(f"{where}: found {shown(name)}{meant}, expected a header of {header}")
+            if name in self.header[:at]:
+                raise InputError(f"{where}: found {name} a second time, expected it once")
+        for group in (header.required, *header.groups):
+            missing = [name for name in group if name not in self.header]
+            if missing and (group is header.required or len(missing) < len(group)):
+                where = f"{self.path}, {self.header_place()}"
+                raise InputError(f"{where}: found no column {missing[0]}, expected a header of {header}")
 
     def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
         """The error for one cell.
@@ -83,6 +171,32 @@ class Table:
             raise self.complain(row, column, found, "a whole number from 0 to 999999999")
         return int(text)
 
+    def numbers(self, allowed: Callable[[str], Numbers]) -> Floats:
+        """Every cell as a number.
+
+        Parameters
+        ----------
+        allowed : callable
+            Of a column's name to what its cells may hold.
+
+        Returns
+        -------
+        (rows, columns) array
+            NaN where a cell may be empty and is.
+        """
+        columns = [(name, allowed(name)) for name in self.header]
+        values = [[self._value(row, name, kind) for name, kind in columns] for row in range(len(self.rows))]
+        return np.array(values, float).reshape(len(self.rows), len(columns))
+
+    def _value(self, row: int, column: str, allowed: Numbers) -> float:
+        text = self.cell(row, column)
+        if not text and allowed.empty:
+            return math.nan
+        value = float(text) if _NUMBER.fullmatch(text) else math.nan
+        if not allowed.hold(value):
+            raise self.complain(row, column, shown(text) if text else "an empty cell", allowed.expected)
+        return value
+
 
 def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> Table:
     """Split a CSV into cells, each column once and every row as long as the header.
@@ -98,32 +212,44 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> 
     InputError
         With the file, line and column, what was found and what was expected.
     """
-    known = (*required, *optional)
-    expected = ",".join(required) + f" (and optionally {', '.join(optional)})"
-    lines = _NEWLINE.split(read_text(path, f"a header of {expected} and a line for each reading"))
+    header = Header(tuple(required), tuple((name,) for name in optional))
+    lines = _NEWLINE.split(read_text(path, f"a header of {header} and a line for each reading"))
     while not lines[-1].strip():
         lines.pop()
-    header = [field.strip() for field in lines[0].split(",")]
-    for column, name in enumerate(header, start=1):
-        if name not in known:
-            meant = hint(name, known)
-            raise InputError(
-                f"{path}, line 1, column {column}: found {shown(name)}{meant}, expected a header of {expected}"
-            )
-        if name in header[: column - 1]:
-            raise InputError(f"{path}, line 1, column {column}: found {name} a second time, expected it once")
-    for name in required:
-        if name not in header:
-            raise InputError(f"{path}, line 1: found no column {name}, expected a header of {expected}")
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        fields = [field.strip() for field in line.split(",")]
-        if len(fields) != len(header):
-            found = counted(len(fields), "field") if line.strip() else "a blank line"
-            column = min(len(fields), len(header))
-            expected = f"{len(header)} fields ({','.join(header)})"
-            raise InputError(f"{path}, line {number}, column {column}: found {found}, expected {expected}")
-        rows.append(fields)
-    if not rows:
+    cells = [[cell.strip() for cell in line.split(",")] for line in lines]
+    table = Table(path, cells[0], cells[1:])
+    table.check_header(header)
+    _check_lengths(table)
+    if not table.rows:
         raise InputError(f"{path}, line 2: found no readings, expected at least one")
-    return Table(path, header, rows)
+    return table
+
+
+def csv_table(source: Path, text: str) -> Table:
+    """The text of another program's CSV, split into cells: they may be quoted, and empty lines are passed over.
+
+    The header is not checked (`Table.check_header`).
+
+    Raises
+    ------
+    InputError
+        It is no CSV, or a row is longer or shorter than the header.
+    """
+    numbered = [(line, [cell.strip() for cell in row]) for line, row in csv_rows(source, text)]
+    numbered = [(line, row) for line, row in numbered if any(row)]
+    if not numbered:
+        raise InputError(f"{source}, line 1: found nothing, expected a header and rows of numbers")
+    (header_line, header), rows = numbered[0], numbered[1:]
+    table = Table(source, header, [row for _, row in rows], header_line=header_line, lines=[line for line, _ in rows])
+    _check_lengths(table)
+    return table
+
+
+def _check_lengths(table: Table) -> None:
+    """Refuse a row that is longer or shorter than the header."""
+    wanted = len(table.header)
+    for row, cells in enumerate(table.rows):
+        if len(cells) != wanted:
+            found = counted(len(cells), "field") if any(cells) or len(cells) > 1 else "a blank line"
+            where = f"{table.path}, line {table.line(row)}, column {min(len(cells), wanted)}"
+            raise InputError(f"{where}: found {found}, expected {wanted} fields ({','.join(table.header)})")

@@ -1,20 +1,23 @@
-"""The keys of one TOML table, read so that every error says where it stands."""
+"""The keys of one TOML table, read so that every error says where it stands: experiments, plans and robots alike."""
 
+import math
 import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from wirebayes.errors import InputError, shown
 from wirebayes.strict.hint import hint
 
+LARGEST_NUMBER = 1e12  # no length, mass, stiffness or time comes near, and its square does not overflow
+
 
 @dataclass(frozen=True)
 class Keys:
-    """One TOML table of an experiment file.
+    """One TOML table of a file, which remembers the keys that were asked for.
 
     Attributes
     ----------
@@ -25,11 +28,13 @@ class Keys:
         Which ``[[experiment]]`` (or other `kind`) the table belongs to, from 0; None for the top level.
     table : dict
     name : str
-        The experiment's name, where it has one.
+        What errors call the experiment; empty where the prefix says it.
     prefix : str
         The way from the experiment to this table.
     kind : str
         What the tables of the file are called.
+    asked : set of str
+        Keys whose values were asked for.
     """
 
     source: Path
@@ -39,6 +44,12 @@ class Keys:
     name: str = ""
     prefix: str = ""
     kind: str = "experiment"
+    asked: set[str] = field(default_factory=set, compare=False)
+
+    @classmethod
+    def of_file(cls, source: Path, text: str) -> Self:
+        """The top level of a TOML file."""
+        return cls(source, text, None, read_toml(source, text))
 
     def complain(self, key: str, found: str, expected: str) -> InputError:
         """The error for one key of the table.
@@ -55,8 +66,8 @@ class Keys:
             With the file, the line, the table and the key; the caller raises it.
         """
         place = f"{self.source}, line {self.line(key)}"
-        if self.index is not None:
-            place += f", {self.kind} {_printable(self.name) or self.index + 1}"
+        if self.name:
+            place += f", {self.kind} {_printable(self.name)}"
         return InputError(f"{place}, key {self.prefix}{_printable(key)}: found {found}, expected {expected}")
 
     def line(self, key: str) -> int:
@@ -69,19 +80,87 @@ class Keys:
                 meant = hint(key, known)
                 raise self.complain(key, f"an unknown key{meant}", "only " + ", ".join(known))
 
-    def value(self, key: str, expected: str) -> Any:
-        if key not in self.table:
-            raise self.complain(key, "nothing", expected)
-        return self.table[key]
+    def finish(self) -> None:
+        """Refuse the keys that nobody asked for."""
+        self.only(tuple(sorted(self.asked)))
 
-    def string(self, key: str, expected: str) -> str:
-        value = self.value(key, expected)
-        if not isinstance(value, str) or not value.strip():
+    def tables(self, kind: str, least: int = 1) -> list[Self]:
+        """The ``[[kind]]`` tables of a file, each called by its name or its number.
+
+        Raises
+        ------
+        InputError
+            There are fewer than `least`.
+        """
+        given = self.value(kind, f"at least {_COUNT[least]} [[{kind}]]")
+        if not isinstance(given, list) or len(given) < least or not all(isinstance(table, dict) for table in given):
+            found = "a single table" if isinstance(given, dict) else shown(given)
+            raise self.complain(kind, found, f"at least {_COUNT[least]} [[{kind}]]")
+        return [
+            replace(self, index=index, table=table, name=_called(table, index), kind=kind, asked=set())
+            for index, table in enumerate(given)
+        ]
+
+    def inside(self, key: str, default: dict[str, Any] | None = None, expected: str = "a table") -> Self:
+        """The table under a key; without a default it must be there."""
+        table = self.value(key, expected, default)
+        if not isinstance(table, dict):
+            raise self.complain(key, shown(table), expected)
+        return replace(self, table=table, prefix=f"{self.prefix}{key}.", asked=set())
+
+    def elements(self, key: str, expected: str) -> list[Self]:
+        """The tables of a list under a key, which may be missing."""
+        entries = self.value(key, expected, [])
+        if not isinstance(entries, list):
+            raise self.complain(key, shown(entries), expected)
+        for index, entry in enumerate(entries):
+            if not isinstance(entry, dict):
+                raise self.complain(f"{key}[{index}]", shown(entry), expected)
+        return [
+            replace(self, table=entry, prefix=f"{self.prefix}{key}[{index}].", asked=set())
+            for index, entry in enumerate(entries)
+        ]
+
+    def value(self, key: str, expected: str, default: Any = None) -> Any:
+        """What stands under a key; without a default it must be there."""
+        self.asked.add(key)
+        if key in self.table:
+            return self.table[key]
+        if default is None:
+            raise self.complain(key, "nothing", expected)
+        return default
+
+    def string(
+        self, key: str, expected: str = "a text", default: str | None = None, among: tuple[str, ...] = ()
+    ) -> str:
+        """A text that is not blank, one of some where there is a choice.
+
+        Parameters
+        ----------
+        key : str
+        expected : str
+            What the message says is expected, where there is no choice.
+        default : str, optional
+            For a key that is missing; without a default that is an error.
+        among : tuple of str
+            The texts allowed; empty for any.
+        """
+        if among:
+            expected = "one of " + ", ".join(among)
+        value = self.value(key, expected, default)
+        if not isinstance(value, str) or not value.strip() or (among and value not in among):
             raise self.complain(key, shown(value), expected)
         return value
 
     def number(
-        self, key: str, expected: str, above: float = -np.inf, least: float = -np.inf, most: float = np.inf
+        self,
+        key: str,
+        expected: str = "",
+        *,
+        above: float = -math.inf,
+        least: float = -LARGEST_NUMBER,
+        most: float = LARGEST_NUMBER,
+        default: float | None = None,
     ) -> float:
         """A finite number within limits.
 
@@ -89,27 +168,66 @@ class Keys:
         ----------
         key : str
         expected : str
-            What the message says is expected.
+            What the message says is expected; without it the limits.
         above : float
             The number must be greater.
         least, most : float
             The number must not be less, nor more.
+        default : float, optional
+            For a key that is missing; without a default that is an error.
 
         Raises
         ------
         InputError
             If the key is missing, no number or beyond the limits.
         """
-        value = self.value(key, expected)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.complain(key, shown(value), expected)
-        try:
-            number = float(value)
-        except OverflowError:
-            raise self.complain(key, shown(value), expected) from None
-        if not (np.isfinite(number) and above < number and least <= number <= most):
+        expected = expected or _within(above, least, most)
+        value = self.value(key, expected, default)
+        number = _finite(value)
+        if number is None or not (above < number and least <= number <= most):
             raise self.complain(key, shown(value), expected)
         return number
+
+    def whole(self, key: str, expected: str, least: int, most: int) -> int:
+        """A whole number within limits.
+
+        Parameters
+        ----------
+        key : str
+        expected : str
+            What the message says is expected.
+        least, most : int
+        """
+        value = self.value(key, expected)
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise self.complain(key, shown(value), expected)
+        return value
+
+    def numbers(
+        self, key: str, expected: str, count: int | None = None, default: list[float] | None = None
+    ) -> list[float]:
+        """A list of finite numbers.
+
+        Parameters
+        ----------
+        key : str
+        expected : str
+            What the message says is expected.
+        count : int, optional
+            How many there must be.
+        default : list of float, optional
+            For a key that is missing; without a default that is an error.
+        """
+        values = self.value(key, expected, default)
+        if not isinstance(values, list) or (count is not None and len(values) != count):
+            raise self.complain(key, shown(values), expected)
+        numbers = []
+        for value in values:
+            number = _finite(value)
+            if number is None or abs(number) > LARGEST_NUMBER:
+                raise self.complain(key, shown(value), expected)
+            numbers.append(number)
+        return numbers
 
     def priors(self) -> dict[str, dict[str, Any]]:
         """The ``[prior]`` table, left as written: what a prior may say is known to the statistics alone."""
@@ -141,7 +259,7 @@ def line_of(text: str, key: str, index: int | None = None, kind: str = "experime
     begin, end = 0, len(lines)
     if index is not None and index < len(tables):
         begin, end = tables[index], [*tables, end][index + 1]
-    for part in re.split(r"[.\[]", key):
+    for part in re.sub(r"\[\d+\]", "", key).split("."):
         word = rf"(?<![\w-]){re.escape(part)}(?![\w-])"
         spelled = re.compile(rf"^\s*\[.*{word}.*\]|{word}[\"']?\s*[=.]")
         begin = next((at for at in range(begin, end) if spelled.search(lines[at])), begin)
@@ -174,6 +292,36 @@ def read_toml(source: Path, text: str) -> dict[str, Any]:
             place = f"line {len(before)}, column {len(before[-1]) + 1}"
             found = "a TOML error (a number of thousands of digits)"
     raise InputError(f"{source}, {place}: found {found}, expected valid TOML")
+
+
+_COUNT = {1: "one", 2: "two"}  # in words, as messages have it
+
+
+def _called(table: dict[str, Any], index: int) -> str:
+    """What errors call a table of a list: its name, or its number from 1."""
+    name = table.get("name")
+    return name if isinstance(name, str) and name else str(index + 1)
+
+
+def _finite(value: Any) -> float | None:
+    """A number of a file; None for what is no finite one."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def _within(above: float, least: float, most: float) -> str:
+    """What is expected of a number, from its limits."""
+    size = f"{most:.0e} in size"
+    if above > -math.inf:
+        return f"a number above {above:g}, at most {size}"
+    if least > -LARGEST_NUMBER:
+        return f"a number of at least {least:g}, at most {size}"
+    return f"a number of at most {size}"
 
 
 def _lower(message: str) -> str:

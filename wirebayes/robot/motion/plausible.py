@@ -1,14 +1,19 @@
 """Joint values that cannot be meant: nothing paid out, millimetres, or straight lengths where the wire is meant."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.errors import shown
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.joint_columns import has_motors
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
+from wirebayes.strict.table import Table
 
 _FAR = 10.0  # times the robot's size: no wire is so long, and of millimetres those above a hundredth of it are noticed
 _TWICE = 2.0  # times its length: no wire stretches so far, but a wire of two lines looks so where one line was given
@@ -43,6 +48,33 @@ def wrong(robot: Robot, joint_m: Floats) -> tuple[tuple[int, int], str] | None:
         whole = "the length of the whole wire, lines x straight + beyond_exit_m"
         return _first(short), f"{whole}: between these lengths no pose stretches every wire by less than 100 %"
     return None
+
+
+def refuse(robot: Robot, joint_m: Floats, table: Table, columns: Sequence[str]) -> None:
+    """Refuse joint values of a table that cannot be meant.
+
+    Parameters
+    ----------
+    robot : Robot
+    joint_m : (t, w) array
+    table : Table
+        Where they were read, a row a time.
+    columns : sequence of str
+        The column of each leg.
+
+    Raises
+    ------
+    InputError
+        Naming line and column, what was found and what was expected.
+    """
+    unlikely = wrong(robot, joint_m)
+    if unlikely is None:
+        return
+    (row, leg), expected = unlikely
+    found = shown(table.cell(row, columns[leg]))
+    if has_motors([columns[leg]]):
+        found += f", which pays out {joint_m[row, leg]:.4g} m"
+    raise table.complain(row, columns[leg], found, expected)
 
 
 def _first(bad: NDArray[np.bool_]) -> tuple[int, int]:
