@@ -102,7 +102,16 @@ class Keys:
         ]
 
     def inside(self, key: str, default: dict[str, Any] | None = None, expected: str = "a table") -> Self:
-        """The table under a key; without a default it must be there."""
+        """The table under a key.
+
+        Parameters
+        ----------
+        key : str
+        default : dict, optional
+            For a key that is missing; without a default that is an error.
+        expected : str
+            What the message says is expected.
+        """
         table = self.value(key, expected, default)
         if not isinstance(table, dict):
             raise self.complain(key, shown(table), expected)
@@ -122,7 +131,16 @@ class Keys:
         ]
 
     def value(self, key: str, expected: str, default: Any = None) -> Any:
-        """What stands under a key; without a default it must be there."""
+        """What stands under a key, which counts as known from then on.
+
+        Parameters
+        ----------
+        key : str
+        expected : str
+            What the message says is expected.
+        default : any, optional
+            For a key that is missing; without a default that is an error.
+        """
         self.asked.add(key)
         if key in self.table:
             return self.table[key]
