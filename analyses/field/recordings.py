@@ -88,7 +88,8 @@ def imported(folder: Path, recorded: tuple[Floats, Floats, Floats], length_mm: f
     path = folder / "recording.csv"
     rows = (f"{t:.3f},{x:.4f},{f:.4f}\n" for t, x, f in zip(*recorded, strict=True))
     path.write_text('"Time (s)","Displacement (mm)","Force (N)"\n' + "".join(rows))
-    return convert(path, About("wire", "line", length_mm), Choices())
+    (only,) = convert(path, About("wire", "line", length_mm), Choices())
+    return only
 
 
 def invented(rng: np.random.Generator) -> tuple[dict[str, float], float, list[float], Drive]:

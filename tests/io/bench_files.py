@@ -7,6 +7,10 @@ from pathlib import Path
 
 import openpyxl
 
+from wirebayes.io.bench.convert import About, Converted
+from wirebayes.io.bench.convert import convert as convert_all
+from wirebayes.io.bench.undecided import Choices
+
 Hold = tuple[int, float, list[float], list[float]]  # number, displacement in mm, times in s, tensions in N
 
 NAMES = {
@@ -110,3 +114,9 @@ def write_workbook(path: Path, holds: list[Hold], dialect: Dialect) -> Path:
         sheet.append(list(row))
     book.save(path)
     return path
+
+
+def convert(path: Path, about: About, choices: Choices) -> Converted:
+    """The only experiment of a file."""
+    (only,) = convert_all(path, about, choices)
+    return only

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import wirebayes as wb
+from tests.io.bench_files import convert
 from wirebayes.io import data_checks
-from wirebayes.io.bench.convert import About, convert
+from wirebayes.io.bench.convert import About
 from wirebayes.io.bench.undecided import Choices, Undecided
 from wirebayes.io.experiment import read_experiments
 

@@ -6,8 +6,9 @@ import openpyxl
 import pytest
 
 import wirebayes as wb
+from tests.io.bench_files import convert
 from wirebayes.cli import main
-from wirebayes.io.bench.convert import About, convert
+from wirebayes.io.bench.convert import About
 from wirebayes.io.bench.undecided import Choices, Undecided
 
 ABOUT = About("wire", "line", 1000.0)

@@ -60,6 +60,10 @@ def import_bench(
         Literal["displacement", "force"] | None,
         typer.Option("--control", help="What was set in each hold, where it is not evident; force: weights."),
     ] = None,
+    specimens: Annotated[
+        Literal["several", "one"] | None,
+        typer.Option("--specimens", help="Whose columns of one quantity stand side by side, where it is not evident."),
+    ] = None,
     drop_breaks: DropBreaks = False,
     seed: Seed = 0,
     as_json: AsJson = False,
@@ -67,7 +71,8 @@ def import_bench(
 ) -> None:
     """Turn files of test benches into experiment files: DIR/N.toml, DIR/N.csv, and DIR/N.svg to look at.
 
-    Each file is one experiment, named N after it; several also stand together in DIR/experiments.toml. Delimiter,
+    Each file is one experiment, named N after it, or one for each of the specimens that stand side by side in it;
+    several also stand together in DIR/experiments.toml. Delimiter,
     decimal comma, encoding, preamble, units and columns are recognised, times of the whole test and continuous
     recordings are divided into holds. Ambiguous input leads to a question on a terminal and to an error elsewhere.
     """
@@ -77,7 +82,7 @@ def import_bench(
     imported = run(
         raw, length_mm=length_mm, material=material, name=name, mapping=mapping or (), decimal=decimal,
         time_since=time_since, sheet=sheet, zero_mm=zero_mm, area_mm2=area_mm2, control=control,
-        drop_breaks=drop_breaks, output=Path(raw[0].stem) if output is None else output,
+        specimens=specimens, drop_breaks=drop_breaks, output=Path(raw[0].stem) if output is None else output,
         ask=_ask if sys.stdin.isatty() and sys.stderr.isatty() else None,
     )  # fmt: skip
     for line in imported.messages:

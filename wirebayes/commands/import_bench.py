@@ -11,7 +11,7 @@ from wirebayes.commands.options import above_zero, check_choice, without_breaks,
 from wirebayes.errors import InputError
 from wirebayes.io import data_checks, gross_events
 from wirebayes.io.bench.convert import About, Converted, convert, default_name, toml_of
-from wirebayes.io.bench.undecided import Choices, Decimal, TimeSince, Undecided
+from wirebayes.io.bench.undecided import Choices, Decimal, Specimens, TimeSince, Undecided
 from wirebayes.io.readings import READ
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportJson
@@ -37,6 +37,7 @@ def import_bench(
     zero_mm: float | None = None,
     area_mm2: float | None = None,
     control: Control | None = None,
+    specimens: Specimens | None = None,
     drop_breaks: bool = False,
     output: PathLike | None = None,
     ask: Callable[[Undecided], str] | None = None,
@@ -49,13 +50,15 @@ def import_bench(
     Parameters
     ----------
     raw : path, or sequence of paths
-        Text with columns (CSV and its kin) or xlsx workbooks: one experiment each.
+        Text with columns (CSV and its kin) or xlsx workbooks: one experiment each, or one for each of the specimens
+        that stand side by side in it.
     length_mm : float
         Zero-tension length of the samples before the test.
     material : str, optional
         Samples of one material may be fitted together; the name of each experiment when left out.
     name : str, optional
-        Of the experiment, where there is one file; else each has the name of its file.
+        Of the experiment, where there is one file; else each has the name of its file. Specimens side by side have
+        the names that the file gives them, or numbers after this one.
     mapping : sequence of str
         ``HEADER=COLUMN`` with COLUMN one of hold, displacement, time, tension, temperature, or ignore. The unit is
         read from the header, from the row under it, or from here: ``HEADER=tension [N]``. A minus turns the sign:
@@ -72,6 +75,8 @@ def import_bench(
         Cross-section of the samples, which turns stresses into tensions.
     control : {"displacement", "force"}, optional
         What was set in each hold, where the readings leave it open.
+    specimens : {"several", "one"}, optional
+        Whether columns of one quantity side by side are of several specimens, where the file leaves it open.
     drop_breaks : bool
         Leave out the readings of breaks, of sensors at their limit, and of dropouts.
     output : path, optional
@@ -105,15 +110,20 @@ def import_bench(
         check_choice("time_since", time_since, get_args(TimeSince))
     if control is not None:
         check_choice("control", control, get_args(Control))
+    if specimens is not None:
+        check_choice("specimens", specimens, get_args(Specimens))
     above_zero(("--length-mm", length_mm), *([] if area_mm2 is None else [("--area-mm2", area_mm2)]))
     paths = [Path(raw)] if not isinstance(raw, Sequence) or isinstance(raw, str) else [Path(path) for path in raw]
     names = _names(paths, name)
-    choices = Choices(words(mapping), decimal, time_since, sheet, None if zero_mm is None else float(zero_mm), control)
-    tests: list[Converted] = []
+    zero = None if zero_mm is None else float(zero_mm)
+    choices = Choices(words(mapping), decimal, time_since, sheet, zero, control, specimens)
+    tests: list[tuple[Path, Converted]] = []
     for path, called in zip(paths, names, strict=True):
-        about = About(called, material or called, float(length_mm), None if area_mm2 is None else float(area_mm2))
-        test, choices = _decided(path, about, choices, ask)
-        tests.append(_without_breaks(test) if drop_breaks else test)
+        area = None if area_mm2 is None else float(area_mm2)
+        about = About(called, material, float(length_mm), area, name_is_stated=name is not None)
+        found, choices = _decided(path, about, choices, ask)
+        tests += [(path, _without_breaks(test) if drop_breaks else test) for test in found]
+    _check_names([(path, test.experiment.name) for path, test in tests])
     configuration = {
         "command": "import", "version": __version__,
         "raw": {path.name: hashlib.sha256(read_bytes(path)).hexdigest() for path in paths},
@@ -124,7 +134,7 @@ def import_bench(
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as run:
         if run.state != "done":
-            _write(place.path, paths, tests)
+            _write(place.path, tests)
             run.finish()
     return ImportedTests(place, computed=run.state != "done")
 
@@ -136,18 +146,23 @@ def _names(paths: Sequence[Path], name: str | None) -> list[str]:
         if len(paths) > 1:
             raise InputError(f"--name: found {name!r} for {len(paths)} files, expected it with one file only")
         return [name]
-    names = [default_name(path) for path in paths]
-    for i, called in enumerate(names):
-        if called.casefold() in [other.casefold() for other in names[:i]]:
-            raise InputError(f"{paths[i]}: found the name {called} a second time, expected files of different names")
-        if len(names) > 1 and called == TOGETHER:
-            raise InputError(f"{paths[i]}: found the name {called}, expected another: that file holds all experiments")
-    return names
+    return [default_name(path) for path in paths]
+
+
+def _check_names(named: Sequence[tuple[Path, str]]) -> None:
+    """Refuse files that would overwrite each other."""
+    seen = set[str]()
+    for path, name in named:
+        if name.casefold() in seen:
+            raise InputError(f"{path}: found the name {name} a second time, expected files of different names")
+        if len(named) > 1 and name == TOGETHER:
+            raise InputError(f"{path}: found the name {name}, expected another: that file holds all experiments")
+        seen.add(name.casefold())
 
 
 def _decided(
     path: Path, about: About, choices: Choices, ask: Callable[[Undecided], str] | None
-) -> tuple[Converted, Choices]:
+) -> tuple[list[Converted], Choices]:
     """A file read, and the choices made for it, which hold for the files after it too."""
     while True:
         try:
@@ -174,12 +189,12 @@ def _without_breaks(test: Converted) -> Converted:
     return replace(test, experiment=kept, rows=rows, notes=[*test.notes, *(f"left out: {e.text}" for e in events)])
 
 
-def _write(folder: Path, paths: Sequence[Path], tests: Sequence[Converted]) -> None:
+def _write(folder: Path, tests: Sequence[tuple[Path, Converted]]) -> None:
     from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
 
     tables: list[str] = []
     content: ImportJson = {"experiments": {}, "warnings": []}
-    for path, test in zip(paths, tests, strict=True):
+    for path, test in tests:
         experiment = test.experiment
         write_csv(folder / f"{experiment.name}.csv", test.header, test.rows)
         sentences = [f"{note[:1].upper()}{note[1:]}." for note in (f"from {path.name}", *test.notes)]

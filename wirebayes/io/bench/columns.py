@@ -66,7 +66,6 @@ _OF_RIG: dict[Role, tuple[str, ...]] = {
     "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok"),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
 }  # fmt: skip
-_LEAST_WIDE = 3  # columns of tensions that make a table with one for each time; two may be two load cells
 _NO_UNIT = ("", "-", "–", "1")  # what stands in a row of units where there is none
 _COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg or Prüfzeit
 _BRACKET = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
@@ -280,6 +279,25 @@ def _units(role: Role) -> str:
     return f" ({listed(COMMON[role], 'or')})"
 
 
+def is_of(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a column seems to be of a quantity, by its name and its unit.
+
+    Parameters
+    ----------
+    table : RawTable
+    index : int
+    role : str
+    """
+    return _may_be(table, index, role) or _is_of_rig(table, index, role)
+
+
+def speaks_of_a_quantity(word: str) -> bool:
+    """Whether a word, or a letter, is the name of a quantity."""
+    letters = {letter for known in _LETTERS.values() for letter in known}
+    of_rig = {name for names in _OF_RIG.values() for name in names}
+    return plain(word) in letters | of_rig or any(_speaks_of(word, role) for role in ROLES)
+
+
 def _may_be(table: RawTable, index: int, role: Role) -> bool:
     """Whether a header's words and unit fit a quantity."""
     header = table.header[index]
@@ -362,10 +380,11 @@ def plain(text: str) -> str:
 def _several(table: RawTable, likely: Sequence[int], role: Role, how: str = "") -> Undecided:
     names = [table.header[i] for i in likely]
     how = how or f", each of which may be the {role}"
+    answers = {f"--map {name}={role}": name for name in names}
+    if role in ("tension", "displacement") and not table.specimen:
+        answers["--specimens several"] = "each, as a specimen of its own"
     return Undecided(
-        f"{table.sheet.path}, line {table.header_line}: found {listed(names)}{how}",
-        "which one to read",
-        {f"--map {name}={role}": name for name in names},
+        f"{table.sheet.path}, line {table.header_line}: found {listed(names)}{how}", "which one to read", answers
     )
 
 
@@ -380,9 +399,6 @@ def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missin
     hint = ""
     if encoding not in ("utf-8", "utf-8-sig") and not " ".join(names).isascii():
         hint = f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"
-    tensions = [i for i in free if name_and_unit(table.header[i], "tension")[1]]
-    if {"time", "tension"} <= set(missing) and len(tensions) >= _LEAST_WIDE:
-        hint += "; a table with a column for each time has to be turned into one with a row for each reading"
     place = f"{table.sheet.path}, line {table.header_line}: found no column of"
     with_units = " ".join(f'--map "HEADER={missed} [{UNITS[missed]}]"' for missed in missing)
     message = (

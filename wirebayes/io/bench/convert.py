@@ -22,9 +22,11 @@ from wirebayes.io.bench.quantities import UNITS, Role
 from wirebayes.io.bench.recorded import Cut, Readings
 from wirebayes.io.bench.resolution import evident_step
 from wirebayes.io.bench.sheet import Sheet, is_number, is_value
+from wirebayes.io.bench.specimens import side_by_side
 from wirebayes.io.bench.stamps import is_coarse, spread
 from wirebayes.io.bench.table import RawTable, find_table
 from wirebayes.io.bench.thinning import MOST, thinned
+from wirebayes.io.bench.turned import turned
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
 from wirebayes.io.bench.unread import unread
 from wirebayes.io.data_checks import falls
@@ -55,16 +57,21 @@ class About:
 
     Attributes
     ----------
-    name, material : str
+    name : str
+    material : str or None
+        The name of each specimen when left out.
     length_mm : float
     area_mm2 : float or None
         Of its cross-section, where it is known: turns stresses into tensions.
+    name_is_stated : bool
+        Whether the name is the user's, and not the file's.
     """
 
     name: str
-    material: str
+    material: str | None
     length_mm: float
     area_mm2: float | None = None
+    name_is_stated: bool = False
 
 
 @dataclass(frozen=True)
@@ -108,7 +115,7 @@ class Recording:
     start_s: Floats
 
 
-def convert(path: Path, about: About, choices: Choices) -> Converted:
+def convert(path: Path, about: About, choices: Choices) -> list[Converted]:
     """Read a raw file.
 
     Parameters
@@ -116,18 +123,45 @@ def convert(path: Path, about: About, choices: Choices) -> Converted:
     path : Path
         Text with columns, or an xlsx workbook.
     about : About
+        Specimens side by side are named after what the file calls them, or by a number after this name.
     choices : Choices
+
+    Returns
+    -------
+    list of Converted
+        One for each specimen.
 
     Raises
     ------
     InputError
         With file, line and column; `Undecided` where the file can be read in several ways.
     """
-    table = find_table(_sheet(path, choices))
+    table = turned(find_table(_sheet(path, choices)))
+    tables = side_by_side(table, choices.mapping, choices.specimens)
+    if len(tables) == 1:
+        return [_convert(each, about, replace(choices, mapping=said)) for each, said in tables]
+    names = _names_of([each.specimen for each, _ in tables], about)
+    return [
+        _convert(each, replace(about, name=name), replace(choices, mapping=said))
+        for (each, said), name in zip(tables, names, strict=True)
+    ]
+
+
+def _names_of(specimens: Sequence[str], about: About) -> list[str]:
+    """The names of specimens' experiments: what the file calls them if it does by words, else after the file."""
+    names = [name_from(specimen) for specimen in specimens]
+    if len({name.casefold() for name in names}) < len(names):  # of letters that no folder's name has
+        names = [str(i + 1) for i in range(len(names))]
+    in_words = all(re.search("[A-Za-z]{2}", name) for name in names)
+    return names if in_words and not about.name_is_stated else [f"{about.name}-{name}" for name in names]
+
+
+def _convert(table: RawTable, about: About, choices: Choices) -> Converted:
+    """The experiment of one specimen."""
     columns = _of_sample(table, understand(table, choices.mapping), about)
     table, notes = _complete(table, columns)
     decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
-    notes = [_read_as(table, columns, decimal), *notes]
+    notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes]
     texts: dict[Role, list[str]] = {
         role: _numbers(table, column, decimal) for role, column in columns.items() if role != "hold"
         and not (role == "time" and clock.has_moments(table, column.index))
@@ -318,9 +352,19 @@ def _complete(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, l
     return replace(table, rows=tuple(kept)), notes
 
 
+def _whose(table: RawTable, columns: dict[Role, Column]) -> list[str]:
+    """Of which specimen these columns are, where several stand side by side."""
+    if not table.specimen:
+        return []
+    places = [table.sheet.column_name(i) for i in sorted(column.index for column in columns.values())]
+    return [f"specimens side by side: {table.whose} in columns {listed(places)}"]
+
+
 def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> str:
     parts = []
     for role, column in columns.items():
+        if table.turned and role == "hold":
+            continue  # the table's own
         stated = column.unit is None or column.unit.text in (UNITS[role], *re.split(r"[\s()\[\]/_,]+", column.header))
         unit = "" if stated or column.unit is None else f" in {column.unit.text}"
         how = " (sign turned)" if column.unit and column.unit.factor < 0 else ""
@@ -462,7 +506,7 @@ def _experiment(
     about: About, resolution: float | None, control: Control,
 ) -> Experiment:  # fmt: skip
     """The experiment checked as the reader of files checks its own, blaming the raw file's lines."""
-    keys = {"name": about.name, "material": about.material, "length_mm": about.length_mm}
+    keys = {"name": about.name, "material": about.material or about.name, "length_mm": about.length_mm}
     extra: dict[str, Any] = {"control": control} if control != "displacement" else {}
     extra |= {RESOLUTION[control]: resolution} if resolution else {}
 
@@ -522,5 +566,9 @@ def _string(text: str) -> str:
 
 def default_name(path: Path) -> str:
     """The name of an experiment from the name of its file: what a folder may be called."""
-    kept = "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in path.stem).strip("-.")
-    return kept or "experiment"
+    return name_from(path.stem) or "experiment"
+
+
+def name_from(text: str) -> str:
+    """The letters, digits, points and dashes of a text, with dashes for what is between them; perhaps none."""
+    return "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in text).strip("-.")

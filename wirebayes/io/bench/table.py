@@ -8,6 +8,7 @@ from wirebayes.io.bench.sheet import Row, Sheet, is_value
 
 _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
 LONGEST_HEADER = 200  # characters: names and units take a few words, prose is no header
+LONGEST_MARK = 2  # characters: a number or a letter says nothing without the word specimen
 _SHOWN = 5  # rows that show how many columns there are
 
 
@@ -22,6 +23,13 @@ class RawTable:
     units : tuple of str
         Of the row of units under the header; empty texts where there is none.
     rows : tuple of Row
+    header_line : int
+    above : tuple of str
+        Of the row above the header, which may name specimens; empty texts where there is none.
+    specimen : str
+        Whose readings these are, where the file holds several side by side.
+    turned : bool
+        Whether the file has a column for each hold or time: then its columns are not those of the table.
     """
 
     sheet: Sheet
@@ -29,10 +37,21 @@ class RawTable:
     units: tuple[str, ...]
     rows: tuple[Row, ...]
     header_line: int
+    above: tuple[str, ...] = ()
+    specimen: str = ""
+    turned: bool = False
+
+    @property
+    def whose(self) -> str:
+        """The specimen, in words."""
+        return f"specimen {self.specimen}" if len(self.specimen) <= LONGEST_MARK else self.specimen
 
     def place(self, line: int, column: int) -> str:
         """Where a cell stands."""
-        return f"line {line}, column {self.sheet.column_name(column)} ({self.header[column]})"
+        name = f"{self.header[column]} of {self.whose}" if self.specimen else self.header[column]
+        return (
+            f"line {line} ({name})" if self.turned else f"line {line}, column {self.sheet.column_name(column)} ({name})"
+        )
 
     def complain(self, line: int, column: int, found: str, expected: str) -> InputError:
         """The error for one cell.
@@ -55,6 +74,18 @@ class RawTable:
         """The cells of a column."""
         return [row.cell(column) for row in self.rows]
 
+    def check_names(self) -> None:
+        """Refuse two columns of one name.
+
+        Raises
+        ------
+        InputError
+        """
+        for column, name in enumerate(self.header):
+            if name and name in self.header[:column]:
+                where = f"line {self.header_line}, column {self.sheet.column_name(column)}"
+                raise InputError(f"{self.sheet.path}, {where}: found {name} a second time, expected it once")
+
 
 def find_table(sheet: Sheet) -> RawTable:
     """Find header, units and readings.
@@ -62,7 +93,7 @@ def find_table(sheet: Sheet) -> RawTable:
     Raises
     ------
     InputError
-        There are no rows of numbers, no header above them, or two columns have one header.
+        There are no rows of numbers, or no header above them.
     """
     rows = sheet.rows
     first = _first(rows)
@@ -86,11 +117,8 @@ def find_table(sheet: Sheet) -> RawTable:
         raise InputError(f"{sheet.path}, {where}: found {found}, expected at most {LONGEST_HEADER}")
     width = max(len(head.cells), *(len(row.cells) for row in rows[first : first + _SHOWN]))
     header = tuple(head.cell(column) for column in range(width))
-    for column, name in enumerate(header):
-        if name and name in header[:column]:
-            where = f"line {head.line}, column {sheet.column_name(column)}"
-            raise InputError(f"{sheet.path}, {where}: found {name} a second time, expected it once")
     padded = tuple(units[column] if column < len(units) else "" for column in range(width))
+    names = tuple(above[-2].cell(column) for column in range(width)) if len(above) > 1 else ()
     body = tuple(row for row in rows[first:] if not row.comment)
     named = len(head.cells)
     for row in body:
@@ -100,7 +128,7 @@ def find_table(sheet: Sheet) -> RawTable:
                 f"expected {named} as in the header of line {head.line}"
                 + (" (a comma as decimal sign needs another sign between cells)" if "comma" in sheet.described else "")
             )
-    return RawTable(sheet, header, padded, body, head.line)
+    return RawTable(sheet, header, padded, body, head.line, names)
 
 
 def _first(rows: tuple[Row, ...]) -> int | None:

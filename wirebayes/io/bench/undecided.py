@@ -10,6 +10,7 @@ from wirebayes.wire.protocol import Control
 
 Decimal = Literal["point", "comma"]
 TimeSince = Literal["hold", "test"]
+Specimens = Literal["several", "one"]
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Choices:
         Reading of the displacement where the wire has its zero-tension length.
     control : {"displacement", "force"} or None
         What was set in each hold.
+    specimens : {"several", "one"} or None
+        Of which columns stand side by side.
     """
 
     mapping: tuple[str, ...] = ()
@@ -38,6 +41,7 @@ class Choices:
     sheet: str | None = None
     zero_mm: float | None = None
     control: Control | None = None
+    specimens: Specimens | None = None
 
     def with_option(self, option: str) -> "Choices":
         """These choices and one more, as the command line spells it: ``--decimal comma``."""

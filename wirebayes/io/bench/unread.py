@@ -83,7 +83,7 @@ def _check_one_specimen(table: RawTable, index: int, x: Floats, time: Floats) ->
     names = [labels[i] for i in begins]
     if len(set(names)) < len(names):
         return
-    if not any(map(_speaks_of_specimens, (table.header[index], *names))):
+    if not any(map(speaks_of_specimens, (table.header[index], *names))):
         without_numbers = {re.sub(r"\d+", "", name) for name in names}
         if len(without_numbers) < len(names) or not (time[changes] < time[changes - 1]).all():
             return
@@ -93,6 +93,7 @@ def _check_one_specimen(table: RawTable, index: int, x: Floats, time: Floats) ->
     raise table.complain(table.rows[row].line, index, found, expected)
 
 
-def _speaks_of_specimens(text: str) -> bool:
+def speaks_of_specimens(text: str) -> bool:
+    """Whether a text holds a word for a specimen."""
     words = re.findall(r"[^\W\d_]+", plain(text))
     return any(w == known or (len(known) >= _PREFIX and w.startswith(known)) for w in words for known in _SPECIMEN)

@@ -1,0 +1,129 @@
+"""Tables with a column for each time or each hold, as people write them on paper, as rows of one reading each.
+
+``Weg [mm]; 0 s; 30 s; 60 s`` has a hold in each row, ``Zeit [s]; 1 mm; 2 mm; 3 mm`` one in each column. The headers of
+three columns or more then are numbers with one unit, and one other column is what these leave open.
+"""
+
+import re
+from dataclasses import dataclass, replace
+
+from wirebayes.io.bench.columns import is_of, name_and_unit
+from wirebayes.io.bench.quantities import Role, unit_of
+from wirebayes.io.bench.sheet import Row, is_number
+from wirebayes.io.bench.table import RawTable
+
+FEWEST = 3  # columns: two may be two sensors, with a number in their names
+_NUMBER = r"[+\-\u2212]?\d+(?:[.,]\d+)?"
+_MEASURE = re.compile(
+    rf"(?P<before>.*?)(?<![\w.,])(?P<number>{_NUMBER})\s*(?P<unit>[^\W\d_°]+\.?|\")(?!\w)(?P<after>.*)"
+)
+_EMPTY = re.compile(r"\(\s*\)|\[\s*\]")
+_ALONG: tuple[Role, ...] = ("time", "displacement", "tension")  # what may run along the header
+
+
+@dataclass(frozen=True)
+class _Across:
+    """Columns whose headers are values of one quantity.
+
+    Attributes
+    ----------
+    role : str
+        The quantity.
+    unit : str
+    values : dict of int to str
+        The number in the header of each of these columns.
+    cells : str
+        What is left of the headers: name and unit of what stands under them, as far as they say.
+    """
+
+    role: Role
+    unit: str
+    values: dict[int, str]
+    cells: str
+
+
+def turned(table: RawTable) -> RawTable:
+    """The table with a row for each reading; itself where it has one already.
+
+    Parameters
+    ----------
+    table : RawTable
+
+    Raises
+    ------
+    InputError
+        A cell is no number.
+    """
+    across = _across(table)
+    if across is None:
+        return table
+    others = [i for i, name in enumerate(table.header) if name and i not in across.values]
+    roles: tuple[Role, ...] = ("displacement", "tension") if across.role == "time" else ("time",)
+    beside = [(i, role) for i in others for role in roles if is_of(table, i, role)]
+    if len(beside) != 1:
+        return table
+    column, role = beside[0]
+    read: Role = "displacement" if "tension" in (across.role, role) else "tension"
+    by_row = across.role == "time"
+    rows = _by_row(table, across, column) if by_row else _by_column(table, across, column)
+    name, unit = _name_of_cells(table, across, read)
+    header = ("hold", table.header[column], f"{across.role} [{across.unit}]", name)
+    units = ("", table.units[column], across.unit, unit)
+    described = f"{table.sheet.described}, a {'hold in each row' if by_row else 'hold in each column'}"
+    sheet = replace(table.sheet, described=described)
+    return RawTable(sheet, header, units, tuple(rows), table.header_line, turned=True)
+
+
+def _across(table: RawTable) -> _Across | None:
+    """The columns whose headers are different values of one quantity in one unit; None where they are few."""
+    found: dict[tuple[Role, str, str], dict[int, str]] = {}
+    for i, name in enumerate(table.header):
+        measure = _MEASURE.fullmatch(name)
+        role = None if measure is None else next((r for r in _ALONG if unit_of(measure["unit"], r)), None)
+        if measure is None or role is None:
+            continue
+        left = _EMPTY.sub("", f"{measure['before']} {measure['after']}")
+        cells = " ".join(left.split()).strip("@=,;: ")
+        found.setdefault((role, measure["unit"], cells), {})[i] = measure["number"]
+    alike = max(found, key=lambda key: len(found[key]), default=None)
+    if alike is None or len(set(found[alike].values())) < max(FEWEST, len(found[alike])):
+        return None
+    role, unit, cells = alike
+    return _Across(role, unit, found[alike], cells)
+
+
+def _name_of_cells(table: RawTable, across: _Across, read: Role) -> tuple[str, str]:
+    """What the cells are called, and their unit where a row of units states one for all of them."""
+    units = {table.units[i] for i in across.values}
+    stated = units.pop() if len(units) == 1 else ""
+    above = {table.above[i] for i in across.values if i < len(table.above)} - {""}
+    of_quantity = (text for text in (across.cells, *above) if name_and_unit(text, read)[1])
+    name = next(of_quantity, read)
+    return name, stated if unit_of(stated, read) else ""
+
+
+def _by_row(table: RawTable, across: _Across, column: int) -> list[Row]:
+    """A hold in each row."""
+    return [
+        Row(row.line, (str(hold), row.cell(column), time, _reading(table, row, i)))
+        for hold, row in enumerate(table.rows, start=1)
+        for i, time in across.values.items()
+        if row.cell(i)
+    ]
+
+
+def _by_column(table: RawTable, across: _Across, column: int) -> list[Row]:
+    """A hold in each column."""
+    return [
+        Row(row.line, (str(hold), row.cell(column), setting, _reading(table, row, i)))
+        for hold, (i, setting) in enumerate(across.values.items(), start=1)
+        for row in table.rows
+        if row.cell(i)
+    ]
+
+
+def _reading(table: RawTable, row: Row, column: int) -> str:
+    cell = row.cell(column)
+    if not is_number(cell):
+        raise table.complain(row.line, column, repr(cell), "a number, or nothing where nothing was read")
+    return cell
