@@ -6,7 +6,7 @@ import openpyxl
 import pytest
 
 import wirebayes as wb
-from tests.io.bench_files import convert
+from tests.io.bench_files import convert, convert_all
 from wirebayes.cli import main
 from wirebayes.io.bench.convert import About
 from wirebayes.io.bench.undecided import Choices, Undecided
@@ -74,7 +74,7 @@ def test_two_readings_are_refused_and_an_answer_settles_it(tmp_path, text, messa
     assert before > 1
     for answer in refused.value.answers:
         path = tmp_path / "raw.csv"
-        assert convert(path, ABOUT, Choices().with_option(answer)).rows
+        assert all(made.rows for made in convert_all(path, ABOUT, Choices().with_option(answer)))
 
 
 def test_each_answer_means_what_it_says(tmp_path):

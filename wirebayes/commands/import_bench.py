@@ -104,30 +104,20 @@ def import_bench(
     >>> imported.experiments[0].tension().shape
     (2, 3)
     """
-    if decimal is not None:
-        check_choice("decimal", decimal, get_args(Decimal))
-    if time_since is not None:
-        check_choice("time_since", time_since, get_args(TimeSince))
-    if control is not None:
-        check_choice("control", control, get_args(Control))
-    if specimens is not None:
-        check_choice("specimens", specimens, get_args(Specimens))
+    _check_options(decimal, time_since, control, specimens)
     above_zero(("--length-mm", length_mm), *([] if area_mm2 is None else [("--area-mm2", area_mm2)]))
     paths = [Path(raw)] if not isinstance(raw, Sequence) or isinstance(raw, str) else [Path(path) for path in raw]
     names = _names(paths, name)
-    zero = None if zero_mm is None else float(zero_mm)
+    zero, area = (None if value is None else float(value) for value in (zero_mm, area_mm2))
     choices = Choices(words(mapping), decimal, time_since, sheet, zero, control, specimens)
-    tests: list[tuple[Path, Converted]] = []
-    for path, called in zip(paths, names, strict=True):
-        area = None if area_mm2 is None else float(area_mm2)
-        about = About(called, material, float(length_mm), area, name_is_stated=name is not None)
-        found, choices = _decided(path, about, choices, ask)
-        tests += [(path, _without_breaks(test) if drop_breaks else test) for test in found]
-    _check_names([(path, test.experiment.name) for path, test in tests])
+    samples = [About(own, material, float(length_mm), area, name_is_stated=name is not None) for own in names]
+    tests, choices = _read_all(paths, samples, choices, ask)
+    if drop_breaks:
+        tests = [(path, _without_breaks(test)) for path, test in tests]
     configuration = {
         "command": "import", "version": __version__,
         "raw": {path.name: hashlib.sha256(read_bytes(path)).hexdigest() for path in paths},
-        "names": names, "length_mm": float(length_mm), "material": material, "area_mm2": area_mm2,
+        "names": names, "length_mm": float(length_mm), "material": material, "area_mm2": area,
         "drop_breaks": drop_breaks,
         **vars(choices),
     }  # fmt: skip
@@ -137,6 +127,16 @@ def import_bench(
             _write(place.path, tests)
             run.finish()
     return ImportedTests(place, computed=run.state != "done")
+
+
+def _check_options(
+    decimal: Decimal | None, time_since: TimeSince | None, control: Control | None, specimens: Specimens | None
+) -> None:
+    stated = {"decimal": (decimal, Decimal), "time_since": (time_since, TimeSince), "control": (control, Control),
+              "specimens": (specimens, Specimens)}  # fmt: skip
+    for option, (value, choices) in stated.items():
+        if value is not None:
+            check_choice(option, value, get_args(choices))
 
 
 def _names(paths: Sequence[Path], name: str | None) -> list[str]:
@@ -158,6 +158,18 @@ def _check_names(named: Sequence[tuple[Path, str]]) -> None:
         if len(named) > 1 and name == TOGETHER:
             raise InputError(f"{path}: found the name {name}, expected another: that file holds all experiments")
         seen.add(name.casefold())
+
+
+def _read_all(
+    paths: Sequence[Path], samples: Sequence[About], choices: Choices, ask: Callable[[Undecided], str] | None
+) -> tuple[list[tuple[Path, Converted]], Choices]:
+    """The tests of all files, each with its file, and the choices made for them."""
+    tests: list[tuple[Path, Converted]] = []
+    for path, about in zip(paths, samples, strict=True):
+        found, choices = _decided(path, about, choices, ask)
+        tests += [(path, test) for test in found]
+    _check_names([(path, test.experiment.name) for path, test in tests])
+    return tests, choices
 
 
 def _decided(

@@ -107,7 +107,8 @@ class Problem:
         KeyError
             If there is none.
         """
-        for candidate in (f"{name}[{sample.name}]", f"{name}[{sample.material}]", name):
+        marks = sample.name, sample.material, sample.protocol.control
+        for candidate in (*(f"{name}[{mark}]" for mark in marks), name):
             if candidate in self.prior.distributions or candidate in self.prior.fixed:
                 return candidate
         raise KeyError(name)
@@ -307,9 +308,8 @@ def build(
     Raises
     ------
     InputError
-        If a prior in the file names no parameter, or is malformed, or one amplitude would belong to two instruments.
+        If a prior in the file names no parameter, or is malformed.
     """
-    check_instruments(experiments, effects)
     materials: dict[str, list[Experiment]] = {}
     for experiment in experiments:
         materials.setdefault(experiment.material, []).append(experiment)
@@ -322,6 +322,7 @@ def build(
         mark = f"[{material}]" if len(materials) > 1 else ""
         distributions |= _material_priors(members, effects, mark, length_exponent, scales, likelihood)
         samples += _samples(members, [effect.referred(scales.hold_s) for effect in effects], law, history)
+    distributions |= _instrument_priors(experiments, effects)
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""
         zero_mm = scales.zeros_mm.get(experiment.name, 0.0)
@@ -403,7 +404,8 @@ def unit_of_column(name: str, samples: Sequence[Sample]) -> str:
     base, _, mark = name.partition("[")
     if base in _UNITS:
         return _UNITS[base]
-    here = [sample for sample in samples if sample.name == mark.rstrip("]")] or samples
+    own = mark.rstrip("]")
+    here = [s for s in samples if s.name == own] or [s for s in samples if s.protocol.control == own] or samples
     if base in _ERRORS:
         return _ERRORS[base][here[0].protocol.control if here else "displacement"]
     for sample in here:
@@ -446,23 +448,6 @@ def _sample_in(sample: Sample, old: Units, new: Units) -> Sample:
     )
 
 
-def check_instruments(experiments: Sequence[Experiment], effects: Sequence[Effect]) -> None:
-    """Refuse to share the amplitude of an instrument between steps and weights, which are read by different ones.
-
-    Raises
-    ------
-    InputError
-    """
-    if len({experiment.control for experiment in experiments}) < 2:
-        return
-    shared = [effect.name for effect in effects if effect.scope in ("instrument", "environment")]
-    if shared:
-        raise InputError(
-            f"{experiments[0].source}: found {shared[0]}, an effect of an instrument, in a fit of steps and weights "
-            "together, expected effects of the wire alone: the two are read by different instruments; fit them apart"
-        )
-
-
 def _reference_length(members: Sequence[Experiment]) -> float:
     """Geometric mean of the lengths, mm: B belongs to it."""
     return geometric_mean(e.length_mm for e in members)
@@ -483,9 +468,18 @@ def _material_priors(
     out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in wanted}
     if len({e.length_mm for e in members}) > 1:
         out[f"{LENGTH_EXPONENT}{mark}"] = length_exponent
-    for effect in effects:
-        suffix = mark if effect.scope == "material" else ""
-        out |= {f"{c}{suffix}": a.prior for c, a in _amplitudes([effect]) if not a.of_each_test}
+    of_wire = [effect for effect in effects if effect.scope == "material"]
+    return out | {f"{c}{mark}": a.prior for c, a in _amplitudes(of_wire) if not a.of_each_test}
+
+
+def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effect]) -> dict[str, Any]:
+    """Priors of what does not belong to the wire: steps and weights are read by different instruments, each its own."""
+    controls = dict.fromkeys(e.control for e in experiments)
+    out: dict[str, Any] = {}
+    for effect in (effect for effect in effects if effect.scope != "material"):
+        apart = len(controls) > 1 and effect.scope != "event"
+        marks = [f"[{control}]" for control in controls] if apart else [""]
+        out |= {f"{c}{mark}": a.prior for mark in marks for c, a in _amplitudes([effect]) if not a.of_each_test}
     return out
 
 
@@ -527,9 +521,8 @@ def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experimen
             line = experiment.prior_lines.get(name)
             key = f"{experiment.source}{f', line {line}' if line else ''}: prior.{name}"
             wanted = possible(key, name, from_table(key, table))
-            hits = [
-                c for c in (f"{name}[{experiment.name}]", f"{name}[{experiment.material}]", name) if c in distributions
-            ]
+            marks = experiment.name, experiment.material, experiment.control
+            hits = [c for c in (*(f"{name}[{mark}]" for mark in marks), name) if c in distributions]
             if hits:
                 distributions[hits[0]] = wanted
                 stated.add(hits[0])

@@ -46,16 +46,21 @@ def warnings(fit: Fit, sample: Sample) -> list[Notice]:
     if fit.problem.likelihood == "chain":
         stated = {name for name in ("k1", "preload") if fit.problem.column(name, sample) in fit.problem.stated}
         of_readings += data_checks.one_hold(sample.protocol, stated)
-    first = sample is fit.problem.samples[0]
+    samples, control = fit.problem.samples, sample.protocol.control
+    first = sample is samples[0]
+    first_read_so = sample is next(s for s in samples if s.protocol.control == control)
     latent = f"{Discrepancy.name}."  # values of a smooth curve, of which nobody knows anything to state
-    columns = [n for n in fit.problem.names if _belongs(n, sample, shared=first) and not n.startswith(latent)]
+    of_sample = [n for n in fit.problem.names if _belongs(n, sample, shared=first, of_instrument=first_read_so)]
+    columns = [n for n in of_sample if not n.startswith(latent)]
     return [*of_readings, *of_posterior(own, prior, sample), *leaning(fit.problem.prior, theta, columns)]
 
 
-def _belongs(name: str, sample: Sample, *, shared: bool) -> bool:
+def _belongs(name: str, sample: Sample, *, shared: bool, of_instrument: bool) -> bool:
     """Whether a column is the sample's own, or one that it shares, which is said once."""
-    _, bracket, mark = name.partition("[")
-    return mark.rstrip("]") == sample.name if bracket and mark.rstrip("]") != sample.material else shared
+    mark = name.partition("[")[2].rstrip("]")
+    if mark in ("", sample.material):
+        return shared
+    return mark == sample.name or (mark == sample.protocol.control and of_instrument)
 
 
 def of_posterior(own: Mapping[str, Floats], prior: Mapping[str, Floats], sample: Sample) -> list[Notice]:

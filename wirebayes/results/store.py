@@ -559,15 +559,18 @@ def _by_length(
 
 
 def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:
-    """Columns under their plain names; those of one sample each stacked along a last axis."""
-    out: dict[str, Any] = {}
-    for i, name in enumerate(problem.names):
+    """Columns under their plain names; those of one sample each, or of one instrument, by sample along a last axis."""
+    columns = dict(zip(problem.names, np.moveaxis(theta, -1, 0), strict=True))
+    out: dict[str, Array] = {}
+    for name in problem.names:
         plain = name.split("[")[0]
         if plain == name:
-            out[plain] = theta[..., i]
-        else:
-            out.setdefault(plain, []).append(theta[..., i])
-    return {name: np.stack(v, axis=-1) if isinstance(v, list) else v for name, v in out.items()}
+            out[plain] = columns[name]
+        elif plain not in out:
+            of_samples = [problem.column(plain, sample) for sample in problem.samples]
+            fixed = {c: np.full(theta.shape[:-1], value) for c, value in problem.prior.fixed.items() if c in of_samples}
+            out[plain] = np.stack([(columns | fixed)[c] for c in of_samples], axis=-1)
+    return out
 
 
 def unit_of(name: str, effects: tuple[Effect, ...] = (), controls: Sequence[Control] = ("displacement",)) -> str:
@@ -648,7 +651,8 @@ def _summary(fit: Fit, sample: Sample | None) -> SummaryJson:
             parameters[name] = {"unit": unit, **statistics(values)}
         else:
             for i, s in enumerate(fit.problem.samples):
-                parameters[f"{name}[{s.name}]"] = {"unit": unit, **statistics(values[..., i])}
+                own = unit_of(name, first.model.effects, [s.protocol.control])
+                parameters[f"{name}[{s.name}]"] = {"unit": own, **statistics(values[..., i])}
     tension = round(first.model.tension_ref_N, 3)
     wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
     chains = fit.chains

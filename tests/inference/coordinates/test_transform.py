@@ -28,6 +28,7 @@ PROBLEMS = {
         LINE, Truth(effects=(named("fixture_compliance"), named("steady_creep"))), seed=7
     ).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
+    "one hold": draw([Bench(displacements_mm=(1.0,))], Truth({"k1": 800.0}), seed=8).problem,
     "slack": build([Bench().experiment()]),  # every reading zero
     "hold": build([Bench(displacements_mm=(1, 2, 3), times_s=(0.0, 10.0)).experiment()], likelihood="hold"),
 }

@@ -17,6 +17,8 @@ no proposal leaves the support; others are measured in standard deviations of th
 - log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + lost / step)``, with the tension lost
   in a hold over the root mean square of the steps between first readings. Where all creep is over before a first
   reading, the readings see this stiffness alone; where there is little, it is k1. Under weights it stays log k1;
+- in a test of one hold, k1 and B become what its tensions say beside the preload
+  (`wirebayes.inference.coordinates.tension_level`);
 - where a fixture's compliance is sampled, k1 is in all this the stiffness of the wire with its fixture, and what creeps
   beside the creep in proportion to a sampled amplitude belongs to the tension lost in a hold; these compliances and
   amplitudes become their shares (`wirebayes.inference.coordinates.shares`).
@@ -39,6 +41,7 @@ from wirebayes.inference.coordinates.edges import edge
 from wirebayes.inference.coordinates.power_of_tension import suiting_powers
 from wirebayes.inference.coordinates.shares import Elongation
 from wirebayes.inference.coordinates.slack_edge import slack_edge
+from wirebayes.inference.coordinates.tension_level import tension_level
 from wirebayes.model.problem import MATERIAL, Problem, Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.wire import compiled
@@ -195,6 +198,9 @@ class Transformation:
         self._most = np.where([d.dist.name == "logitnorm" for d in problem.prior.distributions.values()], ends, np.inf)
         slack = [slack_edge(problem, sample) for sample in problem.samples] if for_draws else []
         self.slack_edges = [s for s in slack if s and not self.log_columns[s.preload] and s.preload not in self.edges]
+        level = tension_level(problem, self.slack_edges) if for_draws else None
+        open_ = level is not None and self.log_columns[level.k1] and not self.log_columns[level.preload]
+        self.level = level if open_ and level is not None and level.preload not in self.edges else None
         self.log_spread = np.ones(len(names))
         for i in np.flatnonzero(self.log_columns).tolist():
             low, high = problem.prior.distributions[names[i]].ppf(_ONE_SD)
@@ -238,6 +244,8 @@ class Transformation:
                     else:
                         fixed[column] = problem.prior.fixed[name]
                 ridge = _ridge(where, fixed, moved, problem, sample, effects)
+                if self.level is not None:
+                    ridge = replace(ridge, log_step=self.level.log_last)
                 self.ridges.append(self._with_shares(ridge, sample) if for_draws else ridge)
                 self.shares += self.ridges[-1].shares
 
@@ -263,19 +271,15 @@ class Transformation:
                 z[:, ridge.where["U"]] -= ridge.log_power(z)
             with np.errstate(all="ignore"):
                 if "B" in ridge.shifted:
-                    stiffness = ridge.log_stiffness(theta)
-                    lost = z[:, ridge.where["B"]] + (ridge.log_creep(theta) + stiffness)
-                    for part in ridge.beside:
-                        own = np.log(theta[:, part.column]) + part.log_gained(theta) + stiffness
-                        z[:, part.column] = shares.score(own, lost)
-                        lost = np.logaddexp(lost, own)
-                    z[:, ridge.where["B"]] = lost
+                    self._add_losses(z, theta, ridge)
                 if ridge.fixture is not None:
                     own = np.log(theta[:, ridge.fixture]) + np.log(ridge.get(theta, "k1")) - ridge.log_length
                     z[:, ridge.fixture] = shares.score(own, np.zeros_like(own))
                     z[:, ridge.where["k1"]] -= np.logaddexp(0.0, own)
                 if "k1" in ridge.shifted:
                     z[:, ridge.where["k1"]] -= ridge.softened(z)
+        if self.level is not None:
+            z[:, self.level.k1] += self.level.stretch(theta)
         return z
 
     def to_natural(self, z: Array) -> Array:
@@ -283,6 +287,10 @@ class Transformation:
         theta = z * self.scale
         for i, at in self.edges.items():
             theta[:, i] = at.value(z[:, i])
+        if self.level is not None:  # no coordinate of a preload depends on k1 there
+            self._preloads(theta)
+            z = z.copy()
+            z[:, self.level.k1] -= self.level.stretch(theta)
         with np.errstate(all="ignore"):
             odds = np.exp(z[:, self.log_columns])
             theta[:, self.log_columns] = odds / (1.0 + odds / self._most[self.log_columns])
@@ -304,9 +312,10 @@ class Transformation:
                         share, rest = shares.log_shares(z[:, part.column])
                         gained = part.log_gained(theta) + stiffness
                         theta[:, part.column], lost = np.exp(lost + share - gained), lost + rest
-                    theta[:, ridge.where["B"]] = np.exp(lost - (ridge.log_creep(theta) + stiffness))
-            for slack in self.slack_edges:
-                theta[:, slack.preload] = slack.value(theta[:, slack.preload], theta)
+                    driven = self._driven(theta, ridge)
+                    theta[:, ridge.where["B"]] = np.exp(lost - (ridge.log_creep(theta) + stiffness) - driven)
+            if self.level is None:
+                self._preloads(theta)
         return theta
 
     def log_jacobian(self, theta: Array, z: Array) -> Array:
@@ -349,6 +358,25 @@ class Transformation:
     def _logarithms(self, theta: Array) -> Array:
         """(n, k) logarithms of the positive parameters, of those with a largest value the log odds of reaching it."""
         return _log_odds(theta[:, self.log_columns], self._most[self.log_columns])
+
+    def _add_losses(self, z: Array, theta: Array, ridge: _Ridge) -> None:
+        """Put the tension lost in a hold in place of B, and shares of it in place of what creeps beside the creep."""
+        stiffness = ridge.log_stiffness(theta)
+        lost = z[:, ridge.where["B"]] + (ridge.log_creep(theta) + stiffness) + self._driven(theta, ridge)
+        for part in ridge.beside:
+            own = np.log(theta[:, part.column]) + part.log_gained(theta) + stiffness
+            z[:, part.column] = shares.score(own, lost)
+            lost = np.logaddexp(lost, own)
+        z[:, ridge.where["B"]] = lost
+
+    def _preloads(self, theta: Array) -> None:
+        """Put preloads in place of their scores."""
+        for slack in self.slack_edges:
+            theta[:, slack.preload] = slack.value(theta[:, slack.preload], theta)
+
+    def _driven(self, theta: Array, ridge: _Ridge) -> Any:
+        """(n,) log creep by which the tension at the beginning of the only hold drives more than its first reading."""
+        return 0.0 if self.level is None else ridge.get(theta, "U") * self.level.driven(theta)
 
     def _hazard(self, theta: Array, ridge: _Ridge) -> Array:
         return np.asarray(ridge.get(theta, "N") * ridge.log_half_hold)

@@ -158,26 +158,13 @@ def _names_of(specimens: Sequence[str], about: About) -> list[str]:
 
 def _convert(table: RawTable, about: About, choices: Choices) -> Converted:
     """The experiment of one specimen."""
-    columns = _of_sample(table, understand(table, choices.mapping), about)
-    table, notes = _complete(table, columns)
-    decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
-    notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes]
-    texts: dict[Role, list[str]] = {
-        role: _numbers(table, column, decimal) for role, column in columns.items() if role != "hold"
-        and not (role == "time" and clock.has_moments(table, column.index))
-    }  # fmt: skip
-    values: dict[Role, Floats] = {role: _converted(columns[role], text) for role, text in texts.items()}
-    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes)
-    _check_sizes(table, columns, values)
-    values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
-    notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
-    hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
-    recorded = _Recorded(table, columns, texts, values, hold, of_day)
+    recorded, notes = _recorded(table, about, choices)
+    table, columns, values = recorded.table, recorded.columns, recorded.values
     control = choices.control or _control(recorded)
     holds = cut(recorded.readings(control), choices.time_since)
     holds, thin = _thin(holds)
-    notes += _what_was_set(control) + numbering + holds.notes + thin + _missing_holds(holds)
-    resolution = _resolution(columns[READS[control]], texts[READS[control]])
+    notes += _what_was_set(control) + recorded.numbering + holds.notes + thin + _missing_holds(holds)
+    resolution = _resolution(columns[READS[control]], recorded.texts[READS[control]])
     if resolution:
         read, unit = READS[control], UNITS[READS[control]]
         notes.append(f"{read}s are written in steps of {resolution:.3g} {unit}: that is their resolution")
@@ -207,6 +194,8 @@ class _Recorded:
     hold : (r,) array of int or None
     of_day : bool
         Whether times are moments of a day.
+    numbering : list of str
+        How holds that have names were numbered, in a sentence.
     """
 
     table: RawTable
@@ -215,6 +204,7 @@ class _Recorded:
     values: dict[Role, Floats]
     hold: NDArray[np.int64] | None
     of_day: bool
+    numbering: list[str]
 
     def complain(self, row: int, role: str, found: str, expected: str) -> InputError:
         """The error of a cell.
@@ -239,6 +229,25 @@ class _Recorded:
             role, self.values[role], self.values[READS[control]], self.values["time"], self.hold, self.of_day, step,
             self.columns["time"].header, self.complain,
         )  # fmt: skip
+
+
+def _recorded(table: RawTable, about: About, choices: Choices) -> tuple[_Recorded, list[str]]:
+    """The numbers of a table, with what was understood on the way."""
+    columns = _of_sample(table, understand(table, choices.mapping), about)
+    table, notes = _complete(table, columns)
+    decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
+    notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes]
+    texts: dict[Role, list[str]] = {
+        role: _numbers(table, column, decimal) for role, column in columns.items() if role != "hold"
+        and not (role == "time" and clock.has_moments(table, column.index))
+    }  # fmt: skip
+    values: dict[Role, Floats] = {role: _converted(columns[role], text) for role, text in texts.items()}
+    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes)
+    _check_sizes(table, columns, values)
+    values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
+    notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
+    hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
+    return _Recorded(table, columns, texts, values, hold, of_day, numbering), notes
 
 
 def _control(recorded: _Recorded) -> Control:

@@ -134,7 +134,7 @@ def _by_repetition(table: RawTable) -> _Marked | None:
         return None
     mark = tuple(str(header[: i + 1].count(name)) if name in repeated else "" for i, name in enumerate(header))
     full = tuple(f"{name} {m}".strip() for m, name in zip(mark, header, strict=True))
-    return _Marked(mark, header, full, certain=True)
+    return _Marked(mark, header, full, certain=False)
 
 
 def _by_numbers(table: RawTable) -> _Marked:

@@ -1,0 +1,90 @@
+"""Steps and weights of one wire together: the wire is one, and each kind of test has its own instruments."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import wirebayes as wb
+from wirebayes.effects import named
+from wirebayes.io.arrays import from_arrays
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.problem import build, unit_of_column
+
+TIMES = (0.0, 30.0, 60.0, 120.0)
+STEPS, WEIGHTS = (1.0, 2.0, 3.0, 4.0, 5.0), (1.0, 2.0, 3.0, 4.0)
+DRIFT_N, DRIFT_MM = 2e-4, -1e-4  # a second, of the cell and of the gauge
+SENSOR_N, SENSOR_MM = 0.004, 0.004
+
+
+def test_of(control: str, name: str, drift: float, seed: int) -> Experiment:
+    """A wire of 1 m, k1 900 N, whose reading drifts; the model's own equations, written down again."""
+    k1, B, U, k2, N, L = 900.0, 0.03, 0.9, 0.05, 0.8, 1000.0
+    rng, e, start = np.random.default_rng(seed), 0.0, 0.0
+    holds, x, t, read = [], [], [], []
+    for j, value in enumerate(STEPS if control == "displacement" else WEIGHTS, start=1):
+        tension = k1 * (value - e) / (L + e) if control == "displacement" else value
+        goal = B * tension**U
+        for time in TIMES:
+            length = L + e + (goal - e) * -np.expm1(-k2 * time**N)
+            true = k1 * ((L + value) / length - 1.0) if control == "displacement" else length * (1.0 + value / k1) - L
+            noise = rng.normal(0.0, SENSOR_N if control == "displacement" else SENSOR_MM)
+            holds.append(j), x.append(value), t.append(time), read.append(true + drift * (start + time) + noise)
+        e += (goal - e) * -np.expm1(-k2 * TIMES[-1] ** N)
+        start += TIMES[-1]
+    displacement, tension = (x, read) if control == "displacement" else (read, x)
+    return from_arrays(holds, displacement, t, tension, length_mm=L, name=name, material="line", control=control)
+
+
+test_of.__test__ = False  # type: ignore[attr-defined]
+
+
+@pytest.fixture(scope="module")
+def pair() -> list[Experiment]:
+    return [test_of("displacement", "steps", DRIFT_N, 1), test_of("force", "hung", DRIFT_MM, 2)]
+
+
+def test_an_instrument_belongs_to_the_tests_that_it_reads(pair):
+    problem = build([*pair, test_of("force", "again", 0.0, 3)], [named("sensor_drift"), named("toe")])
+    of_effects = [name for name in problem.names if "." in name]
+    assert of_effects == ["toe.w", "sensor_drift.a[displacement]", "sensor_drift.a[force]"]
+    assert [problem.column("sensor_drift.a", s) for s in problem.samples] == [
+        "sensor_drift.a[displacement]", "sensor_drift.a[force]", "sensor_drift.a[force]"
+    ]  # fmt: skip
+    units = [unit_of_column(f"sensor_drift.a[{c}]", problem.samples) for c in ("displacement", "force")]
+    assert units == ["N/s", "mm/s"]
+
+
+def test_tests_of_one_kind_share_the_amplitude_as_before(pair):
+    names = build([pair[0], test_of("displacement", "more", 0.0, 4)], [named("sensor_drift")]).names
+    assert "sensor_drift.a" in names
+
+
+def test_the_likelihood_is_that_of_each_test_with_its_own_drift(pair):
+    effect = named("sensor_drift")
+    both, alone = build(pair, [effect]), [build([test], [effect]) for test in pair]
+    theta = both.prior.rvs(20, np.random.default_rng(0))
+    columns = dict(zip(both.names, theta.T, strict=True))
+    expected = np.zeros(20)
+    for one, sample in zip(alone, both.samples, strict=True):
+        own = np.column_stack([columns[both.column(name, sample)] for name in one.names])
+        expected += one.log_likelihood(own)
+    assert both.log_likelihood(theta) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_both_drifts_and_the_wire_are_found_together(pair):
+    few = wb.Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=800)
+    found = wb.fit(pair, together="line", effects=["sensor_drift"], check=False, policy=few).summary()
+    assert found["converged"]
+    for name, truth, unit in (
+        ("sensor_drift.a[steps]", DRIFT_N, "N/s"), ("sensor_drift.a[hung]", DRIFT_MM, "mm/s"), ("k1", 900.0, "N")
+    ):  # fmt: skip
+        one = found["parameters"][name]
+        assert one["unit"] == unit and one["q05"] < truth < one["q95"]
+
+
+def test_a_prior_in_one_file_is_of_its_own_instrument(pair):
+    stated = replace(pair[1], priors={"sensor_drift.a": {"fixed": 0.0}})
+    problem = build([pair[0], stated], [named("sensor_drift")])
+    assert "sensor_drift.a[displacement]" in problem.names and problem.prior.fixed == {"sensor_drift.a[force]": 0.0}
