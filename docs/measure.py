@@ -11,8 +11,10 @@ import json
 import re
 import subprocess
 import sys
+from collections import Counter
 from datetime import UTC, datetime
 from pathlib import Path
+from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -28,8 +30,14 @@ STUDIES = {
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
     "robot_calibration": ("-m analyses.robots.whole_calibration coverage 120 --output {folder}/it.json", "it.json"),
     "robot_lengths_alone": ("-m analyses.robots.whole_calibration lengths 30 --output {folder}/it.json", "it.json"),
+    "discover_clean": (
+        "-m analyses.hidden_effects --size small --answer api --simulations 199 --kinds clean --clean 1200 --seed 5000 "
+        "--output {folder}",
+        "scores.json",
+    ),
     "real_wires": ("analyses/discovery/real_wires.py --together --output {folder}/wires.json", "wires.json"),
 }
+REDUCED = {"discover_clean": lambda scores: _clean_in_short(scores)}  # of results that hold every file's answer
 _BLOCK = re.compile(r"(<!-- measured -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -46,6 +54,8 @@ def measure(name: str) -> None:
     with TemporaryDirectory() as folder:
         subprocess.run([sys.executable, *command.format(folder=folder).split()], cwd=ROOT, check=True)
         result = json.loads((Path(folder) / file).read_text(encoding="utf-8"))
+    if name in REDUCED:
+        result = REDUCED[name](result)
     kept = {
         "command": "python " + re.sub(r" --(rows|output) \S+", "", command),
         "commit": commit.strip(),
@@ -68,6 +78,7 @@ def texts() -> dict[Path, str]:
         DOCS / "coverage.inc": _coverage(kept["coverage"]),
         DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"], kept["robot_lengths_alone"]),
         DOCS / "real-wires.inc": _real_wires(kept["real_wires"]),
+        DOCS / "discover-clean-said.inc": _clean(kept["discover_clean"]),
     }
 
 
@@ -190,6 +201,41 @@ def _robot_calibration(kept: dict[str, Any], alone: dict[str, Any]) -> str:
         "as wrong as before, at the median.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _clean_in_short(scores: dict[str, Any]) -> dict[str, Any]:
+    """Of answers to files without an effect: alarms by protocol, their verdicts and names, and the time."""
+    rows = scores["api"]["rows"]
+    alarms = [row for row in rows if row["any_alarm"]]
+    protocols = sorted({row["protocol"] for row in rows})
+    return {
+        "files": len(rows),
+        "alarms": len(alarms),
+        "by_protocol": {p: sum(row["protocol"] == p for row in alarms) for p in protocols},
+        "files_a_protocol": len(rows) // len(protocols),
+        "verdicts": dict(Counter(row["verdict"] for row in alarms).most_common()),
+        "named": [[row["protocol"], row["accepted"]] for row in alarms if row["verdict"] == "named"],
+        "median_seconds": median(row["seconds"] for row in rows),
+    }
+
+
+def _clean(kept: dict[str, Any]) -> str:
+    """A paragraph on which files without an effect raise an alarm, and what is then said."""
+    found = kept["result"]
+    counts = found["by_protocol"]
+    most = max(counts, key=counts.__getitem__)
+    others = [count for protocol, count in counts.items() if protocol != most]
+    verdicts = ", ".join(f"*{verdict}* in {count}" for verdict, count in found["verdicts"].items())
+    names = "; ".join(
+        f"{' and '.join(accepted).replace('_', ' ')} in a file of the protocol *{protocol.replace('_', ' ')}*"
+        for protocol, accepted in found["named"]
+    )
+    return (
+        f"By protocol {min(others)} to {max(others)} of {found['files_a_protocol']} files raise an alarm, with "
+        f"*{most.replace('_', ' ')}* {counts[most]}. Of the {found['alarms']} alarms the verdict is {verdicts}. "
+        f"Named: {names or 'nothing'}. A file takes {found['median_seconds']:.1f} s (median). Commit {kept['commit']}, "
+        f"{kept['date']}.\n"
+    )
 
 
 def _real_wires(kept: dict[str, Any]) -> str:

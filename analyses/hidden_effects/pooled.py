@@ -1,6 +1,6 @@
 """The table of targets over several runs together, as the docs include it.
 
-    python -m analyses.hidden_effects.pooled out/clean/scores.json out/singles/scores.json > docs/discover-table.inc
+    python -m analyses.hidden_effects.pooled out/clean/scores.json out/singles/scores.json > table.inc
 
 What is found has its 90 % interval; a missed row is bold. The last column counts only cases of which a refit of the
 plain model, whose noise is not known, leaves most to be seen.

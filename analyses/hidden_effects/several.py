@@ -1,6 +1,6 @@
 """Names and remainders over several runs together, by protocol, as the docs include them.
 
-    python -m analyses.hidden_effects.several out/one/scores.json out/other/scores.json > docs/discover-several.inc
+    python -m analyses.hidden_effects.several out/one/scores.json out/other/scores.json > tables.inc
 
 The first table has the targets of names and remainders with 90 % intervals, the others the stated probabilities of a
 remainder, of names and of families with 95 % intervals, as the cases are and as the prior expects them. A missed row is

@@ -9,6 +9,7 @@ import pytest
 
 from wirebayes.app.folders import READ, Shelf
 from wirebayes.app.jobs import Jobs
+from wirebayes.app.work import _own_robot
 from wirebayes.cli import main
 from wirebayes.errors import InputError
 from wirebayes.processes.workers import load_early
@@ -109,6 +110,23 @@ def test_an_experiment_file_without_its_table_is_refused_in_a_line(shelf, jobs):
     job = ended(jobs.start(test, READ, {}))
     assert job.state == "refused" and "\n" not in job.value
     assert job.value.startswith("a.toml, line 5, experiment a, key readings: found 'a.csv', which is no file there")
+
+
+def test_a_robot_of_ones_own_is_one_file_and_at_most_one_table(shelf):
+    test = dropped(shelf, "b.csv", b"")
+    place = test.place_for_robot(["way.csv", "my robot.TOML"])
+    assert place == test.folder / "robots" / "my-robot"
+    with pytest.raises(InputError, match="expected one robot's file"):
+        _own_robot(place)
+    (place / "my robot.TOML").write_text("")
+    assert _own_robot(place) == (place / "my robot.TOML", {})
+    for header, kind in (("time_s,x_m,y_m,z_m", "trajectory"), ("time_s,joint_1_m", "joints")):
+        (place / "way.csv").write_text(f"{header}\n0,1,2,3\n")
+        assert _own_robot(place)[1] == {kind: place / "way.csv"}
+    (place / "log.csv").write_text("")
+    with pytest.raises(InputError, match="found log.csv, my robot.TOML, way.csv; expected"):
+        _own_robot(place)
+    assert list(test.place_for_robot(["my robot.toml"]).iterdir()) == []  # dropped anew
 
 
 def test_a_stop_ends_the_work_with_all_its_processes_and_it_can_go_on(shelf, jobs):

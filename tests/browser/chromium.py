@@ -97,10 +97,19 @@ class Tab:
         while not self._loaded:
             self._connection.read()
 
-    def wait_for(self, script: str, seconds: float = 60.0) -> None:
-        """Wait until an expression is true, or something that is there."""
+    def holds(self, script: str) -> bool:
+        """Whether an expression is true, or something that is there; not while the tab goes to another page."""
+        try:
+            return bool(self.run(f"Boolean({script})"))
+        except AssertionError as gone:
+            if "navigated" not in str(gone):
+                raise
+            return False
+
+    def wait_for(self, script: str, seconds: float = 300.0) -> None:
+        """Wait until an expression is true, or something that is there; long, for other work may hold the machine."""
         end = time.monotonic() + seconds
-        while not self.run(f"Boolean({script})"):
+        while not self.holds(script):
             assert time.monotonic() < end, f"waited {seconds:g} s for {script}; {self.run('document.body.innerText')}"
             time.sleep(0.1)
 

@@ -18,6 +18,7 @@ import pytest
 from tests.browser import chromium
 
 BENCH = Path(__file__).parents[2] / "docs" / "example" / "bench.csv"
+ROBOTS = Path(__file__).parents[2] / "data" / "robots"
 
 pytestmark = [
     pytest.mark.browser,
@@ -109,7 +110,7 @@ def test_from_a_dropped_file_to_the_downloaded_posterior(tab, served, tmp_path):
     read(tab, served, bench_file(tmp_path, "first.csv"))
     assert "first: 3 holds, 15 readings, 1200 mm of first" in text(tab)
     tab.click("Fit")
-    tab.wait_for("document.querySelector('iframe')", 120)
+    tab.wait_for("document.querySelector('iframe')")
     tab.wait_for("document.querySelector('iframe').contentDocument.querySelector('h1')")
     assert "first creeps by" in tab.run("document.querySelector('iframe').contentDocument.body.innerText")
     tab.keep_downloads(tmp_path / "taken")
@@ -130,6 +131,39 @@ def test_from_a_dropped_file_to_the_downloaded_posterior(tab, served, tmp_path):
     tab.wait_for("document.querySelector('iframe')")
     assert tab.run("document.documentElement.scrollWidth") <= 390
     nothing_went_out(tab, served)
+
+
+def test_a_robot_of_ones_own_moves_on_the_wire(tab, served, tmp_path):
+    """Its file and a table of poses are dropped together; then a shipped one is chosen. Both show their drift."""
+    read(tab, served, bench_file(tmp_path, "moved.csv"))
+    tab.click("Fit")
+    tab.wait_for("document.querySelector('iframe')")
+    robot, way = tmp_path / "mine.toml", tmp_path / "way.csv"
+    robot.write_text((ROBOTS / "linear-6.toml").read_text().replace('name = "linear-6"', 'name = "mine"'))
+    way.write_text("time_s,x_m,y_m,z_m\n0,0,0,0.6\n60,0.1,0,0.6\n600,0.1,0,0.6\n")
+    tab.wait_for("document.querySelector('[data-robot]')")
+    tab.run("document.querySelector('[data-robot]').scrollIntoView({block: 'center'})")
+    tab.drop([robot, way], "[data-robot]")
+    tab.wait_for("document.querySelector('iframe').getAttribute('src') == '/files/moved/pose-mine/report.html'")
+    tab.wait_for("document.querySelector('iframe').contentDocument.querySelector('.lead')")
+    assert "mm" in tab.run("document.querySelector('iframe').contentDocument.querySelector('.lead').innerText")
+    assert tab.run("document.querySelector('iframe').contentDocument.querySelectorAll('img').length") >= 1
+    tab.click("Drift")
+    tab.wait_for(
+        "document.querySelector('iframe').getAttribute('src') == '/files/moved/pose-linear-7/report.html'", 240
+    )
+    nothing_went_out(tab, served)
+
+
+def test_ten_files_leave_no_memory_behind(tab, served, tmp_path):
+    """Files are read in processes of their own, so the server grows by what its pages hold, not by what was in them."""
+    sizes = []
+    for number in range(10):
+        read(tab, served, bench_file(tmp_path, f"file-{number}.csv"))
+        status = Path(f"/proc/{served.process.pid}/status").read_text()
+        sizes.append(int(status.partition("VmRSS:")[2].split()[0]) / 1024.0)
+    print(f"memory of the server after each of ten files, MB: {', '.join(f'{size:.0f}' for size in sizes)}")
+    assert sizes[-1] < sizes[0] + 20.0 and sizes[-1] < 200.0
 
 
 def test_a_broken_file_gives_one_plain_line_in_the_page(tab, served, tmp_path):
@@ -173,7 +207,7 @@ def test_two_tabs_do_not_mix_and_a_closed_one_leaves_nothing_broken(tab, served,
     other.click("Check")
     other.wait_for(STOP)
     other.close()  # in the midst of its work
-    tab.wait_for("document.querySelector('iframe')", 120)
+    tab.wait_for("document.querySelector('iframe')")
     assert tab.run("document.querySelector('iframe').getAttribute('src')") == "/files/left/fit/report.html"
     assert "right" not in text(tab)
     assert tab.errors == []

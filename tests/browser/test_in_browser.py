@@ -19,6 +19,7 @@ import pytest
 from tests import light
 from tests.browser import chromium
 from wirebayes.report.page import write
+from wirebayes.report.pages.predict import write_beside
 
 WIDTHS = (360, 820, 1400)
 RESULTS = Path(__file__).parents[1] / "data" / "results"
@@ -109,7 +110,12 @@ def commands_of(folder: Path) -> None:
     wb.import_bench("bench.csv", length_mm=1000, material="line", output=folder / "import")
     shutil.copytree(RESULTS / "calibrate", folder / "calibrate")
     for name in KINDS[1:]:
-        write(folder / name)
+        if name != "predict":
+            write(folder / name)
+    (folder / "predict").mkdir()
+    later = {"hold": [7, 7, 8, 8], "displacement_mm": [5, 5, 6, 6], "time_s": [0, 60, 0, 60]}
+    table = folder / "predict" / "report.csv"
+    write_beside(wb.predict(fitted, later, output=table), table)
 
 
 def poses_over_time(folder: Path, wires) -> None:
@@ -137,7 +143,7 @@ WAY = {
 }  # fmt: skip
 KINDS = (
     "reproduce", "batch", "calibrate", "check", "compare", "discover", "export", "fit", "import", "plan", "pose",
-    "pose-joints", "pose-trajectory", "simulate",
+    "pose-joints", "pose-trajectory", "predict", "simulate",
 )  # fmt: skip
 
 

@@ -136,6 +136,8 @@ def test_a_stress_is_a_tension_with_the_area_of_the_sample(tmp_path, unit, facto
     made = read(path, About("wire", "line", 1000.0, 0.25))
     factor = 0.00689475729317 if factor is None else factor
     assert [row[3] for row in made.rows] == pytest.approx(F * factor / 4)
+    spelt = table(tmp_path / "c.csv", ["x (mm)", "t/s", f"sigma/{unit}"], [], X, T, F)
+    assert len(read(spelt, About("wire", "line", 1000.0, 0.25)).rows) == len(F)
     beside = table(tmp_path / "b.csv", ["x (mm)", "Time (s)", "Stress (MPa)", "Load (N)"], [], X, T, 7 * F, F)
     assert [row[3] for row in read(beside).rows] == pytest.approx(F)
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from wirebayes.errors import InputError
 
 RAW, ABOUT = "raw", "about.json"
+ROBOTS = "robots"  # a folder for each robot of the user's own, with its file and a table of poses
 READ = "read"  # the step that turns raw files into an experiment file
 STEPS = (READ, "check", "fit", "discover")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,80}")
@@ -49,6 +51,14 @@ class Test:
     def say(self, about: dict[str, Any]) -> None:
         """Keep ``length_mm``, ``material``, ``area_mm2``, ``control``, and ``options`` as the command line has them."""
         write(self.folder / ABOUT, about)
+
+    def place_for_robot(self, names: list[str]) -> Path:
+        """An empty folder for files that were dropped together, named after the robot; an earlier one is replaced."""
+        robot = next((name for name in names if name.lower().endswith(".toml")), names[0])
+        place = self.folder / ROBOTS / _bare(Path(robot).stem, "robot")
+        shutil.rmtree(place, ignore_errors=True)
+        place.mkdir(parents=True)
+        return place
 
     def record(self, step: str) -> dict[str, Any] | None:
         """What the page shows of a step; None before it is done."""
@@ -94,7 +104,7 @@ class Shelf:
 
     def new(self, title: str) -> Test:
         """An empty test, named after a file; the second of one name has a number behind it."""
-        bare = re.sub(r"[^A-Za-z0-9._-]+", "-", title).strip("-._")[:60] or "test"
+        bare = _bare(title, "test")
         count = 1
         while True:
             folder = self.root / (bare if count == 1 else f"{bare}-{count}")
@@ -105,6 +115,11 @@ class Shelf:
                 continue
             (folder / RAW).mkdir()
             return Test(folder)
+
+
+def _bare(title: str, otherwise: str) -> str:
+    """A title as the name of a folder and as part of an address."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", title).strip("-._")[:60] or otherwise
 
 
 def write(path: Path, content: dict[str, Any]) -> None:

@@ -262,6 +262,16 @@ class _TestPage:
                     self.start(f"pose-{robot.value}", robot=robot.value, experiment=wire)
 
                 ui.button("Drift", on_click=drift)
+            ui.label("Your own robot: drop its file (TOML), with a trajectory (CSV) beside it if there is one.")
+
+            async def dropped(event: Any) -> None:
+                place = self.test.place_for_robot([file.name for file in event.files])
+                for file in event.files:
+                    await file.save(place / Path(file.name.replace("\\", "/")).name)
+                wire = names[0] if experiment is None else experiment.value
+                self.start(f"pose-{place.name}", robot=str(place), experiment=wire)
+
+            ui.upload(multiple=True, auto_upload=True, on_multi_upload=dropped, label="Your robot").props("data-robot")
 
     def _address(self, file: str) -> str:
         return quote(f"/files/{self.test.name}/{file}")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import wirebayes
-from wirebayes.app.folders import RAW, READ, STEPS, Test, write
+from wirebayes.app.folders import RAW, READ, ROBOTS, STEPS, Test, write
 from wirebayes.errors import InputError
 
 Progress = Callable[[str, float, float], None]
@@ -74,12 +74,27 @@ def _ask(test: Test, step: str, options: dict[str, Any], progress: Progress) -> 
 
 def _pose(test: Test, step: str, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
     """The drift of a robot on this wire: on the final model of `discover` where it was run, else on the fit."""
-    experiment, robot = options["experiment"], step.removeprefix("pose-")
+    experiment, robot, along = options["experiment"], options["robot"], dict[str, Any]()
+    if Path(robot).is_dir():
+        robot, along = _own_robot(Path(robot))
     discovered = test.folder / "discover" / experiment / "final"
     wires = discovered if "discover" in test.steps() else test.folder / "fit" / experiment
     shutil.rmtree(test.folder / step, ignore_errors=True)  # perhaps of the fit, before there was a discovery
-    found = wirebayes.pose(robot, wires, output=test.folder / step, progress=progress, seed=options["seed"])
+    found = wirebayes.pose(robot, wires, output=test.folder / step, progress=progress, seed=options["seed"], **along)
     return _with_page(found)
+
+
+def _own_robot(place: Path) -> tuple[Path, dict[str, Path]]:
+    """The robot's file that was dropped, and the table beside it: of joint values, or of commanded poses."""
+    robots, tables = ([p for p in sorted(place.iterdir()) if p.suffix.lower() == end] for end in (".toml", ".csv"))
+    if len(robots) != 1 or len(tables) > 1:
+        found = ", ".join(path.name for path in sorted(place.iterdir()))
+        raise InputError(f"found {found}; expected one robot's file (TOML), and one table of poses (CSV) or none")
+    if not tables:
+        return robots[0], {}
+    header = tables[0].read_text(encoding="utf-8", errors="replace").partition("\n")[0]
+    kind = "joints" if "joint_1" in header or "motor_1" in header else "trajectory"
+    return robots[0], {kind: tables[0]}
 
 
 def _read_experiment_file(test: Test, target: Path) -> dict[str, Any]:
@@ -120,6 +135,6 @@ def _with_page(found: Any) -> dict[str, Any]:
 
 def _bare(text: str, test: Test) -> str:
     """A message without the app's own folders before the names of files."""
-    for folder in (test.folder / RAW, test.folder / READ, test.folder):
+    for folder in (*(test.folder / ROBOTS).glob("*"), test.folder / RAW, test.folder / READ, test.folder):
         text = text.replace(f"{folder}/", "")
     return text

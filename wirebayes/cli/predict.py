@@ -18,7 +18,11 @@ ModelOption = Annotated[
 ]
 Table = Annotated[
     Path | None,
-    typer.Option("--output", metavar="FILE.csv", help="The table to write; default: named after the protocol."),
+    typer.Option(
+        "--output",
+        metavar="FILE.csv",
+        help="The table, with a page beside it; default: named after PROTOCOL.",
+    ),
 ]
 Fresh = Annotated[
     bool, typer.Option("--fresh", help="Predict a fresh sample with no history instead of the tested one.")
@@ -50,16 +54,18 @@ def predict(
     from wirebayes.commands.predict import as_json as json_of
     from wirebayes.commands.predict import predict as run
     from wirebayes.json_files.plain import plain
+    from wirebayes.report.pages.predict import write_beside
 
     table = protocol.with_name(f"{protocol.stem}-predicted.csv") if output is None else output
     predicted = run(
         folder, protocol, experiment=experiment, model=model, fresh=fresh, own_effects=own_effects, seed=seed,
         output=table,
     )  # fmt: skip
+    page = write_beside(predicted, table)
     for warning in predicted.attrs.get("warnings", []):
         typer.echo(f"warning: {warning}", err=True)
     typer.echo(f"{protocol}: {predicted.attrs['prediction']}", err=True)
     if as_json:
         typer.echo(json.dumps(plain(json_of(predicted)), indent=2, ensure_ascii=False, allow_nan=False))
     elif not quiet:
-        typer.echo(f"Results: {table}")
+        typer.echo(f"Results: {table} (open {page})")

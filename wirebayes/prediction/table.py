@@ -164,20 +164,24 @@ class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __ini
             axes = plt.subplots()[1]
         control: Control = "displacement" if "mean_N" in self else "force"
         unit, setting = READ_UNIT[control], SET[control]
-        for hold in np.unique(self["hold"].values):
+        holds = np.unique(self["hold"].values)
+        named = holds[np.unique(np.linspace(0, len(holds) - 1, _MOST_NAMED).round().astype(int))]
+        for hold in holds:
             rows = self.isel(reading=np.flatnonzero(self["hold"].values == hold))
             time = rows["time_s"].values
-            label = f"hold {hold}, {rows[setting].values[0]:g} {SET_UNIT[control]}"
+            label = f"hold {hold}, {rows[setting].values[0]:g} {SET_UNIT[control]}" if hold in named else None
             (line,) = axes.plot(time, rows[f"q50_{unit}"].values, "o-", ms=3, label=label)
             low, high = rows[f"q05_{unit}"].values, rows[f"q95_{unit}"].values
             axes.fill_between(time, low, high, color=line.get_color(), alpha=0.25, lw=0)
         axes.set_xlabel("time in the hold, s")
         axes.set_ylabel(f"{_READ_WORD[control]}, {unit}")
         axes.set_title(f"{self.attrs['experiment']}: predicted, 90 % band")
-        axes.legend(frameon=False)
+        # the best place is looked for among all points of all lines
+        axes.legend(frameon=False, loc="best" if len(holds) <= _MOST_NAMED else "upper right")
         return axes
 
 
+_MOST_NAMED = 12  # holds that a legend has room for; of more, some evenly spaced ones are named
 _READ_WORD = {"displacement": "tension", "force": "displacement"}
 
 

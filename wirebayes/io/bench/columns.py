@@ -55,10 +55,11 @@ _LETTERS: dict[Role, tuple[str, ...]] = {  # mean something beside the right uni
 # What a strain or a stress is called; only beside a unit of one, for other quantities have these names too.
 _OF_SAMPLE: dict[Role, tuple[str, ...]] = {
     "displacement": (
-        "strain", "verformung", "deformation", "deformacion", "deformazione", "ε", "e", "应变", "ひずみ",
+        "strain", "verformung", "deformation", "deformacion", "deformazione", "ε", "epsilon", "e", "应变", "ひずみ",
     ),
     "tension": (
-        "stress", "spannung", "contrainte", "esfuerzo", "sforzo", "tensao", "spanning", "σ", "s", "应力", "応力",
+        "stress", "spannung", "contrainte", "esfuerzo", "sforzo", "tensao", "spanning", "σ", "sigma", "s",
+        "应力", "応力",
     ),
 }  # fmt: skip
 # What a rig calls its weights, and the gauge that reads the wire: only where no column speaks of the quantity itself.
