@@ -33,9 +33,10 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import write_csv
-from wirebayes.prediction.request import read_request
-from wirebayes.prediction.table import table as predicted_table
+from wirebayes.prediction.request import request_of
+from wirebayes.prediction.table import mixture_table
 from wirebayes.results.jobs import Job, one
 from wirebayes.results.store import CREEP_TIMES_S, Stored, load
 from wirebayes.robot.export import files
@@ -174,8 +175,8 @@ def figures(stored: Stored, simulated: Simulated, folder: Path) -> list[dict[str
     stiff, value = (w.stiffness_N(tension) for w in wires)
     add("derived", "stiffness_N", float(value[0]), *map(float, np.quantile(stiff, [0.05, 0.95])))
 
-    request = read_request(folder / "later.csv", stored)
-    rows = predicted_table(request)
+    request = request_of(protocol_table(folder / "later.csv"), stored)
+    rows = mixture_table([(1.0, request)])
     measured = truth.readings[-LATER:, :, 0][truth.protocol.mask[-LATER:]]
     for row, reading in zip(rows, measured, strict=True):
         add("predict", f"hold {row[1]}", float(reading), row[6], row[8])

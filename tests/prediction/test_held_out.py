@@ -12,7 +12,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build
-from wirebayes.prediction.held_out import Scores, _log_mean, _scores, held_out, pit_band, train_counts, two_thirds
+from wirebayes.prediction.held_out import Scores, _log_mean, _scores, held_out, pit_band, two_thirds
 from wirebayes.wire.staircase import simulate
 
 QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
@@ -120,14 +120,6 @@ def test_band_itself_covers_the_diagonal_and_is_ordered() -> None:
     assert 0 <= p <= 1
 
 
-def test_training_counts() -> None:
-    assert train_counts(12) == [5, 8]
-    assert train_counts(11) == [5, 7, 8]
-    assert train_counts(8) == [5]
-    assert two_thirds(8) == 5
-    assert train_counts(3) == []
-
-
 def test_scores_are_moments_quantiles_and_ranks_of_the_draws_of_each_reading() -> None:
     """A draw that equals the reading does not lie below it; the spread has the divisor of a sample."""
     draws = np.zeros((2, 2, 4))
@@ -141,7 +133,6 @@ def test_scores_are_moments_quantiles_and_ranks_of_the_draws_of_each_reading() -
     assert found.pit.tolist() == [0.25, 0.75]
     assert found.quantiles_N[3].tolist() == [2.0, 7.0] and found.quantiles_N.shape == (7, 2)
     assert found.rmse_N == pytest.approx(np.sqrt((0.5**2 + 2.0**2) / 2.0))
-    assert found.residual_sd == pytest.approx([-0.5 / np.sqrt(3.0), 2.0 / np.sqrt(20.0 / 3.0)])
     assert found.elpd.tolist() == [1.0, 2.0] and found.elpd_together == 2.5
 
 
@@ -208,7 +199,5 @@ def test_with_nothing_to_come_there_is_nothing_to_predict() -> None:
         held_out(stub, experiment, np.random.default_rng(0))  # type: ignore[arg-type]
 
 
-def test_training_counts_leave_two_holds_to_predict_and_are_rounded_to_nearest() -> None:
-    assert [two_thirds(n) for n in (3, 4, 5, 7, 10)] == [2, 3, 3, 5, 7]
-    counts = {n: train_counts(n) for n in (4, 5, 6, 7, 9, 10, 13)}
-    assert counts == {4: [], 5: [3], 6: [4], 7: [5], 9: [5, 6], 10: [5, 7, 8], 13: [5, 8, 9]}
+def test_two_thirds_are_rounded_to_nearest() -> None:
+    assert [two_thirds(n) for n in (3, 4, 5, 7, 8, 10)] == [2, 3, 3, 5, 5, 7]

@@ -17,7 +17,6 @@ from wirebayes.prediction import leave_one_hold_out as module
 from wirebayes.prediction.leave_one_hold_out import (
     REFIT,
     LeftOut,
-    difference,
     log_mean,
     smoothed_leave_one_hold_out,
     standard_error,
@@ -203,18 +202,10 @@ def test_the_draws_that_a_bridge_stands_on_say_how_well_it_is_known(centre: floa
     assert 0.4 < np.var(values) * shared.mean() < 1.2
 
 
-def test_difference_and_its_standard_error() -> None:
-    hold = np.array([1, 2, 3, 4])
-    names, none = ("a",) * 4, np.zeros(4)
-    one = LeftOut(names, hold, np.array([3.0, 2.0, 5.0, 2.0]), none, none > 0)
-    other = LeftOut(names, hold, np.array([2.0, 2.0, 2.0, 2.0]), none, none > 0)
-    total, se = difference(one, other)
-    assert total == 4.0
-    assert se == pytest.approx(2 * np.std([1, 0, 3, 0], ddof=1))
+def test_the_total_and_its_standard_error() -> None:
+    none = np.zeros(4)
+    one = LeftOut(("a",) * 4, np.arange(1, 5), np.array([3.0, 2.0, 5.0, 2.0]), none, none > 0)
     assert one.total == 12.0 and one.se == pytest.approx(2 * np.std([3, 2, 5, 2], ddof=1)) and one.converged
-    for foreign in (LeftOut(names, hold + 1, none, none, none > 0), LeftOut(("b",) * 4, hold, none, none, none > 0)):
-        with pytest.raises(ValueError, match="same holds"):
-            difference(one, foreign)
 
 
 @pytest.mark.parametrize("seed", [0, 1])

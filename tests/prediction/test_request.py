@@ -8,9 +8,11 @@ import pytest
 from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import read_experiments
+from wirebayes.io.readings import protocol_table
 from wirebayes.model.problem import build
-from wirebayes.prediction.request import read_request
+from wirebayes.prediction.request import request_of
 from wirebayes.results.store import Stored
+from wirebayes.strict.table import Table
 
 TRAINED = """hold,displacement_mm,time_s,tension_N,temperature_C
 1,1,0,1.00,20.0
@@ -38,15 +40,15 @@ def stored(tmp_path: Path) -> Stored:
     return Stored({"k1": np.ones(3)}, sample, "chain")
 
 
-def ask(folder: Path, text: str) -> Path:
+def ask(folder: Path, text: str) -> Table:
     path = folder / "protocol.csv"
     path.write_text(text)
-    return path
+    return protocol_table(path)
 
 
 def test_holds_to_come_follow_all_that_was_held(tmp_path: Path, stored: Stored) -> None:
     text = "hold,displacement_mm,time_s,temperature_C\n3,2,0,21.0\n3,2,60,21.5\n7,4,0,25\n7,4,10,25\n7,4,90,26\n"
-    request = read_request(ask(tmp_path, text), stored)
+    request = request_of(ask(tmp_path, text), stored)
     prediction = request.prediction
     assert prediction.trained == 3
     assert list(prediction.requested) == [False, False, True, True]
@@ -66,8 +68,8 @@ def test_holds_to_come_follow_all_that_was_held(tmp_path: Path, stored: Stored) 
 def test_later_holds_continue_the_test_though_no_training_hold_is_repeated(tmp_path: Path, stored: Stored) -> None:
     later = "7,4,0,25\n7,4,10,25\n7,4,90,26\n9,5,0,25\n10,4.5,0,25\n"
     header = "hold,displacement_mm,time_s,temperature_C\n"
-    alone = read_request(ask(tmp_path, header + later), stored)
-    repeating = read_request(ask(tmp_path, header + "3,2,0,21.0\n3,2,60,21.5\n" + later), stored)
+    alone = request_of(ask(tmp_path, header + later), stored)
+    repeating = request_of(ask(tmp_path, header + "3,2,0,21.0\n3,2,60,21.5\n" + later), stored)
     assert alone.prediction.trained == repeating.prediction.trained == 3
     assert list(alone.prediction.requested) == [False, False, False, True, True, True]
     one, other = alone.prediction.protocol, repeating.prediction.protocol
@@ -84,7 +86,7 @@ def test_later_holds_continue_the_test_though_no_training_hold_is_repeated(tmp_p
 @pytest.mark.parametrize("number", [1, 2, 101])
 def test_a_fresh_sample_starts_anew_without_the_others_events(tmp_path: Path, stored: Stored, number: int) -> None:
     text = f"hold,displacement_mm,time_s,temperature_C\n{number},3,0,24\n{number},3,60,26\n"
-    request = read_request(ask(tmp_path, text), stored, fresh=True)
+    request = request_of(ask(tmp_path, text), stored, fresh=True)
     protocol = request.prediction.protocol
     assert request.prediction.trained == 0 and list(protocol.start_s) == [0.0]
     assert protocol.warming_K is not None and protocol.warming_K[0] == pytest.approx([0.0, 2.0])
@@ -94,7 +96,7 @@ def test_a_fresh_sample_starts_anew_without_the_others_events(tmp_path: Path, st
 
 def test_replicates_alone_are_said_to_be_that(tmp_path: Path, stored: Stored) -> None:
     text = "hold,displacement_mm,time_s,temperature_C\n1,1,0,20\n1,1,60,20.5\n3,2,0,21\n3,2,60,21.5\n"
-    assert read_request(ask(tmp_path, text), stored).sentence == "holds 1, 3 of the training predicted as replicates"
+    assert request_of(ask(tmp_path, text), stored).sentence == "holds 1, 3 of the training predicted as replicates"
 
 
 @pytest.mark.parametrize(
@@ -125,5 +127,5 @@ def test_replicates_alone_are_said_to_be_that(tmp_path: Path, stored: Stored) ->
 )
 def test_refusals_say_where(tmp_path: Path, stored: Stored, text: str, words: str) -> None:
     with pytest.raises(InputError) as caught:
-        read_request(ask(tmp_path, text), stored)
+        request_of(ask(tmp_path, text), stored)
     assert words in str(caught.value)

@@ -12,7 +12,7 @@ from tests.simulated import simulated_tests
 from wirebayes.model.problem import build
 from wirebayes.prediction import table as module
 from wirebayes.prediction.predictive import PredictionRequest
-from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table, table
+from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table
 from wirebayes.results.store import Stored
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.model import Model
@@ -70,7 +70,7 @@ def test_quantiles_are_those_of_the_known_normal() -> None:
     every = np.ones(3, bool)
     question = PredictionRequest(protocol, 0, every, np.full(3, np.nan))  # the same holds of a fresh sample
     request = SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)
-    rows = [dict(zip(header("displacement"), row, strict=True)) for row in table(request, draws=DRAWS)]  # type: ignore[arg-type]
+    rows = [dict(zip(header("displacement"), row, strict=True)) for row in mixture_table([(1.0, request)], draws=DRAWS)]  # type: ignore[arg-type]
     r, covariance, hold = normal(protocol, WIRE, Model(), experiment.tension(), 0.02)
     mean, sd = experiment.tension()[protocol.mask] - r, np.sqrt(np.diag(covariance))
     assert [row["hold"] for row in rows] == list(hold + 1)
@@ -125,8 +125,8 @@ def test_four_thousand_draws_are_shared_by_probability_and_an_improbable_model_h
     monkeypatch.setattr(module, "predict", predict)
     mixture_table([(share, request) for share in shares])  # type: ignore[misc]
     assert [len(rows) for rows in asked] == used
-    table(request)  # type: ignore[arg-type]
-    table(request, 0, 70)  # type: ignore[arg-type]
+    mixture_table([(1.0, request)])  # type: ignore[arg-type]
+    mixture_table([(1.0, request)], 0, 70)  # type: ignore[arg-type]
     assert [len(rows) for rows in asked[-2:]] == [4000, 70]
     del asked[-2:]
     for rows in asked:
@@ -147,7 +147,7 @@ def test_figures_are_those_of_the_draws_to_the_last_bit_where_a_reading_is_given
     drawn = np.random.default_rng(0).normal(size=(3, 3, 9))
     drawn[1, 0] = 0.1  # the sum of nine is not nine times as much
     monkeypatch.setattr(module, "predict", lambda *given: drawn)
-    rows = table(request)  # type: ignore[arg-type]
+    rows = mixture_table([(1.0, request)])  # type: ignore[arg-type]
     where = [(1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]
     assert [row[:4] for row in rows] == [
         ["wire", 2, 2.0, 0.0], ["wire", 2, 2.0, 50.0], *(["wire", 3, 3.0, time] for time in (0.0, 10.0, 20.0))
@@ -165,10 +165,10 @@ def test_a_prediction_has_a_seed_of_its_own_and_zero_where_none_is_given() -> No
     stored = Stored({name: np.full(9, value) for name, value in WIRE.items()}, sample, "chain")
     question = PredictionRequest(protocol, 0, np.ones(1, bool), np.full(1, np.nan))
     request = SimpleNamespace(stored=stored, prediction=question, holds=experiment.holds)
-    found = {seed: table(request, seed) for seed in (0, 1)}  # type: ignore[arg-type]
-    assert table(request) == found[0] != found[1]  # type: ignore[arg-type]
+    found = {seed: mixture_table([(1.0, request)], seed) for seed in (0, 1)}  # type: ignore[arg-type]
+    assert mixture_table([(1.0, request)]) == found[0] != found[1]  # type: ignore[arg-type]
     mixed = [(1.0, request)]
-    assert mixture_table(mixed) == found[0] == mixture_table(mixed, 0)  # type: ignore[arg-type]
+    assert mixture_table(mixed) == found[0]  # type: ignore[arg-type]
 
 
 def test_a_prediction_draws_the_median_and_band_of_each_hold():

@@ -117,3 +117,8 @@ def with_pulleys(robot, rng, share=0.02):
     radius = share * robot.span_m * rng.uniform(0.5, 1.5, robot.legs)
     radius[0] = 0.0
     return replace(robot, pulleys=Pulleys(radius, axis / np.linalg.norm(axis, axis=1, keepdims=True)))
+
+
+def wrench(robot, shape, tension_N):
+    """(6 or 3, n) force and moment of the wires' tensions (w, n) on the platform, by virtual work."""
+    return -(statics.jacobian(robot, shape) * (robot.lines[:, None] * tension_N)).sum(1)

@@ -325,7 +325,7 @@ def test_a_point_has_the_energy_and_the_forces_of_its_pose():
     assert tau.shape == (n, 8)
     np.testing.assert_array_equal(tau, at.tau.T)
     shape = statics.geometry(robot, c.position_m.T, R)
-    balance = -(statics.wrench(robot, shape, tau.T) + statics.weight(robot, R)) * scale
+    balance = -(cases.wrench(robot, shape, tau.T) + statics.weight(robot, R)) * scale
     np.testing.assert_allclose(at.gradient, balance, atol=1e-12)
     gradient, hessian = forward.balance_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, c.offset_m)
     np.testing.assert_array_equal(gradient, at.gradient)

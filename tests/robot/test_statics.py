@@ -36,7 +36,7 @@ def check_derivatives(robot, law, seed=5):
     shape = statics.geometry(robot, c.position_m.T, R)
     tau, slope = tension(c.wires, statics.stretched(robot, shape, c.offset_m.T), c.zero_m.T)
     gradient, hessian = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
-    np.testing.assert_allclose(gradient, -(statics.wrench(robot, shape, tau) + statics.weight(robot, R)))
+    np.testing.assert_allclose(gradient, -(cases.wrench(robot, shape, tau) + statics.weight(robot, R)))
     h = 1e-4 * robot.size_m if d == 6 else 1e-4
     steps = h * np.diag([1.0] * 3 + [1.0 / robot.size_m] * (d - 3))
     span = np.diag(steps)

@@ -70,43 +70,69 @@ def candidates(
         Keep only these names (and the base).
     """
 
-    def other(name: str, question: str, sentence: str, **changes: Any) -> Candidate:
-        return replace(base, name=name, question=question, sentence=sentence, **changes)
-
-    out = [base]
-    out.append(other("hooke_without_creep", HOOKE, "The wire is a spring and does not creep.", fixed=_NO_CREEP))
-    out.append(other("creep_at_once", HOOKE, RIVALS["at_once"].sentence, effects=("at_once", "not_in_time"),
-                     fixed=_NO_TIME_LAW))  # fmt: skip
-    out.append(other("exponential", TIME, "The creep has one time constant: N = 1.", fixed={"N": 1.0}))
-    out.append(other("logarithmic", TIME, RIVALS["logarithmic"].sentence, effects=("logarithmic",),
-                     fixed=_NO_TIME_LAW))  # fmt: skip
-    out.append(other("power_law", TIME, RIVALS["power_law"].sentence, effects=("power_law",),
-                     fixed=_NO_TIME_LAW))  # fmt: skip
-    out.append(other("two_modes", TIME, RIVALS["two_modes"].sentence, effects=("two_modes",), fixed={"N": 1.0}))
-    if base.law == "hooke":
-        out.append(other("modified_hooke", LAW, "Strain is taken over the stretched length, eq (3).", law="modified"))
-    else:
-        out.append(other("hooke", LAW, "Strain is taken over the zero-tension length, eq (1).", law="hooke"))
-    if base.history == "saturating":
-        out.append(other("additive", HISTORY, "Every hold adds the creep of eq (4) again.", history="additive"))
-    else:
-        out.append(other("saturating", HISTORY, "Creep saturates towards the amount of eq (4).", history="saturating"))
-    if base.likelihood == "chain":
-        out.append(other("hold_by_hold", LIKELIHOOD, "Every hold is a separate experiment.", likelihood="hold"))
-        out.append(other("independent_errors", SETTING, "Positions are exact; each reading has an independent error.",
-                         fixed={"setting_sd": 0.0}))  # fmt: skip
-    else:
-        out.append(other("chain", LIKELIHOOD, "The holds form one history.", likelihood="chain"))
+    beside = [*_other_creep(base), *_other_model(base)]
     if any(not hold.recorded for hold in experiment.holds):
-        out.append(other("unrecorded_skipped", ABSENT, "No time passed where readings are missing.", unrecorded=False))
+        sentence = "No time passed where readings are missing."
+        beside.append(_beside(base, "unrecorded_skipped", ABSENT, sentence, unrecorded=False))
+    beside += _with_effects(experiment, base, known)
+    return [base, *(candidate for candidate in beside if only is None or candidate.name in only)]
+
+
+def _beside(base: Candidate, name: str, question: str, sentence: str, **changes: Any) -> Candidate:
+    return replace(base, name=name, question=question, sentence=sentence, **changes)
+
+
+def _other_creep(base: Candidate) -> list[Candidate]:
+    """No creep, and other laws of how it comes by time."""
+
+    def rival(name: str, fixed: dict[str, float]) -> Candidate:
+        return _beside(base, name, TIME, RIVALS[name].sentence, effects=(name,), fixed=fixed)
+
+    at_once = RIVALS["at_once"].sentence
+    return [
+        _beside(base, "hooke_without_creep", HOOKE, "The wire is a spring and does not creep.", fixed=_NO_CREEP),
+        _beside(base, "creep_at_once", HOOKE, at_once, effects=("at_once", "not_in_time"), fixed=_NO_TIME_LAW),
+        _beside(base, "exponential", TIME, "The creep has one time constant: N = 1.", fixed={"N": 1.0}),
+        rival("logarithmic", _NO_TIME_LAW),
+        rival("power_law", _NO_TIME_LAW),
+        rival("two_modes", {"N": 1.0}),
+    ]
+
+
+def _other_model(base: Candidate) -> list[Candidate]:
+    """The other elastic law, history and likelihood."""
+    out = []
+    if base.law == "hooke":
+        sentence = "Strain is taken over the stretched length, eq (3)."
+        out.append(_beside(base, "modified_hooke", LAW, sentence, law="modified"))
+    else:
+        out.append(_beside(base, "hooke", LAW, "Strain is taken over the zero-tension length, eq (1).", law="hooke"))
+    if base.history == "saturating":
+        sentence = "Every hold adds the creep of eq (4) again."
+        out.append(_beside(base, "additive", HISTORY, sentence, history="additive"))
+    else:
+        sentence = "Creep saturates towards the amount of eq (4)."
+        out.append(_beside(base, "saturating", HISTORY, sentence, history="saturating"))
+    if base.likelihood == "chain":
+        sentence = "Every hold is a separate experiment."
+        out.append(_beside(base, "hold_by_hold", LIKELIHOOD, sentence, likelihood="hold"))
+        sentence = "Positions are exact; each reading has an independent error."
+        out.append(_beside(base, "independent_errors", SETTING, sentence, fixed={"setting_sd": 0.0}))
+    else:
+        out.append(_beside(base, "chain", LIKELIHOOD, "The holds form one history.", likelihood="chain"))
+    return out
+
+
+def _with_effects(experiment: Experiment, base: Candidate, known: Mapping[str, type[Effect]]) -> list[Candidate]:
+    """The model with each effect that the test may show."""
     protocol = experiment.protocol()
+    out = []
     for name, kind in known.items():
         if kind.needs_saturation and base.history == "additive":
             continue
-        for variant in [kind()] if issubclass(kind, EventEffect) else kind.variants([protocol]):
-            key = name if issubclass(kind, EventEffect) else variant.key
-            out.append(other(key, EFFECT, kind.sentence, effects=(key,)))
-    return [c for c in out if only is None or c.name in only or c is base]
+        keys = [name] if issubclass(kind, EventEffect) else [each.key for each in kind.variants([protocol])]
+        out += [_beside(base, key, EFFECT, kind.sentence, effects=(key,)) for key in keys]
+    return out
 
 
 def effects_of(

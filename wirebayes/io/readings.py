@@ -75,12 +75,17 @@ class Hold:
         return self.readings if self.control == "displacement" else self.setting
 
 
-def read_readings(path: Path, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
-    """Read and check a readings' CSV.
+def readings_table(path: Path) -> Table:
+    """A readings' CSV split into fields, not checked any further."""
+    return read_table(path, REQUIRED, OPTIONAL)
+
+
+def readings_of(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
+    """Check a table of readings.
 
     Parameters
     ----------
-    path : Path
+    table : Table
     length_mm : float
         Zero-tension length, so that a displacement that leaves no wire is found.
     control : {"displacement", "force"}
@@ -95,25 +100,6 @@ def read_readings(path: Path, length_mm: float, control: Control = "displacement
     ------
     InputError
         With the file, line, column, what was found and what was expected.
-    """
-    return readings_of(readings_table(path), length_mm, control)
-
-
-def readings_table(path: Path) -> Table:
-    """A readings' CSV split into fields, not checked any further."""
-    return read_table(path, REQUIRED, OPTIONAL)
-
-
-def readings_of(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
-    """Check a table of readings, as `read_readings` does.
-
-    Parameters
-    ----------
-    table : Table
-    length_mm : float
-        Zero-tension length, so that a displacement that leaves no wire is found.
-    control : {"displacement", "force"}
-        What was set.
     """
     column = READ[control]
     values = [table.number(row, column) if table.cell(row, column) else np.nan for row in range(len(table.rows))]
@@ -167,7 +153,7 @@ def protocol_holds(table: Table, length_mm: float, control: Control = "displacem
     Raises
     ------
     InputError
-        As `read_readings`, and where a value stands at a later time of its hold.
+        As `readings_of`, and where a value stands at a later time of its hold.
     """
     column = READ[control]
     values = [np.nan] * len(table.rows)
@@ -181,58 +167,115 @@ def protocol_holds(table: Table, length_mm: float, control: Control = "displacem
     return _holds(table, length_mm, control, values)
 
 
+@dataclass(frozen=True)
+class _Rows:
+    """The columns of a table of readings, a value a row; `read` is NaN where nothing was read."""
+
+    table: Table
+    control: Control
+    number: Sequence[int]
+    setting: Sequence[float]
+    time_s: Sequence[float]
+    read: Sequence[float]
+    temperature_C: Sequence[float] | None
+
+    def complain(self, row: int, column: str, expected: str) -> InputError:
+        """The error for a cell, which it shows.
+
+        Parameters
+        ----------
+        row : int
+        column : str
+        expected : str
+            As the message shows it.
+        """
+        return self.table.complain(row, column, self.table.cell(row, column), expected)
+
+    def check(self, row: int, length_mm: float) -> None:
+        """Refuse what cannot be, whatever the rows before it say."""
+        displacement = self.setting if self.control == "displacement" else self.read
+        _check_displacement(self.table, row, displacement[row], length_mm)
+        if self.control == "force" and not self.setting[row] > 0:
+            raise self.complain(row, SET[self.control], "a tension above 0 N")
+        if self.time_s[row] < 0:
+            raise self.complain(row, "time_s", "0 s or later")
+
+    def begins(self, row: int) -> bool:
+        """Whether a hold begins in a row; otherwise it has the setting of the row before, and a later time."""
+        if not row:
+            return True
+        before, column = row - 1, SET[self.control]
+        number, last = self.number[row], self.number[before]
+        if number > last:
+            return True
+        if number < last:
+            together = " (its rows must stand together)" if number in self.number[:row] else ""
+            raise self.complain(row, "hold", f"a hold number above {last}{together}")
+        if self.setting[row] != self.setting[before]:
+            raise self.complain(row, column, f"{self.table.cell(before, column)} as before in hold {number}")
+        if self.time_s[row] <= self.time_s[before]:
+            earlier = self.table.cell(before, "time_s")
+            raise self.complain(row, "time_s", f"a time after {earlier} s in hold {number}")
+        return False
+
+    def hold(self, begin: int, end: int, start_s: float) -> Hold:
+        """The hold of some rows.
+
+        Parameters
+        ----------
+        begin, end : int
+            The first of its rows, and the one after its last.
+        start_s : float
+            When the holds before it ended.
+        """
+        rows = slice(begin, end)
+        return Hold(
+            number=self.number[begin],
+            setting=self.setting[begin],
+            duration_s=self.time_s[end - 1],
+            time_s=frozen(self.time_s[rows]),
+            readings=frozen(self.read[rows]),
+            temperature_C=None if self.temperature_C is None else frozen(self.temperature_C[rows]),
+            start_s=start_s,
+            control=self.control,
+        )
+
+
 def _holds(table: Table, length_mm: float, control: Control, values: Sequence[float]) -> tuple[Hold, ...]:
-    rows = range(len(table.rows))
-    set_column = SET[control]
-    number = [table.whole(row, "hold") for row in rows]
-    setting = [table.number(row, set_column) for row in rows]
-    time = [table.number(row, "time_s") for row in rows]
-    temperature = _temperatures(table, values)
-    displacement = setting if control == "displacement" else values
+    count = range(len(table.rows))
+    rows = _Rows(
+        table,
+        control,
+        number=[table.whole(row, "hold") for row in count],
+        setting=[table.number(row, SET[control]) for row in count],
+        time_s=[table.number(row, "time_s") for row in count],
+        read=values,
+        temperature_C=_temperatures(table, values),
+    )
     first = []
-    for row in rows:
-        _check_displacement(table, row, displacement[row], length_mm)
-        if control == "force" and not setting[row] > 0:
-            raise table.complain(row, set_column, table.cell(row, set_column), "a tension above 0 N")
-        if time[row] < 0:
-            raise table.complain(row, "time_s", table.cell(row, "time_s"), "0 s or later")
-        if row and number[row] == number[row - 1]:
-            if setting[row] != setting[row - 1]:
-                expected = f"{table.cell(row - 1, set_column)} as before in hold {number[row]}"
-                raise table.complain(row, set_column, table.cell(row, set_column), expected)
-            if time[row] <= time[row - 1]:
-                expected = f"a time after {table.cell(row - 1, 'time_s')} s in hold {number[row]}"
-                raise table.complain(row, "time_s", table.cell(row, "time_s"), expected)
-            continue
-        if row and number[row] < number[row - 1]:
-            interleaved = " (its rows must stand together)" if number[row] in number[:row] else ""
-            expected = f"a hold number above {number[row - 1]}{interleaved}"
-            raise table.complain(row, "hold", str(number[row]), expected)
-        first.append(row)
+    for row in count:
+        rows.check(row, length_mm)
+        if rows.begins(row):
+            first.append(row)
     holds, start = [], 0.0
     for begin, end in zip(first, [*first[1:], len(table.rows)], strict=True):
-        holds.append(
-            Hold(
-                number=number[begin],
-                setting=setting[begin],
-                duration_s=time[end - 1],
-                time_s=frozen(time[begin:end]),
-                readings=frozen(values[begin:end]),
-                temperature_C=None if temperature is None else frozen(temperature[begin:end]),
-                start_s=start,
-                control=control,
-            )
-        )
-        start += time[end - 1]
+        hold = rows.hold(begin, end, start)
+        holds.append(hold)
+        start += hold.duration_s
+    _check_size(table, holds)
+    if times_run_on([hold.time_s for hold in holds]) < RUN_ON_CERTAIN:
+        since = f"the time since hold {holds[1].number} began, not since the test began"
+        raise rows.complain(first[1], "time_s", f"{since} (0 s at each hold's start)")
+    return tuple(holds)
+
+
+def _check_size(table: Table, holds: Sequence[Hold]) -> None:
+    """Refuse more readings than a fit can pad and hold in memory."""
     longest = max(hold.time_s.size for hold in holds)
     if len(holds) * longest > MOST:
         found = f"{len(holds)} holds, the longest of {longest} readings"
         expected = f"at most {MOST} as holds times readings of the longest; `wirebayes import` thins a recording"
         raise InputError(f"{table.path}: found {found}, expected {expected}")
-    if times_run_on([hold.time_s for hold in holds]) < RUN_ON_CERTAIN:
-        expected = f"the time since hold {number[first[1]]} began, not since the test began (0 s at each hold's start)"
-        raise table.complain(first[1], "time_s", table.cell(first[1], "time_s"), expected)
-    return tuple(holds)
 
 
 def _temperatures(table: Table, values: Sequence[float]) -> list[float] | None:

@@ -61,11 +61,6 @@ class Scores:
         """Of the predictive mean."""
         return float(np.sqrt(np.mean((self.observed_N - self.mean_N) ** 2)))
 
-    @property
-    def residual_sd(self) -> Array:
-        """(rows,) residual in units of the predictive sd."""
-        return np.asarray((self.observed_N - self.mean_N) / self.sd_N)
-
     def coverage(self) -> dict[float, float]:
         """Share of readings inside each central interval."""
         ends = dict(zip(QUANTILES, self.quantiles_N, strict=True))
@@ -206,19 +201,20 @@ def _chain_scores(
     fitted: Posterior, experiment: Experiment, sample: int, requested: NDArray[np.bool_]
 ) -> tuple[Array, Array, float]:
     """log p(readings | training) and log p(later readings | first, training) of each held-out hold; all together."""
-    problem, here = fitted.problem, fitted.problem.samples[sample]
-    whole, tension = experiment.protocol(), experiment.readings()[..., None]
-    later, one = whole.mask & requested[:, None], np.arange(whole.mask.shape[1]) == 0
+    here = fitted.problem.samples[sample]
+    protocol, read = experiment.protocol(), experiment.readings()[..., None]
+    later = protocol.mask & requested[:, None]
+    firsts = later & (np.arange(protocol.mask.shape[1]) == 0)
     parts: list[tuple[Array, Array, Array]] = []
     theta = thinned(fitted.flat)
     for start in range(0, len(theta), _CHUNK):
-        own = problem.parameters(theta[start : start + _CHUNK], here)
-        line = linearise(whole, own, here.model)
+        own = fitted.problem.parameters(theta[start : start + _CHUNK], here)
+        line = linearise(protocol, own, here.model)
         noise = likelihoods.reading_variance(own["sensor_sd"], here.resolution), own["setting_sd"]
         with np.errstate(all="ignore"):
-            before = likelihoods.chain(line, tension, whole.mask & ~requested[:, None], *noise)
-            holds, first = (likelihoods.held_out(line, before, tension, rows, *noise) for rows in (later, later & one))
-            together = likelihoods.chain(line, tension, whole.mask, *noise).log_likelihood[requested].sum(axis=0)
+            before = likelihoods.chain(line, read, protocol.mask & ~requested[:, None], *noise)
+            holds, first = (likelihoods.held_out(line, before, read, rows, *noise) for rows in (later, firsts))
+            together = likelihoods.chain(line, read, protocol.mask, *noise).log_likelihood[requested].sum(axis=0)
         parts.append((holds, first, together))
     whole_hold, first_reading, every = (_log_mean(np.concatenate(v, axis=-1)) for v in zip(*parts, strict=True))
     return whole_hold, whole_hold - first_reading, float(every)
@@ -237,11 +233,6 @@ def _log_mean(log_p: Array) -> Array:
     """(...) logarithm of the mean density over draws (..., n)."""
     finite = np.where(np.isfinite(log_p), log_p, -np.inf)
     return np.asarray(logsumexp(finite, axis=-1) - np.log(finite.shape[-1]))
-
-
-def train_counts(recorded: int) -> list[int]:
-    """How many holds to train on: 5 as the paper did, 8, and two thirds; only where two or more are left."""
-    return sorted({k for k in (5, 8, two_thirds(recorded)) if 2 <= k <= recorded - 2})
 
 
 def two_thirds(recorded: int) -> int:

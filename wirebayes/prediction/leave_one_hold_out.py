@@ -70,20 +70,6 @@ class LeftOut:
         return standard_error(self.elpd)
 
 
-def difference(one: LeftOut, other: LeftOut) -> tuple[float, float]:
-    """How much better `one` predicts than `other`: the elpd difference and its standard error over holds.
-
-    Raises
-    ------
-    ValueError
-        When they are not about the same holds.
-    """
-    if one.sample != other.sample or not np.array_equal(one.hold, other.hold):
-        raise ValueError("the two do not leave out the same holds")
-    gained = one.elpd - other.elpd
-    return float(gained.sum()), standard_error(gained)
-
-
 def smoothed_leave_one_hold_out(
     fitted: Posterior,
     seed: int = 0,

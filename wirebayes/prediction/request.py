@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError, shown
 from wirebayes.io.experiment import protocol_of
-from wirebayes.io.readings import READ, SET, Hold, protocol_holds, protocol_table
+from wirebayes.io.readings import READ, SET, Hold, protocol_holds
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.store import Stored
@@ -41,43 +40,20 @@ class ProtocolRequest:
     sentence: str
 
 
-def read_request(path: Path, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
-    """Read a protocol file and check it against what was trained on.
-
-    Parameters
-    ----------
-    path : Path
-        Columns ``hold``, what is set (``displacement_mm``, or ``tension_N`` under weights) and ``time_s``, with
-        ``temperature_C`` where the training data had it, and optionally what is read, filled only at a hold's first
-        time.
-    stored : Stored
-    fresh : bool
-        The file is the whole history of another sample. Otherwise its holds are those of the tested sample: repeated
-        ones are replicated, later ones begin when the last trained hold ended.
-
-    Returns
-    -------
-    ProtocolRequest
-
-    Raises
-    ------
-    InputError
-        With the file, line, column, what was found and what was expected.
-    """
-    return request_of(protocol_table(path, stored.sample.protocol.control), stored, fresh=fresh)
-
-
 def request_of(table: Table, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
     """Check the table of a protocol against what was trained on.
 
     Parameters
     ----------
     table : Table
-        Rows of the protocol file, or of arrays given in its place.
+        Rows of a protocol file, or of arrays given in its place: ``hold``, what is set (``displacement_mm``, or
+        ``tension_N`` under weights) and ``time_s``, with ``temperature_C`` where the training data had it, and
+        optionally what is read, filled only at a hold's first time.
     stored : Stored
         The posterior.
     fresh : bool
-        The table is the whole history of another sample (see `read_request`).
+        The table is the whole history of another sample. Otherwise its holds are those of the tested sample: repeated
+        ones are replicated, later ones begin when the last trained hold ended.
 
     Returns
     -------
@@ -93,25 +69,37 @@ def request_of(table: Table, stored: Stored, *, fresh: bool = False) -> Protocol
     file.check_temperature(trained.reference_C is not None)
     if stored.likelihood == "hold":
         file.check_first_readings()
-    first = np.array([hold.readings[0] for hold in file.holds])
-    if fresh:
-        began_at = None if file.holds[0].temperature_C is None else float(file.holds[0].temperature_C[0])
-        alone = protocol_of(file.holds, trained.length_mm, began_at)
-        prediction = PredictionRequest(alone, 0, np.ones(len(first), bool), first)
-        return ProtocolRequest(_without_events(stored), prediction, file.holds, _FRESH)
+    return _of_fresh_sample(file, stored) if fresh else _of_tested_sample(file, stored)
+
+
+def _of_fresh_sample(file: "_File", stored: Stored) -> ProtocolRequest:
+    """The holds are all that ever happens to another sample."""
+    temperature_C = file.holds[0].temperature_C
+    began_at = None if temperature_C is None else float(temperature_C[0])
+    alone = protocol_of(file.holds, stored.sample.protocol.length_mm, began_at)
+    prediction = PredictionRequest(alone, 0, np.ones(len(file.holds), bool), file.first)
+    return ProtocolRequest(_without_events(stored), prediction, file.holds, _FRESH)
+
+
+def _of_tested_sample(file: "_File", stored: Stored) -> ProtocolRequest:
+    """Holds that were trained on are replicated; the others follow the last one."""
+    trained = stored.sample.protocol
     row_of = {int(number): row for row, number in enumerate(trained.number) if number >= 0}
     file.check_repeats(trained, row_of)
-    repeated = np.array([hold.number in row_of for hold in file.holds])
-    rows = np.array([row_of[int(h.number or 0)] for h, known in zip(file.holds, repeated, strict=True) if known], int)
+    numbers = [int(hold.number or 0) for hold in file.holds]
+    repeated = np.array([number in row_of for number in numbers])
+    rows = np.array([row_of[number] for number in numbers if number in row_of], int)
     requested = np.zeros(len(trained.number), bool)
     requested[rows] = True
     given = np.full(len(trained.number), np.nan)
-    given[rows] = first[repeated]
-    after = tuple(h for h, known in zip(file.holds, repeated, strict=True) if not known)
+    given[rows] = file.first[repeated]
+    after = tuple(hold for hold, known in zip(file.holds, repeated, strict=True) if not known)
     whole = _joined(trained, protocol_of(after, trained.length_mm, trained.reference_C)) if after else trained
     everything = np.append(requested, np.ones(len(after), bool))
-    prediction = PredictionRequest(whole, len(trained.number), everything, np.append(given, first[~repeated]))
-    sentence = _tested(tuple(trained.number[rows]), [int(h.number or 0) for h in after], max(row_of), stored.likelihood)
+    first = np.append(given, file.first[~repeated])
+    prediction = PredictionRequest(whole, len(trained.number), everything, first)
+    later = [number for number in numbers if number not in row_of]
+    sentence = _tested(tuple(trained.number[rows]), later, max(row_of), stored.likelihood)
     return ProtocolRequest(stored, prediction, file.holds, sentence)
 
 
@@ -154,6 +142,11 @@ class _File:
     table: Table
     holds: tuple[Hold, ...]
 
+    @property
+    def first(self) -> Floats:
+        """What was read first in each hold; NaN where it is not given."""
+        return np.array([hold.readings[0] for hold in self.holds])
+
     def complain(self, hold: int, reading: int, column: str, found: str, expected: str) -> InputError:
         """The error for one cell of the file.
 
@@ -185,37 +178,49 @@ class _File:
                 raise self.complain(i, 0, column, shown(float(first)), expected)
 
     def check_repeats(self, trained: Protocol, row_of: dict[int, int]) -> None:
+        """Refuse holds between the trained ones, and repeated ones that are not as they were trained on."""
         last = max(row_of)
         for i, hold in enumerate(self.holds):
             number = int(hold.number or 0)
-            if number not in row_of:
-                if number < last:
-                    known = ", ".join(str(n) for n in sorted(row_of))
-                    expected = f"one of the trained holds ({known}), or one after hold {last}, or --fresh"
-                    raise self.complain(i, 0, "hold", str(number), expected)
-                continue
-            row = row_of[number]
-            if hold.setting != trained.setting[row]:
-                expected = f"{trained.setting[row]:g}, as hold {number} was trained on"
-                raise self.complain(i, 0, SET[hold.control], f"{hold.setting:g}", expected)
-            times = trained.time_s[row][trained.mask[row]]
-            if len(hold.time_s) == len(times) + 1 and trained.duration_s[row] > times[-1]:
-                times = np.append(times, trained.duration_s[row])  # the row that says when the hold ended
-            for k in range(max(len(times), len(hold.time_s))):
-                if k >= len(hold.time_s):
-                    found = f"{counted(k, 'reading')} of hold {number}"
-                    raise self.complain(i, k - 1, "time_s", found, f"{len(times)}, as it was trained on")
-                if k >= len(times) or hold.time_s[k] != times[k]:
-                    listed = ", ".join(f"{t:g}" for t in times)
-                    expected = f"the times hold {number} was trained on: {listed}"
-                    raise self.complain(i, k, "time_s", f"{hold.time_s[k]:g}", expected)
-            if hold.temperature_C is not None and trained.warming_K is not None and trained.reference_C is not None:
-                logged = trained.reference_C + trained.warming_K[row][: len(times)]
-                wrong = np.flatnonzero(np.abs(hold.temperature_C - logged) > _SAME_K)
-                if len(wrong):
-                    k = int(wrong[0])
-                    expected = f"{logged[k]:g}, as hold {number} was trained on"
-                    raise self.complain(i, k, "temperature_C", f"{hold.temperature_C[k]:g}", expected)
+            if number in row_of:
+                self._check_repeat(i, trained, row_of[number])
+            elif number < last:
+                known = ", ".join(str(n) for n in sorted(row_of))
+                expected = f"one of the trained holds ({known}), or one after hold {last}, or --fresh"
+                raise self.complain(i, 0, "hold", str(number), expected)
+
+    def _check_repeat(self, i: int, trained: Protocol, row: int) -> None:
+        hold = self.holds[i]
+        if hold.setting != trained.setting[row]:
+            expected = f"{trained.setting[row]:g}, as hold {hold.number} was trained on"
+            raise self.complain(i, 0, SET[hold.control], f"{hold.setting:g}", expected)
+        times = trained.time_s[row][trained.mask[row]]
+        if len(hold.time_s) == len(times) + 1 and trained.duration_s[row] > times[-1]:
+            times = np.append(times, trained.duration_s[row])  # the row that says when the hold ended
+        self._check_times(i, times)
+        if trained.warming_K is not None and trained.reference_C is not None:
+            self._check_temperatures(i, trained.reference_C + trained.warming_K[row][: len(times)])
+
+    def _check_times(self, i: int, times: Floats) -> None:
+        hold = self.holds[i]
+        for k in range(max(len(times), len(hold.time_s))):
+            if k >= len(hold.time_s):
+                found = f"{counted(k, 'reading')} of hold {hold.number}"
+                raise self.complain(i, k - 1, "time_s", found, f"{len(times)}, as it was trained on")
+            if k >= len(times) or hold.time_s[k] != times[k]:
+                listed = ", ".join(f"{t:g}" for t in times)
+                expected = f"the times hold {hold.number} was trained on: {listed}"
+                raise self.complain(i, k, "time_s", f"{hold.time_s[k]:g}", expected)
+
+    def _check_temperatures(self, i: int, logged: Floats) -> None:
+        hold = self.holds[i]
+        if hold.temperature_C is None:
+            return
+        wrong = np.flatnonzero(np.abs(hold.temperature_C - logged) > _SAME_K)
+        if len(wrong):
+            k = int(wrong[0])
+            expected = f"{logged[k]:g}, as hold {hold.number} was trained on"
+            raise self.complain(i, k, "temperature_C", f"{hold.temperature_C[k]:g}", expected)
 
 
 _SAME_K = 1e-6  # kelvin: readings are stored as differences from the first, so only rounding is forgiven

@@ -29,31 +29,18 @@ def header(control: Control) -> tuple[str, ...]:
     return ("experiment", "hold", SET[control], "time_s", *figures)
 
 
-def table(request: ProtocolRequest, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
+def mixture_table(
+    members: Sequence[tuple[float, ProtocolRequest]], seed: int = 0, draws: int = DRAWS
+) -> list[list[Any]]:
     """Mean, sd and quantiles of the requested readings, in the file's order.
 
     Parameters
     ----------
-    request : ProtocolRequest
-    seed : int
-    draws : int
-        Posterior draws used, evenly spread over the stored ones.
-    """
-    return mixture_table([(1.0, request)], seed, draws)
-
-
-def mixture_table(
-    members: Sequence[tuple[float, ProtocolRequest]], seed: int = 0, draws: int = DRAWS
-) -> list[list[Any]]:
-    """The same of several models, each as often among the draws as it is probable.
-
-    Parameters
-    ----------
     members : sequence of (probability, ProtocolRequest)
-        One protocol requested of each model; the probabilities sum to one.
+        One protocol requested of each model, as often among the draws as it is probable; the probabilities sum to one.
     seed : int
     draws : int
-        In all.
+        In all, evenly spread over the stored ones.
     """
     drawn = _drawn(members, seed, draws)
     request = members[0][1]
@@ -188,7 +175,7 @@ _READ_WORD = {"displacement": "tension", "force": "displacement"}
 def dataset(
     rows: Sequence[Sequence[Any]], attributes: Mapping[str, Any], control: Control = "displacement"
 ) -> Prediction:
-    """The rows of `table` with units, along the dimension ``reading``.
+    """The rows of `mixture_table` with units, along the dimension ``reading``.
 
     Parameters
     ----------

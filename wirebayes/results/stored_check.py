@@ -22,16 +22,27 @@ def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
     sample : Sample
     likelihood : str
     """
-    model, protocol = sample.model, sample.protocol
-    for what, value, known in [
-        ("elastic law", model.law, get_args(ElasticLaw)),
-        ("history", model.history, get_args(History)),
+    _check_words(sample, likelihood)
+    _check_draws(draws, sample, likelihood)
+    _check_shapes(sample)
+    _check_numbers(sample)
+
+
+def _check_words(sample: Sample, likelihood: str) -> None:
+    """Law, history and likelihood are those that there are."""
+    for what, value, known in (
+        ("elastic law", sample.model.law, get_args(ElasticLaw)),
+        ("history", sample.model.history, get_args(History)),
         ("likelihood", likelihood, get_args(Likelihood)),
-    ]:
+    ):
         if value not in known:
             raise ValueError(f"{what} {value!r}")
+
+
+def _check_draws(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
+    """Every parameter of the model has draws, and each a value that it can have."""
     needed = [*sample.parameters(likelihood)]  # type: ignore[arg-type]
-    needed += [column for effect in model.effects for column in effect.columns()]
+    needed += [column for effect in sample.model.effects for column in effect.columns()]
     missing = [name for name in needed if name not in draws]
     if missing:
         raise ValueError(f"no draws of {', '.join(missing)}")
@@ -40,28 +51,42 @@ def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
             raise ValueError(f"draws of {name} that are too few or no finite numbers")
         if (name in ABOVE_ZERO and values.min() <= 0) or (name in NOT_BELOW_ZERO and values.min() < 0):
             raise ValueError(f"draws of {name} below zero")
-    holds = (len(protocol.setting),)
-    for what, array in [("durations", protocol.duration_s), ("hold numbers", protocol.number)]:
-        if array.shape != holds:
-            raise ValueError(f"{len(array)} {what} for {holds[0]} holds")
-    readings = sample.readings[..., 0]
-    if protocol.mask.ndim != 2 or not protocol.mask.any() or len(protocol.mask) != holds[0]:
+
+
+def _check_shapes(sample: Sample) -> None:
+    """Arrays of holds and of readings belong together."""
+    protocol, readings = sample.protocol, sample.readings[..., 0]
+    holds = len(protocol.setting)
+    for what, array in (("durations", protocol.duration_s), ("hold numbers", protocol.number)):
+        if array.shape != (holds,):
+            raise ValueError(f"{len(array)} {what} for {holds} holds")
+    if protocol.mask.ndim != 2 or not protocol.mask.any() or len(protocol.mask) != holds:
         raise ValueError("no readings")
-    for array in (protocol.time_s, readings, *([] if protocol.warming_K is None else [protocol.warming_K])):
+    warming = [] if protocol.warming_K is None else [protocol.warming_K]
+    for array in (protocol.time_s, readings, *warming):
         if array.shape != protocol.mask.shape:
             raise ValueError("readings, times and temperatures that do not belong together")
+
+
+def _check_numbers(sample: Sample) -> None:
+    """Numbers are finite and have the sign that they must have."""
+    protocol = sample.protocol
     numbers: dict[str, Any] = {
-        "length": protocol.length_mm, "displacements": protocol.setting, "times": protocol.time_s,
-        "durations": protocol.duration_s, "tensions": readings, "resolution": sample.resolution,
-        "reference tension": model.tension_ref_N,
-    }  # fmt: skip
+        "length": protocol.length_mm,
+        "displacements": protocol.setting,
+        "times": protocol.time_s,
+        "durations": protocol.duration_s,
+        "tensions": sample.readings[..., 0],
+        "resolution": sample.resolution,
+        "reference tension": sample.model.tension_ref_N,
+    }
     for what, value in numbers.items():
         if not _usable(np.asarray(value)):
             raise ValueError(f"{what} that are no finite numbers")
     for what in ("times", "durations", "resolution"):
         if np.min(numbers[what]) < 0:
             raise ValueError(f"{what} below zero")
-    if protocol.length_mm <= 0 or model.tension_ref_N <= 0:
+    if protocol.length_mm <= 0 or sample.model.tension_ref_N <= 0:
         raise ValueError("length or reference tension that is not above zero")
 
 

@@ -295,28 +295,42 @@ class Transformation:
             odds = np.exp(z[:, self.log_columns])
             theta[:, self.log_columns] = odds / (1.0 + odds / self._most[self.log_columns])
             for ridge in self.ridges:
-                if "k2" in ridge.shifted:
-                    theta[:, ridge.where["k2"]] = np.exp(z[:, ridge.where["k2"]] - self._hazard(theta, ridge))
-                if "U" in ridge.shifted:
-                    theta[:, ridge.where["U"]] = np.exp(z[:, ridge.where["U"]] + ridge.log_power(z))
-                if "k1" in ridge.shifted:
-                    log_k1 = z[:, ridge.where["k1"]] + ridge.softened(z)
-                    if ridge.fixture is not None:
-                        share, rest = shares.log_shares(z[:, ridge.fixture])
-                        theta[:, ridge.fixture] = np.exp(share - log_k1 + ridge.log_length)
-                        log_k1 = log_k1 - rest
-                    theta[:, ridge.where["k1"]] = np.exp(log_k1)
-                if "B" in ridge.shifted:
-                    lost, stiffness = z[:, ridge.where["B"]], ridge.log_stiffness(theta)
-                    for part in reversed(ridge.beside):
-                        share, rest = shares.log_shares(z[:, part.column])
-                        gained = part.log_gained(theta) + stiffness
-                        theta[:, part.column], lost = np.exp(lost + share - gained), lost + rest
-                    driven = self._driven(theta, ridge)
-                    theta[:, ridge.where["B"]] = np.exp(lost - (ridge.log_creep(theta) + stiffness) - driven)
+                self._fill_ridge(theta, z, ridge)
             if self.level is None:
                 self._preloads(theta)
         return theta
+
+    def _fill_ridge(self, theta: Array, z: Array, ridge: _Ridge) -> None:
+        """Natural parameters of a ridge, in the order in which one needs the other."""
+        column = ridge.where
+        if "k2" in ridge.shifted:
+            theta[:, column["k2"]] = np.exp(z[:, column["k2"]] - self._hazard(theta, ridge))
+        if "U" in ridge.shifted:
+            theta[:, column["U"]] = np.exp(z[:, column["U"]] + ridge.log_power(z))
+        if "k1" in ridge.shifted:
+            self._fill_stiffness(theta, z, ridge)
+        if "B" in ridge.shifted:
+            self._fill_creep(theta, z, ridge)
+
+    def _fill_stiffness(self, theta: Array, z: Array, ridge: _Ridge) -> None:
+        """Stiffness, and the share of it that a fixture takes."""
+        log_k1 = z[:, ridge.where["k1"]] + ridge.softened(z)
+        if ridge.fixture is not None:
+            share, rest = shares.log_shares(z[:, ridge.fixture])
+            theta[:, ridge.fixture] = np.exp(share - log_k1 + ridge.log_length)
+            log_k1 = log_k1 - rest
+        theta[:, ridge.where["k1"]] = np.exp(log_k1)
+
+    def _fill_creep(self, theta: Array, z: Array, ridge: _Ridge) -> None:
+        """Creep by the tension that it loses, and what is beside it by its share of that."""
+        lost, stiffness = z[:, ridge.where["B"]], ridge.log_stiffness(theta)
+        for part in reversed(ridge.beside):
+            share, rest = shares.log_shares(z[:, part.column])
+            gained = part.log_gained(theta) + stiffness
+            theta[:, part.column] = np.exp(lost + share - gained)
+            lost = lost + rest
+        driven = self._driven(theta, ridge)
+        theta[:, ridge.where["B"]] = np.exp(lost - (ridge.log_creep(theta) + stiffness) - driven)
 
     def log_jacobian(self, theta: Array, z: Array) -> Array:
         """(n,) log |d natural / d sampled|.

@@ -88,22 +88,14 @@ def _direction(keys: Keys, key: str) -> Floats:
 
 
 def _robot(top: Keys) -> Robot:
-    version = top.value("version", "the number 1")
-    if version != 1 or isinstance(version, bool):
-        raise top.complain("version", shown(version), "the number 1")
+    _check_version(top)
     name, description, source = (top.string(key) for key in ("name", "description", "source"))
     freedom = top.string("freedom", default="pose", among=("pose", "position"))
-    platform = top.inside("platform")
-    mass, centre = platform.number("mass_kg", above=0), _triple(platform, "centre_of_mass_m", [0.0, 0.0, 0.0])
-    platform.finish()
+    mass, centre = _platform(top.inside("platform"))
     tension = _tension(top.inside("tension"))
-    home = top.inside("pose")
-    position, turn = _triple(home, "position_m"), _triple(home, "rotation_vector_rad", [0.0, 0.0, 0.0])
-    home.finish()
+    position, turn = _home(top.inside("pose"))
     lower, upper = _workspace(top.inside("workspace"))
-    sensors = top.inside("sensors", {})
-    bias = sensors.number("tension_bias_N", default=0.0, least=0)
-    sensors.finish()
+    bias = _bias(top.inside("sensors", {}))
     plane = _plane(top)
     given, declared, masses = _wires(top)
     legs = [_leg(leg, declared) for leg in top.tables("leg", least=2)]
@@ -140,6 +132,33 @@ def _robot(top: Keys) -> Robot:
         mass_kg_m=mass_kg_m if mass_kg_m.any() else None,
         plane=plane,
     )
+
+
+def _check_version(top: Keys) -> None:
+    version = top.value("version", "the number 1")
+    if version != 1 or isinstance(version, bool):
+        raise top.complain("version", shown(version), "the number 1")
+
+
+def _platform(keys: Keys) -> tuple[float, Floats]:
+    """Mass, and where its centre is."""
+    mass, centre = keys.number("mass_kg", above=0), _triple(keys, "centre_of_mass_m", [0.0, 0.0, 0.0])
+    keys.finish()
+    return mass, centre
+
+
+def _home(keys: Keys) -> tuple[Floats, Floats]:
+    """Position and rotation vector of the home pose."""
+    position, turn = _triple(keys, "position_m"), _triple(keys, "rotation_vector_rad", [0.0, 0.0, 0.0])
+    keys.finish()
+    return position, turn
+
+
+def _bias(keys: Keys) -> float:
+    """Standard deviation of a tension sensor's bias."""
+    bias = keys.number("tension_bias_N", default=0.0, least=0)
+    keys.finish()
+    return bias
 
 
 def _tension(keys: Keys) -> TensionRule:

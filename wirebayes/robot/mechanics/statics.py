@@ -106,24 +106,6 @@ def weight(robot: Robot, rotation: Floats) -> Floats:
     return out if robot.motions is None else robot.motions @ out
 
 
-def wrench(robot: Robot, shape: Geometry, tension_N: Floats) -> Floats:
-    """Wrench of the wires on the platform about the reference point, as far as no plane takes it.
-
-    Parameters
-    ----------
-    robot : Robot
-    shape : Geometry
-        What `geometry` returned for the poses.
-    tension_N : (w, n) array
-
-    Returns
-    -------
-    (6 or 3, n) array
-        Force, N, then moment, N m, in the world's axes.
-    """
-    return np.asarray(-(jacobian(robot, shape) * (robot.lines[:, None] * tension_N)).sum(1))
-
-
 def stretched(robot: Robot, shape: Geometry, offset_m: Floats) -> Floats:
     """Stretched length of every wire: its lines, and what lies beyond the exit point.
 

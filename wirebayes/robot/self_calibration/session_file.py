@@ -95,9 +95,7 @@ def parse(
     motions, tensions = _of_legs(robot, "motion_{}"), _of_legs(robot, "tension_{}_N")
     moved, tilted = motions[0] in table.header, NORMAL[0] in table.header
     if moved and not biased:
-        expected = "--tension-bias N, or tension_bias_N under [sensors] in the robot's file"
-        where = f"{table.path}, {table.header_place()}"
-        raise InputError(f"{where}: found directions of motion, but the sensors have no bias, expected {expected}")
+        raise _motions_without_bias(table)
     cells = table.numbers(lambda name: _allowed(name, biased))
     if not len(cells):
         raise InputError(f"{table.path}: found no holds, expected at least one row")
@@ -112,9 +110,9 @@ def parse(
     plausible.refuse(robot, joint, table, joints)
     tension, normal = some(tensions), some(NORMAL if tilted else ())
     position, turn = some(POSITION), some(TURN)
-    _refuse_half(table, np.concatenate([tension, normal], axis=1), "the readings")
-    _refuse_half(table, position, "the position")
-    _refuse_half(table, turn, "the rotation")
+    measured = np.concatenate([tension, normal], axis=1)
+    for values, name in ((measured, "the readings"), (position, "the position"), (turn, "the rotation")):
+        _refuse_half(table, values, name)
     if robot.degrees != 6:
         turn = np.tile(robot.home_rotation_rad, (len(cells), 1))
     known = np.asarray(np.isfinite(position).all(1))
@@ -131,8 +129,15 @@ def parse(
         number,
     )
     # without any tension read, what is left is for the calibration of the whole robot
-    readings = [(tension[was_read] / tension_sd_N).ravel(), (normal[was_read] / tilt_sd_rad).ravel()]
-    return session, np.concatenate(readings)
+    read_N, read_normal = tension[was_read].ravel(), normal[was_read].ravel()
+    return session, np.concatenate([read_N / tension_sd_N, read_normal / tilt_sd_rad])
+
+
+def _motions_without_bias(table: Table) -> InputError:
+    """The error for directions of motion that nothing depends on."""
+    found = "directions of motion, but the sensors have no bias"
+    expected = "--tension-bias N, or tension_bias_N under [sensors] in the robot's file"
+    return InputError(f"{table.path}, {table.header_place()}: found {found}, expected {expected}")
 
 
 def _refuse_twice(table: Table, number: Floats) -> None:
