@@ -351,7 +351,10 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
     gain = best["difference"]
     against = ""
     if gain is not None and best["name"] != table["base"]:
+        from wirebayes.comparison.compare import meaningful  # loaded by now, and by no other command
+
         against = f", by {number(gain['elpd'], 2)} ± {number(gain['se'], 2)} in elpd against {table['base']}"
+        against += "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
     come = "come" if others[1:] else "comes"
     then = f"; then {come} {listed([row['name'] for row in others[:3]])}" if others else ""
     rest = f" and {len(others) - 3} more" if len(others) > 3 else ""

@@ -4,7 +4,8 @@ import matplotlib
 import matplotlib.pyplot as plt
 import pytest
 
-from wirebayes.report.figures import logarithmic
+from wirebayes.io.paper import experiments
+from wirebayes.report.figures import logarithmic, measured
 
 matplotlib.use("Agg")
 
@@ -16,3 +17,12 @@ def test_an_axis_is_logarithmic_where_something_is_above_zero(values, scale):
     logarithmic(axes, "both")
     assert axes.get_xscale() == "log" and axes.get_yscale() == scale
     plt.close(figure)
+
+
+def test_readings_below_zero_are_in_the_picture():
+    """Noise of a slack wire is; a test whose readings are all above zero begins at zero."""
+    experiment = experiments()[0]
+    readings = experiment.readings()
+    above = measured(experiment.protocol(), readings, "a").axes[0].get_ylim()
+    below = measured(experiment.protocol(), readings - readings[experiment.protocol().mask].max() / 2, "a")
+    assert above[0] == 0.0 and below.axes[0].get_ylim()[0] < (-readings[experiment.protocol().mask].max() / 2) * 0.8

@@ -41,6 +41,10 @@ def test_a_comparison_is_a_ranking_in_words() -> None:
     assert answers.comparison_in_words("a", table) == (  # type: ignore[arg-type]
         "a: toe predicts left-out holds best, by 12 ± 3.2 in elpd against plain; then comes plain."
     )
+    for elpd, se, chance in ((4.0, 2.0, False), (3.99, 0.1, True), (12.3, 6.2, True)):
+        rows[0]["difference"] = {"elpd": elpd, "se": se}
+        said = answers.comparison_in_words("a", table)  # type: ignore[arg-type]
+        assert ("against plain, which may be chance; then" in said) == chance
 
 
 def test_a_batch_says_a_sentence_a_finding_and_no_plural_of_one() -> None:

@@ -277,6 +277,11 @@ def _difference(one: LeaveOneHoldOut | PredictionScores, other: LeaveOneHoldOut 
     return {"elpd": float(gained.sum()), "se": standard_error(gained)}
 
 
+def meaningful(elpd: float, se: float) -> bool:
+    """Whether a difference in elpd is more than chance may bring."""
+    return abs(elpd) >= max(MEANINGFUL_ELPD, MEANINGFUL_SE * se)
+
+
 def _meaning(row: ComparedModel, base: str) -> str:
     if row["failed"] is not None:
         return f"could not be judged ({row['failed']})"
@@ -293,7 +298,7 @@ def _meaning(row: ComparedModel, base: str) -> str:
         return f"elpd {gain['elpd']:+.1f} against {base}, {where}: one hold alone, which says nothing of its error"
     if not row["converged"]:
         return f"{size}; its sampling did not converge, so this may be wrong"
-    if abs(gain["elpd"]) < MEANINGFUL_ELPD or abs(gain["elpd"]) < MEANINGFUL_SE * gain["se"]:
+    if not meaningful(gain["elpd"], gain["se"]):
         return f"{size}: no meaningful difference"
     return f"{size}: predicts {'better' if gain['elpd'] > 0 else 'worse'}"
 

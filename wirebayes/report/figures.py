@@ -76,7 +76,7 @@ def legend_below(figure: Figure, axes: Any, columns: int = 2) -> None:
 
 
 def measured(protocol: Protocol, readings: Array, title: str) -> Figure:
-    """What was read against what was set: each hold's readings from the first (dark) to the last (light).
+    """What was read against what was set: each hold's first reading (blue) and its later ones (red).
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def measured(protocol: Protocol, readings: Array, title: str) -> Figure:
             axes.scatter([x] * (len(y) - 1), y[1:], s=11, color=HOLD, zorder=2, label=label)
         first = False
     legend(axes, loc="lower right")
-    if not weights:
+    if not weights and readings[protocol.mask].min() >= 0.0:  # noise of a slack wire reaches below
         axes.set_ylim(bottom=0)
     return figure
 

@@ -142,6 +142,12 @@ def _alone(v: ExperimentFindings) -> list[Block]:
     return [Text(f"{like[2:3].upper()}{like[3:]}.", strong=True)] if like else []
 
 
+def _means(name: str) -> str:
+    """A parameter's meaning in a line; of one of an effect, which it is."""
+    effect, _, _ = name.partition(".")
+    return SYMBOLS.get(name) or (f"of the effect {spoken(effect)}" if effect != name else "–")
+
+
 def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
     """Every parameter before and after what was found joined the model."""
     files = [folder / model / "summary.json" for model in ("plain", "final")]
@@ -155,7 +161,7 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
         rows.append([
             name, unit_text(after["unit"]) or "–",
             *([number(before["q50"]), span(before["q05"], before["q95"])] if before else ["–", "–"]),
-            number(after["q50"]), span(after["q05"], after["q95"]), SYMBOLS.get(name, "–"),
+            number(after["q50"]), span(after["q05"], after["q95"]), _means(name),
         ])  # fmt: skip
     header = ["parameter", "unit", "plain", "90 %", "with what was found", "90 %", "what it is"]
     same = v["verdict"] == "nothing-missing"

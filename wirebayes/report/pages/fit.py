@@ -153,8 +153,8 @@ _CURVE = (
     "Above: every reading, and the curve that the model draws through them, with its 90 % band, given all readings. "
     "Below: what is left between reading and curve; nine in ten should lie in the band of the readings' own error."
 )
-_READ = "What was read at each displacement: dark when the hold begins, light later."
-_GREW = "What was read under each weight: dark when the hold begins, light later."
+_READ = "What was read at each displacement: blue when the hold begins, red later."
+_GREW = "What was read under each weight: blue when the hold begins, red later."
 _LEFT = (
     "What the model leaves over. Where the readings lie outside the band, or show a pattern within it, the model "
     "misses something."

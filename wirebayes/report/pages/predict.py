@@ -62,12 +62,12 @@ def page(predicted: Prediction, table: Path) -> Page:
     about = predicted.attrs
     warned = zip(about.get("warning_kinds", ()), about.get("warnings", ()), strict=True)
     warnings: Warned = {"warnings": [{"kind": kind, "text": text} for kind, text in warned]}
-    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+    figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     predicted.plot(figure.subplots())
     alt = f"Predicted readings of {about['experiment']} against the time in each hold, medians and 90 % bands."
     blocks: list[Block] = [
         *before_the_answer(warnings),
-        Pictures([Picture(drawn(figure), alt, _CAPTION, wide=True)]),
+        Pictures([Picture(drawn(figure), alt, _CAPTION)]),
         *beside_the_answer(warnings),
         Text(sentence(about["prediction"])),
         _rows(predicted),

@@ -56,7 +56,7 @@ def _section(e: Experiment, truth: TrueWire) -> Section:
     picture = Picture(
         drawn(figures.measured(e.protocol(), e.readings(), e.name)),
         f"Readings of {e.name} against what was set.",
-        "Within each hold the readings go from the dark point to the light ones.",
+        "Within each hold the readings go from the blue point to the red ones.",
     )
     known = tuple(named(effect) for effect in effects if effect.split("@")[0] in CATALOGUE)
     lines = [
