@@ -1,6 +1,6 @@
 """Laws, histories, likelihoods and effects side by side."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -33,6 +33,7 @@ from wirebayes.sentences import counted
 from wirebayes.strict.files import PathLike
 from wirebayes.views.comparison import Comparison
 from wirebayes.views.result import ResultFolder
+from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 
 
@@ -168,31 +169,49 @@ def plan(
     own, names = path_of(own_effects), words(only)
     experiments = experiments_of(source, experiment)
     base = Candidate(BASE, "", "The plain model.", elastic_law, history, likelihood)
-    known = catalogue(own)
     tasks = []
     for one in experiments:
-        recorded = len(one.recorded_holds)
-        one.first(recorded if train_holds is None else train_holds)  # complains where there are not so many
-        if recorded < 3:
-            holds = counted(recorded, "recorded hold")
-            found = f"found {holds}, expected 3 or more: some are held out, and the others tell the models apart"
-            raise InputError(f"{one.source}, experiment {one.name}: {found}")
+        _check_holds(one, train_holds)
         problem_of(base, one, [])  # checks the file's priors
-        chosen = candidates(one, base, known, names or None)
-        missing = set(names) - {c.name for c in chosen}
-        if missing:
-            possible = ", ".join(c.name for c in candidates(one, base, known))
-            raise InputError(f"--only {min(missing)}: no such model for {one.name}, expected one of {possible}")
-        tasks += [Task(one, candidate, train_holds, own) for candidate in chosen]
+        tasks += [Task(one, candidate, train_holds, own) for candidate in _chosen(one, base, catalogue(own), names)]
     configuration = {
-        "command": "compare", "version": __version__, "seed": seed, "train_holds": train_holds,
-        "elastic_law": elastic_law, "history": history, "likelihood": likelihood,
+        "command": "compare",
+        "version": __version__,
+        "seed": seed,
+        "train_holds": train_holds,
+        "elastic_law": elastic_law,
+        "history": history,
+        "likelihood": likelihood,
         "own_effects": source_of(own),
         "models": {one.name: [t.candidate.name for t in tasks if t.experiment is one] for one in experiments},
         "priors": {one.name: one.priors for one in experiments},
         "data_sha256": {one.name: one.data_hash for one in experiments},
-    } | ({} if policy is None else {"policy": vars(policy)})  # fmt: skip
+    }
+    if policy is not None:
+        configuration["policy"] = vars(policy)
     return Plan(tasks, experiments, configuration, seed, policy or POLICY, own)
+
+
+def _check_holds(experiment: Experiment, train_holds: int | None) -> None:
+    """Refuse a test that has not as many holds as are wanted, or too few to hold some out."""
+    recorded = len(experiment.recorded_holds)
+    experiment.first(recorded if train_holds is None else train_holds)
+    if recorded < 3:
+        holds = counted(recorded, "recorded hold")
+        found = f"found {holds}, expected 3 or more: some are held out, and the others tell the models apart"
+        raise InputError(f"{experiment.source}, experiment {experiment.name}: {found}")
+
+
+def _chosen(
+    experiment: Experiment, base: Candidate, known: Mapping[str, type[Effect]], names: Sequence[str]
+) -> list[Candidate]:
+    """The models to compare; every name that is given must be one of them."""
+    chosen = candidates(experiment, base, known, names or None)
+    missing = set(names) - {candidate.name for candidate in chosen}
+    if missing:
+        possible = ", ".join(candidate.name for candidate in candidates(experiment, base, known))
+        raise InputError(f"--only {min(missing)}: no such model for {experiment.name}, expected one of {possible}")
+    return chosen
 
 
 def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) -> Comparison:

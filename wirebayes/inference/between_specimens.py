@@ -72,21 +72,29 @@ def between_specimens(
 
     bounds = [(mean - _REACH * sd, mean + _REACH * sd)] * p
     mode = np.asarray(optimize.minimize(unlikely, [mean] * p, method="L-BFGS-B", bounds=bounds).x)
-    root = np.linalg.cholesky(_covariance(log_density, mode, sd))
-    normal = rng.standard_normal((_PROPOSALS, p))
-    scale = np.sqrt(_FREEDOM / rng.chisquare(_FREEDOM, _PROPOSALS))
-    unit = normal * scale[:, None]
-    log_s = mode + unit @ root.T
-    proposal = -0.5 * (_FREEDOM + p) * np.log1p((unit**2).sum(1) / _FREEDOM)
-    log_weight = log_density(log_s) - proposal
-    weight = np.exp(log_weight - log_weight.max())
-    weight /= weight.sum()
-    pick = rng.permutation(systematic_rows(weight, count, rng))
-    _, precision, vector = _collapsed(log_s[pick], information, prior)
+    root = np.asarray(np.linalg.cholesky(_covariance(log_density, mode, sd)), np.float64)
+    log_s, weight = _weighted(log_density, mode, root, rng)
+    chosen = log_s[rng.permutation(systematic_rows(weight, count, rng))]
+    _, precision, vector = _collapsed(chosen, information, prior)
     covariance = np.linalg.inv(precision)
     centre = np.einsum("nij,nj->ni", covariance, vector)
     noise = np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), rng.standard_normal((count, p)))
-    return LineDraws(centre + noise, np.exp(log_s[pick]), float(1.0 / (weight**2).sum()))
+    return LineDraws(centre + noise, np.exp(chosen), float(1.0 / (weight**2).sum()))
+
+
+def _weighted(
+    log_density: Callable[[Floats], Floats], mode: Floats, root: Floats, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Points ``(n, p)`` of a Student t about the mode, and their weights for the density, which sum to one."""
+    p = len(mode)
+    normal = rng.standard_normal((_PROPOSALS, p))
+    scale = np.sqrt(_FREEDOM / rng.chisquare(_FREEDOM, _PROPOSALS))
+    unit = normal * scale[:, None]
+    points = mode + unit @ root.T
+    proposal = -0.5 * (_FREEDOM + p) * np.log1p((unit**2).sum(1) / _FREEDOM)
+    log_weight = log_density(points) - proposal
+    weight = np.exp(log_weight - log_weight.max())
+    return points, weight / weight.sum()
 
 
 def _information(values: Floats, prior: tuple[Floats, Floats]) -> tuple[Floats, Floats]:

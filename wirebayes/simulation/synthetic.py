@@ -186,16 +186,7 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     problem = build(tests, truth.effects, law=truth.law, history=truth.history, scales=scales)
     theta = problem.prior.rvs(1, rng)
     for name, value in truth.parameters.items():
-        hits = [i for i, column in enumerate(problem.names) if name in (column, column.split("[")[0])]
-        if not hits:
-            meant = hint(name, problem.names)
-            raise InputError(f"parameter {name}: no such parameter{meant}; there are {', '.join(problem.names)}")
-        for i in hits:
-            low, high = problem.prior.distributions[problem.names[i]].support()
-            high = np.inf if name.split("[")[0] == "setting_sd" else high  # a bench may be worse than its prior
-            if not low <= value <= high:
-                raise InputError(f"parameter {name}: found {value:g}, expected a number from {low:g} to {high:g}")
-            theta[0, i] = value
+        theta[0, _columns(problem, name, value)] = value
     problem = replace(problem, samples=tuple(_referred(problem, theta, sample) for sample in problem.samples))
     settings, clean, readings = [], [], []
     for sample in problem.samples:
@@ -207,6 +198,20 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
         settings.append(setting[:, 0])
         clean.append(exact[..., 0])
     return Simulated(with_readings(problem, readings), theta, settings, clean)
+
+
+def _columns(problem: Problem, name: str, value: float) -> list[int]:
+    """Columns of a parameter, one or one a sample, which may have the value."""
+    columns = [i for i, column in enumerate(problem.names) if name in (column, column.split("[")[0])]
+    if not columns:
+        meant = hint(name, problem.names)
+        raise InputError(f"parameter {name}: no such parameter{meant}; there are {', '.join(problem.names)}")
+    for i in columns:
+        low, high = problem.prior.distributions[problem.names[i]].support()
+        high = np.inf if name.split("[")[0] == "setting_sd" else high  # a bench may be worse than its prior
+        if not low <= value <= high:
+            raise InputError(f"parameter {name}: found {value:g}, expected a number from {low:g} to {high:g}")
+    return columns
 
 
 def write(folder: Path, benches: Sequence[Bench], truth: Truth = Truth(), seed: int = 0) -> Simulated:

@@ -70,50 +70,77 @@ def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:
 
 
 def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
+    known, blind = Points("What it is", _about(e)), Points("What it cannot determine", _blind(e))
+    return [
+        *before_the_answer(e),
+        Columns([known, blind]),
+        *beside_the_answer(e),
+        *picture,
+        _parameters(e),
+        _effects(e),
+        _holds(e),
+    ]
+
+
+def _about(e: CheckedExperiment) -> list[str]:
+    """The sample and the test in sentences."""
+    holds, readings = counted(e["recorded_holds"], "recorded hold"), counted(e["readings"], "reading")
     about = [
         f"{e['material']}, {number(e['length_mm'])} mm.",
-        f"{counted(e['recorded_holds'], 'recorded hold')}, {e['unrecorded_holds']} unrecorded, "
-        f"{counted(e['readings'], 'reading')}.",
+        f"{holds}, {e['unrecorded_holds']} unrecorded, {readings}.",
         f"{number(e['duration_s'] / 60.0)} min in all.",
     ]
     if ends := e.get("hold_ends"):
         about.append(sentence(ends["sentence"]))
-    hidden = [name for name, effect in e["effects"].items() if effect["shows"] == "no"]
-    blind = [f"Effects it cannot show: {', '.join(spoken(name) for name in hidden)}."] if hidden else []
-    prior = [name for name, p in e["parameters"].items() if p["determined_by"] == "prior"]
-    blind += [f"Parameters it does not determine: {', '.join(prior)}."] if prior else []
-    blocks: list[Block] = [
-        *before_the_answer(e),
-        Columns([Points("What it is", about), Points("What it cannot determine", blind or ["Nothing to report."])]),
-        *beside_the_answer(e),
-        *picture,
-    ]
+    return about
+
+
+def _blind(e: CheckedExperiment) -> list[str]:
+    """Effects that the test cannot show, and parameters that it does not determine."""
+    hidden = [spoken(name) for name, effect in e["effects"].items() if effect["shows"] == "no"]
+    prior = [name for name, parameter in e["parameters"].items() if parameter["determined_by"] == "prior"]
+    blind = []
+    if hidden:
+        blind.append(f"Effects it cannot show: {', '.join(hidden)}.")
+    if prior:
+        blind.append(f"Parameters it does not determine: {', '.join(prior)}.")
+    return blind or ["Nothing to report."]
+
+
+def _parameters(e: CheckedExperiment) -> Table:
+    """What is known of each parameter before and after the test."""
+    rows = []
+    for name, p in e["parameters"].items():
+        after, before = span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"])
+        by, meaning = _DETERMINED_BY[p["determined_by"]], SYMBOLS.get(name, "–")
+        rows.append([name, number(p["q50"]), after, before, by, meaning])
+    header = ["parameter", "median", "90 % interval", "prior's 90 %", "determined by", "what it is"]
+    return Table(header, rows, "A first estimate by a short run of the sampler; fit gives the posterior.")
+
+
+def _effects(e: CheckedExperiment) -> Table:
+    """How small an effect the test would show."""
     rows = [
-        [name, number(p["q50"]), span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"]),
-         _DETERMINED_BY[p["determined_by"]], SYMBOLS.get(name, "–")]
-        for name, p in e["parameters"].items()
-    ]  # fmt: skip
-    caption = "A first estimate by a short run of the sampler; fit gives the posterior."
-    blocks.append(
-        Table(["parameter", "median", "90 % interval", "prior's 90 %", "determined by", "what it is"], rows, caption)
-    )
-    seen = [
         [spoken(name), number(effect["amplitude_80"]), effect["unit"], effect["shows"]]
         for name, effect in e["effects"].items()
         if effect["shows"] != "no"
     ]
     caption = "The smallest amplitude of each effect that discover would detect in four tests of five like this one."
-    blocks.append(Table(["effect", "amplitude", "unit", "shows"], seen, caption))
+    return Table(["effect", "amplitude", "unit", "shows"], rows, caption)
+
+
+def _holds(e: CheckedExperiment) -> Table:
+    """The holds, a row each."""
     weights = e["control"] == "force"
-    holds = [
-        [str(h["number"] or "–"), number(h["tension_N" if weights else "displacement_mm"]), number(h["start_s"]),
-         number(h["duration_s"]), str(h["readings"]), number(read(h, "first")), number(read(h, "last"))]
-        for h in e["holds"]
-    ]  # fmt: skip
     what, unit = ("weight (N)", "mm") if weights else ("displacement (mm)", "N")
+    rows = []
+    for hold in e["holds"]:
+        setting = number(hold["tension_N" if weights else "displacement_mm"])
+        begins, lasts = number(hold["start_s"]), number(hold["duration_s"])
+        first, last = number(read(hold, "first")), number(read(hold, "last"))
+        rows.append([str(hold["number"] or "–"), setting, begins, lasts, str(hold["readings"]), first, last])
     header = ["hold", what, "begins (s)", "lasts (s)", "readings", f"first ({unit})", f"last ({unit})"]
-    blocks.append(Table(header, holds, "The holds as they were read; one without a number was not recorded."))
-    return blocks
+    return Table(header, rows, "The holds as they were read; one without a number was not recorded.")
 
 
 def _picture(folder: Path, name: str) -> list[Block]:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from wirebayes.answers import fit_in_a_sentence
 from wirebayes.io.run_folder import read_json
@@ -98,45 +99,50 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     blocks: list[Block] = _cautions(summary)
     if stored.likelihood == "chain":
         alt = f"Readings of {sample.name} with the fitted curve through them, hold after hold."
-        drawn_curve = drawn(through_the_readings(stored, sample.name))
-        blocks.append(Pictures([Picture(drawn_curve, alt, _CURVE, wide=True)]))
+        blocks.append(_wide(through_the_readings(stored, sample.name), alt, _CURVE))
     blocks.append(Text(_next(summary)))
     blocks.append(Columns([_measured(stored, summary.get("hold_ends")), *_known(draws, shrunk, sample, trusted)]))
-    alt = f"Measured minus predicted readings of {sample.name}, hold after hold, inside the 90 % band."
-    measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
-    weights = sample.protocol.control == "force"
-    alt_measured = (
-        f"Displacement of {sample.name} against weight."
-        if weights
-        else (f"Tension of {sample.name} against displacement.")
-    )
-    pictures = [Picture(drawn(measured), alt_measured, _GREW if weights else _READ)]
-    pictures.append(Picture(drawn(_residuals(stored)), alt, _LEFT))
-    blocks.append(Pictures(pictures))
+    blocks.append(_readings(stored))
     blocks.append(_parameters(draws, shrunk, sample))
     pairs = figures.corner({name: draws[name] for name in sampled}, sample.model.effects, sample.protocol.control)
     if pairs is not None:
-        alt = f"Posterior of {sample.name}, every pair of parameters."
-        blocks.append(Pictures([Picture(drawn(pairs), alt, _PAIRS, wide=True)]))
-    sentences = [t["sentence"] for t in summary["identifiability"].values()]
-    blocks.append(
-        Columns(
-            [
-                Points(
-                    "What the data determine" if trusted else "What the data would determine if the model were right",
-                    sentences,
-                )
-            ]
-        )
-    )
+        blocks.append(_wide(pairs, f"Posterior of {sample.name}, every pair of parameters.", _PAIRS))
+    determined = "What the data determine" if trusted else "What the data would determine if the model were right"
+    sentences = [each["sentence"] for each in summary["identifiability"].values()]
+    blocks.append(Columns([Points(determined, sentences)]))
     blocks.append(_derived(summary))
-    ahead = summary["extrapolation"]
-    alt = f"Creep of {sample.name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
-    caption = ahead["sentence"] if trusted else "The model that this band continues does not describe the readings."
-    caption = f"{caption} {ahead['warning']}".strip()
-    blocks.append(Pictures([Picture(drawn(figures.creep_ahead(ahead, sample.name)), alt, caption)]))
+    blocks.append(_ahead(summary, sample.name, trusted))
     blocks.append(Text(_sampled(summary)))
     return Section(sample.name, blocks)
+
+
+def _wide(figure: Figure, alt: str, caption: str) -> Pictures:
+    """One picture as wide as the page."""
+    return Pictures([Picture(drawn(figure), alt, caption, wide=True)])
+
+
+def _readings(stored: Stored) -> Pictures:
+    """What was read, and what the model leaves of it."""
+    sample = stored.sample
+    weights = sample.protocol.control == "force"
+    against = "Displacement of {} against weight." if weights else "Tension of {} against displacement."
+    measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
+    left = f"Measured minus predicted readings of {sample.name}, hold after hold, inside the 90 % band."
+    return Pictures(
+        [
+            Picture(drawn(measured), against.format(sample.name), _GREW if weights else _READ),
+            Picture(drawn(_residuals(stored)), left, _LEFT),
+        ]
+    )
+
+
+def _ahead(summary: SummaryJson, name: str, trusted: bool) -> Pictures:
+    """How the creep goes on, with what speaks against it."""
+    ahead = summary["extrapolation"]
+    alt = f"Creep of {name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
+    caption = ahead["sentence"] if trusted else "The model that this band continues does not describe the readings."
+    caption = f"{caption} {ahead['warning']}".strip()
+    return Pictures([Picture(drawn(figures.creep_ahead(ahead, name)), alt, caption)])
 
 
 def _next(summary: SummaryJson) -> str:
