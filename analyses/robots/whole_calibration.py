@@ -5,8 +5,11 @@ from what the estimator is told, and its encoders read the true lengths with an 
 from the forward statics with creep (`session.predict`), which the estimator does not use.
 
     python -m analyses.robots.whole_calibration coverage 200
-    python -m analyses.robots.whole_calibration exact 60
+    python -m analyses.robots.whole_calibration exact 120
     python -m analyses.robots.whole_calibration lengths 100
+
+With ``--rows FILE`` every robot's row is kept as soon as it is there, rows of earlier runs are counted too, and a run
+that was stopped goes on with another seed.
 """
 
 import argparse
@@ -18,13 +21,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import beta, chi2, ncx2
 
 from tests.robot import drawn
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.tensions import nearest
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration import equations, session, whole
+from wirebayes.robot.self_calibration import answer, equations, session, whole, whole_answer
 from wirebayes.robot.self_calibration.identified import identified
 from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.summary import Moment, summarised
@@ -34,6 +38,9 @@ from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 MODES = ("poses known", "poses roughly known", "poses unknown", "some poses")
 POINTS = ("point-4", "point-5")
 ENCODERS = (1e-5, 1e-4)  # error of a length over the span: .05 to .5 mm of 5 m
+OFF = (1e-4, 1e-2)  # of the span, .5 to 50 mm of 5 m: how far anchors are off that are held exact
+FEW = 8  # stops where poses are requests and all else is exact: the history is solved for every unknown, seconds a step
+SEEN = 0.99  # power from which wrong anchors are to be seen
 
 
 @dataclass
@@ -46,10 +53,17 @@ class Case:
     reference_m: np.ndarray
     length_m: np.ndarray
     position_m: np.ndarray
+    rotation: np.ndarray
+    pull_N: np.ndarray
 
 
-def case(kind: str, mode: str, rng: np.random.Generator, anchor: float, stops: int, tensions: bool) -> Case | None:
-    """One robot whose anchors are off by a share of its span; None where nothing holds its platform often enough."""
+def case(
+    kind: str, mode: str, rng: np.random.Generator, anchor: float, stops: int, tensions: bool, encoder: float
+) -> Case | None:
+    """One robot whose anchors and encoders are off by shares of its span.
+
+    None where nothing holds its platform often enough.
+    """
     try:
         made = drawn.draw(kind, rng, 200, 0.03)
     except RuntimeError:
@@ -71,8 +85,9 @@ def case(kind: str, mode: str, rng: np.random.Generator, anchor: float, stops: i
         real = session.predict(true, prior, log, values)
     if not real.solved[0] or not np.isfinite(real.readings).all():
         return None
-    tension = real.readings[0].reshape(stops, robot.legs) + rng.normal(size=(stops, robot.legs))
-    tension = np.maximum(tension * log.tension_sd_N, 0.0) if tensions else np.full((stops, robot.legs), np.nan)
+    pull_N = real.readings[0].reshape(stops, robot.legs) * log.tension_sd_N
+    tension = np.maximum(pull_N + rng.normal(size=pull_N.shape) * log.tension_sd_N, 0.0)
+    tension = tension if tensions else np.full_like(pull_N, np.nan)
     position, turn = real.position_m[0].copy(), real.rotation[0].copy()
     pose_sd = 1e-3 * span if mode == "poses roughly known" else 0.0
     position += pose_sd * rng.normal(size=position.shape)
@@ -82,10 +97,10 @@ def case(kind: str, mode: str, rng: np.random.Generator, anchor: float, stops: i
     if unknown is not None:
         position[unknown], turn[unknown] = np.nan, np.nan
     told = Unknowns(robot, prior, StatedErrors(exit_m=anchor * span, pose_m=pose_sd))
-    read = log.joint_m + span * float(rng.choice(ENCODERS)) * rng.normal(size=log.joint_m.shape)
+    read = log.joint_m + span * encoder * rng.normal(size=log.joint_m.shape)
     log = replace(log, position_m=position, rotation=turn, joint_m=read, read=np.full(stops, tensions))
     return Case(told, equations.Holds(log, tension), true.exit_m, values[0, : robot.legs], real.length_m[0],
-                real.position_m[0])  # fmt: skip
+                real.position_m[0], real.rotation[0], pull_N)  # fmt: skip
 
 
 def _visited(
@@ -110,16 +125,27 @@ def _visited(
     return session.Session(x[good], R[good], joint, held, np.ones(stops, bool), 0.0012 * highest)
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What kind of robot to draw, and how far what is told of it is off, over its span."""
+
+    kind: str
+    mode: str
+    anchor: float
+    encoder: float
+    stops: int = 20
+
+
 def _cases(
-    size: int, rng: np.random.Generator, of: Callable[[int], tuple[str, str, float]], stops: int, tensions: bool
-) -> Iterator[tuple[str, str, float, Case]]:
+    size: int, rng: np.random.Generator, of: Callable[[int], Asked], tensions: bool
+) -> Iterator[tuple[Asked, Case]]:
     made = 0
     while made < size:
-        kind, mode, anchor = of(made)
-        one = case(kind, mode, rng, anchor, stops, tensions)
+        asked = of(made)
+        one = case(asked.kind, asked.mode, rng, asked.anchor, asked.stops, tensions, asked.encoder)
         if one is not None:
             made += 1
-            yield kind, mode, anchor, one
+            yield asked, one
 
 
 def _verdict(found: whole.Whole) -> bool:
@@ -132,24 +158,28 @@ def _inside(known: Moment, truth: np.ndarray, exact: float = 0.0) -> float:
     return float((np.abs(known.mean - truth) <= known.half * known.sd + exact).mean())
 
 
-def coverage(size: int, seed: int, kept: Path | None) -> dict[str, Any]:
-    """Shares of 90 % intervals that hold the truth, by kind of robot and by what is known of its poses.
+def _share(good: list[bool]) -> dict[str, Any]:
+    """A share with its 95 % interval (Clopper-Pearson)."""
+    k, n = sum(good), len(good)
+    low = float(beta.ppf(0.025, k, n - k + 1)) if k else 0.0
+    high = float(beta.ppf(0.975, k + 1, n - k)) if k < n else 1.0
+    return {"of": n, "share": k / n if n else float("nan"), "low": low, "high": high}
 
-    Rows of a file that runs with other seeds left are counted too.
-    """
+
+def coverage(size: int, seed: int) -> Iterator[dict[str, Any]]:
+    """Whether 90 % intervals hold the truth, by kind of robot and by what is known of its poses."""
     rng = np.random.default_rng(seed)
-    rows = [json.loads(line) for line in kept.read_text().splitlines()] if kept and kept.is_file() else []
 
-    def of(made: int) -> tuple[str, str, float]:
-        kinds = len(drawn.KINDS)
-        return drawn.KINDS[(made + seed) % kinds], MODES[(made + seed // 2) % len(MODES)], (2e-3, 1e-2)[made % 2]
+    def of(made: int) -> Asked:
+        kind, mode = drawn.KINDS[(made + seed) % len(drawn.KINDS)], MODES[(made + seed // 2) % len(MODES)]
+        return Asked(kind, mode, (2e-3, 1e-2)[made % 2], float(rng.choice(ENCODERS)))
 
-    for kind, mode, anchor, one in _cases(size, rng, of, 20, True):
-        begun = time.perf_counter()
+    for asked, one in _cases(size, rng, of, True):
+        begun = time.process_time()
         with np.errstate(all="ignore"):
             found = best(one.told, one.holds, rng)
         s = summarised(found)
-        row = {"kind": kind, "mode": mode, "anchor": anchor, "seconds": time.perf_counter() - begun}
+        row = {"kind": asked.kind, "mode": asked.mode, "anchor": asked.anchor, "seconds": time.process_time() - begun}
         row |= {"converged": bool(found.converged), "usable": bool(_verdict(found))}
         if found.converged:
             exact = 1e-6 * one.told.robot.span_m
@@ -159,69 +189,132 @@ def coverage(size: int, seed: int, kept: Path | None) -> dict[str, Any]:
                 "lengths": _inside(s.length_m, one.length_m),
                 "poses": _inside(s.position_m, one.position_m, exact),
             }
-        else:
-            print("   not converged", kind, mode, anchor, found.noise, found.cost)
-        rows.append(row)
-        if kept:
-            with kept.open("a") as file:
-                file.write(json.dumps(row) + "\n")
+        yield row
+
+
+def coverage_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Shares of 90 % intervals that hold the truth."""
     shares = {name: _shares([r for r in rows if name in (r["mode"], r["kind"], "all")])
               for name in ("all", *MODES, *drawn.KINDS)}  # fmt: skip
-    seconds = float(np.median([r["seconds"] for r in rows]))
-    return {"robots": len(rows), "median_seconds_each": seconds, "shares": shares}
+    return {"median_seconds_each": float(np.median([r["seconds"] for r in rows])), "shares": shares}
 
 
 def _shares(rows: list[dict[str, Any]]) -> dict[str, float]:
     out: dict[str, float] = {"robots": len(rows)}
-    if rows:
-        out |= {name: float(np.mean([r[name] for r in rows])) for name in ("converged", "usable")}
-        for name in ("exit_points", "references", "lengths", "poses"):
-            out[name] = float(np.mean([r[name] for r in rows if r["converged"]] or [np.nan]))
+    if not rows:
+        return out
+    for name in ("converged", "usable"):
+        share = _share([r[name] for r in rows])
+        out |= {name: share["share"], f"{name}_low": share["low"], f"{name}_high": share["high"]}
+    for name in ("exit_points", "references", "lengths", "poses"):
+        held = np.array([r[name] for r in rows if r["converged"]] or [np.nan])
+        out |= {name: float(held.mean()), f"{name}_se": float(held.std() / np.sqrt(len(held)))}
     return out
 
 
-def exact(size: int, seed: int) -> dict[str, Any]:
-    """How often anchors held exact are usable, where they are off by 1 % of the span, and where they are not."""
-    rng, out = np.random.default_rng(seed), {}
-    for anchor in (1e-2, 0.0):
-        usable = []
+def exact(size: int, seed: int) -> Iterator[dict[str, Any]]:
+    """Whether anchors that are held exact are usable, each robot with right ones or with wrong ones.
 
-        def of(made: int, anchor: float = anchor) -> tuple[str, str, float]:
-            return drawn.KINDS[made % len(drawn.KINDS)], MODES[made % 2], anchor
+    Joint values are exact, or their error is stated as it is; the answer is that of ``calibrate``.
+    """
+    rng = np.random.default_rng(seed)
 
-        for _, _, _, one in _cases(size, rng, of, 20, True):
-            known = replace(one.told.errors, exit_m=0.0, joint_m=1e-4 * one.told.robot.span_m)
-            with np.errstate(all="ignore"):
-                usable.append(_verdict(best(replace(one.told, errors=known), one.holds, rng)))
-        out[f"usable with anchors off by {anchor:g} of the span"] = float(np.mean(usable))
-    return out
+    def of(made: int) -> Asked:
+        off = float(np.exp(rng.uniform(*np.log(OFF)))) if made % 2 else 0.0
+        kind, mode = drawn.KINDS[(made // 2 + seed) % len(drawn.KINDS)], MODES[made // 6 % len(MODES)]
+        encoder = (0.0, *ENCODERS)[made // 2 % 3]
+        return Asked(kind, mode, off, encoder, FEW if mode == MODES[0] and encoder == 0 else 20)
+
+    for asked, one in _cases(size, rng, of, True):
+        begun = time.process_time()
+        robot, log = one.told.robot, one.holds.session
+        errors = replace(one.told.errors, exit_m=0.0, joint_m=asked.encoder * robot.span_m)
+        readings = (one.holds.tension_N / log.tension_sd_N).ravel()
+        with np.errstate(all="ignore"):
+            if asked.stops == FEW:
+                found, _ = answer.answer(robot, one.told.prior, log, readings, seed, 0)
+            else:
+                found = whole_answer.answer(robot, one.told.prior, errors, log, readings, seed, False, 0).content
+            power = _power(one, errors, _unplaced(log) if asked.stops == FEW else log) if asked.anchor else 0.0
+        yield {
+            "kind": asked.kind, "mode": asked.mode, "anchor": asked.anchor, "encoder": asked.encoder, "power": power,
+            "usable": bool(found["usable"]), "converged": bool(found["with_creep_model"]["converged"]),
+            "p": float(found["with_creep_model"]["p_joint"]), "seconds": time.process_time() - begun,
+        }  # fmt: skip
 
 
-def lengths(size: int, seed: int) -> dict[str, Any]:
-    """Anchors from lengths alone, poses unknown: how often found, how often silently wrong."""
-    rng, rows = np.random.default_rng(seed), []
+def _unplaced(log: session.Session) -> session.Session:
+    """The session with poses that are requests: they are no readings."""
+    nowhere, unturned = np.full_like(log.position_m, np.nan), np.full_like(log.rotation, np.nan)
+    return replace(log, position_m=nowhere, rotation=unturned)
 
-    def of(made: int) -> tuple[str, str, float]:
-        return POINTS[made % 2], "poses unknown", 2e-2
 
-    for kind, _, _, one in _cases(size, rng, of, 24, False):
+def _power(one: Case, errors: StatedErrors, log: session.Session) -> float:
+    """Power of a chi-squared test of all readings that knows every error, at the level of the verdict.
+
+    Its non-centrality is what the anchors' shift adds to the least sum of squares, by the slopes at the truth.
+    """
+    unit = 1e-3 * one.told.robot.span_m
+    shift = ((one.exit_m - one.told.robot.exit_m) / unit).ravel()
+    free = Unknowns(one.told.robot, one.told.prior, replace(errors, exit_m=unit))
+    white = np.zeros(free.count)
+    white[free.slices["exit"]] = shift
+    state = equations.State(white, one.position_m, one.rotation, one.pull_N)
+    holds = replace(one.holds, session=log)
+    creep = whole._creep(free, holds, state)
+    noise = equations.Noise(max(errors.joint_m or 0.0, equations.EXACT * one.told.robot.span_m),
+                            equations.FRICTIONLESS, 1.0, 0.0, 1e-3 * one.told.robot.rule.lowest_N)  # fmt: skip
+    e = equations.linearised(free, holds, noise, state, creep, state)
+    covariance = np.linalg.inv(whole._eliminated(e, white, 0.0).matrix)
+    at = free.slices["exit"]
+    information = np.linalg.inv(covariance[at, at]) - np.eye(len(shift))
+    count = float(e.known.sum()) - e.by_hold.shape[0] * e.by_hold.shape[2]
+    return float(ncx2.sf(chi2.isf(SIGNIFICANT, count), count, max(float(shift @ information @ shift), 0.0)))
+
+
+def exact_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """How often right anchors are usable, and wrong ones are not, by the power of a test that knew the noise."""
+    wrong = [r for r in rows if r["anchor"] > 0]
+    seen = [r for r in wrong if r["power"] >= SEEN]
+    return {
+        "usable_where_all_is_right": _share([r["usable"] for r in rows if r["anchor"] == 0]),
+        "not_usable_where_power_is_99_percent": _share([not r["usable"] for r in seen]),
+        "not_usable_where_it_is_less": _share([not r["usable"] for r in wrong if r["power"] < SEEN]),
+        "mean_power_there": float(np.mean([r["power"] for r in wrong if r["power"] < SEEN] or [np.nan])),
+        "median_seconds_each": float(np.median([r["seconds"] for r in rows])),
+    }
+
+
+def lengths(size: int, seed: int) -> Iterator[dict[str, Any]]:
+    """Anchors from lengths alone, poses unknown."""
+    rng = np.random.default_rng(seed)
+
+    def of(made: int) -> Asked:
+        return Asked(POINTS[made % 2], "poses unknown", 2e-2, float(rng.choice(ENCODERS)), stops=24)
+
+    for asked, one in _cases(size, rng, of, False):
+        begun = time.process_time()
         with np.errstate(all="ignore"):
             found = best(one.told, one.holds, rng)
-        s, before = summarised(found), one.told.errors.exit_m
-        ok = _verdict(found)
-        worst = float((np.abs(s.exit_m.mean - one.exit_m) / s.exit_m.sd).max())
-        after = {"anchors": _between(s.exit_m.mean, one.exit_m), "before": _between(one.told.robot.exit_m, one.exit_m)}
-        rows.append({"kind": kind, "ok": ok, "good": worst < 4, "sharper": after["anchors"] / after["before"]})
-        print(kind, "ok" if ok else "refused", f"worst {worst:.1f} sd; sd {np.median(s.exit_m.sd) / before:.2f} of "
-              f"before; between anchors {after['anchors'] / before:.2f} of {after['before'] / before:.2f}; "
-              f"converged {found.converged} p {whole.trust(found):.2g} {identified(found).determined}")  # fmt: skip
-    accepted = np.array([r["ok"] for r in rows])
-    good = np.array([r["good"] for r in rows])
+        s = summarised(found)
+        after, before = _between(s.exit_m.mean, one.exit_m), _between(one.told.robot.exit_m, one.exit_m)
+        yield {
+            "kind": asked.kind, "usable": bool(_verdict(found)), "seconds": time.process_time() - begun,
+            "worst_sd": float((np.abs(s.exit_m.mean - one.exit_m) / s.exit_m.sd).max()),
+            "sharper": after / before, "sd_over_before": float(np.median(s.exit_m.sd) / one.told.errors.exit_m),
+        }  # fmt: skip
+
+
+def lengths_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """How often anchors were found from lengths alone, and how often silently wrong."""
+    usable = [r for r in rows if r["usable"]]
     return {
-        "found": float((accepted & good).mean()),
-        "silently_wrong": float((accepted & ~good).mean()),
-        "refused": float((~accepted).mean()),
-        "distance_error_over_before": float(np.median([r["sharper"] for r in rows if r["ok"]] or [np.nan])),
+        "found": _share([r["usable"] and r["worst_sd"] < 4 for r in rows]),
+        "silently_wrong": _share([r["usable"] and not r["worst_sd"] < 4 for r in rows]),
+        "refused": _share([not r["usable"] for r in rows]),
+        "distance_error_over_before": float(np.median([r["sharper"] for r in usable] or [np.nan])),
+        "sd_over_before": float(np.median([r["sd_over_before"] for r in usable] or [np.nan])),
+        "median_seconds_each": float(np.median([r["seconds"] for r in rows])),
     }
 
 
@@ -234,19 +327,25 @@ def _between(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.sqrt(np.mean((apart(a) - apart(b)) ** 2)))
 
 
+STUDIES = {"coverage": (coverage, coverage_of), "exact": (exact, exact_of), "lengths": (lengths, lengths_of)}
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    parser.add_argument("what", choices=["coverage", "exact", "lengths"])
+    parser.add_argument("what", choices=STUDIES)
     parser.add_argument("size", type=int, default=200, nargs="?")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", type=Path)
-    parser.add_argument("--rows", type=Path, help="coverage: kept here robot by robot, those of earlier runs counted")
+    parser.add_argument("--rows", type=Path, help="kept here robot by robot, those of earlier runs counted")
     given = parser.parse_args()
-    if given.what == "coverage":
-        answer = coverage(given.size, given.seed, given.rows)
-    else:
-        answer = {"exact": exact, "lengths": lengths}[given.what](given.size, given.seed)
-    text = json.dumps({"robots": given.size} | answer, indent=1) + "\n"
+    kept = given.rows
+    rows = [json.loads(line) for line in kept.read_text().splitlines()] if kept and kept.is_file() else []
+    drawn_robots, summed = STUDIES[given.what]
+    for row in drawn_robots(given.size, given.seed):
+        rows.append(row)
+        if kept:
+            with kept.open("a") as file:
+                file.write(json.dumps(row) + "\n")
+    text = json.dumps({"robots": len(rows)} | summed(rows), indent=1) + "\n"
     print(text)
     if given.output:
         given.output.write_text(text)
