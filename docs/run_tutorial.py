@@ -1,9 +1,9 @@
-"""Runs the commands of the tutorial and of the README as they stand, and keeps what they said beside them.
+"""Runs the commands of the tutorials and of the README as they stand, and keeps what they said beside them.
 
     python docs/run_tutorial.py            (make outputs)
 
-writes the outputs and pictures of the tutorial and the gallery, and those of the README. Tests run the same commands
-and compare (`tests/test_docs.py`).
+writes the outputs and pictures of the tutorials and the gallery, and those of the README; with ``hangprinter`` behind
+it those of the Hangprinter's tutorial alone. Tests run the same commands and compare (`tests/test_docs.py`).
 """
 
 import csv
@@ -45,10 +45,16 @@ _CONSOLE = re.compile(r"```console\n(.*?)```", re.DOTALL)
 _PYTHON = re.compile(r"```python\n(.*?)```\n```text\n(.*?)```", re.DOTALL)
 
 
-def commands() -> list[list[str]]:
-    """The commands of the tutorial in their order, without the last one, which is ``make run``."""
-    text = (DOCS / "tutorial.rst").read_text(encoding="utf-8")
-    return [shlex.split(line) for line in re.findall(r"^    wirebayes (.*)", text, re.MULTILINE)][:-1]
+def commands(page: str = "tutorial") -> list[list[str]]:
+    """The commands of a tutorial in their order, without the main one's last, which is ``make run``.
+
+    Parameters
+    ----------
+    page : str
+    """
+    text = (DOCS / f"{page}.rst").read_text(encoding="utf-8")
+    found = [shlex.split(line) for line in re.findall(r"^    wirebayes (.*)", text, re.MULTILINE)]
+    return found[:-1] if page == "tutorial" else found
 
 
 def start(folder: Path) -> None:
@@ -78,6 +84,55 @@ def follow(folder: Path) -> dict[str, str]:
     outputs["predicted.csv"] = _rounded((folder / "predicted.csv").read_text())
     outputs["pose-error.inc"] = _errors(json.loads((folder / "out/pose/pose.json").read_text()))
     return outputs
+
+
+def follow_hangprinter(folder: Path) -> dict[str, str]:
+    """Run the commands of the Hangprinter's tutorial; what each said, the settings, and anchors beside the truth.
+
+    Parameters
+    ----------
+    folder : Path
+        Empty; receives the example's files and all results.
+    """
+    for name in ("config.g", "line.toml", "line.csv", "hangprinter-log.csv"):
+        shutil.copy(DOCS / "example" / name, folder)
+    outputs = {f"{command[0]}.txt": said_by(command, folder) for command in commands("hangprinter")}
+    outputs["reprapfirmware.g"] = (folder / "out/config/reprapfirmware.g").read_text(encoding="utf-8")
+    found = json.loads((folder / "out/anchors/calibration.json").read_text(encoding="utf-8"))
+    outputs["anchors.inc"] = _anchors(found, json.loads((DOCS / "example" / "hangprinter-truth.json").read_text()))
+    return outputs
+
+
+def _anchors(found: dict, truth: dict) -> str:
+    """Coordinates of all anchors as a table: the truth, and how far tape and calibration are from it."""
+    told_mm = _stated_mm(DOCS / "example" / "config.g")
+    exits, anchors = found["exit_points_m"], truth["exit_points_m"]
+    rows, held = [], 0
+    for leg, letter in enumerate("ABCD"):
+        for axis, name in enumerate("xyz"):
+            true, low, high = (1e3 * value[leg][axis] for value in (anchors, exits["q05"], exits["q95"]))
+            held += low <= true <= high
+            rows += [f"   * - {letter} {name}", f"     - {true:.1f}", f"     - {told_mm[leg][axis]:.1f}",
+                     f"     - {low:.1f} to {high:.1f}"]  # fmt: skip
+    head = [".. list-table::", "   :header-rows: 1", "", "   * - anchor", "     - truth", "     - tape",
+            "     - calibrated, 90 %"]  # fmt: skip
+    return "\n".join([*head, *rows, "", f"{held} of {len(rows) // 4} intervals hold the truth."]) + "\n"
+
+
+def _stated_mm(config: Path) -> list[list[float]]:
+    """The anchors that RepRapFirmware's settings state, mm."""
+    text = config.read_text(encoding="utf-8")
+    return [[float(v) for v in m.split(":")] for m in re.findall(r" [ABCD](-?[\d.]+:-?[\d.]+:-?[\d.]+)", text)]
+
+
+def hangprinter() -> None:
+    """Write the outputs of the Hangprinter's tutorial."""
+    (DOCS / "hangprinter").mkdir(exist_ok=True)
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, text in follow_hangprinter(folder).items():
+            (DOCS / "hangprinter" / file).write_text(text, encoding="utf-8")
+        shutil.copy(folder / "out/map/workspace-drift.svg", DOCS / "hangprinter" / "workspace-drift.svg")
 
 
 def _rounded(text: str) -> str:
@@ -197,6 +252,7 @@ def pairs(posterior: Path, target: Path) -> None:
 
 
 def main() -> None:
+    hangprinter()
     (DOCS / "tutorial").mkdir(exist_ok=True)
     (DOCS / "gallery").mkdir(exist_ok=True)
     with TemporaryDirectory() as name:
@@ -215,4 +271,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    (hangprinter if sys.argv[1:] == ["hangprinter"] else main)()

@@ -122,3 +122,24 @@ def with_pulleys(robot, rng, share=0.02):
 def wrench(robot, shape, tension_N):
     """(6 or 3, n) force and moment of the wires' tensions (w, n) on the platform, by virtual work."""
     return -(statics.jacobian(robot, shape) * (robot.lines[:, None] * tension_N)).sum(1)
+
+
+def ball_joint(rng):
+    """A mast on a ball joint, held upright by four to six wires that come from below."""
+    legs = int(rng.integers(4, 7))
+    turn = 2 * np.pi * (np.arange(legs) + rng.uniform(-0.2, 0.2, legs)) / legs
+    ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(legs)])
+    home = rng.normal(0.0, 1.0, 3)
+    exits = home + (1.5 + 0.2 * rng.random(legs))[:, None] * ring + [0.0, 0.0, -0.2]
+    across = (
+        0.3 * np.column_stack([-ring[:, 1], ring[:, 0], ring[:, 2]]) * np.where(np.arange(legs) % 2, 1, -1)[:, None]
+    )
+    points = 0.3 * ring + across + np.array([0.0, 0.0, 1.0]) + 0.05 * rng.normal(size=(legs, 3))
+    plain = schema.read("sled-4")
+    zeros = np.zeros(legs)
+    return replace(
+        plain, name="mast", freedom="orientation", plane=None, mass_kg=2.0, centre_of_mass_m=np.array([0.02, 0.0, 0.8]),
+        exit_m=exits, platform_m=points, lines=np.ones(legs), beyond_m=zeros, actuator=("drum",) * legs, ratio=zeros,
+        wire_m=zeros, wire=("default",) * legs, given={}, home_m=home, home_rotation_rad=np.zeros(3), lower_m=home,
+        upper_m=home, rule=replace(plain.rule, lowest_N=5.0, highest_N=400.0), drums=None, pulleys=None,
+    )  # fmt: skip

@@ -11,9 +11,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+import wirebayes as wb
 from tests.robot.test_commands import fitted, session_csv  # noqa: F401 - fixtures
 from tests.robot.test_history import _joint_values_for, _line, _simulated, _theta
 from wirebayes.cli import main
+from wirebayes.errors import InputError
 from wirebayes.json_files.plain import plain
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history import commanded, corrections
@@ -142,6 +144,15 @@ class Known(NamedTuple):
     covariance: Floats
 
 
+def _run_live(wires, usable, unusable, joint):
+    """A stream goes on from a calibration that is usable, and from no other does it begin."""
+    running = wb.live("linear-7", wires, calibration=usable, draws=4)
+    poses = [running.step(float(t), joint).position_m for t in range(3)]
+    assert np.isfinite(poses).all()
+    with pytest.raises(InputError, match=r"not usable in .* \(warnings: misfit\), expected a calibration"):
+        wb.live("linear-7", wires, calibration=unusable, draws=4)
+
+
 def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_csv, tmp_path, capsys):  # noqa: F811
     session, _ = session_csv
     wires, done = ["--wires", str(fitted)], tmp_path / "calibrate"
@@ -173,6 +184,7 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     found["with_creep_model"]["converged"] = True
     doubted = found | {"usable": False, "warnings": [{"kind": "misfit", "text": "…"}]}
     (unusable / "calibration.json").write_text(json.dumps(doubted))
+    _run_live(fitted, done, unusable, [float(row[name]) for name in joints])
     other = tmp_path / "other"
     other.mkdir()
     (other / "posterior.nc").write_bytes(b"another")

@@ -3,6 +3,7 @@
 import csv
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +11,14 @@ import pytest
 from tests.robot.test_calibration import _line
 from wirebayes.errors import InputError
 from wirebayes.robot.export import files
+from wirebayes.robot.history import table
 from wirebayes.robot.mechanics import draws, drums, schema
 from wirebayes.robot.mechanics.description import Drums
 from wirebayes.robot.motion import claim, forward, inverse
 from wirebayes.robot.pose.answer import answer
 from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.robot.self_calibration import session_file
+from wirebayes.strict.table import csv_table
 
 # one layer; five turns a layer; a spiral of one turn a layer; no drum known
 DRUMS = Drums(
@@ -100,14 +103,44 @@ def test_a_session_may_give_motor_angles(tmp_path):
     for name, motors, values in (("a", False, joint), ("b", True, angle)):
         with (tmp_path / name).open("w", newline="") as file:
             rows = csv.writer(file)
-            rows.writerow(session_file.columns(robot, motors).required)
+            rows.writerow(session_file.columns(robot, ["motor_1_rad"] if motors else []).required)
             rows.writerow([1, *robot.home_m, 0, 0, 0, 60, *map(float, values), *[2.0] * 8])
         sessions.append(session_file.read(tmp_path / name, robot, 0.02, 1e-3)[0])
-    assert "joint_3_m" in session_file.columns(robot, True).required
-    assert "motor_4_rad" in session_file.columns(robot, True).required
+    assert "joint_3_m" in session_file.columns(robot, ["motor_4_rad"]).required
+    assert "motor_4_rad" in session_file.columns(robot, ["motor_4_rad"]).required
     np.testing.assert_allclose(sessions[1].joint_m, sessions[0].joint_m, atol=1e-13)
     with pytest.raises(InputError, match="expected a header of hold,.*joint_1_m"):
         session_file.read(tmp_path / "b", schema.read("cogiro-desk"), 0.02, 1e-3)
+
+
+def test_tables_may_give_the_straight_lengths_that_firmware_counts():
+    """Millimetres from anchor to platform, of wires of several lines with more beyond the anchor."""
+    robot = schema.read("hangprinter-4")
+    straight = np.array([[1650.0, 1840.0, 1630.0, 1990.0], [1660.0, 1830.0, 1640.0, 1980.0]])
+    wire = robot.lines * straight / 1000 + robot.beyond_m
+    given = ["straight_1_mm"]
+    pose, tension = [*robot.home_m, 0, 0, 0, 60], [2.0] * 4
+
+    def session(names, rows):
+        cells = [[i + 1, *pose, *map(float, row), *tension] for i, row in enumerate(rows)]
+        text = "\n".join([",".join(names), *(",".join(map(str, c)) for c in cells)])
+        return session_file.parse(csv_table(Path("session.csv"), text), robot, 0.02, 1e-3)[0].joint_m
+
+    def log(names, rows):
+        cells = [[60.0 * i, *map(float, row)] for i, row in enumerate(rows)]
+        text = "\n".join([",".join(names), *(",".join(map(str, c)) for c in cells)])
+        return table.parse(csv_table(Path("log.csv"), text), robot, table.measured).joint_m
+
+    for read, names in (
+        (session, session_file.columns(robot, given).required),
+        (log, table.measured(robot, given).required),
+    ):
+        assert "straight_4_mm" in names
+        np.testing.assert_allclose(read(names, straight), wire, rtol=1e-12)
+        with pytest.raises(InputError, match=r"straight_2_mm.*1840000.*which is 3683 m of wire, expected"):
+            read(names, straight * [[1, 1000, 1, 1], [1, 1, 1, 1]])
+        with pytest.raises(InputError, match="straight_1_mm.*whole wire"):
+            read(names, straight / 1000)  # metres under a name that says millimetres
 
 
 def test_the_firmware_files_describe_the_drums():

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.robot import cases
+from tests.robot.cases import ball_joint
 from wirebayes.cli import main
 from wirebayes.commands.import_robot import import_robot
 from wirebayes.errors import InputError
@@ -156,6 +157,24 @@ def test_a_planar_joint_of_caspr_is_a_rail(joint, axes, tmp_path):
     assert "a rail" in got.source
     tension = inverse.tensions(got, got.home_m[None], rotation.matrix(got.home_rotation_rad)[None])
     assert np.isfinite(tension).all()
+
+
+@pytest.mark.parametrize(("joint", "axes"), [("S_EULER_XYZ", "XYZ"), ("S_FIXED_XYZ", "xyz")])
+def test_a_spherical_joint_of_caspr_is_a_ball_joint(joint, axes, tmp_path):
+    """Three angles about axes that turn along, or about those of the base; the joint is the home position."""
+    robot = ball_joint(np.random.default_rng(0))
+    bodies = _caspr(tmp_path, robot, "com", base=robot.home_m)
+    given = re.sub('type="SPATIAL_EULER_XYZ" q_initial="[^"]*"', f'type="{joint}" q_initial="0.1 -0.2 0.15"',
+                   bodies.read_text())  # fmt: skip
+    bodies.write_text(given)
+    got = schema.read(import_robot(bodies, tmp_path / "toy.toml"))
+    _same(got, robot)
+    assert got.freedoms == 3 and "a ball joint" in got.source
+    turn = Rotation.from_euler(axes, (0.1, -0.2, 0.15)).as_matrix()
+    np.testing.assert_allclose(rotation.matrix(got.home_rotation_rad), turn, atol=1e-12)
+    assert got.lower_m.tolist() == got.upper_m.tolist() == got.home_m.tolist()
+    with pytest.raises(InputError, match="--position: found one for a platform on a ball joint"):
+        import_robot(bodies, tmp_path / "other.toml", position="0,0,1")
 
 
 def test_what_is_given_beside_the_files_counts(tmp_path):

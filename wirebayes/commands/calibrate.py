@@ -140,6 +140,8 @@ def calibrate(
     if not 0 <= next_poses <= _MOST_VISITS:
         raise InputError(f"--next-poses: found {next_poses}, expected a number from 0 to {_MOST_VISITS}")
     machine = robot_of(robot)
+    if machine.freedom == "orientation":
+        raise InputError(f"{machine.name}: found a platform on a ball joint, expected one that calibrate knows")
     bias = machine.tension_bias_N if tension_bias is None else float(tension_bias)
     if not 0 <= bias < math.inf:
         raise InputError(f"--tension-bias: found {bias:g}, expected a number of at least 0")

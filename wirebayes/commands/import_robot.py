@@ -71,6 +71,8 @@ def import_robot(
     first = names[0]
     if bounds is None:
         raise InputError(f"{first}: found no bounds of the tensions, expected --tension LOWEST,HIGHEST in newtons")
+    if position is not None and found.freedom == "orientation":
+        raise InputError("--position: found one for a platform on a ball joint, expected none: the joint is its place")
     if where is None:
         raise InputError(f"{first}: found no pose, expected --position X,Y,Z of the home pose in metres")
     if not 0 <= bounds[0] < bounds[1]:

@@ -175,6 +175,8 @@ def pose(
     line = draws_for(machine, wires, draws, experiment, own)
     where = machine.home_m if position is None else numbers("--position", position, 3)
     turned = asked_rotation(rotation)
+    if turned is not None and np.isnan(turned).any() and machine.freedom == "orientation":
+        raise InputError("--rotation: found free components for a platform on a ball joint, expected three numbers")
     _refuse_off_plane(machine, where, _start(machine, turned))
     moments = rising_times(times)
     tolerance, tolerance_tilt = float(tolerance), float(tolerance_tilt)
@@ -246,6 +248,9 @@ def asked_rotation(rotation: Numbers | None) -> Floats | None:
 
 def _refuse_off_plane(robot: Robot, position_m: Floats, rotation: Floats) -> None:
     far = float(plane.off(robot, position_m[None], rotation[None])[0])
+    if robot.freedom == "orientation" and far > 0:
+        home = ", ".join(f"{v:g}" for v in robot.home_m)
+        raise InputError(f"--position: found a position {far:.3g} m off the ball joint, expected {home}")
     if robot.plane is not None and far > OFF_PLANE * robot.span_m:
         home, normal = (", ".join(f"{v:g}" for v in values) for values in (robot.home_m, robot.plane.normal))
         raise InputError(
@@ -279,6 +284,8 @@ def _refuse_calibration(alone: bool) -> None:
 
 def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:
     """The requested slices; refused where the robot has only one height or one orientation."""
+    if (heights is not None or rotations is not None) and robot.freedom == "orientation":
+        raise InputError("--map-heights, --map-rotation: found for a platform on a ball joint, expected none")
     if heights is not None and robot.plane is not None:
         raise InputError("--map-heights: found heights for a robot in a plane, expected none")
     if heights is not None and (robot.upper_m[:2] == robot.lower_m[:2]).any():

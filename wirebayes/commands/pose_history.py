@@ -182,9 +182,11 @@ def pose_history(
 
 def _refuse_off_plane(robot: Robot, option: str, history: History) -> None:
     """Refuse commanded poses that a plane does not allow."""
-    if robot.plane is None or history.position_m is None or history.rotation is None:
+    if robot.motions is None or history.position_m is None or history.rotation is None:
         return
     far = plane.off(robot, history.position_m, history.rotation)
     if far.max() > _OFF_PLANE * robot.span_m:
         when = history.times_s[int(far.argmax())]
-        raise InputError(f"{option}: found a pose {far.max():.3g} m off the robot's plane at {when:g} s, expected none")
+        raise InputError(
+            f"{option}: found a pose {far.max():.3g} m off the robot's plane or ball joint at {when:g} s, expected none"
+        )

@@ -23,7 +23,10 @@ _JOINTS: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {  # axes of the c
     "PLANAR_XY": ((0, 1), (2,)),
     "PLANAR_XZ": ((0, 2), (1,)),
     "PLANAR_YZ": ((1, 2), (0,)),
+    "S_EULER_XYZ": ((), (0, 1, 2)),
+    "S_FIXED_XYZ": ((), (0, 1, 2)),
 }
+_FIXED_AXES = "S_FIXED_XYZ"  # its angles turn about axes of the base
 
 
 def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> ImportedRobot:
@@ -44,9 +47,10 @@ def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> Imp
     joint, physical = link.one("joint"), link.one("physical")
     kind = joint.attribute("type")
     if kind not in _JOINTS:
-        raise joint.fail(f"the type {kind!r}", f"a free platform or one in a plane: {', '.join(_JOINTS)}")
+        expected = f"a free platform, one in a plane or on a ball joint: {', '.join(_JOINTS)}"
+        raise joint.fail(f"the type {kind!r}", expected)
     moves, turns = _JOINTS[kind]
-    freedom: Freedom = "pose" if turns else "position"
+    freedom: Freedom = "orientation" if not moves else "pose" if turns else "position"
     normal = np.eye(3)[turns[0]] if len(turns) == 1 else None
     centre = physical.one("com_location").vector()
     base = link.one("parent").one("location").vector()
@@ -62,6 +66,8 @@ def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> Imp
         notes.append("Its cables have bounds of their own: the highest force_min and the lowest force_max are taken.")
     if normal is not None:
         notes.append("Its planar joint is a rail: the plane holds the platform both ways.")
+    if freedom == "orientation":
+        notes.append("Its spherical joint is a ball joint: it carries the platform both ways.")
     names = " and ".join(Path(root.file).name for root in (bodies, cables))
     return ImportedRobot(
         link.attributes.get("name") or Path(bodies.file).stem.removesuffix("_bodies"),
@@ -85,7 +91,9 @@ def _platform(bodies: Element) -> Element:
 
 
 def _home(joint: Element, moves: tuple[int, ...], turns: tuple[int, ...], base: Floats) -> tuple[Floats | None, Floats]:
-    """Position and rotation vector of ``q_initial``; each angle turns about an axis of the platform as turned so far.
+    """Position and rotation vector of ``q_initial``.
+
+    Each angle turns about an axis of the platform as turned so far, or of the base.
 
     Parameters
     ----------
@@ -96,14 +104,15 @@ def _home(joint: Element, moves: tuple[int, ...], turns: tuple[int, ...], base: 
         Position where all coordinates are zero.
     """
     if "q_initial" not in joint.attributes:
-        return None, np.zeros(3)
+        return (None if moves else base), np.zeros(3)
     words = Element(joint.file, joint.tag, joint.line, {}, text=joint.attributes["q_initial"])
     q = words.vector(len(moves) + len(turns))
     position = np.array(base)
     position[list(moves)] += q[: len(moves)]
     turned = np.eye(3)
     for axis, angle in zip(turns, q[len(moves) :], strict=True):
-        turned = turned @ matrix(angle * np.eye(3)[axis])
+        own = matrix(angle * np.eye(3)[axis])
+        turned = own @ turned if joint.attribute("type") == _FIXED_AXES else turned @ own
     return position, vector(turned)
 
 

@@ -154,6 +154,6 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
     notes = ("Spools, motors and the spring constant of the line are left out.",)
     return ImportedRobot(
         path.stem, f"Imported from {path.name} of {firmware}.", "position", found.values["mass"][0], np.zeros(3),
-        1e-3 * np.array(anchors), zero, np.zeros(legs), zero + [0.0, 0.0, 1.0], bounds, np.zeros(3), np.zeros(3),
-        notes, each("lines", 1.0), 1e-3 * each("beyond", 0.0),
+        np.array(anchors) / 1000, zero, np.zeros(legs), zero + [0.0, 0.0, 1.0], bounds, np.zeros(3), np.zeros(3),
+        notes, each("lines", 1.0), each("beyond", 0.0) / 1000, on_bed=True,
     )  # fmt: skip

@@ -19,7 +19,7 @@ class ImportedRobot:
     Attributes
     ----------
     name, source : str
-    freedom : {"pose", "position"}
+    freedom : {"pose", "position", "orientation"}
     mass_kg : float
     centre_of_mass_m : (3,) array
     exit_m, platform_m : (w, 3) arrays
@@ -33,6 +33,8 @@ class ImportedRobot:
         Parallel lines of each wire, and wire beyond its exit point, where the file says so.
     normal : (3,) array or None
         Of the plane in which a rail holds the platform.
+    on_bed : bool
+        Whether the workspace begins at the home pose's height, as above a printer's bed.
     """
 
     name: str
@@ -51,6 +53,7 @@ class ImportedRobot:
     lines: Floats | None = None
     beyond_m: Floats | None = None
     normal: Floats | None = None
+    on_bed: bool = False
 
 
 def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Floats) -> str:
@@ -66,8 +69,13 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
     half = _SHARE * np.where((np.arange(3) == 2) & (extent == 0), extent.max(), extent)
     if robot.normal is not None:
         half = half * (robot.normal == 0)
+    raised = half * [0.0, 0.0, 1.0] * robot.on_bed
+    box = [(home_m + raised + side * half).round(6) for side in (-1, 1)]
+    if robot.freedom == "orientation":
+        box = [home_m, home_m]
     beyond = ", beyond_exit_m" if robot.beyond_m is None else ""
-    ours = f"Ours: the choice of tensions, the workspace{beyond}" + _given(robot, tension_N, home_m)
+    space = "" if robot.freedom == "orientation" else ", the workspace"
+    ours = f"Ours: the choice of tensions{space}{beyond}" + _given(robot, tension_N, home_m)
     source = [_text(line)[1:-1] for line in (robot.source, *robot.notes, ours + ".")]
     lines = [
         "version = 1",
@@ -92,8 +100,8 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
         f"rotation_vector_rad = {_row(robot.home_rotation_rad)}",
         "",
         "[workspace]   # about the pose, to be replaced by yours",
-        f"lower_m = {_row((home_m - half).round(6))}",
-        f"upper_m = {_row((home_m + half).round(6))}",
+        f"lower_m = {_row(box[0])}",
+        f"upper_m = {_row(box[1])}",
     ]
     if robot.normal is not None:
         lines += ["", "[plane]", f"normal = {_row(robot.normal)}", 'contact = "rail"']

@@ -91,6 +91,8 @@ def _joints(robot: Robot, turn: Floats, damping_N_s_m: float) -> str:
         f'damping="{damping_N_s_m!r}"/>'
         for axis in axes
     )
+    if robot.freedom == "orientation":  # the ball joint is where the body's frame is
+        return about
     return slides + (about if robot.degrees == 6 else "")
 
 

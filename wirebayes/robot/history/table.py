@@ -9,7 +9,7 @@ from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.joint_columns import has_motors, joint_columns, joint_values
+from wirebayes.robot.mechanics.joint_columns import joint_columns, joint_values
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import plausible
 from wirebayes.sentences import counted
@@ -21,15 +21,15 @@ PAYLOAD, CENTRE = "payload_kg", ("payload_x_m", "payload_y_m", "payload_z_m")
 TILT = ("roll_deg", "pitch_deg")
 
 
-def measured(robot: Robot, motors: bool = False) -> Header:
-    """Of a table of measured joint values; with `motors`, drums of known radius have their motor's angle instead."""
+def measured(robot: Robot, given: Sequence[str] = ()) -> Header:
+    """Of a table of measured joint values, in the units of a header that is given (`joint_columns`)."""
     turn = TURN if robot.degrees == 6 else ()
     tilt = (TILT,) if robot.degrees == 6 else ()
     groups = (("hold",), (*POSITION, *turn), (PAYLOAD,), CENTRE, _tensions(robot), *tilt)
-    return Header(("time_s", *joint_columns(robot, motors)), groups)
+    return Header(("time_s", *joint_columns(robot, given)), groups)
 
 
-def commanded(robot: Robot, motors: bool = False) -> Header:
+def commanded(robot: Robot, given: Sequence[str] = ()) -> Header:
     """Of a table of commanded poses."""
     turn = (TURN,) if robot.degrees == 6 else ()
     return Header(("time_s", *POSITION), (("hold",), *turn, (PAYLOAD,), CENTRE))
@@ -39,7 +39,7 @@ def _tensions(robot: Robot) -> tuple[str, ...]:
     return tuple(f"tension_{i}_N" for i in range(1, robot.legs + 1))
 
 
-def read(path: Path, robot: Robot, columns_of: Callable[[Robot, bool], Header]) -> History:
+def read(path: Path, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], Header]) -> History:
     """A history from a file.
 
     Parameters
@@ -59,11 +59,11 @@ def read(path: Path, robot: Robot, columns_of: Callable[[Robot, bool], Header]) 
     InputError
         Naming line and column, what was found and what was expected.
     """
-    text = read_text(path, f"a header of {columns_of(robot, False)}")
+    text = read_text(path, f"a header of {columns_of(robot, ())}")
     return parse(csv_table(path, text), robot, columns_of)
 
 
-def parse(table: Table, robot: Robot, columns_of: Callable[[Robot, bool], Header]) -> History:
+def parse(table: Table, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], Header]) -> History:
     """A history from a table whose header is not checked yet.
 
     Parameters
@@ -82,7 +82,7 @@ def parse(table: Table, robot: Robot, columns_of: Callable[[Robot, bool], Header
     InputError
         Naming line and column, what was found and what was expected.
     """
-    header = columns_of(robot, has_motors(table.header))
+    header = columns_of(robot, table.header)
     table.check_header(header)
     cells = table.numbers(_allowed)
     if len(cells) < 2:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from wirebayes.numeric.typing import Floats
 
 Actuator = Literal["drum", "linear"]
-Freedom = Literal["pose", "position"]
+Freedom = Literal["pose", "position", "orientation"]
 Contact = Literal["table", "rail"]
 GRAVITY = 9.80665  # m/s^2, standard
 
@@ -112,8 +112,9 @@ class Robot:
     Attributes
     ----------
     name, description, source : str
-    freedom : {"pose", "position"}
-        "position": parallel lines keep the orientation, only the three coordinates are free.
+    freedom : {"pose", "position", "orientation"}
+        "position": parallel lines keep the orientation, only the three coordinates are free. "orientation": a ball
+        joint at the reference point, which is the home position, holds the platform both ways.
     mass_kg : float
     centre_of_mass_m : (3,) array
         In the platform's frame, from the reference point.
@@ -188,19 +189,26 @@ class Robot:
 
     @property
     def degrees(self) -> int:
-        """Degrees of freedom of the platform: 6, or 3 when parallel lines keep its orientation."""
-        return 6 if self.freedom == "pose" else 3
+        """Coordinates of a pose that are solved for: 6, or 3 when parallel lines keep the orientation."""
+        return 3 if self.freedom == "position" else 6
 
     @property
     def freedoms(self) -> int:
-        """Degrees of freedom that the platform really has: all, or those that a plane leaves."""
+        """Degrees of freedom that the platform really has: all, or those that a plane or a ball joint leaves."""
+        if self.freedom == "orientation":
+            return 3
         if self.plane is None:
             return self.degrees
         return 3 if self.freedom == "pose" else 2
 
     @cached_property
     def motions(self) -> Floats | None:
-        """(d, d) Projection of small motions on those that a plane leaves, along it and about its normal; or None."""
+        """(d, d) Projection of small motions on those that a plane or a ball joint leaves; None where all are left.
+
+        Along a plane and about its normal; about a ball joint, which is the reference point.
+        """
+        if self.freedom == "orientation":
+            return np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
         if self.plane is None:
             return None
         across = np.outer(self.plane.normal, self.plane.normal)

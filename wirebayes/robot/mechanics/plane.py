@@ -22,7 +22,7 @@ from wirebayes.robot.mechanics.rotation import matrix
 
 
 def onto(robot: Robot, position_m: Floats, rotation: Floats) -> tuple[Floats, Floats]:
-    """Poses moved into the plane through the home pose; the same where there is no plane.
+    """Poses moved into the plane through the home pose, or onto the ball joint; the same where there is neither.
 
     Parameters
     ----------
@@ -36,6 +36,8 @@ def onto(robot: Robot, position_m: Floats, rotation: Floats) -> tuple[Floats, Fl
     rotation : (n, 3, 3) array
         Turned from the home orientation about the normal only.
     """
+    if robot.freedom == "orientation":
+        return np.broadcast_to(robot.home_m, position_m.shape).copy(), rotation
     if robot.plane is None:
         return position_m, rotation
     normal, home = robot.plane.normal, matrix(robot.home_rotation_rad)
@@ -45,7 +47,7 @@ def onto(robot: Robot, position_m: Floats, rotation: Floats) -> tuple[Floats, Fl
 
 
 def off(robot: Robot, position_m: Floats, rotation: Floats) -> Floats:
-    """How far poses are from the plane: (n,) m, rotations at the platform's edge; 0 without a plane.
+    """How far poses are from the plane or the ball joint: (n,) m, rotations at the platform's edge; 0 without one.
 
     Parameters
     ----------

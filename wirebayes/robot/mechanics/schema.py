@@ -5,13 +5,13 @@ import os
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, cast, get_args
 
 import numpy as np
 
 from wirebayes.errors import InputError, shown
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.mechanics.description import Drums, GivenWire, Plane, Pulleys, Robot, TensionRule
+from wirebayes.robot.mechanics.description import Drums, Freedom, GivenWire, Plane, Pulleys, Robot, TensionRule
 from wirebayes.robot.mechanics.shipped import shipped as shipped
 from wirebayes.robot.mechanics.tensions import CHOICES
 from wirebayes.strict.files import read_text
@@ -90,7 +90,7 @@ def _direction(keys: Keys, key: str) -> Floats:
 def _robot(top: Keys) -> Robot:
     _check_version(top)
     name, description, source = (top.string(key) for key in ("name", "description", "source"))
-    freedom = top.string("freedom", default="pose", among=("pose", "position"))
+    freedom = cast(Freedom, top.string("freedom", default="pose", among=get_args(Freedom)))
     mass, centre = _platform(top.inside("platform"))
     tension = _tension(top.inside("tension"))
     position, turn = _home(top.inside("pose"))
@@ -100,6 +100,8 @@ def _robot(top: Keys) -> Robot:
     given, declared, masses = _wires(top)
     legs = [_leg(leg, declared) for leg in top.tables("leg", least=2)]
     top.finish()
+    if freedom == "orientation":
+        _check_ball_joint(top, plane, np.array([lower, upper]) - position, len(legs))
     mass_kg_m = np.array([masses.get(leg["wire"], 0.0) for leg in legs])
 
     def stack(key: str) -> Any:
@@ -109,7 +111,7 @@ def _robot(top: Keys) -> Robot:
         name=name,
         description=description,
         source=source,
-        freedom="pose" if freedom == "pose" else "position",
+        freedom=freedom,
         mass_kg=mass,
         centre_of_mass_m=centre,
         exit_m=stack("exit"),
@@ -132,6 +134,16 @@ def _robot(top: Keys) -> Robot:
         mass_kg_m=mass_kg_m if mass_kg_m.any() else None,
         plane=plane,
     )
+
+
+def _check_ball_joint(top: Keys, plane: Plane | None, corners_m: Floats, legs: int) -> None:
+    """A ball joint is the home position, which the platform does not leave; corners count from there."""
+    if plane is not None:
+        raise top.complain("plane", "one beside a ball joint", 'none, or another freedom than "orientation"')
+    if corners_m.any():
+        raise top.complain("workspace", "corners beside the ball joint", "both at pose.position_m, where it is")
+    if legs < _TURNING:
+        raise top.complain("leg", f"{legs} legs", f"at least {_TURNING}, to hold a platform about its ball joint")
 
 
 def _check_version(top: Keys) -> None:
@@ -252,6 +264,7 @@ def _leg(keys: Keys, declared: set[str]) -> dict[str, Any]:
     return row
 
 
+_TURNING = 3  # wires that turn a platform every way
 _DRUM = ("drum_radius", "drum_pitch", "drum_turns", "drum_layer", "drum_wire", "gear")
 _MOST_LAYERS = 10_000  # more wire than any drum holds: a slip of the unit
 

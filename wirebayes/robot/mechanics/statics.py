@@ -173,18 +173,19 @@ def unbalance_and_stiffness(
         _add_rotation(shape, moment, pull, beta, H)
     for i in range(degrees):
         H[i + 1 :, i] = H[i, i + 1 :]
-    return (gradient, H) if robot.motions is None else _in_the_plane(robot, gradient, H)
+    return (gradient, H) if robot.motions is None else _carried(robot, gradient, H)
 
 
-def _in_the_plane(robot: Robot, gradient: Floats, H: Floats) -> tuple[Floats, Floats]:
-    """What a plane leaves of forces and stiffness; across it, it is as stiff as the wires are at most along it."""
+def _carried(robot: Robot, gradient: Floats, H: Floats) -> tuple[Floats, Floats]:
+    """What a plane or a ball joint leaves of forces and stiffness; itself it is as stiff as the wires are at most."""
     P = robot.motions
     assert P is not None
     gradient = P @ gradient
     H = np.einsum("ij,jkn,kl->iln", P, H, P)
-    stiffest = np.abs(np.einsum("iin->in", H[:3, :3])).max(0)
     size = np.ones(robot.degrees)
     size[3:] = robot.size_m**2
+    stiffness = np.abs(np.einsum("iin->in", H)) / size[:, None]
+    stiffest = stiffness[3:].max(0) if robot.freedom == "orientation" else stiffness[:3].max(0)
     return gradient, H + ((np.eye(robot.degrees) - P) * size)[..., None] * stiffest
 
 

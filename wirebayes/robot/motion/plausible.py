@@ -9,7 +9,7 @@ from wirebayes.errors import shown
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
-from wirebayes.robot.mechanics.joint_columns import has_motors
+from wirebayes.robot.mechanics.joint_columns import meant
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
@@ -71,9 +71,7 @@ def refuse(robot: Robot, joint_m: Floats, table: Table, columns: Sequence[str]) 
     if unlikely is None:
         return
     (row, leg), expected = unlikely
-    found = shown(table.cell(row, columns[leg]))
-    if has_motors([columns[leg]]):
-        found += f", which pays out {joint_m[row, leg]:.4g} m"
+    found = shown(table.cell(row, columns[leg])) + meant(columns[leg], joint_m[row, leg])
     raise table.complain(row, columns[leg], found, expected)
 
 

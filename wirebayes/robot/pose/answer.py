@@ -126,7 +126,7 @@ def _why_not(robot: Robot, x: Floats, turned: Orientation) -> str:
     """Why nothing holds the platform at the requested pose."""
     if not statics.geometry(robot, x[:, None], turned.rotation[..., None]).clear[0]:
         return "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
-    if robot.plane is None and not _pulled_up(robot, x, turned.rotation):
+    if robot.motions is None and not _pulled_up(robot, x, turned.rotation):
         return (
             "No wire pulls upwards, so the wires cannot carry the weight here. If a table or a rail carries the "
             "platform, say so in the robot's file: [plane] with normal = [0.0, 0.0, 1.0]."

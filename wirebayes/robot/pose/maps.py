@@ -76,6 +76,8 @@ def map_slices(robot: Robot, line: WireDraws, slices: Slices) -> tuple[Map, ...]
     -------
     tuple of Map
     """
+    if robot.freedom == "orientation":  # it has one position
+        return ()
     few = line.part(np.unique(np.linspace(0, line.count - 1, _DRAWS).round().astype(int)))
     wires = draws.for_robot(robot, few)
     where = claim.grid(robot, _GRID if (robot.upper_m > robot.lower_m).all() else _FLAT)

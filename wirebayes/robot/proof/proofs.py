@@ -35,7 +35,7 @@ def alone(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> C
         ``proved``: True, False, or None where no proof was tried, for the reason in ``sentence``; ``enclosure_m``: how
         far the equilibrium may be from the pose; ``alone_within_m``: where there is no other.
     """
-    if robot.plane is not None:
+    if robot.motions is not None:
         return {"proved": None, "sentence": "Proofs know robots that hang on their wires alone."}
     if wires.at("strain"):
         return {"proved": None, "sentence": "Proofs know laws (1), (3) and (6) without further effects."}
@@ -76,7 +76,7 @@ def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rot
         ``band`` with the time, the share of the band that was proved and the box, mm from the commanded position;
         empty where no proof can be tried.
     """
-    if wires.at("strain") or robot.plane is not None:
+    if wires.at("strain") or robot.motions is not None:
         return {}
     end_s = course.times_s[-1]
     nothing: EnclosedBand = {"band": {"time_s": end_s, "share": 0.0, "low_mm": None, "high_mm": None}}

@@ -1,5 +1,6 @@
 """Reads a calibration session from CSV, strictly: one row per hold, errors with line and column."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.joint_columns import has_motors, joint_columns, joint_values
+from wirebayes.robot.mechanics.joint_columns import joint_columns, joint_values
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import plausible
 from wirebayes.robot.self_calibration.session import Session
@@ -18,13 +19,13 @@ POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 NORMAL = ("normal_x", "normal_y")
 
 
-def columns(robot: Robot, motors: bool = False) -> Header:
+def columns(robot: Robot, given: Sequence[str] = ()) -> Header:
     """The file's columns: requested pose, duration, joint values and tensions at the end; motions and the normal's.
 
-    With `motors` the legs with a drum of known radius have their motor's angle in place of the joint value.
+    Joint values are in the units of a header that is given (`joint_columns`).
     """
     return Header(
-        ("hold", *POSITION, *TURN, "duration_s", *joint_columns(robot, motors), *_of_legs(robot, "tension_{}_N")),
+        ("hold", *POSITION, *TURN, "duration_s", *joint_columns(robot, given), *_of_legs(robot, "tension_{}_N")),
         (_of_legs(robot, "motion_{}"), NORMAL),
     )
 
@@ -90,8 +91,7 @@ def parse(
     InputError
         Naming line and column, what was found and what was expected.
     """
-    motors = has_motors(table.header)
-    table.check_header(columns(robot, motors))
+    table.check_header(columns(robot, table.header))
     motions, tensions = _of_legs(robot, "motion_{}"), _of_legs(robot, "tension_{}_N")
     moved, tilted = motions[0] in table.header, NORMAL[0] in table.header
     if moved and not biased:
@@ -105,7 +105,7 @@ def parse(
 
     number = some(("hold",))[:, 0]
     _refuse_twice(table, number)
-    joints = joint_columns(robot, motors)
+    joints = joint_columns(robot, table.header)
     joint = joint_values(robot, joints, some(joints))
     plausible.refuse(robot, joint, table, joints)
     tension, normal = some(tensions), some(NORMAL if tilted else ())
