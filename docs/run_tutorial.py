@@ -96,7 +96,8 @@ def follow_hangprinter(folder: Path) -> dict[str, str]:
     """
     for name in ("config.g", "line.toml", "line.csv", "hangprinter-log.csv"):
         shutil.copy(DOCS / "example" / name, folder)
-    outputs = {f"{command[0]}.txt": said_by(command, folder) for command in commands("hangprinter")}
+    said = {f"{command[0]}.txt": said_by(command, folder) for command in commands("hangprinter")}
+    outputs = {name: text for name, text in said.items() if text.strip()}
     outputs["reprapfirmware.g"] = (folder / "out/config/reprapfirmware.g").read_text(encoding="utf-8")
     found = json.loads((folder / "out/anchors/calibration.json").read_text(encoding="utf-8"))
     outputs["anchors.inc"] = _anchors(found, json.loads((DOCS / "example" / "hangprinter-truth.json").read_text()))

@@ -40,6 +40,18 @@ def test_a_config_by_hand(tmp_path):
     assert (robot.rule.lowest_N, robot.rule.highest_N) == (10.0, 120.0)
 
 
+def test_anchors_in_metres_are_refused_in_both_formats(tmp_path):
+    anchors = "A0:-1.62:-.15 B1.8:.9:-.15 C-1.62:.9:-.15 D0:0:2.35"
+    metres = RRF.replace("A0:-1620:-150 B1800:900:-150 C-1620:900:-150 D0:0:2350", anchors)
+    (tmp_path / "config.g").write_text(metres)
+    corners = {"a": (0, -1.62), "b": (1.8, 0.9), "c": (-1.62, 0.9)}
+    steppers = [f"[stepper_{name}]\nanchor_x: {x}\nanchor_y: {y}\nanchor_z: 0\n" for name, (x, y) in corners.items()]
+    (tmp_path / "printer.cfg").write_text("".join(steppers) + "[printer]\nwinch_mover_weight: 2\n")
+    for name in ("config.g", "printer.cfg"):
+        with pytest.raises(InputError, match=r"found anchors within 3\.42 of one another; expected millimetres"):
+            import_robot(tmp_path / name, tmp_path / "robot.toml")
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

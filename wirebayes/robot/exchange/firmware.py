@@ -20,6 +20,7 @@ SUFFIXES = (".g", ".cfg")
 _WORD = re.compile(r"([A-Z])\s*((?:[-+]?[0-9.]+)(?::[-+]?[0-9.]+)*)")
 _ANCHORS = "ABCDI"
 _STEPPERS = "abcdefghi"
+_SMALLEST_MM = 20.0  # no printer's anchors lie so near to one another; those of metres do
 
 
 @dataclass
@@ -145,6 +146,9 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
             )
         return np.broadcast_to(np.array(value, float), legs).copy()
 
+    extent = float(np.ptp(anchors, axis=0).max())
+    if extent < _SMALLEST_MM:
+        raise InputError(f"{path}: found anchors within {extent:.3g} of one another; expected millimetres")
     if "mass" not in found.values:
         raise InputError(f"{path}: found no weight of the mover, expected M666 W or winch_mover_weight in kg")
     bounds = None

@@ -65,14 +65,7 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
     tension_N : (lowest, highest)
     home_m : (3,) array
     """
-    extent = np.ptp(robot.exit_m, axis=0)
-    half = _SHARE * np.where((np.arange(3) == 2) & (extent == 0), extent.max(), extent)
-    if robot.normal is not None:
-        half = half * (robot.normal == 0)
-    raised = half * [0.0, 0.0, 1.0] * robot.on_bed
-    box = [(home_m + raised + side * half).round(6) for side in (-1, 1)]
-    if robot.freedom == "orientation":
-        box = [home_m, home_m]
+    lower, upper = _workspace(robot, home_m)
     beyond = ", beyond_exit_m" if robot.beyond_m is None else ""
     space = "" if robot.freedom == "orientation" else ", the workspace"
     ours = f"Ours: the choice of tensions{space}{beyond}" + _given(robot, tension_N, home_m)
@@ -100,8 +93,8 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
         f"rotation_vector_rad = {_row(robot.home_rotation_rad)}",
         "",
         "[workspace]   # about the pose, to be replaced by yours",
-        f"lower_m = {_row(box[0])}",
-        f"upper_m = {_row(box[1])}",
+        f"lower_m = {_row(lower)}",
+        f"upper_m = {_row(upper)}",
     ]
     if robot.normal is not None:
         lines += ["", "[plane]", f"normal = {_row(robot.normal)}", 'contact = "rail"']
@@ -115,6 +108,18 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
         wire = 0.0 if robot.beyond_m is None else float(robot.beyond_m[i])
         lines.append(f"beyond_exit_m = {wire!r}   # wire from here to the drum: it stretches and creeps too")
     return "\n".join(lines) + "\n"
+
+
+def _workspace(robot: ImportedRobot, home_m: Floats) -> tuple[Floats, Floats]:
+    """Corners of the box of workspace figures, about the home pose as far as the platform can leave it."""
+    if robot.freedom == "orientation":
+        return home_m, home_m
+    extent = np.ptp(robot.exit_m, axis=0)
+    half = _SHARE * np.where((np.arange(3) == 2) & (extent == 0), extent.max(), extent)
+    if robot.normal is not None:
+        half = half * (robot.normal == 0)
+    middle = home_m + half * [0.0, 0.0, 1.0] * robot.on_bed
+    return (middle - half).round(6), (middle + half).round(6)
 
 
 def _given(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Floats) -> str:
