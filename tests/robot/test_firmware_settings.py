@@ -48,7 +48,7 @@ def test_anchors_in_metres_are_refused_in_both_formats(tmp_path):
     steppers = [f"[stepper_{name}]\nanchor_x: {x}\nanchor_y: {y}\nanchor_z: 0\n" for name, (x, y) in corners.items()]
     (tmp_path / "printer.cfg").write_text("".join(steppers) + "[printer]\nwinch_mover_weight: 2\n")
     for name in ("config.g", "printer.cfg"):
-        with pytest.raises(InputError, match=r"found anchors within 3\.42 of one another; expected millimetres"):
+        with pytest.raises(InputError, match=r"found anchors within 3\.42 of one another, expected millimetres"):
             import_robot(tmp_path / name, tmp_path / "robot.toml")
 
 

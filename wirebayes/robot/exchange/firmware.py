@@ -148,7 +148,7 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
 
     extent = float(np.ptp(anchors, axis=0).max())
     if extent < _SMALLEST_MM:
-        raise InputError(f"{path}: found anchors within {extent:.3g} of one another; expected millimetres")
+        raise InputError(f"{path}: found anchors within {extent:.3g} of one another, expected millimetres")
     if "mass" not in found.values:
         raise InputError(f"{path}: found no weight of the mover, expected M666 W or winch_mover_weight in kg")
     bounds = None
