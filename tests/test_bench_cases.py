@@ -69,6 +69,12 @@ def test_a_recording_of_steps_is_read_as_it_is(name, settings, said):
     assert said in " ".join(notes)
 
 
+def test_a_pull_is_refused_by_the_names_of_its_own_columns():
+    """Its header is in GBK, with a row of units: it is understood, and there is nothing to hold."""
+    with pytest.raises(wb.InputError, match=r"line 4, column 2 \(位移\): found a displacement that stays in 0 %"):
+        imported("vhb_gbk.csv")
+
+
 HUNG = [("creep_dw_noisy.csv", 4.43, 0.1031), ("creep_deadweight_hand.csv", 4.34, 0.8432),
         ("creep_cont_small.csv", 4.43, 0.1031)]  # fmt: skip
 
@@ -142,9 +148,13 @@ def test_a_tendon_agrees_with_least_squares_where_its_priors_are_stated():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "tension", "truth"),
-    [("f5fibre_prior.toml", 0.001, 0.0099), ("f4rope_prior.toml", 29666.0, 3.48)],
+    [
+        ("f5fibre_prior.toml", 0.001, 0.0099),
+        ("f4rope_prior.toml", 29666.0, 3.48),
+        ("f4rope_priorB.toml", 29666.0, 3.48),
+    ],
 )
-def test_fibre_and_rope_creep_as_they_do_with_no_prior_of_b(name, tension, truth):
+def test_fibre_and_rope_creep_as_they_do_with_and_without_a_prior_of_b(name, tension, truth):
     low, high = creep(fitted(read(name)), tension)
     assert low < truth < high
 

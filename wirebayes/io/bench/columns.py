@@ -17,8 +17,8 @@ from wirebayes.strict.hint import hint
 IGNORE = "ignore"
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
 
-# Words of English, German, French, Spanish, Italian, Portuguese, Dutch, Polish, Russian, Japanese, Chinese and Korean,
-# without accents.
+# Words of English, German, French, Spanish, Italian, Portuguese, Dutch, Swedish, Danish, Norwegian, Finnish, Polish,
+# Czech, Turkish, Russian, Japanese, Chinese and Korean, without accents.
 _WORDS: dict[Role, tuple[str, ...]] = {
     "hold": (
         "hold", "step", "stage", "segment", "cycle", "stufe", "schritt", "haltestufe", "palier", "etape", "pas",
@@ -30,16 +30,20 @@ _WORDS: dict[Role, tuple[str, ...]] = {
         "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
         "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
         "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp",
+        "forlangning", "forskjutning", "forskydning", "forskyvning", "forlengelse", "siirtyma", "venyma",
+        "posunuti", "prodlouzeni", "uzama",
         "przemieszczenie", "wydłuzenie", "перемещение", "удлинение", "ход", "смещение",
         "変位", "伸び", "ストローク", "位移", "伸长", "伸長", "變形", "变形", "행정", "변위", "신율",
     ),
     "time": (
         "time", "elapsed", "seconds", "timestamp", "clock", "zeit", "uhrzeit", "zeitpunkt", "temps", "duree", "heure",
-        "tiempo", "tempo", "hora", "tijd", "czas", "время", "時間", "时间", "時刻", "시간",
+        "tiempo", "tempo", "hora", "tijd", "czas", "tid", "aika", "cas", "zaman",
+        "время", "時間", "时间", "時刻", "시간",
     ),
     "tension": (
         "tension", "force", "load", "loadcell", "pull", "kraft", "last", "zugkraft", "spannkraft", "effort", "charge",
         "fuerza", "carga", "forza", "carico", "tensione", "tracao", "forca", "kracht", "trekkracht",
+        "voima", "sila", "zatizeni", "kuvvet",
         "siła", "obciazenie", "сила", "нагрузка", "усилие", "натяжение",
         "荷重", "試験力", "張力", "力", "拉力", "载荷", "负荷", "张力", "荷載", "하중", "장력",
     ),
