@@ -22,6 +22,7 @@ from wirebayes.inference.laplace_fit import fitted
 from wirebayes.inference.rough_draws import draws
 from wirebayes.io.bench.convert import About, Converted, convert
 from wirebayes.io.bench.undecided import Choices
+from wirebayes.model.scales import NATURAL
 from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import workers
 from wirebayes.wire.laws import creep_fraction, creep_target, strain
@@ -116,8 +117,9 @@ def one(job: tuple[int, int]) -> dict[str, tuple[float, float]] | None:
     if len(experiment.holds) != len(levels):
         return None
     found = fitted([experiment], (), "hooke", "saturating", rng)
-    theta = draws(found.target, found.modes, rng, 2000)
-    columns = dict(zip(found.target.problem.names, theta.T, strict=True))
+    problem = found.target.problem
+    theta = problem.theta_in(NATURAL, draws(found.target, found.modes, rng, 2000))
+    columns = dict(zip(problem.names, theta.T, strict=True))
     return {n: (float((v.mean() - wire[n]) / v.std()), float((v < wire[n]).mean())) for n, v in columns.items()}
 
 

@@ -19,7 +19,7 @@ SENSOR_N, SENSOR_MM = 0.004, 0.004
 
 def test_of(control: str, name: str, drift: float, seed: int) -> Experiment:
     """A wire of 1 m, k1 900 N, whose reading drifts; the model's own equations, written down again."""
-    k1, B, U, k2, N, L = 900.0, 0.03, 0.9, 0.05, 0.8, 1000.0
+    k1, B, U, k2, N, L = 900.0, 0.3, 0.9, 0.05, 0.8, 1000.0
     rng, e, start = np.random.default_rng(seed), 0.0, 0.0
     holds, x, t, read = [], [], [], []
     for j, value in enumerate(STEPS if control == "displacement" else WEIGHTS, start=1):
@@ -74,14 +74,14 @@ def test_the_likelihood_is_that_of_each_test_with_its_own_drift(pair):
 
 @pytest.mark.slow
 def test_both_drifts_and_the_wire_are_found_together(pair):
-    few = wb.Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=800)
+    few = wb.Policy(walkers=64, ess=1000.0)
     found = wb.fit(pair, together="line", effects=["sensor_drift"], check=False, policy=few).summary()
     assert found["converged"]
     for name, truth, unit in (
         ("sensor_drift.a[steps]", DRIFT_N, "N/s"), ("sensor_drift.a[hung]", DRIFT_MM, "mm/s"), ("k1", 900.0, "N")
     ):  # fmt: skip
         one = found["parameters"][name]
-        assert one["unit"] == unit and one["q05"] < truth < one["q95"]
+        assert one["unit"] == unit and abs(one["mean"] - truth) < 3.0 * one["sd"]
 
 
 def test_a_prior_in_one_file_is_of_its_own_instrument(pair):
