@@ -149,9 +149,7 @@ def test_a_robot_of_ones_own_moves_on_the_wire(tab, served, tmp_path):
     assert "mm" in tab.run("document.querySelector('iframe').contentDocument.querySelector('.lead').innerText")
     assert tab.run("document.querySelector('iframe').contentDocument.querySelectorAll('img').length") >= 1
     tab.click("Drift")
-    tab.wait_for(
-        "document.querySelector('iframe').getAttribute('src') == '/files/moved/pose-linear-7/report.html'", 240
-    )
+    tab.wait_for("document.querySelector('iframe[src=\"/files/moved/pose-linear-7/report.html\"]')")
     nothing_went_out(tab, served)
 
 
