@@ -107,29 +107,55 @@ def measured(bench: Bench, truth: dict[str, float], seed: int, *, rests: bool = 
     return replace(test, holds=tuple(holds))
 
 
-def one(seed: int, index: int) -> dict[str, Any]:
-    """One test: what was done, and which 90 % intervals hold the truth."""
-    own_seed = seed_of(seed, "any scale", str(index))
+@dataclass(frozen=True)
+class Made:
+    """A simulated test with its truth."""
+
+    test: Experiment
+    truth: dict[str, float]
+    line: Line
+    weights: bool
+    rests: bool
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What a record says of it."""
+        return {"weights": self.weights, "rests": self.rests, "tension_N": self.line.tension_N}
+
+
+def made_test(own_seed: int, index: int) -> Made:
+    """A line and its test; the number decides whether it is under weights and whether it rests before each move."""
     rng = np.random.default_rng(own_seed)
     made = line(rng)
     weights, rests = index % 3 == 0, index // 3 % 3 == 0
     shares = [*SHARES, REST] if rests else list(SHARES)
     bench, own = (under_weights if weights else under_steps)(made, shares, rng)
     truth = made.truth | own
-    done = fit(build([measured(bench, truth, own_seed, rests=rests)]), own_seed, policy=POLICY)
+    return Made(measured(bench, truth, own_seed, rests=rests), truth, made, weights, rests)
+
+
+def one(seed: int, index: int) -> dict[str, Any]:
+    """One test: what was done, and which 90 % intervals hold the truth."""
+    own_seed = seed_of(seed, "any scale", str(index))
+    made = made_test(own_seed, index)
+    done = fit(build([made.test]), own_seed, policy=POLICY)
     low, high = np.quantile(done.flat, [0.05, 0.95], axis=0)
     columns = {name: done.problem.names.index(name) for name in PLAIN}
-    inside = {name: bool(low[i] <= truth[name] <= high[i]) for name, i in columns.items()}
-    return {"index": index, "weights": weights, "rests": rests, "tension_N": made.tension_N,
-            "converged": done.converged, "inside": inside}  # fmt: skip
+    inside = {name: bool(low[i] <= made.truth[name] <= high[i]) for name, i in columns.items()}
+    return {"index": index, **made.about, "converged": done.converged, "inside": inside}
+
+
+def kinds_of(rows: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
+    """The records of all tests, and of those of each kind."""
+    weights, rests = ([row for row in rows if row[kind]] for kind in ("weights", "rests"))
+    steps = [row for row in rows if not row["weights"]]
+    return {"all": list(rows), "weights": weights, "steps": steps, "rests": rests}
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Coverage of each parameter, over all tests and in each kind of test."""
-    kinds = {"all": rows, "weights": [r for r in rows if r["weights"]], "steps": [r for r in rows if not r["weights"]],
-             "rests": [r for r in rows if r["rests"]]}  # fmt: skip
     out: dict[str, Any] = {"tests": len(rows), "not_converged": sum(not row["converged"] for row in rows)}
-    for kind, chosen in kinds.items():
+    for kind, chosen in kinds_of(rows).items():
         hits = {name: [row["inside"][name] for row in chosen] for name in PLAIN}
         out[kind] = {"tests": len(chosen), **{name: float(np.mean(hit)) for name, hit in hits.items()}}
     return out

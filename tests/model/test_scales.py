@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wirebayes.effects import named
+from tests.rescaled import FACTORS, KINDS, drawn, factors, rewritten
 from wirebayes.inference.fit import fit
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
@@ -15,10 +15,6 @@ from wirebayes.model.problem import build
 from wirebayes.model.scales import NATURAL, Units, scales_of
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.simulation.synthetic import Bench, Truth, draw
-
-EFFECTS = ("toe", "creep_threshold", "second_relaxation", "sensor_drift", "clamp_transient", "steady_creep")
-POWERS = [Units(2.0**-7, 2.0**10, 2.0**6), Units(2.0**9, 2.0**-20, 2.0**-10)]
-OTHERS = [Units(25.4, 4.448, 60.0), Units(1e-2, 1e-6, 1e4), Units(1e3, 1e6, 1e-3)]
 
 
 def simulated(seed: int, names: tuple[str, ...] = ("a",)) -> list[Experiment]:
@@ -57,63 +53,45 @@ def under_weights(seed: int) -> list[Experiment]:
     return [from_arrays(holds, x, t, y, length_mm=1000.0, name="w", material="line", control="force")]
 
 
-def rewritten(experiment: Experiment, by: Units) -> Experiment:
-    """The same test with lengths, tensions and times multiplied."""
-    setting, reading = by.length_mm, by.tension_N
-    if experiment.control == "force":
-        setting, reading = reading, setting
-    holds = [
-        replace(
-            hold,
-            setting=hold.setting * setting,
-            readings=hold.readings * reading,
-            duration_s=hold.duration_s * by.time_s,
-            time_s=hold.time_s * by.time_s,
-            start_s=hold.start_s * by.time_s,
-        )
-        for hold in experiment.holds
-    ]
-    length = experiment.length_mm * by.length_mm
-    return replace(experiment, length_mm=length, resolution=experiment.resolution * reading, holds=tuple(holds))
+NUMBER, FEW = 48, 15
+LIKELIHOODS = ("chain", "hold")
+UNIT = {"tension": "tension_N", "length": "length_mm", "time": "time_s"}
+HASTY = Policy(ensembles=2, walkers=32, ess=100, rounds=2, most_rounds=2, round_draws=512, most_steps=32)
+EVERY = [pytest.param(index, marks=[pytest.mark.slow] if index >= FEW else []) for index in range(NUMBER)]
 
 
-CASES = [
-    (simulated(1), (), "chain"),
-    (simulated(2), EFFECTS, "chain"),
-    (simulated(3), (), "hold"),
-    (simulated(4, ("a", "b")), ("toe", "sensor_nonlinearity"), "chain"),
-    (under_weights(5), ("creep_threshold", "sensor_drift"), "chain"),
-    (under_weights(6), (), "hold"),
-]
+def test_the_drawn_tests_are_of_every_kind():
+    made = [drawn(index) for index in range(NUMBER)]
+    assert {(d.kind, d.likelihood) for d in made} == {
+        (kind, likelihood) for kind in KINDS for likelihood in LIKELIHOODS
+    }
+    assert {(d.kind, d.rests) for d in made} == {(kind, rests) for kind in KINDS for rests in (True, False)}
+    assert len({effect.name for d in made for effect in d.effects}) > 15
+    for name, (low, high) in FACTORS.items():
+        reached = [np.log10(getattr(factors(i, powers_of_two=False), UNIT[name])) for i in range(NUMBER)]
+        assert min(reached) < low + 1.0 and max(reached) > high - 1.0
 
 
-def problems(case, by):
-    experiments, effects, likelihood = case
-    chosen = [named(name) for name in effects]
-    one = build(experiments, chosen, likelihood=likelihood)
-    other = build([rewritten(e, by) for e in experiments], chosen, likelihood=likelihood)
-    return one.in_units(one.own_units), other.in_units(other.own_units)
-
-
-@pytest.mark.parametrize("by", POWERS)
-@pytest.mark.parametrize("case", CASES)
-def test_for_powers_of_two_the_problem_in_its_own_units_has_the_same_bits(case, by):
-    one, other = problems(case, by)
+@pytest.mark.parametrize("index", EVERY)
+def test_for_powers_of_two_the_problem_in_its_own_units_has_the_same_bits(index):
+    case = drawn(index)
+    one, other = (case.problem(by) for by in (NATURAL, factors(index, powers_of_two=True)))
+    one, other = one.in_units(one.own_units), other.in_units(other.own_units)
     for a, b in zip(one.samples, other.samples, strict=True):
         for field in ("length_mm", "setting", "time_s", "mask", "duration_s"):
             np.testing.assert_array_equal(getattr(a.protocol, field), getattr(b.protocol, field))
         np.testing.assert_array_equal(a.readings, b.readings)
         assert a.resolution == b.resolution and a.model == b.model
-    rng = np.random.default_rng(0)
-    z = LogPosterior(one).coordinates.to_sampled(one.prior.rvs(50, rng))
+    z = LogPosterior(one).coordinates.to_sampled(one.prior.rvs(50, np.random.default_rng(0)))
     np.testing.assert_array_equal(LogPosterior(one)(z), LogPosterior(other)(z))
 
 
-@pytest.mark.parametrize("by", OTHERS)
-@pytest.mark.parametrize("case", CASES)
-def test_for_other_factors_the_log_posterior_is_the_same_at_mapped_parameters(case, by):
-    one, other = problems(case, by)
-    theta = one.prior.rvs(200, np.random.default_rng(0))
+@pytest.mark.parametrize("index", EVERY)
+def test_for_other_factors_the_log_posterior_is_the_same_at_mapped_parameters(index):
+    case = drawn(index)
+    one, other = (case.problem(by) for by in (NATURAL, factors(index, powers_of_two=False)))
+    one, other = one.in_units(one.own_units), other.in_units(other.own_units)
+    theta = one.prior.rvs(100, np.random.default_rng(0))
     for a, b in ((one, other), (one, one.in_units(NATURAL).in_units(one.units))):
         target, again = LogPosterior(a), LogPosterior(b)
         value = target(target.coordinates.to_sampled(theta))
@@ -121,11 +99,38 @@ def test_for_other_factors_the_log_posterior_is_the_same_at_mapped_parameters(ca
         np.testing.assert_allclose(mapped, value, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("index", [1, 4, *(pytest.param(index, marks=pytest.mark.slow) for index in range(5, NUMBER))])
+def test_for_powers_of_two_the_draws_are_the_same_to_the_last_bit(index):
+    case, by = drawn(index), factors(index, powers_of_two=True)
+    one, other = (fit(case.problem(units), 3, policy=HASTY).chains for units in (NATURAL, by))
+    np.testing.assert_array_equal(one.z, other.z)
+    assert one.evaluations == other.evaluations
+
+
+def draws(case, by, policy):
+    """Parameters of a fit of the tests in other units, each in the units that the tests have of their own."""
+    problem = case.problem(by)
+    z = fit(problem, 3, policy=policy).chains.z
+    target = LogPosterior(problem.in_units(problem.own_units))
+    return target.coordinates.to_natural(z.reshape(-1, z.shape[-1]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", range(FEW))
+def test_for_other_factors_means_and_quantiles_are_the_same_within_a_tenth_of_an_sd(index):
+    case, policy = drawn(index), Policy(ess=8000.0)
+    one, other = (draws(case, by, policy) for by in (NATURAL, factors(index, powers_of_two=False)))
+    sd = one.std(axis=0)
+    np.testing.assert_array_less(np.abs(other.mean(axis=0) - one.mean(axis=0)), 0.1 * sd)
+    for level in (0.05, 0.5, 0.95):
+        moved = np.quantile(other, level, axis=0) - np.quantile(one, level, axis=0)
+        np.testing.assert_array_less(np.abs(moved), 0.1 * sd)
+
+
 def test_a_fit_in_other_units_has_the_same_draws():
     (experiment,) = simulated(7)
     by = Units(2.0**7, 2.0**-10, 2.0**6)
-    policy = Policy(ensembles=2, walkers=32, ess=100, rounds=2, most_rounds=2, round_draws=512, most_steps=32)
-    one, other = (fit(build([e]), 3, policy=policy) for e in (experiment, rewritten(experiment, by)))
+    one, other = (fit(build([e]), 3, policy=HASTY) for e in (experiment, rewritten(experiment, by)))
     U, N = (one.flat[:, one.problem.names.index(name)] for name in ("U", "N"))
     units = {"k1": by.tension_N, "B": by.length_mm * by.tension_N**-U, "U": 1.0, "k2": by.time_s**-N, "N": 1.0,
              "preload": by.length_mm, "sensor_sd": by.tension_N, "setting_sd": by.length_mm}  # fmt: skip
