@@ -9,6 +9,7 @@ texts with them (`tests/test_docs.py`).
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -24,8 +25,25 @@ RESULTS = DOCS / "results"
 # what each study is called, with the file that it writes
 STUDIES = {
     "any_scale": ("-m analyses.posterior.any_scale --rows {folder} --output {folder}/any_scale.json", "any_scale.json"),
-    "real_files": ("-m analyses.posterior.real_files --output {folder}/real_files.json", "real_files.json"),
+    # 1d5.csv is a public file, named in the study's docstring
+    "real_files": (
+        "-m analyses.posterior.real_files --elastomer ../1d5.csv --output {folder}/real_files.json",
+        "real_files.json",
+    ),
     "weights": ("-m analyses.posterior.weights --rows {folder} --output {folder}/weights.json", "weights.json"),
+    "clean_any_scale": (
+        "-m analyses.discovery.clean_any_scale --rows {folder} --output {folder}/clean.json",
+        "clean.json",
+    ),
+    "weights_calibration": (
+        "-m analyses.calibration --only weights-chain weights-hold --data-sets 200 --broken 0 --output {folder}",
+        "calibration.json",
+    ),
+    # ../before is a checkout of the commit before priors were free of scale
+    "wires_before": (
+        "-m analyses.posterior.wires_before --against ../before --rows {folder} --output {folder}/wires.json",
+        "wires.json",
+    ),
     "coverage": ("-m analyses.posterior.coverage --output {folder}", "coverage.json"),
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
     "robot_calibration": ("-m analyses.robots.whole_calibration coverage 120 --output {folder}/it.json", "it.json"),
@@ -54,6 +72,8 @@ def measure(name: str) -> None:
     with TemporaryDirectory() as folder:
         subprocess.run([sys.executable, *command.format(folder=folder).split()], cwd=ROOT, check=True)
         result = json.loads((Path(folder) / file).read_text(encoding="utf-8"))
+        for picture in Path(folder).glob("*.png"):
+            shutil.copy(picture, DOCS / "images" / f"{name}.png")
     if name in REDUCED:
         result = REDUCED[name](result)
     kept = {
@@ -75,6 +95,9 @@ def texts() -> dict[Path, str]:
         DOCS / "any-scale.inc": _any_scale(kept["any_scale"]),
         DOCS / "real-files.inc": _real_files(kept["real_files"]),
         DOCS / "weights.inc": _weights(kept["weights"]),
+        DOCS / "clean-any-scale.inc": _clean_any_scale(kept["clean_any_scale"]),
+        DOCS / "calibration-weights.inc": _calibration(kept["weights_calibration"]),
+        DOCS / "wires-before.inc": _wires_before(kept["wires_before"]),
         DOCS / "coverage.inc": _coverage(kept["coverage"]),
         DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"], kept["robot_lengths_alone"]),
         DOCS / "real-wires.inc": _real_wires(kept["real_wires"]),
@@ -124,20 +147,37 @@ def _any_scale(kept: dict[str, Any]) -> str:
 
 
 def _real_files(kept: dict[str, Any]) -> str:
-    """A paragraph on a tendon's relaxation."""
-    found = kept["result"]
-    plain, later = found["least_squares"], found["later"]
-    each = ", ".join(
-        f"{name} {low:.3g} to {high:.3g} (least squares {plain[name]:.3g})"
-        for name, (low, _, high) in found["posterior"].items()
-    )
-    return (
-        f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}) reads the relaxation of a tendon fascicle, a "
-        f"public recording. Without a preload, 90 % intervals are {each}: least squares fits to "
-        f"{1000 * plain['rms_N']:.1f} mN and says nothing of how little its numbers are worth. From the first minute, "
-        f"{later['in_band_90']} of {later['readings']} later readings lie in their 90 % bands; rms "
-        f"{1000 * later['posterior_rms_N']:.0f} mN, least squares {1000 * later['least_squares_rms_N']:.0f} mN.\n"
-    )
+    """A paragraph on each public recording."""
+    about = {
+        "tendon": "the relaxation of a tendon fascicle",
+        "elastomer": "that of a strip of VHB 4910, which relaxes by a power law",
+    }
+    lines = [f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}) reads two public recordings."]
+    for file, found in kept["result"].items():
+        plain, later = found["least_squares"], found["later"]
+        known, free = (
+            ", ".join(f"{name} {_three(low)} to {_three(high)}" for name, (low, _, high) in found[of].items())
+            for of in ("posterior", "posterior_with_preload")
+        )
+        numbers = ", ".join(f"{name} {_three(plain[name])}" for name in ("k1", "k2", "N"))
+        fit, band, by_draws, by_plain = (
+            _milli(value)
+            for value in (plain["rms_N"], later["band_N"], later["posterior_rms_N"], later["least_squares_rms_N"])
+        )
+        lines += [
+            "",
+            f"*{file.capitalize()}*: {about[file]}, {found['readings']} readings in {found['duration_s']:.0f} s. Least "
+            f"squares, without a preload, find {numbers}, fit to {fit}, and do not say what these are worth. 90 % "
+            f"intervals are {known} without a preload, {free} with one. From the first third of the time, "
+            f"{later['in_band_90']} of {later['readings']} later readings lie in their 90 % bands, {band} wide on "
+            f"average; rms {by_draws}, least squares {by_plain}.",
+        ]
+    return "\n".join(lines) + "\n"
+
+
+def _milli(newtons: float) -> str:
+    """Two digits, in mN."""
+    return f"{float(f'{1000 * newtons:.2g}'):g} mN"
 
 
 def _weights(kept: dict[str, Any]) -> str:
@@ -165,6 +205,105 @@ def _coverage(kept: dict[str, Any]) -> str:
         f"the holds contained {100 * found['held_out_coverage']:.1f} % of {found['held_out_readings']} readings. "
         f"{found['not_converged']} of {found['wires']} did not converge.\n"
     )
+
+
+def _clean_any_scale(kept: dict[str, Any]) -> str:
+    """A paragraph and a table on false alarms of tests of any scale."""
+    found = kept["result"]
+    kinds = {"all": "all tests", "steps": "steps", "weights": "weights", "rests": "with recorded rests"}
+    verdicts = ", ".join(f"*{verdict}* {count}" for verdict, count in found["verdicts"].items()) or "none"
+    named = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in found["named"].items())
+    searched, alpha = found["searched"], 100 * found["alpha"]
+    names = f"names accepted: {named}" if named else "no name was accepted"
+    lines = [
+        f"``{kept['command']}``",
+        f"(commit {kept['commit']}, {kept['date']}), at a level of {alpha:.0f} %. Where the check failed,",
+        f"``discover`` said: {verdicts}; {names}. In {searched['same_p']} of {searched['tests']} tests that both",
+        "were asked, the two had the same p. If p is uniform, values as uneven have a probability of",
+        f"{found['uniform_p']:.2f} (Kolmogorov-Smirnov).",
+        "",
+        ".. list-table::",
+        "   :header-rows: 1",
+        "",
+        "   * - tests",
+        "     - number",
+        "     - the check fails, % [90 % interval]",
+        "     - upper bound, 95 %",
+        "     - ``discover`` finds something missing, %",
+        "     - upper bound, 95 %",
+    ]
+    for kind, words in kinds.items():
+        alarms = found[kind]
+        lines += [f"   * - {words}", f"     - {alarms['tests']}"]
+        for of in ("check", "discover"):
+            rate = alarms[of]
+            lines += [f"     - {100 * rate['value']:.1f} [{100 * rate['low']:.1f}, {100 * rate['high']:.1f}]"]
+            lines += [f"     - {100 * rate['upper_95']:.1f} %"]
+    return "\n".join(lines) + "\n"
+
+
+def _calibration(kept: dict[str, Any]) -> str:
+    """A paragraph on the ranks of truths."""
+    found = kept["result"]
+    sets = " and ".join(f"{count} of ``{name}``" for name, count in found["data_sets"].items())
+    worst = min(found["extremeness"], key=found["extremeness"].get)
+    edge = max(found["threshold"].values())
+    inside = (
+        f"All {found['quantities']} quantities stay inside the joint band"
+        if found["inside"]
+        else f"Of {found['quantities']} quantities these leave the joint band: {', '.join(found['outside'])}"
+    )
+    stopped = sum(map(len, found["not_converged"].values()))
+    return (
+        f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}) does the same under weights, up to 8 N and "
+        f"back, with holds of 600 s: {sets}. {inside} of {100 * found['joint']:.0f} %; the most extreme is {worst} "
+        f"(tail probability {found['extremeness'][worst]:.1g}, the edge of the band is at {edge:.1g}). {stopped} of "
+        f"{sum(found['data_sets'].values())} fits did not converge.\n"
+    )
+
+
+def _wires_before(kept: dict[str, Any]) -> str:
+    """Tables of the paper's wires by two commits, and which intervals differ."""
+    found = kept["result"]
+    ratio, fits_of_a_seed = found["after_over_before"], len(found["fits"])
+    stopped = sum(map(len, found["not_converged"].values()))
+    lines = [
+        f"``{kept['command']}``",
+        f"(commit {kept['commit']}, {kept['date']}) repeats the {fits_of_a_seed} fits of ``wirebayes reproduce`` by",
+        f"commit {found['against']}, the last one before, and by this one, with {found['seeds']} seeds:",
+        f"{stopped} of {2 * found['seeds'] * fits_of_a_seed} did not converge. Effective draws an evaluation are",
+        f"{ratio['mean']:.2f} [{ratio['low']:.2f}, {ratio['high']:.2f}] times those before (mean of the fits, 95 %).",
+        "Intervals of 90 % (seed 0), the upper line before, the lower one now; bold where the median moved by more",
+        "than half a standard deviation, or the width by more than a factor of 1.5:",
+    ]
+    for likelihood, words in {"chain": "The chain", "hold": "Hold by hold"}.items():
+        fits = {name: parameters for name, parameters in found["fits"].items() if f", {likelihood}, " in name}
+        names = list(next(iter(fits.values())))
+        lines += ["", f"{words}:", "", ".. list-table::", "   :header-rows: 1", "", "   * - wire"]
+        lines += [f"     - {name}" for name in names]
+        for fit, parameters in fits.items():
+            lines.append(f"   * - {fit.replace(f', {likelihood}', '')}")
+            for name in names:
+                lines += _before_and_after(parameters[name])
+    differing = {
+        fit: [name for name, p in parameters.items() if p["differs"]] for fit, parameters in found["fits"].items()
+    }
+    told = [f"{fit} ({', '.join(names)})" for fit, names in differing.items() if names]
+    same = len(differing) - len(told)
+    lines += ["", f"Different: {'; '.join(told)}. In the other {same} fits nothing differs."]
+    return "\n".join(lines) + "\n"
+
+
+def _before_and_after(parameter: dict[str, Any]) -> list[str]:
+    """Two lines of a cell."""
+    mark = "**" if parameter["differs"] else ""
+    before, after = (f"{mark}{parameter[when]}{mark}" for when in ("before", "after"))
+    return [f"     - | {before}", f"       | {after}"]
+
+
+def _three(value: float) -> str:
+    """Three digits, without an exponent where there are few zeros."""
+    return f"{float(f'{value:.3g}'):g}"
 
 
 def _robot_calibration(kept: dict[str, Any], alone: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""The studies: two protocols, two likelihoods, and a likelihood that is broken on purpose."""
+"""The studies: three protocols, one of them under weights, two likelihoods, and a likelihood broken on purpose."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +19,11 @@ BENCHES = {
     "unloading": Bench(
         "unloading",
         displacements_mm=(1, 2, 4, 6, 8, 10, 7, 4, 2, 5, 9),
+        times_s=(0.0, 10.0, 30.0, 100.0, 300.0, 600.0),
+    ),
+    "weights": Bench(
+        "weights",
+        weights_N=(1, 2, 3, 4, 5, 6, 8, 5, 2, 4),
         times_s=(0.0, 10.0, 30.0, 100.0, 300.0, 600.0),
     ),
 }
@@ -74,9 +79,11 @@ def stays_taut(problem: Problem) -> bool:
     """Whether no hold that began with more than a newton ended with less than a twentieth of it.
 
     The prior's corner of soft, fast creepers gives wires that fall slack in every hold: nobody would go on with such a
-    test, and its posterior has a kink wherever a reading falls to zero.
+    test, and its posterior has a kink wherever a reading falls to zero. Under weights the wire is always taut.
     """
     for sample in problem.samples:
+        if sample.protocol.control == "force":
+            continue
         for tension, mask in zip(sample.readings[..., 0], sample.protocol.mask, strict=True):
             kept = tension[mask]
             if len(kept) and kept[0] > 1.0 and kept[-1] < 0.05 * kept[0]:
@@ -90,11 +97,11 @@ def _as_it_is(problem: Problem) -> Problem:
 
 def _with_first_readings(problem: Problem, protocol: str, seed: int) -> Problem:
     """First readings from a wire of its own, drawn anew until every hold pulls: they are given, so they may not know
-    the truth that is to be found from the later ones."""
+    the truth that is to be found from the later ones. Under weights every hold pulls."""
     test = BENCHES[protocol].experiment()
     chain = build([test], scales=planned_scales([test]))
     rng = np.random.default_rng(seed_of(seed, "first readings"))
     while True:
         made = [readings(chain, chain.prior.rvs(1, rng), sample, rng) for sample in chain.samples]
-        if all((y[:, 0] > 0).all() for y in made):
+        if test.control == "force" or all((y[:, 0] > 0).all() for y in made):
             return with_readings(problem, made)
