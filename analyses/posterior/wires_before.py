@@ -11,12 +11,12 @@ import argparse
 import json
 import subprocess
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy import stats
 
-LIKELIHOODS = ("chain", "hold")
+LIKELIHOODS: tuple[Literal["chain", "hold"], ...] = ("chain", "hold")
 HOLDS = {"all holds": None, "first 5": 5}
 MOVED, WIDER = 0.5, 1.5
 WANTED = 20_000  # effective draws, as where docs/speed.rst counts what they cost
