@@ -53,6 +53,7 @@ STUDIES = {
         "--output {folder}",
         "scores.json",
     ),
+    "robot_exact_geometry": ("-m analyses.robots.whole_calibration exact 240 --output {folder}/it.json", "it.json"),
     "real_wires": ("analyses/discovery/real_wires.py --together --output {folder}/wires.json", "wires.json"),
 }
 REDUCED = {"discover_clean": lambda scores: _clean_in_short(scores)}  # of results that hold every file's answer
@@ -99,7 +100,8 @@ def texts() -> dict[Path, str]:
         DOCS / "calibration-weights.inc": _calibration(kept["weights_calibration"]),
         DOCS / "wires-before.inc": _wires_before(kept["wires_before"]),
         DOCS / "coverage.inc": _coverage(kept["coverage"]),
-        DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"], kept["robot_lengths_alone"]),
+        DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"], kept["robot_lengths_alone"])
+        + _exact_geometry(kept["robot_exact_geometry"]),
         DOCS / "real-wires.inc": _real_wires(kept["real_wires"]),
         DOCS / "discover-clean-said.inc": _clean(kept["discover_clean"]),
     }
@@ -374,6 +376,25 @@ def _clean(kept: dict[str, Any]) -> str:
         f"*{most.replace('_', ' ')}* {counts[most]}. Of the {found['alarms']} alarms the verdict is {verdicts}. "
         f"Named: {names or 'nothing'}. A file takes {found['median_seconds']:.1f} s (median). Commit {kept['commit']}, "
         f"{kept['date']}.\n"
+    )
+
+
+def _exact_geometry(kept: dict[str, Any]) -> str:
+    """A paragraph on what is said of anchors that are held exact, right ones and wrong ones."""
+    found = kept["result"]
+
+    def said(key: str) -> str:
+        one = found[key]
+        return f"{round(one['share'] * one['of'])} of {one['of']} [{100 * one['low']:.0f}, {100 * one['high']:.0f} %]"
+
+    return (
+        f"\nAnchors held exact (``{kept['command']}``, commit {kept['commit']},\n"
+        f"{kept['date']}; {found['robots']} robots, joint values exact or of a stated error, anchors right or off by\n"
+        "0.01 to 1 % of the span; 95 % intervals): where all is right,\n"
+        f"{said('usable_where_all_is_right')} calibrations are usable. Of wrong anchors that a\n"
+        "chi-squared test of all readings, which knows every error, would see with 99 % power,\n"
+        f"{said('not_usable_where_power_is_99_percent')} are not usable; where its power is less,\n"
+        f"{said('not_usable_where_it_is_less')} are not.\n"
     )
 
 

@@ -449,3 +449,14 @@ def test_a_saddle_is_left_in_as_many_steps_as_its_distance_has_doublings(aside):
     assert found.found.all()
     assert found.rotation[0, 2, 2] < 0  # upside down
     assert found.iterations[0] < np.log2(1.0 / aside) + 20
+
+
+def test_a_stiffness_that_has_overflowed_gives_no_step_and_spoils_no_other():
+    rng = np.random.default_rng(0)
+    H, gradient = rng.normal(size=(3, 3, 3)), rng.normal(size=(3, 3))
+    level, floor = np.ones(3), np.zeros(3)
+    alone = forward._off_saddle(H[..., [0, 2]], gradient[:, [0, 2]], level[:2], floor[:2])
+    H[1, 2, 1] = np.inf
+    step = forward._off_saddle(H, gradient, level, floor)
+    assert np.isnan(step[:, 1]).all()
+    np.testing.assert_allclose(step[:, [0, 2]], alone)

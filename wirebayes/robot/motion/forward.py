@@ -317,12 +317,19 @@ def _off_saddle(H: Floats, gradient: Floats, level: Floats, floor: Floats) -> Fl
         The stiffness if every wire were taut; less than its rounding is none.
     floor : (n,) array
         Force below which none can be trusted: it leads nowhere.
+
+    Returns
+    -------
+    (d, n) array
+        NaN where the stiffness has overflowed: no step from there is better.
     """
-    curvature, along = np.linalg.eigh(np.moveaxis(H, -1, 0), UPLO="U")
+    finite = np.isfinite(H).all((0, 1))
+    curvature, along = np.linalg.eigh(np.moveaxis(np.where(finite, H, 0.0), -1, 0), UPLO="U")
     slope = np.einsum("nij,in->nj", along, gradient)
     slope = np.where(np.abs(slope) > floor[:, None], slope, 0.0)
     stiffness = np.maximum(np.abs(curvature), np.finfo(float).eps * level[:, None])
-    return np.asarray(-np.einsum("nij,nj->in", along, slope / stiffness))
+    step = -np.einsum("nij,nj->in", along, slope / stiffness)
+    return np.where(finite, step, np.nan)
 
 
 @dataclass(frozen=True)
