@@ -67,6 +67,7 @@ def test_a_bench_format_gives_the_readings_it_was_made_of(tmp_path, monkeypatch)
     lines = [" ".join(f"{name}={value:g}" for name, value in zip(names, row, strict=True)) for row in rows]
     path = tmp_path / "bench.txt"
     path.write_text("#pairs\n" + "\n".join(lines) + "\n")
-    holds = convert(path, About("bench", "line", 1000.0), Choices()).experiment.recorded_holds
+    (converted,) = convert(path, About("bench", "line", 1000.0), Choices())
+    holds = converted.experiment.recorded_holds
     assert [hold.setting for hold in holds] == [2.0, 4.0, 6.0]
     assert np.concatenate([hold.readings for hold in holds]).tolist() == pytest.approx([row[3] for row in rows])

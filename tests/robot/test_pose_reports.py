@@ -307,7 +307,7 @@ def test_a_platform_that_always_falls_has_no_margin_left() -> None:
 
 def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pytest.MonkeyPatch) -> None:
     """From beside the pose, by a hundredth of the platform's size; stiffness is that of the draws that can hold it."""
-    robot: Any = SimpleNamespace(size_m=0.5, plane=None)
+    robot: Any = SimpleNamespace(size_m=0.5, plane=None, freedom="pose")
     x, R = np.array([1.0, 2.0, 3.0]), np.eye(3)
     commands: Any = SimpleNamespace(
         zero_m=np.ones((4, 3)), offset_m=np.zeros((4, 3)), feasible=np.array([True, True, False, True]),
