@@ -54,9 +54,7 @@ def pareto_smoothed(log_ratio: Array, independent: float = 1.0) -> tuple[Array, 
         Shape of the tail: above 0.7, no number of draws is enough. NaN, and nothing is replaced, where the tail has
         fewer than five draws or only one value.
     """
-    n = len(log_ratio)
-    size = int(3.0 * np.sqrt(n / independent)) if n * independent > _FEW else n // 5
-    return _smoothed(log_ratio, size)
+    return _smoothed(log_ratio, _tail_size(len(log_ratio), independent))
 
 
 def power_scaled(log_component: Array, power: float) -> Array:
@@ -70,8 +68,7 @@ def power_scaled(log_component: Array, power: float) -> Array:
     """
     independent = tail_ess(log_component[None]) / log_component.size
     n = log_component.size
-    size = int(3.0 * np.sqrt(n / independent)) if n * independent > _FEW else n // 5
-    size = max(min(size, n // 2), _LEAST_TAIL)
+    size = max(min(_tail_size(n, independent), n // 2), _LEAST_TAIL)
     return _smoothed((power - 1.0) * log_component, size)[0]
 
 
@@ -158,6 +155,11 @@ def _autocovariance(chains: Array) -> Array:
     padded = 1 << (2 * n - 1).bit_length()  # so that the ends do not meet
     spectrum = np.fft.rfft(chains - chains.mean(axis=1, keepdims=True), padded, axis=1)
     return np.fft.irfft(spectrum * spectrum.conj(), padded, axis=1)[:, :n] / n
+
+
+def _tail_size(n: int, independent: float) -> int:
+    """How many of n draws make up the tail, each worth a share of an independent one."""
+    return int(3.0 * np.sqrt(n / independent)) if n * independent > _FEW else n // 5
 
 
 def _smoothed(log_ratio: Array, size: int) -> tuple[Array, float]:
