@@ -586,10 +586,11 @@ class Continuation:
         self._blocks, self._each = blocks, parallel_map
         self._ways = ladders(blocks, trials, candidates, data)
         found = self._strengths(self._ways, [(b.modes.z[:1], None) for b in blocks])
+        self.log_bayes = {c: float(v[0]) for c, v in found.items()}  # of every candidate that has a ladder
         linear = by_name(candidates, data)
         self._values = {c.name: float(linear[c.name][0]) for c in found}
-        for c, value in found.items():
-            self._values[c.name] = max(self._values[c.name], float(value[0]))
+        for c, value in self.log_bayes.items():
+            self._values[c.name] = max(self._values[c.name], value)
         self.p = 1.0
         self._known: dict[str, Array] = {}  # of each name, in the simulations climbed so far
 
