@@ -84,6 +84,9 @@ def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch)
             curvature = np.ones((len(start), 1, 1))
             return Optimum(start, ratio - 0.5 * np.log(2.0 * np.pi), curvature, np.ones(len(start), dtype=bool))
 
+        def curved(self, ends: Optimum, amplitude: np.ndarray) -> Optimum:
+            return ends
+
         def natural(self, z: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
             return z
 

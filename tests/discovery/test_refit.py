@@ -1,7 +1,8 @@
 """A refit on evidence that is a known curve of the amplitude: its top is found wherever it lies, and its width."""
 
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from scipy import stats
 from wirebayes.discovery import refit
 from wirebayes.discovery.refit import occam
 from wirebayes.effects import named
+from wirebayes.inference.modes import Optimum
 
 TWO_SIDED = named("strain_stiffening")
 
@@ -27,15 +29,9 @@ class Flat:
         return float(amplitude > 0)
 
 
-class Ends(NamedTuple):
-    """Where climbs ended."""
-
-    converged: np.ndarray
-    log_evidence: np.ndarray
-    z: np.ndarray
-
-    def rows(self, which: np.ndarray) -> "Ends":
-        return Ends(*(part[which] for part in self))
+def ends_of(value: np.ndarray, z: np.ndarray, converged: np.ndarray) -> Optimum:
+    """Where climbs of one coordinate ended: what the normal approximation adds to the log density is nothing."""
+    return Optimum(z, value, np.full((len(z), 1, 1), 2.0 * np.pi), converged)
 
 
 def refitted(
@@ -61,14 +57,17 @@ def refitted(
         def starts(self, shapes: Any) -> np.ndarray:
             return np.zeros((2, 1))
 
-        def climb(self, start: np.ndarray, amplitude: np.ndarray) -> SimpleNamespace:
+        def climb(self, start: np.ndarray, amplitude: np.ndarray) -> Optimum:
             """The second of two starts ends lower; a climb from afar does not converge."""
             value = -0.5 * (amplitude / 1e-3 - self.top) ** 2
             if len(start) > 1 and amplitude[0] == amplitude[1]:
                 value[1::2] -= 5.0
             end = (amplitude / 1e-3)[:, None]
             near = np.abs(end - start[:, :1])[:, 0] <= leap
-            return Ends(near, value, end)
+            return ends_of(value, end, near)
+
+        def curved(self, ends: Optimum, amplitude: np.ndarray) -> Optimum:
+            return ends
 
         def natural(self, z: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
             assert z[:, 0] == pytest.approx(amplitude / 1e-3)
@@ -116,7 +115,8 @@ class Profiles:
         near = np.isin(amplitudes, self.reached) if self.rounds == 0 else np.ones(len(amplitudes), bool)
         self.rounds += 1
         value = np.where(amplitudes < 0, amplitudes**2, amplitudes)
-        return refit._Profile(amplitudes, np.where(near, value, -np.inf), [amplitudes[:, None]])
+        value = np.where(near, value, -np.inf)
+        return refit._Profile(amplitudes, value, [ends_of(value, amplitudes[:, None], near)])
 
     def tried(self) -> Any:
         grid = np.array([-20.0, -10.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0])
@@ -221,30 +221,59 @@ def test_amplitudes_from_a_half_to_forty_and_the_scan_s_guess_are_tried_first(mo
     )
 
 
-def test_a_top_within_is_looked_at_twice_more_closely(monkeypatch: pytest.MonkeyPatch) -> None:
-    first, _, second, third = tried(monkeypatch, 9.0, named("toe"))
-    assert second == pytest.approx(np.linspace(5.0, 20.0, 8)[1:-1])
-    best = max(first.tolist() + second.tolist(), key=lambda a: -abs(a - 9.0))
-    every = np.sort(np.concatenate([first, second]))
-    at = int(np.argmin(abs(every - best)))
-    assert third == pytest.approx(np.linspace(every[at - 1], every[at + 1], 8)[1:-1])
+def test_a_top_within_is_tried_where_a_parabola_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through what is known at 5, 10 and 20; a standard deviation apart, they need not be looked at more closely."""
+    first, _, second = tried(monkeypatch, 9.0, named("toe"))
+    assert 5.0 in first and 10.0 in first and 20.0 in first
+    assert second == pytest.approx([7.0, 8.0, 9.0, 10.0, 11.0])
+    # what would lie beyond the neighbours is left out
+    *_, second = tried(monkeypatch, 9.0, named("toe"), guess=8.0)
+    assert second == pytest.approx([7.0, 8.0, 9.0, 10.0])
+
+
+@pytest.mark.parametrize(("drop", "close"), [(1.19, True), (1.21, False)])
+def test_neighbours_within_a_nat_or_so_are_close_enough(drop: float, close: bool) -> None:
+    grid = np.array([0.0, 1.0, 2.0, 9.0])
+    assert refit._is_close(refit._Profile(grid, np.array([-0.5, 0.0, -drop, -50.0]), [])) == close
+    assert refit._is_close(refit._Profile(grid, np.array([0.0, -drop, -9.0, -50.0]), [])) == close
+
+
+def test_curvatures_are_exact_where_they_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Climbs know their expectation alone, here e² times too small: a nat too much of each value, exactly."""
+    grid = np.array([0.0, 1.0, 2.0, 3.0])
+    value = np.array([-0.5, 0.0, -5.9, -6.1])
+    rough = ends_of(value, grid[:, None], np.ones(4, bool))
+
+    class Block:
+        common = ()
+
+        def curved(self, ends: Optimum, amplitude: np.ndarray) -> Optimum:
+            assert ends.z[:, 0].tolist() == amplitude.tolist()
+            return replace(ends, curvature=np.exp(2.0) * ends.curvature)
+
+    found = refit._exact([Block()], lambda a: np.zeros(len(a)), refit._Profile(grid, value, [rough]))  # type: ignore[list-item]
+    assert found.value == pytest.approx([-1.5, -1.0, -6.9, -6.1])
+
+
+def outwards(rounds: list[Any]) -> list[Any]:
+    """The rounds that go on from an end: three amplitudes each."""
+    return [amplitudes for amplitudes in rounds[1:] if len(amplitudes) == 3]
 
 
 def test_a_top_outside_is_followed_outwards_six_times_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
     """By 1.3, 1.7 and 2.3 from the end where it lies; within the bounds of the prior."""
     for side in (1.0, -1.0):
-        rounds = tried(monkeypatch, side * 1e9)
-        assert len(rounds) == 2 + 6 + 2
-        for n in range(6):
-            assert rounds[2 + n] == pytest.approx(side * 40.0 * 2.3**n * np.array([1.3, 1.7, 2.3]))
+        rounds = outwards(tried(monkeypatch, side * 1e9))
+        assert len(rounds) == 6
+        for n, amplitudes in enumerate(rounds):
+            assert amplitudes == pytest.approx(side * 40.0 * 2.3**n * np.array([1.3, 1.7, 2.3]))
     few = tried(monkeypatch, 150.0)
-    assert [len(r) for r in few] == [16, 14, 3, 3, 6, 6]  # 92, then 211.6, then back between them
+    assert len(outwards(few)) == 2 and few[-1] == pytest.approx(np.arange(148.0, 153.0))  # 92, 211.6, then back
     bounded = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(-0.1, 0.2), neutral=0.0)])
-    rounds = tried(monkeypatch, 1e9, bounded)
-    assert [len(r) for r in rounds] == [16, 14, 3, 3, 6, 6]
-    assert rounds[2] == pytest.approx([52.0, 68.0, 92.0]) and rounds[3] == pytest.approx([100.0] * 3)
+    rounds = outwards(tried(monkeypatch, 1e9, bounded))
+    assert rounds[0] == pytest.approx([52.0, 68.0, 92.0]) and rounds[1] == pytest.approx([100.0] * 3)
     at_end = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(-0.04, 0.08), neutral=0.0)])
-    assert [len(r) for r in tried(monkeypatch, 1e9, at_end)] == [16, 14, 6, 6]  # the end of the prior is the end
+    assert outwards(tried(monkeypatch, 1e9, at_end)) == []  # the end of the prior is the end
 
 
 def test_around_the_best_lie_six_between_its_neighbours_or_beyond_an_end() -> None:
@@ -252,7 +281,7 @@ def test_around_the_best_lie_six_between_its_neighbours_or_beyond_an_end() -> No
 
     def around(best: int, end: float | None) -> np.ndarray:
         value = np.zeros(3)
-        value[best] = 1.0
+        value[best] = 1e-3  # a parabola through these is so wide that hardly any of its amplitudes lie between
         return refit._around(refit._Profile(grid, value, []), end, 0.1)
 
     for end in (None, 0.5):
@@ -268,12 +297,19 @@ def test_around_the_only_amplitude_known_lie_six_within_a_unit_on_either_side() 
     assert refit._around(alone, 0.5, 0.7) == pytest.approx(np.linspace(0.5, 2.7, 8)[1:-1])
 
 
+def profile_of(amplitude: list[float], value: list[float], ends: list[float]) -> refit._Profile:
+    place = ends_of(np.array(value), np.array(ends)[:, None], np.ones(len(ends), bool))
+    return refit._Profile(np.array(amplitude), np.array(value), [place])
+
+
 def test_a_profile_keeps_what_it_had_and_is_sorted() -> None:
-    one = refit._Profile(np.array([1.0, 3.0]), np.array([10.0, 30.0]), [np.array([[1.0], [3.0]])])
-    other = refit._Profile(np.array([3.0, 2.0, 0.0]), np.array([-1.0, 20.0, 0.0]), [np.array([[9.0], [2.0], [0.0]])])
-    both = one.joined(other)
+    one = profile_of([1.0, 3.0], [10.0, 30.0], [1.0, 3.0])
+    both = one.joined(profile_of([3.0, 2.0, 0.0], [-1.0, 20.0, 0.0], [9.0, 2.0, 0.0]))
     assert both.amplitude.tolist() == [0.0, 1.0, 2.0, 3.0] and both.value.tolist() == [0.0, 10.0, 20.0, 30.0]
-    assert both.ends[0][:, 0].tolist() == [0.0, 1.0, 2.0, 3.0] and both.best == 3
+    assert both.ends[0].z[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0] and both.best == 3
+    mixed = both.with_rows(np.array([1, 3]), profile_of([1.0, 3.0], [11.0, 31.0], [-1.0, -3.0]))
+    assert mixed.amplitude.tolist() == [0.0, 1.0, 2.0, 3.0] and mixed.value.tolist() == [0.0, 11.0, 20.0, 31.0]
+    assert mixed.ends[0].z[:, 0].tolist() == [0.0, -1.0, 2.0, -3.0]
 
 
 def test_a_climb_that_did_not_converge_has_no_evidence() -> None:
@@ -281,7 +317,7 @@ def test_a_climb_that_did_not_converge_has_no_evidence() -> None:
 
     def block(value: list[float], converged: list[bool]) -> Any:
         ends = np.arange(float(len(value)))[:, None]
-        found = Ends(np.array(converged), np.array(value), ends)
+        found = ends_of(np.array(value), ends, np.array(converged))
 
         def climb(start: np.ndarray, amplitude: np.ndarray) -> Any:
             assert amplitude.tolist() == list(np.repeat([5.0, 6.0], len(value) // 2))
@@ -293,7 +329,7 @@ def test_a_climb_that_did_not_converge_has_no_evidence() -> None:
     starts = [np.zeros((4, 1)), np.zeros((2, 1))]
     found = refit._climbed(blocks, lambda a: np.full(len(a), -100.0), np.array([5.0, 6.0]), starts)
     assert found.value.tolist() == [1.0 + 10.0 - 100.0, -np.inf]
-    assert [ends[:, 0].tolist() for ends in found.ends] == [[0.0, 2.0], [0.0, 1.0]]
+    assert [ends.z[:, 0].tolist() for ends in found.ends] == [[0.0, 2.0], [0.0, 1.0]]
 
 
 @pytest.mark.parametrize(("slope", "top"), [(3.0, 1.0), (-3.0, 0.0), (0.0, None)])

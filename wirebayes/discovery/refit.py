@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wirebayes.discovery.sharing import alike
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
-from wirebayes.inference.modes import Optimum
+from wirebayes.inference.modes import Optimum, together
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 
@@ -29,6 +29,13 @@ _TOP = 1.0  # nats; neighbours alone may lie so close that their values' last di
 _DELTAS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
 _SWEEPS = 3  # times that climbs may begin once more where their neighbour nearer to neutral has ended
 _NEWS = 0.1  # nats that such a climb must gain to be followed further
+_FAR = 12.0  # nats below the best amplitude, from which on no climb begins at an amplitude once more
+_CLOSER = 3  # times that amplitudes are tried closer to the best one
+_CLOSE = 1.2  # nats from the best amplitude to its neighbours: near enough for a parabola, as `_TOP` has it
+_COUNTS = 6.0  # nats below the best amplitude, up to which the curvature is computed exactly
+# of a top that is a parabola's, where it is tried: standard deviations
+_ABOUT_TOP = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+_ENOUGH = 3  # of them between the neighbours of the best amplitude; with fewer, what lies between is tried evenly
 
 
 @dataclass(frozen=True)
@@ -70,13 +77,13 @@ class _Profile:
     amplitude : (a,) array
     value : (a,) array
         Log evidence against the blocks without the effect, with the amplitude's prior; -inf where no climb converged.
-    ends : sequence of (a, d) arrays
-        Where the climbs of each block ended, unconstrained.
+    ends : sequence of Optimum
+        Where the climbs of each block ended, a row an amplitude.
     """
 
     amplitude: Array
     value: Array
-    ends: Sequence[Array]
+    ends: Sequence[Optimum]
 
     @property
     def best(self) -> int:
@@ -85,32 +92,24 @@ class _Profile:
     def joined(self, other: "_Profile") -> "_Profile":
         """Both as one; where an amplitude is in both, this one's."""
         amplitude, order = np.unique(np.concatenate([self.amplitude, other.amplitude]), return_index=True)
-        ends = [np.concatenate(pair)[order] for pair in zip(self.ends, other.ends, strict=True)]
+        ends = [together(pair).rows(order) for pair in zip(self.ends, other.ends, strict=True)]
         return _Profile(amplitude, np.concatenate([self.value, other.value])[order], ends)
 
-    def with_rows(self, rows: NDArray[np.int64], other: "_Profile", which: NDArray[np.bool_]) -> "_Profile":
-        """With some rows of another profile in place of its own.
+    def with_rows(self, rows: NDArray[np.int64], other: "_Profile") -> "_Profile":
+        """With some rows replaced by those of another profile."""
+        number = np.arange(len(self.value))
+        number[rows] = len(number) + np.arange(len(rows))
+        ends = [together(pair).rows(number) for pair in zip(self.ends, other.ends, strict=True)]
+        return _Profile(self.amplitude, np.concatenate([self.value, other.value])[number], ends)
 
-        Parameters
-        ----------
-        rows : (r,) array
-            Which are replaced.
-        other : _Profile
-        which : (n,) bool array
-            Its rows, of which r are true.
-        """
-        value, ends = self.value.copy(), [own.copy() for own in self.ends]
-        value[rows] = other.value[which]
-        for own, new in zip(ends, other.ends, strict=True):
-            own[rows] = new[which]
-        return _Profile(self.amplitude, value, ends)
+    def rows(self, which: Any) -> "_Profile":
+        """Some rows, by number or mask."""
+        return _Profile(self.amplitude[which], self.value[which], [ends.rows(which) for ends in self.ends])
 
     def known(self) -> "_Profile":
         """Without the amplitudes at which no climb converged, where there are others."""
-        rows = np.isfinite(self.value)
-        if not rows.any():
-            return self
-        return _Profile(self.amplitude[rows], self.value[rows], [ends[rows] for ends in self.ends])
+        converged = np.isfinite(self.value)
+        return self.rows(converged) if converged.any() else self
 
 
 def refit(
@@ -155,8 +154,8 @@ def refit(
     starts = [p.starts(own) for p, own in zip(pinned, shapes or [{}] * len(pinned), strict=True)]
     profile = _climbed(pinned, added, grid, [np.tile(start, (len(grid), 1)) for start in starts])
     profile = _followed(pinned, added, profile, main.neutral).known()
-    outward = refined = 0
-    while refined < 2:
+    outward = closer = 0
+    while closer < _CLOSER and not (closer and _is_close(profile)):
         at = float(profile.amplitude[profile.best])
         at_end = profile.best in (0, len(profile.amplitude) - 1)
         if at_end and low < at < high and at != main.neutral and outward < _OUTWARD:
@@ -165,10 +164,10 @@ def refit(
             outward += 1
         else:
             finer = _around(profile, main.neutral if one_sided else None, per_delta)
-            refined += 1
-        begin = [_between(profile.amplitude, e, profile.best, finer) for e in profile.ends]
+            closer += 1
+        begin = [_between(profile.amplitude, e.z, profile.best, finer) for e in profile.ends]
         profile = profile.joined(_climbed(pinned, added, finer, begin)).known()
-    return _summary(effect, which, pinned, profile, per_delta)
+    return _summary(effect, which, pinned, _exact(pinned, added, profile), per_delta)
 
 
 def _followed(pinned: Sequence[Pinned], added: Callable[[Array], Array], profile: _Profile, neutral: float) -> _Profile:
@@ -182,12 +181,13 @@ def _followed(pinned: Sequence[Pinned], added: Callable[[Array], Array], profile
     inner = np.where(side[towards] == side, towards, number)
     news = np.isfinite(profile.value)
     for _ in range(_SWEEPS):
-        rows = np.flatnonzero(news[inner] & (inner != number))
+        hopeful = profile.value[inner] > profile.value.max() - _FAR
+        rows = np.flatnonzero(news[inner] & hopeful & (inner != number))
         if not len(rows):
             break
-        tried = _climbed(pinned, added, profile.amplitude[rows], [ends[inner[rows]] for ends in profile.ends])
+        tried = _climbed(pinned, added, profile.amplitude[rows], [ends.z[inner[rows]] for ends in profile.ends])
         better = tried.value > profile.value[rows] + _NEWS
-        profile = profile.with_rows(rows[better], tried, better)
+        profile = profile.with_rows(rows[better], tried.rows(better))
         news = np.isin(number, rows[better])
     return profile
 
@@ -220,17 +220,33 @@ def _climbed(
 
     `added` is the prior's log density, less the evidence without the effect.
     """
-    total, ends, rows = np.zeros(len(amplitudes)), [], np.arange(len(amplitudes))
+    ends, rows = [], np.arange(len(amplitudes))
     for block, start in zip(pinned, begin, strict=True):
         k = len(start) // len(amplitudes)
         found = block.climb(start, np.repeat(amplitudes, k))
         value = np.where(found.converged, found.log_evidence, -np.inf).reshape(-1, k)
-        pick = np.argmax(value, axis=1)
-        total = total + value[rows, pick]
-        ends.append(found.rows(rows * k + pick))
+        ends.append(found.rows(rows * k + np.argmax(value, axis=1)))
+    return _profile(pinned, added, amplitudes, ends)
+
+
+def _profile(
+    pinned: Sequence[Pinned], added: Callable[[Array], Array], amplitudes: Array, ends: Sequence[Optimum]
+) -> _Profile:
+    """The profile of climbs that have ended, one an amplitude and block."""
+    total = np.sum([np.where(end.converged, end.log_evidence, -np.inf) for end in ends], axis=0)
     if len(pinned) > 1 and pinned[0].common:
         total = total + _one_value_each(pinned, ends, amplitudes)
-    return _Profile(amplitudes, total + added(amplitudes), [end.z for end in ends])
+    return _Profile(amplitudes, total + added(amplitudes), ends)
+
+
+def _exact(pinned: Sequence[Pinned], added: Callable[[Array], Array], profile: _Profile) -> _Profile:
+    """The profile with exact curvatures where it counts; until then their expectation has shown where the top is."""
+    rows = np.flatnonzero(profile.value > profile.value.max() - _COUNTS)
+    if not len(rows):
+        return profile
+    near = profile.rows(rows)
+    ends = [block.curved(end, near.amplitude) for block, end in zip(pinned, near.ends, strict=True)]
+    return profile.with_rows(rows, _profile(pinned, added, near.amplitude, ends)).known()
 
 
 def _one_value_each(pinned: Sequence[Pinned], ends: Sequence[Optimum], amplitudes: Array) -> Array:
@@ -243,8 +259,15 @@ def _one_value_each(pinned: Sequence[Pinned], ends: Sequence[Optimum], amplitude
     return total
 
 
+def _is_close(profile: _Profile) -> bool:
+    """Whether the best amplitude's neighbours are so near it that nothing between them would be news."""
+    best = profile.best
+    beside = profile.value[max(best - 1, 0) : best + 2]
+    return bool(beside.min() > profile.value[best] - _CLOSE)
+
+
 def _around(profile: _Profile, end: float | None, per_delta: float) -> Array:
-    """Six amplitudes on either side of the best, no lower than `end` if there is one.
+    """Amplitudes about the top that the best and its neighbours suggest, no lower than `end` if there is one.
 
     An amplitude that is the only one with evidence has neighbours `per_delta` away.
     """
@@ -253,6 +276,13 @@ def _around(profile: _Profile, end: float | None, per_delta: float) -> Array:
     outside = 2 * grid[0] - next_up if end is None else end
     left = grid[best - 1] if best else outside
     right = next_up if len(grid) == 1 else grid[min(best + 1, len(grid) - 1)]
+    if 0 < best < len(grid) - 1:
+        bend, slope, _ = np.polyfit(grid[best - 1 : best + 2] - grid[best], profile.value[best - 1 : best + 2], 2)
+        if bend < 0:
+            about = grid[best] - 0.5 * slope / bend + _ABOUT_TOP / np.sqrt(-2.0 * bend)
+            about = about[(left < about) & (about < right)]
+            if len(about) >= _ENOUGH:
+                return about
     return np.linspace(left, right, 8)[1:-1]
 
 
@@ -270,7 +300,7 @@ def _summary(
         log_bayes, sd = _integrated(profile, effect.amplitudes[0].neutral, per_delta)
     else:
         log_bayes = float(profile.value[best] + 0.5 * np.log(2.0 * np.pi) + np.log(sd))
-    theta = tuple(p.natural(e[best][None], at)[0] for p, e in zip(pinned, profile.ends, strict=True))
+    theta = tuple(p.natural(e.z[best : best + 1], at)[0] for p, e in zip(pinned, profile.ends, strict=True))
     return Refit(effect, tuple(which), log_bayes, float(at[0]), sd, theta)
 
 

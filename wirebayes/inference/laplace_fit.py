@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.inference.modes import Optimum, climb, modes
+from wirebayes.inference.log_posterior import Density, LogPosterior
+from wirebayes.inference.modes import Optimum, climb, curved, modes
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem, build, unit_of_column
@@ -167,6 +167,7 @@ def fitted(
 
 
 _HOPELESS = 12.0  # nats below the best amplitude, which no curvature makes up for
+_TOLERANCE = 1e-2  # nats that a climb may still gain: evidence is compared in tenths of a nat
 
 
 class Pinned:
@@ -210,16 +211,26 @@ class Pinned:
         return self._drop(self.target.coordinates.to_sampled(np.insert(theta, self.column, 0.0, axis=1)))
 
     def climb(self, start: Array, amplitude: Array) -> Optimum:
-        """Climb every row with its own amplitude."""
-
-        def density(points: Array, rows: Array) -> Array:
-            return self.target(self._insert(points, amplitude[rows])) - _LOG_FLAT
+        """Climb every row with its own amplitude; the curvature is the expected information, which is nearly it."""
 
         def residuals(points: Array, rows: Array) -> tuple[Array, Array]:
             value, every = self.target.standardised(self._insert(points, amplitude[rows]))
             return value - _LOG_FLAT, every
 
-        return climb(density, start, residuals, iterations=40, tolerance=1e-3, reach=_HOPELESS)
+        density = self._density(amplitude)
+        return climb(
+            density, start, residuals, iterations=40, tolerance=_TOLERANCE, reach=_HOPELESS, curvature_at_end=False
+        )
+
+    def curved(self, ends: Optimum, amplitude: Array) -> Optimum:
+        """The ends of climbs, each with its own amplitude, with the curvature of the density itself."""
+        return curved(self._density(amplitude), ends)
+
+    def _density(self, amplitude: Array) -> Density:
+        def density(points: Array, rows: Array) -> Array:
+            return self.target(self._insert(points, amplitude[rows])) - _LOG_FLAT
+
+        return density
 
     def shapes(self, ends: Optimum, amplitude: Array) -> tuple[Array, Array]:
         """(n, s) logarithms of the shape constants that all tests have alike, and their standard deviations.
@@ -254,7 +265,8 @@ class Pinned:
         return self.target.coordinates.to_natural(self._insert(z, amplitude))
 
     def _insert(self, z: Array, amplitude: Array) -> Array:
-        return np.insert(z, self.column, amplitude / self.target.coordinates.scale[self.column], axis=1)
+        own = amplitude / self.target.coordinates.scale[self.column]
+        return np.concatenate([z[:, : self.column], own[:, None], z[:, self.column :]], axis=1)
 
     def _drop(self, z: Array) -> Array:
         return np.delete(z, self.column, axis=1)

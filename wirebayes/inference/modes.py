@@ -108,7 +108,7 @@ class _Ends:
     @classmethod
     def of(cls, known: Sequence[Optimum]) -> "_Ends":
         """Modes of each density that are known."""
-        return cls(np.repeat(np.arange(len(known)), [len(found.z) for found in known]), _together(known))
+        return cls(np.repeat(np.arange(len(known)), [len(found.z) for found in known]), together(known))
 
     def joined(self, which: NDArray[np.int64], ended: Optimum) -> "_Ends":
         """With further places, highest first, but for those that are near one.
@@ -123,7 +123,7 @@ class _Ends:
         for i in np.argsort(-ended.log_density):
             here = ended.rows([i])
             if not out.near(which[[i]], here.z, here.log_density)[0]:
-                out = _Ends(np.append(out.which, which[i]), _together([out.places, here]))
+                out = _Ends(np.append(out.which, which[i]), together([out.places, here]))
         return out
 
     def near(self, which: NDArray[np.int64], z: Array, value: Array) -> NDArray[np.bool_]:
@@ -231,7 +231,7 @@ def climb(
         left = left[hopeless]
         done[left], value[left] = True, -np.inf
     found = Optimum(z, value, _composed(eigen, vectors), converged)
-    return _curved(density, found, np.arange(n)) if curvature_at_end else found
+    return curved(density, found) if curvature_at_end else found
 
 
 def _best(value: Array, group: NDArray[np.int64]) -> Array:
@@ -241,8 +241,18 @@ def _best(value: Array, group: NDArray[np.int64]) -> Array:
     return best[group]
 
 
-def _curved(density: Density, found: Optimum, which: NDArray[np.int64]) -> Optimum:
-    """The same places with the curvature of the density itself, where that is finite; `which` (n,) start each is of."""
+def curved(density: Density, found: Optimum, which: NDArray[np.int64] | None = None) -> Optimum:
+    """The same places with the curvature of the density itself, where that is finite.
+
+    Parameters
+    ----------
+    density : function of ((m, d) points, (m,) row numbers) to (m,) values
+    found : Optimum
+        Of n places.
+    which : (n,) int array, optional
+        The row numbers of the places; their own where left out.
+    """
+    which = np.arange(len(found.z)) if which is None else which
     rows = np.flatnonzero(np.isfinite(found.log_density))
     if not len(rows):
         return found
@@ -486,7 +496,7 @@ class _SideBySide:
         )  # fmt: skip
         found = [distinct([end.rows(of == i)]) for i in range(self.n)]
         of = np.repeat(np.arange(self.n), [len(f.z) for f in found])
-        every = _curved(self.density, _together(found), of)
+        every = curved(self.density, together(found), of)
         return [every.rows(of == i) for i in range(self.n)]
 
     def with_ratios(self, begin: Sequence[Array]) -> Sequence[Array]:
@@ -586,7 +596,7 @@ def distinct(found: Sequence[Optimum]) -> Optimum:
     -------
     Optimum
     """
-    every = _together(found)
+    every = together(found)
     order = np.argsort(-every.log_density)
     keep: list[int] = []
     for i in order:
@@ -597,7 +607,8 @@ def distinct(found: Sequence[Optimum]) -> Optimum:
     return every.rows(keep)
 
 
-def _together(found: Sequence[Optimum]) -> Optimum:
+def together(found: Sequence[Optimum]) -> Optimum:
+    """The rows of several, one after the other."""
     return Optimum(*(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(Optimum)))
 
 

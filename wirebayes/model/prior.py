@@ -189,6 +189,8 @@ def fast_logpdf(dist: Any) -> Callable[[Array], Array]:
         return _logit_normal(shape, float(dist.dist._parse_args(*dist.args, **dist.kwds)[0][1]), scale)
     if name == "uniform":
         return lambda x: np.where((x >= loc) & (x <= loc + scale), -np.log(scale), -np.inf)
+    if name == "loguniform" and loc == 0.0:
+        return _log_uniform(*(float(end) for end in dist.support()))
     return lambda x: np.asarray(dist.logpdf(x))
 
 
@@ -215,6 +217,17 @@ def _lognormal(spread: Any, median: Any) -> Callable[[Array], Array]:
         inside = x > 0
         log_x = np.log(np.where(inside, x, 1.0))
         return np.where(inside, -0.5 * ((log_x - middle) / spread) ** 2 - log_x - constant, -np.inf)
+
+    return evaluate
+
+
+def _log_uniform(low: float, high: float) -> Callable[[Array], Array]:
+    """The log density of a positive number whose logarithm is uniform between two ends."""
+    constant = float(np.log(np.log(high / low)))
+
+    def evaluate(x: Array) -> Array:
+        inside = (x >= low) & (x <= high)
+        return np.where(inside, -np.log(np.where(inside, x, low)) - constant, -np.inf)
 
     return evaluate
 
