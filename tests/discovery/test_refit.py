@@ -84,8 +84,7 @@ def test_the_top_is_found_within_and_far_beyond_the_first_amplitudes(
 ) -> None:
     found = refitted(monkeypatch, [top])
     assert found.amplitude / 1e-3 == pytest.approx(top, abs=max(0.15, 0.02 * abs(top)))
-    off = found.amplitude / 1e-3 - top
-    assert found.log_bayes == pytest.approx(0.5 * top**2 - 0.5 * off**2 + occam(False))
+    assert found.log_bayes == pytest.approx(0.5 * top**2 + occam(False))
     assert found.sd == pytest.approx(1e-3, rel=1e-6)
     assert found.theta[0] == pytest.approx([found.amplitude / 1e-3, found.amplitude])
 
@@ -164,7 +163,8 @@ def test_an_amplitude_that_is_hardly_possible_pays_for_it(monkeypatch: pytest.Mo
 
 
 def width(value: list[float], grid: Any = (0.0, 1.0, 3.0, 4.0, 9.0)) -> Any:
-    return refit._width(np.array(grid), np.array(value), int(np.argmax(value)), 7.0)
+    top = refit._top(np.array(grid), np.array(value), int(np.argmax(value)), 7.0)
+    return top and top.sd
 
 
 def test_a_width_is_that_of_the_parabola_through_the_top_on_any_grid() -> None:
@@ -178,7 +178,20 @@ def test_a_width_is_that_of_the_parabola_through_the_top_on_any_grid() -> None:
     # at an end there is no parabola
     assert width([0.0, -1.0, -2.0, -3.0, -4.0]) == width([-4.0, -3.0, -2.0, -1.0, 0.0]) is None
     # a plateau has no curvature
-    assert width([0.0, 0.0, 0.0], (0.0, 1.0, 2.0)) is None and refit._width(np.arange(3.0), np.zeros(3), 1, 7.0) is None
+    assert width([0.0, 0.0, 0.0], (0.0, 1.0, 2.0)) is None and refit._top(np.arange(3.0), np.zeros(3), 1, 7.0) is None
+
+
+@pytest.mark.parametrize("top", [0.3, 1.5])
+@pytest.mark.parametrize("ends", [(0.0, np.inf), (0.0, 2.0), (-np.inf, np.inf)])
+def test_of_a_parabola_counts_what_lies_between_the_ends_of_the_prior(top: float, ends: tuple[float, float]) -> None:
+    """An amplitude that cannot be negative, with its top near none: half of a normal curve is not possible."""
+    grid = np.array([0.0, 0.25, 0.5, 1.0, 2.0])
+    value = 3.0 - 0.5 * ((grid - top) / 0.8) ** 2
+    found = refit._top(grid, value, int(np.argmax(value)), 1.0)
+    assert found is not None and found.amplitude == pytest.approx(top) and found.value == pytest.approx(3.0)
+    inside = stats.norm(top, 0.8).cdf(ends[1]) - stats.norm(top, 0.8).cdf(ends[0])
+    assert found.log_integral(*ends) == pytest.approx(3.0 + np.log(0.8 * np.sqrt(2.0 * np.pi) * inside))
+    assert np.isfinite(refit._Top(-50.0, 1.0, 0.0).log_integral(0.0, np.inf))
 
 
 def test_climbs_begin_on_the_line_between_what_is_known() -> None:
@@ -350,5 +363,6 @@ def test_the_width_bears_what_climbs_leave_over(jitter: float) -> None:
     grid = np.array([-4.0, -1.2, -0.5, -0.05, -0.02, 0.0, 0.03, 0.06, 0.6, 1.3, 5.0])
     value = -0.5 * grid**2 + jitter * np.array([0, 0, 0, 1, -1, 1, -1, 1, 0, 0, 0])
     value[[0, -1]] += 3.0
-    assert refit._width(grid, value, 5, 1.0) == pytest.approx(1.0, rel=0.03)
-    assert refit._width(grid[:6], value[:6], 5, 7.0) is None  # at the end of the grid there is no parabola
+    found = refit._top(grid, value, 5, 1.0)
+    assert found is not None and found.sd == pytest.approx(1.0, rel=0.03)
+    assert refit._top(grid[:6], value[:6], 5, 7.0) is None  # at the end of the grid there is no parabola

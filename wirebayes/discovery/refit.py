@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from wirebayes.discovery.sharing import alike
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
@@ -24,6 +25,7 @@ LARGEST = 40.0
 _OUTWARD = 6  # times that the grid may grow outwards, by up to 2.3 each: 150-fold in all
 _ROUNDING = 1e-9  # of a reach, which a grid may end on
 _TOP = 1.0  # nats; neighbours alone may lie so close that their values' last digits decide
+_LEAST_INSIDE = 1e-3  # of a parabola; one farther outside the prior's ends is not the profile's
 # δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice. The scan's unit
 # may be too large where the parameters bend themselves to the effect, so that it begins below what could be seen.
 _DELTAS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
@@ -31,7 +33,7 @@ _SWEEPS = 3  # times that climbs may begin once more where their neighbour neare
 _NEWS = 0.1  # nats that such a climb must gain to be followed further
 _FAR = 12.0  # nats below the best amplitude, from which on no climb begins at an amplitude once more
 _CLOSER = 3  # times that amplitudes are tried closer to the best one
-_CLOSE = 1.2  # nats from the best amplitude to its neighbours: near enough for a parabola, as `_TOP` has it
+_CLOSE = 1.2  # nats from the best amplitude to its neighbours: near enough for a parabola
 _COUNTS = 6.0  # nats below the best amplitude, up to which the curvature is computed exactly
 # of a top that is a parabola's, where it is tried: standard deviations
 _ABOUT_TOP = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
@@ -167,7 +169,7 @@ def refit(
             closer += 1
         begin = [_between(profile.amplitude, e.z, profile.best, finer) for e in profile.ends]
         profile = profile.joined(_climbed(pinned, added, finer, begin)).known()
-    return _summary(effect, which, pinned, _exact(pinned, added, profile), per_delta)
+    return _summary(effect, which, pinned, _exact(pinned, added, profile), per_delta, (low, high))
 
 
 def _followed(pinned: Sequence[Pinned], added: Callable[[Array], Array], profile: _Profile, neutral: float) -> _Profile:
@@ -292,14 +294,16 @@ def _summary(
     pinned: Sequence[Pinned],
     profile: _Profile,
     per_delta: float,
+    ends: tuple[float, float] = (-np.inf, np.inf),
 ) -> Refit:
+    """What a profile says, between the ends of the amplitude's prior."""
     best = profile.best
     at = profile.amplitude[best : best + 1]
-    sd = _width(profile.amplitude, profile.value, best, per_delta)
-    if sd is None:
+    top = _top(profile.amplitude, profile.value, best, per_delta)
+    if top is None:
         log_bayes, sd = _integrated(profile, effect.amplitudes[0].neutral, per_delta)
     else:
-        log_bayes = float(profile.value[best] + 0.5 * np.log(2.0 * np.pi) + np.log(sd))
+        log_bayes, sd = top.log_integral(*ends), top.sd
     theta = tuple(p.natural(e.z[best : best + 1], at)[0] for p, e in zip(pinned, profile.ends, strict=True))
     return Refit(effect, tuple(which), log_bayes, float(at[0]), sd, theta)
 
@@ -313,10 +317,24 @@ def _between(grid: Array, ends: Array, best: int, finer: Array) -> Array:
     return np.where(near[:, None], ends[best] + share[:, None] * (ends[aside] - ends[best]), ends[best])
 
 
-def _width(grid: Array, value: Array, best: int, per_delta: float) -> float | None:
-    """Standard deviation of the amplitude: a parabola through the neighbours of the top and whatever is near it.
+@dataclass(frozen=True)
+class _Top:
+    """The top of a profile as a parabola: where it is, its standard deviation, and the value there."""
 
-    None where there is no such parabola: the top lies at an end, as of an amplitude that cannot go further.
+    amplitude: float
+    sd: float
+    value: float
+
+    def log_integral(self, low: float, high: float) -> float:
+        """Log of the integral between two ends."""
+        inside = ndtr((high - self.amplitude) / self.sd) - ndtr((low - self.amplitude) / self.sd)
+        return float(self.value + 0.5 * np.log(2.0 * np.pi) + np.log(self.sd) + np.log(max(inside, _LEAST_INSIDE)))
+
+
+def _top(grid: Array, value: Array, best: int, per_delta: float) -> _Top | None:
+    """The parabola through the neighbours of the best amplitude and whatever is near it.
+
+    None where there is no such parabola: the best lies at an end, as of an amplitude that cannot go further.
     """
     if 0 < best < len(grid) - 1:
         near = (value > value[best] - _TOP) & np.isfinite(value)
@@ -324,9 +342,12 @@ def _width(grid: Array, value: Array, best: int, per_delta: float) -> float | No
         x, y = (grid[near] - grid[best]) / per_delta, value[near] - value[best]
         if np.isfinite(y).all():
             scale = np.abs(x).max()
-            bend = 2.0 * np.polyfit(x / scale, y, 2)[0] / scale**2
+            bend, slope, height = np.polyfit(x / scale, y, 2)
             if bend < 0:
-                return float(per_delta / np.sqrt(-bend))
+                summit = float(np.clip(-0.5 * slope / bend, (x / scale).min(), (x / scale).max()))
+                rise = height + slope * summit + bend * summit**2
+                sd = per_delta * scale / np.sqrt(-2.0 * bend)
+                return _Top(float(grid[best] + summit * scale * per_delta), float(sd), float(value[best] + rise))
     return None
 
 
