@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.inference.coordinates.slack_edge import DECADES
+from wirebayes.inference.coordinates.steps import Preload
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import modes
 
@@ -153,6 +154,7 @@ def log_likelihood(xp, problem):
 def natural(xp, problem, coordinates):
     """A function from our sampled coordinates (a sequence) to named natural parameters and log density of the prior."""
     (ridge,) = coordinates.ridges
+    slack_edges = [step.edge for step in coordinates.steps if isinstance(step, Preload)]
     names, terms = problem.names, prior_terms(problem)
 
     def convert(z):
@@ -179,7 +181,7 @@ def natural(xp, problem, coordinates):
         v["B"] = v["B"] - creep - v["k1"] + ridge.log_length
         theta = {name: _value(xp, v[name], coordinate) for name, coordinate, *_ in terms}
         volume = 0.0
-        for slack in coordinates.slack_edges:  # the benchmark's wires have no threshold of creep
+        for slack in slack_edges:  # the benchmark's wires have no threshold of creep
             near = (v["preload"] - slack.at) / slack.width
             far = -near - 2.0 * DECADES
             v["preload"] = slack.at + slack.width * (xp.logaddexp(0.0, near) - xp.logaddexp(0.0, far))

@@ -102,7 +102,7 @@ def _modes(problem: Problem, longer: Problem, best: Array) -> tuple[Array, Array
     """(d,) parameters at the mode that is reached from these, of both problems; what is integrated out stays."""
     own = problem.in_units(problem.own_units)
     target, other = (LogPosterior(integrated(p.in_units(own.units)), for_draws=False) for p in (problem, longer))
-    other.coordinates.ridges = target.coordinates.ridges  # so that both modes are of one density
+    other.coordinates.steps = target.coordinates.steps  # so that both modes are of one density
     columns = [problem.names.index(name) for name in target.problem.names]
     start = target.coordinates.to_sampled(problem.theta_in(own.units, best[None])[:, columns])
     ends = []

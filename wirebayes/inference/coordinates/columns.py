@@ -1,0 +1,118 @@
+"""Each parameter by itself: what it is measured in before the parameters are straightened together."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.coordinates.edges import Edge, edge
+from wirebayes.model.problem import Problem
+from wirebayes.numeric.typing import Array
+
+ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The map of the columns of ``(n, d)`` parameters, one by one.
+
+    Attributes
+    ----------
+    positive : (d,) array of bool
+        Sampled by their logarithms.
+    most : (d,) array
+        The largest value of what is sampled by its log odds of that; infinite for the others.
+    edges : mapping of column to Edge
+        Parameters whose prior ends at an edge.
+    scale : (d,) array
+        Units of the others, a standard deviation of their prior; 1 for the former.
+    log_spread : (d,) array
+        Standard deviations of the logarithms under the prior; 1 for what is no logarithm.
+    """
+
+    positive: NDArray[np.bool_]
+    most: Array
+    edges: dict[int, Edge]
+    scale: Array
+    log_spread: Array
+
+    @cached_property
+    def _log_scale(self) -> float:
+        return float(np.log(self.scale).sum())
+
+    def is_linear(self, column: int) -> bool:
+        """Whether a parameter is only divided by its scale."""
+        return not self.positive[column] and column not in self.edges
+
+    def logarithms(self, theta: Array) -> Array:
+        """(n, k) logarithms of the positive parameters, of those with a largest value the log odds of reaching it."""
+        return _log_odds(theta[:, self.positive], self.most[self.positive])
+
+    def coordinate(self, theta: Array, column: int) -> Array:
+        """(n,) coordinate of a parameter that is not sampled by its logarithm."""
+        value = theta[:, column]
+        return self.edges[column].score(value) if column in self.edges else value / self.scale[column]
+
+    def to_sampled(self, theta: Array) -> Array:
+        """(n, d) coordinates of natural parameters (n, d)."""
+        z = theta / self.scale
+        z[:, self.positive] = self.logarithms(theta)
+        for i, at in self.edges.items():
+            z[:, i] = at.score(theta[:, i])
+        return z
+
+    def to_natural(self, z: Array) -> Array:
+        """(n, d) natural parameters of coordinates (n, d)."""
+        theta = z * self.scale
+        odds = np.exp(z[:, self.positive])
+        theta[:, self.positive] = odds / (1.0 + odds / self.most[self.positive])
+        for i, at in self.edges.items():
+            theta[:, i] = at.value(z[:, i])
+        return theta
+
+    def log_jacobian(self, theta: Array, replaced: list[int]) -> Array:
+        """(n,) log |d natural / d sampled|.
+
+        Parameters
+        ----------
+        theta : (n, d) array
+            Natural parameters.
+        replaced : list of int
+            Columns with an edge that have another coordinate in the end.
+        """
+        value = theta[:, self.positive]
+        total = (np.log(value) + np.log1p(-value / self.most[self.positive])).sum(axis=1) + self._log_scale
+        for i, at in self.edges.items():
+            if i not in replaced:
+                total = total + at.log_slope(theta[:, i])
+        return np.asarray(total)
+
+
+def columns_of(problem: Problem) -> Columns:
+    """How each parameter of a problem is measured."""
+    distributions = list(problem.prior.distributions.values())
+    positive = np.array([name in problem.prior.logarithmic for name in problem.names], dtype=bool)
+    edges = {i: at for i, d in enumerate(distributions) if not positive[i] and (at := edge(d)) is not None}
+    linear = [not positive[i] and i not in edges for i in range(len(distributions))]
+    most = [float(d.support()[1]) if d.dist.name == "logitnorm" else np.inf for d in distributions]
+    scale = [_spread(d) if own else 1.0 for d, own in zip(distributions, linear, strict=True)]
+    spread = [_log_spread(d, m) if p else 1.0 for d, m, p in zip(distributions, most, positive, strict=True)]
+    return Columns(positive, np.array(most), edges, np.array(scale), np.array(spread))
+
+
+def _log_odds(value: Any, most: Any) -> Any:
+    """``log(value / (1 - value / most))``: the logarithm of values far below the most."""
+    with np.errstate(all="ignore"):  # what cannot be has no coordinate
+        return np.log(value) - np.log1p(-value / most)
+
+
+def _spread(distribution: Any) -> float:
+    sd = float(distribution.std())
+    return sd if np.isfinite(sd) and sd > 0 else 1.0
+
+
+def _log_spread(distribution: Any, most: float) -> float:
+    low, high = distribution.ppf(ONE_SD)
+    return float(0.5 * (_log_odds(high, most) - _log_odds(low, most)))

@@ -1,0 +1,272 @@
+"""What the measured tensions say about the curved ridge in the creep parameters of one material."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.inference.coordinates.columns import ONE_SD, Columns
+from wirebayes.inference.coordinates.power_of_tension import suiting_powers
+from wirebayes.inference.coordinates.shares import Elongation
+from wirebayes.model.problem import MATERIAL, Problem, Sample
+from wirebayes.numeric.typing import Array
+from wirebayes.wire import compiled
+from wirebayes.wire.effect import Effect, HoldContext, Placed
+
+
+@dataclass(frozen=True)
+class Ridge:
+    """Columns of one material's parameters (or fixed values), which of them are shifted, and what shifts them.
+
+    `effects` are those on the amount of creep, and `holds` what they see of the test, tensions as measured. `powers`
+    are log hazards and the log U that suits the losses best at each of them. `fixture` is the column of a compliance in
+    series with the wire, and `beside` what creeps beside the creep. `elongations` where these are read, not tensions.
+    """
+
+    where: dict[str, int]
+    fixed: dict[str, float]
+    shifted: frozenset[str]
+    log_tension: Array
+    log_step: float
+    times_s: Array
+    which_time: NDArray[np.int64]
+    kept: float
+    hold_s: float
+    log_length: float
+    effects: tuple[Effect, ...]
+    holds: tuple[HoldContext, ...]
+    powers: tuple[Array, Array]
+    fixture: int | None = None
+    beside: tuple[Elongation, ...] = ()
+    elongations: bool = False
+
+    @property
+    def shares(self) -> list[int]:
+        """Columns of what is sampled by its share."""
+        return [*([] if self.fixture is None else [self.fixture]), *(each.column for each in self.beside)]
+
+    def get(self, theta: Array, name: str) -> Any:
+        """(n,) a parameter of the material, or the number that it is fixed at."""
+        return theta[:, self.where[name]] if name in self.where else self.fixed[name]
+
+    @cached_property
+    def _tensions(self) -> tuple[float, Array]:
+        """Mean of the log tensions, and how far each is from it, (H, 1)."""
+        mean = float(self.log_tension.mean())
+        return mean, (self.log_tension - mean)[:, None]
+
+    @cached_property
+    def log_half_hold(self) -> float:
+        """Logarithm of half a typical hold, s."""
+        return float(np.log(0.5 * self.hold_s))
+
+    def log_hazard(self, theta: Array) -> Array:
+        """(n,) log hazard at half a typical hold, less log k2, at natural parameters (n, d)."""
+        return np.asarray(self.get(theta, "N") * self.log_half_hold)
+
+    def log_power(self, z: Array) -> Array:
+        """(n,) log U that suits the measured losses best at the hazards of sampled coordinates (n, d)."""
+        return np.interp(z[:, self.where["k2"]], *self.powers)
+
+    def log_stiffness(self, theta: Array) -> Array:
+        """(n,) log of what is read per elongation: N/mm of the wire with its fixture, 1 where elongations are read."""
+        if self.elongations:
+            return np.zeros(len(theta))
+        stiffness = np.log(self.get(theta, "k1")) - self.log_length
+        if self.fixture is None:
+            return np.asarray(stiffness)
+        return np.asarray(stiffness - np.logaddexp(0.0, np.log(theta[:, self.fixture]) + stiffness))
+
+    def softened(self, z: Array) -> Array:
+        """(n,) by how much the log stiffness is less after the creep, at sampled coordinates (n, d)."""
+        return np.asarray(np.logaddexp(0.0, z[:, self.where["B"]] - self.log_step))
+
+    def log_creep(self, theta: Array) -> Array:
+        """(n,) log G: root mean square of the elongation gained in a hold, for B = 1, at natural parameters (n, d)."""
+        U, k2, N = (self.get(theta, name) for name in ("U", "k2", "N"))
+        reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
+        mean, apart = self._tensions
+        drive = np.exp(U * apart)
+        if compiled.kernel is not None and not self.effects:
+            # of parameters that are fixed there is one column
+            every, share = (
+                a if a.shape[1] == len(theta) else np.repeat(a, len(theta), axis=1) for a in (drive, reached)
+            )
+            square = compiled.kernel.square_gained(every, share, self.which_time, self.kept)
+        else:
+            square = self._square_gained(drive, reached, theta)
+        # the floor keeps the logarithm finite
+        return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
+
+    def _square_gained(self, drive: Array, reached: Array, theta: Array) -> Array:
+        """What `compiled.kernel.square_gained` computes, by numpy; effects on the amount of creep included."""
+        carried, square = 0.0 * reached[0], 0.0 * drive[0]
+        effects = Placed(self.effects, {c: self.get(theta, c) for e in self.effects for c in e.columns()})
+        for j, time in enumerate(self.which_time):
+            amount = drive[j] - self.kept * carried
+            if self.effects:
+                amount = effects.change("amount", amount[None], self.holds[j].carrying(carried[None]))[0]
+            gained = amount * reached[time]
+            carried = carried + gained
+            square = square + gained * gained
+        return square
+
+
+def ridges_of(problem: Problem, columns: Columns, for_draws: bool) -> list[Ridge]:
+    """The ridges of a problem's materials; a column that several samples share follows the first of them.
+
+    Parameters
+    ----------
+    problem : Problem
+    columns : Columns
+        How each parameter is measured by itself.
+    for_draws : bool
+        Whether U, and amounts that add to others, have coordinates in which proposals suit them better.
+    """
+    found: list[Ridge] = []
+    taken: set[int] = set()
+    for sample in problem.samples:
+        where, fixed = _parameters(problem, sample, columns)
+        if len(where) + len(fixed) < len(MATERIAL):
+            continue  # a user's prior that allows negative values: leave this material's columns as they are
+        shifted = _shifted(problem, sample, {name for name, column in where.items() if column not in taken})
+        if not for_draws:
+            shifted -= {"U"}
+        if shifted:
+            taken |= {where[name] for name in shifted}
+            ridge = _ridge(problem, sample, where, fixed, shifted)
+            owned = [column for each in found for column in each.shares]
+            found.append(_with_shares(ridge, problem, sample, columns, owned) if for_draws else ridge)
+    return found
+
+
+def _parameters(problem: Problem, sample: Sample, columns: Columns) -> tuple[dict[str, int], dict[str, float]]:
+    """Columns of a sample's positive creep parameters, and what others are fixed at."""
+    names, mark = problem.names, _mark(problem, sample.material)
+    own = {name: f"{name}[{sample.name}]" for name in MATERIAL}
+    called = {name: own[name] if own[name] in names else f"{name}{mark}" for name in MATERIAL}
+    fixed = {name: problem.prior.fixed[c] for name, c in called.items() if c in problem.prior.fixed}
+    if "k1" not in sample.parameters(problem.likelihood):
+        fixed["k1"] = 1.0  # no reading depends on it
+    where = {name: names.index(c) for name, c in called.items() if c in names}
+    return {name: column for name, column in where.items() if columns.positive[column]}, fixed
+
+
+def _mark(problem: Problem, material: str) -> str:
+    marked = f"k1[{material}]"
+    return f"[{material}]" if marked in problem.names or marked in problem.prior.fixed else ""
+
+
+def _shifted(problem: Problem, sample: Sample, free: set[str]) -> frozenset[str]:
+    """Those of the free parameters that have another coordinate than their logarithm."""
+    shifted = {"k2", "U", "B", "k1"} & free
+    if "B" not in shifted or sample.protocol.control == "force":
+        shifted -= {"k1"}  # the tension lost in a hold is not known
+    if "k2" not in shifted or sample.model.history != "saturating" or problem.likelihood != "chain":
+        shifted -= {"U"}  # every hold creeps anew, or the rate of the creep is not sampled here
+    return frozenset(shifted)
+
+
+def _ridge(
+    problem: Problem, sample: Sample, where: dict[str, int], fixed: dict[str, float], shifted: frozenset[str]
+) -> Ridge:
+    effects = tuple(e for e in sample.model.at("amount") if compiled.has_formula(e))  # others may ask for B
+    for column in (c for e in effects for c in e.columns()):
+        name = problem.column(column, sample)
+        if name in problem.names:
+            where[column] = problem.names.index(name)
+        else:
+            fixed[column] = problem.prior.fixed[name]
+    tension = _driving(sample)
+    hold_s, duration = sample.typical_hold_s, sample.protocol.duration_s
+    durations = np.where(duration > 0, duration, hold_s)
+    times, which_time = np.unique(durations, return_inverse=True)
+    no_power = np.zeros(1), np.zeros(1)  # U is sampled as it is
+    powers = _powers(problem, sample, np.log(tension), durations / (0.5 * hold_s)) if "U" in shifted else no_power
+    return Ridge(
+        where,
+        fixed,
+        shifted,
+        log_tension=np.log(tension),
+        log_step=0.5 * float(np.log(np.mean(np.diff(tension, prepend=0.0) ** 2))),
+        times_s=times,
+        which_time=which_time,
+        kept=1.0 if sample.model.history == "saturating" and problem.likelihood == "chain" else 0.0,
+        hold_s=hold_s,
+        log_length=float(np.log(_length_mm(sample))),
+        effects=effects,
+        holds=_holds(sample, tension),
+        powers=powers,
+        elongations=sample.protocol.control == "force",
+    )
+
+
+def _length_mm(sample: Sample) -> float:
+    return sample.model.length_ref_mm or sample.protocol.length_mm
+
+
+def _holds(sample: Sample, tension: Array) -> tuple[HoldContext, ...]:
+    """What effects see of the holds, which begin at these tensions (H,)."""
+    length, reference = _length_mm(sample), sample.model.tension_ref_N
+    return tuple(
+        HoldContext(
+            **hold, length_ref_mm=length, tension_ref_N=reference, theta={}, initial_tension=np.full((1, 1), first)
+        )
+        for hold, first in zip(sample.protocol.holds, tension, strict=True)
+    )
+
+
+def _driving(sample: Sample) -> Array:
+    """(H,) tensions that drive the creep: as set, or the first readings."""
+    if sample.protocol.control == "force":
+        return sample.protocol.setting
+    recorded = np.flatnonzero(sample.protocol.recorded)
+    first = np.interp(np.arange(len(sample.readings)), recorded, sample.readings[recorded, 0, 0])
+    # a slack wire drives no creep; a small share of the largest tension stands in for it
+    return np.maximum(first, 0.02 * first.max()) if first.max() > 0 else np.ones_like(first)
+
+
+def _powers(problem: Problem, sample: Sample, log_tension: Array, relative_s: Array) -> tuple[Array, Array]:
+    """Log hazards and the log U that suits the losses of a sample's holds best at each of them."""
+    readings, protocol = sample.readings[..., 0], sample.protocol
+    last = readings[np.arange(len(readings)), protocol.last_reading]
+    changed = last - readings[:, 0] if protocol.control == "force" else readings[:, 0] - last
+    lost = np.where(protocol.mask.sum(axis=1) > 1, changed, np.nan)
+    power, exponent = (problem.column(name, sample) for name in ("U", "N"))
+    low, middle, high = np.log(problem.prior.distributions[power].ppf([ONE_SD[0], 0.5, ONE_SD[1]]))
+    fixed = problem.prior.fixed
+    N = fixed[exponent] if exponent in fixed else problem.prior.distributions[exponent].median()
+    return suiting_powers(lost, log_tension, relative_s, float(N), float(middle), 0.5 * float(high - low))
+
+
+def _with_shares(ridge: Ridge, problem: Problem, sample: Sample, columns: Columns, owned: Collection[int]) -> Ridge:
+    """The ridge with what is to be sampled by its share: amounts that are half-normal under the prior.
+
+    Of these any sum and any share is possible. What other ridges own stays there.
+    """
+    for effect in sample.model.effects:
+        names = [problem.column(column, sample) for column in effect.columns()]
+        if not names or names[0] not in problem.names:
+            continue
+        amount = problem.names.index(names[0])
+        if amount in owned or amount in ridge.shares or amount not in columns.edges or columns.edges[amount].ends:
+            continue
+        if effect.in_series and "k1" in ridge.shifted:
+            ridge = replace(ridge, fixture=amount)
+        elif effect.amplitudes[0].is_elongation and effect.place != "strain" and "B" in ridge.shifted:
+            ridge = replace(ridge, beside=(*ridge.beside, _elongation(ridge, problem, effect, names)))
+    return ridge
+
+
+def _elongation(ridge: Ridge, problem: Problem, effect: Effect, names: list[str]) -> Elongation:
+    """What an effect with amplitudes of these names adds to the creep of a ridge."""
+    columns = [problem.names.index(n) if n in problem.names else problem.prior.fixed[n] for n in names]
+    others = {a.name: column for a, column in zip(effect.amplitudes[1:], columns[1:], strict=True)}
+    ends = tuple(
+        replace(hold, time_s=ridge.times_s[time].reshape(1, 1))
+        for hold, time in zip(ridge.holds, ridge.which_time, strict=True)
+    )
+    return Elongation(problem.names.index(names[0]), effect, others, ends, ridge.kept)

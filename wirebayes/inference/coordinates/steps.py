@@ -1,0 +1,154 @@
+"""The steps that straighten a posterior, each a map of a few columns beside all others.
+
+A step puts its coordinates ``z`` in place of what stands there, given all natural parameters ``theta``; back, it puts
+natural parameters in place, given all coordinates. Arrays are ``(n, d)`` and changed where they are.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wirebayes.inference.coordinates import shares
+from wirebayes.inference.coordinates.ridge import Ridge
+from wirebayes.inference.coordinates.slack_edge import SlackEdge
+from wirebayes.inference.coordinates.tension_level import TensionLevel
+from wirebayes.numeric.typing import Array
+
+
+class Step:
+    """A step of unit Jacobian."""
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        """Put coordinates in place, after the steps before this one."""
+        raise NotImplementedError
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        """Put natural parameters in place, after the steps behind this one."""
+        raise NotImplementedError
+
+    def log_jacobian(self, theta: Array, z: Array) -> Array | float:
+        """(n,) what it adds to log |d natural / d sampled|."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Hazard(Step):
+    """Log k2 becomes the log hazard at half a typical hold."""
+
+    ridge: Ridge
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        z[:, self.ridge.where["k2"]] += self.ridge.log_hazard(theta)
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        column = self.ridge.where["k2"]
+        theta[:, column] = np.exp(z[:, column] - self.ridge.log_hazard(theta))
+
+
+@dataclass(frozen=True)
+class Power(Step):
+    """Log U becomes its distance from the power of tension that suits the measured losses best at this hazard."""
+
+    ridge: Ridge
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        z[:, self.ridge.where["U"]] -= self.ridge.log_power(z)
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        column = self.ridge.where["U"]
+        theta[:, column] = np.exp(z[:, column] + self.ridge.log_power(z))
+
+
+@dataclass(frozen=True)
+class Loss(Step):
+    """Log B becomes the log of what is lost in a hold, and what creeps beside the creep its share of that."""
+
+    ridge: Ridge
+    level: TensionLevel | None
+
+    def _driven(self, theta: Array) -> Any:
+        """(n,) log creep by which the tension at the beginning of the only hold drives more than its first reading."""
+        return 0.0 if self.level is None else self.ridge.get(theta, "U") * self.level.driven(theta)
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        column, stiffness = self.ridge.where["B"], self.ridge.log_stiffness(theta)
+        lost = z[:, column] + (self.ridge.log_creep(theta) + stiffness) + self._driven(theta)
+        for part in self.ridge.beside:
+            own = np.log(theta[:, part.column]) + part.log_gained(theta) + stiffness
+            z[:, part.column] = shares.score(own, lost)
+            lost = np.logaddexp(lost, own)
+        z[:, column] = lost
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        column, stiffness = self.ridge.where["B"], self.ridge.log_stiffness(theta)
+        lost = z[:, column]
+        for part in reversed(self.ridge.beside):
+            share, rest = shares.log_shares(z[:, part.column])
+            gained = part.log_gained(theta) + stiffness
+            theta[:, part.column] = np.exp(lost + share - gained)
+            lost = lost + rest
+        theta[:, column] = np.exp(lost - (self.ridge.log_creep(theta) + stiffness) - self._driven(theta))
+
+    def log_jacobian(self, theta: Array, z: Array) -> Array | float:
+        return sum(shares.log_slope(theta[:, part.column], z[:, part.column]) for part in self.ridge.beside)
+
+
+@dataclass(frozen=True)
+class SoftenedStiffness(Step):
+    """Log k1 becomes the log stiffness of the wire, with its fixture, after its creep; a fixture its share of it."""
+
+    ridge: Ridge
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        ridge, column = self.ridge, self.ridge.where["k1"]
+        if ridge.fixture is not None:
+            own = np.log(theta[:, ridge.fixture]) + np.log(ridge.get(theta, "k1")) - ridge.log_length
+            z[:, ridge.fixture] = shares.score(own, np.zeros_like(own))
+            z[:, column] -= np.logaddexp(0.0, own)
+        z[:, column] -= ridge.softened(z)
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        ridge, column = self.ridge, self.ridge.where["k1"]
+        log_k1 = z[:, column] + ridge.softened(z)
+        if ridge.fixture is not None:
+            share, rest = shares.log_shares(z[:, ridge.fixture])
+            theta[:, ridge.fixture] = np.exp(share - log_k1 + ridge.log_length)
+            log_k1 = log_k1 - rest
+        theta[:, column] = np.exp(log_k1)
+
+    def log_jacobian(self, theta: Array, z: Array) -> Array | float:
+        column = self.ridge.fixture
+        return 0.0 if column is None else shares.log_slope(theta[:, column], z[:, column])
+
+
+@dataclass(frozen=True)
+class Level(Step):
+    """In a test of one hold, the log stiffness becomes that beside the preload."""
+
+    level: TensionLevel
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        z[:, self.level.k1] += self.level.stretch(theta)
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        z[:, self.level.k1] -= self.level.stretch(theta)  # for the steps before this one
+        theta[:, self.level.k1] = np.exp(z[:, self.level.k1])
+
+
+@dataclass(frozen=True)
+class Preload(Step):
+    """The preload becomes what is wide where the first hold hardly creeps."""
+
+    edge: SlackEdge
+    scale: float
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        z[:, self.edge.preload] = self.edge.score(theta) / self.scale
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        column = self.edge.preload
+        theta[:, column] = self.edge.value(theta[:, column], theta)
+
+    def log_jacobian(self, theta: Array, z: Array) -> Array | float:
+        return self.edge.log_slope(theta)
