@@ -12,6 +12,7 @@ from wirebayes.inference.importance import Weighted, effective, expected, from_d
 from wirebayes.inference.sampler import proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES, SHARES
 
 D = 4
 ORDER = np.arange(D)
@@ -324,14 +325,14 @@ def test_a_proposal_is_learned_as_a_close_one_of_few_points(monkeypatch: pytest.
 
     monkeypatch.setattr(proposal, "fit_proposal", fit)
     begin, z, rng = start(0.0), Points.equal(np.zeros((4, D))), np.random.default_rng(0)
-    before = proposal.Proposal(proposal.SHARES, None, begin, begin, begin, begin)  # type: ignore[arg-type]
+    before = proposal.Proposal(SHARES, None, begin, begin, begin, begin)  # type: ignore[arg-type]
     assert importance._learned(z, z, begin, ORDER, rng, begin) is new
     assert importance._learned(z, z, begin, ORDER, rng, before) is new
     assert importance._learned(z, z, begin, ORDER, rng, before) is before  # points that span nothing
     few = {"most": 8, "points": 2500, "along_tails": False}
     assert asked[:2] == [
-        (proposal.ROUGH_SHARES, {**few, "before": None}),
-        (proposal.EXPLORING, {**few, "before": before}),
+        (ROUGH_SHARES, {**few, "before": None}),
+        (EXPLORING_SHARES, {**few, "before": before}),
     ]
 
 

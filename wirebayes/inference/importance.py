@@ -25,6 +25,7 @@ from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
+from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.resampling import truncated_rows
 from wirebayes.numeric.spread_rows import spread_rows
@@ -295,7 +296,7 @@ def _learned(
 ) -> Mixture | Proposal:
     """The proposal fitted to points, or the one before where they are too few."""
     known = before if isinstance(before, Proposal) else None
-    shares = proposal.EXPLORING if known else proposal.ROUGH_SHARES
+    shares = EXPLORING_SHARES if known else ROUGH_SHARES
     try:
         # no walker is caught in a tail here, and a map for the middle leaves more effective draws
         return proposal.fit_proposal(

@@ -13,6 +13,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES, SHARES
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers
 from wirebayes.numeric.resampling import effective_number
 
@@ -260,7 +261,7 @@ def test_kept_draws_teach_the_next_proposal_and_may_count_on(stay: bool) -> None
     assert found.learned.previous is (start if stay else None)
     learned = found.learned.proposal
     assert isinstance(learned, proposal.Proposal)
-    assert learned.shares == proposal.SHARES and len(learned.close.weights) == 6
+    assert learned.shares == SHARES and len(learned.close.weights) == 6
     places = z.reshape(-1, d)
     spread = [np.std(target(places) - by.log_density(places)) for by in (learned, start)]
     assert spread[0] < 0.5 * spread[1]  # in nats, half of what the start left
@@ -291,9 +292,9 @@ def test_a_mode_found_by_a_few_walkers_begins_the_run_anew(known: int, modes: in
 
 def test_the_frozen_proposal_draws_less_from_its_wide_parts() -> None:
     """Shares sum to one; while it learns more than twice as much comes from what reaches the tails."""
-    for shares in (proposal.SHARES, proposal.EXPLORING, proposal.ROUGH_SHARES):
+    for shares in (SHARES, EXPLORING_SHARES, ROUGH_SHARES):
         assert sum(shares) == pytest.approx(1.0)
-    assert proposal.SHARES[0] > proposal.EXPLORING[0] > proposal.ROUGH_SHARES[0]
+    assert SHARES[0] > EXPLORING_SHARES[0] > ROUGH_SHARES[0]
 
 
 def test_a_walk_looks_further_every_time() -> None:
@@ -430,7 +431,7 @@ def test_the_proposal_is_fitted_to_this_round_and_the_one_before(monkeypatch: py
         (6, 12000, None),
         (24, 12000, None),
     ]
-    assert all(a["given"][-1] == proposal.EXPLORING for a in asked)  # type: ignore[index]
+    assert all(a["given"][-1] == EXPLORING_SHARES for a in asked)  # type: ignore[index]
     failed = burn_in._fitted(target, state.knowing(proposal=NORMAL), Policy(), *rows[:2])  # type: ignore[arg-type]
     assert failed.learned.proposal is NORMAL and failed.seen == (rows[0], rows[1])
 
@@ -459,4 +460,4 @@ def test_known_modes_are_widened_and_rough_draws_teach_the_first_proposal(monkey
     assert plain.learned.witness is None and plain.evaluations == learned.evaluations == target.evaluations / 2 > 0
     assert len(plain.walkers.positions) == 2 * 10 and plain.round == 0  # a quarter of the walkers
     assert learned.learned.proposal == "proposal" and learned.learned.acceptance == 1.0 and learned.seen is None
-    assert taught == [(rough.tolist(), rough.tolist(), proposal.ROUGH_SHARES)]
+    assert taught == [(rough.tolist(), rough.tolist(), ROUGH_SHARES)]

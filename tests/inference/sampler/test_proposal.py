@@ -10,8 +10,8 @@ from wirebayes.inference import modes
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, mixture, moves, proposal, transport_map
 from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.settings import EXPLORING_SHARES, OUTWEIGHS, ROUGH_SHARES, SHARES
 from wirebayes.inference.sampler.state import BurnIn
-from wirebayes.inference.sampler.stop_rule import OUTWEIGHS
 
 
 def crescent(n, rng):
@@ -116,9 +116,9 @@ def test_the_map_follows_tails_that_belong_to_the_posterior(wider, along_tails, 
     hot = cold * [1.6, wider, 1.6]
     start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
     one, other = Points.equal(hot), Points.equal(cold)
-    known = proposal.fit_proposal(other, other, start, np.arange(3), rng, proposal.SHARES, most=2) if before else None
+    known = proposal.fit_proposal(other, other, start, np.arange(3), rng, SHARES, most=2) if before else None
     found = proposal.fit_proposal(
-        one, other, start, np.arange(3), rng, proposal.SHARES, most=2, before=known, along_tails=along_tails
+        one, other, start, np.arange(3), rng, SHARES, most=2, before=known, along_tails=along_tails
     )
     points = {"hot": hot, "cold": cold}[followed]
     assert found.straight.scale == pytest.approx(points.std(axis=0), rel=1e-12)
@@ -159,9 +159,7 @@ def test_the_density_of_a_proposal_is_that_of_its_draws(points):
     """The mean of 1/q over draws of q inside a box is the box's volume."""
     rng = np.random.default_rng(4)
     start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
-    q = proposal.fit_proposal(
-        Points.equal(points), Points.equal(points), start, np.arange(3), rng, proposal.SHARES, most=3
-    )
+    q = proposal.fit_proposal(Points.equal(points), Points.equal(points), start, np.arange(3), rng, SHARES, most=3)
     x = q.rvs(200000, rng)
     inside = (np.abs(x - [0.0, 0.0, 2.5]) < [1.0, 1.0, 1.0]).all(axis=1)
     weight = inside * np.exp(-q.log_density(x))
@@ -181,8 +179,8 @@ def test_a_proposal_learns_with_wider_parts_than_it_is_frozen_with():
     while isinstance(state, BurnIn):
         shares.append(state.learned.proposal.shares)
         state = burn_in.step(target, state, policy)
-    assert shares == [proposal.ROUGH_SHARES, proposal.EXPLORING, proposal.EXPLORING]
-    assert state.learned.proposal.shares == proposal.SHARES
+    assert shares == [ROUGH_SHARES, EXPLORING_SHARES, EXPLORING_SHARES]
+    assert state.learned.proposal.shares == SHARES
 
 
 def test_degrees_of_freedom_reach_the_density():
@@ -209,7 +207,7 @@ def without_excess(points, rng):
     """A proposal that knows the hill alone."""
     hill = Points.equal(points[len(points) // 500 :])
     start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
-    return proposal.fit_proposal(hill, hill, start, np.arange(3), rng, proposal.SHARES, most=2)
+    return proposal.fit_proposal(hill, hill, start, np.arange(3), rng, SHARES, most=2)
 
 
 def log_neck(z):
@@ -230,7 +228,7 @@ def test_what_the_proposal_makes_too_little_of_becomes_a_part_of_it():
 
     assert np.median(over(before)) > 10.0 and over(found).max() < OUTWEIGHS
     drawn = found.rvs(20_000, rng)
-    assert (drawn[:, 0] > 8.0).mean() == pytest.approx(proposal.SHARES[-1], abs=0.01)
+    assert (drawn[:, 0] > 8.0).mean() == pytest.approx(SHARES[-1], abs=0.01)
     weight = np.exp(log_neck(drawn) - found.log_density(drawn))
     assert weight.mean() == pytest.approx(1.0, abs=4 * weight.std() / np.sqrt(len(weight)))
 

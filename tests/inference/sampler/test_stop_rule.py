@@ -19,8 +19,8 @@ from wirebayes.inference.policy import Policy, describe
 from wirebayes.inference.sampler import burn_in, ensemble, kept, stop_rule
 from wirebayes.inference.sampler import state as sampler_state
 from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.settings import OUTWEIGHS, POOL
 from wirebayes.inference.sampler.state import BurnIn, Diagnostics, Kept, Learned, Sampling, Walkers
-from wirebayes.inference.sampler.stop_rule import OUTWEIGHS
 
 ENSEMBLES, WALKERS, D = 4, 32, 3
 EASY = {"ensembles": ENSEMBLES, "walkers": WALKERS, "ess": 1.0, "r_hat": 10.0, "most_steps": 4000}
@@ -143,7 +143,7 @@ def test_the_last_step_ends_it_and_names_what_is_missing() -> None:
     ],
 )
 def test_places_that_the_proposal_overlooks(nats: float, again: int, finished: bool, converged: bool) -> None:
-    assert np.exp(OUTWEIGHS) == pytest.approx(sampler_state.POOL / 2) == 32.0  # half a pool of typical places
+    assert np.exp(OUTWEIGHS) == pytest.approx(POOL / 2) == 32.0  # half a pool of typical places
     state, _ = looked(draws(64), overlooked=nats, again=again)
     assert (state.finished, state.converged) == (finished, converged)
     assert ("makes too little of some places" in state.why) is (finished and not converged)

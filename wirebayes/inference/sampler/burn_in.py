@@ -18,12 +18,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.inference.modes import LEAST_CURVATURE, Optimum, climb, distinct, search
+from wirebayes.inference.modes import Optimum, climb, distinct, search
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, net, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
+from wirebayes.inference.sampler.settings import (
+    CLIMBS,
+    EFFECTIVE,
+    EXPLORING_SHARES,
+    FEW_ROUNDS,
+    GOOD_ACCEPTANCE,
+    HOT,
+    IN_FULL,
+    LEAST_DRAWS,
+    LEAST_OF,
+    LONGEST_SETTLING,
+    MORE_COMPONENTS,
+    MOST_COMPONENTS,
+    NEXT_TO_NOTHING,
+    OVERDISPERSED,
+    PASSING_POINTS,
+    POINTS,
+    REMEMBERED,
+    ROUGH_SHARES,
+    SHARES,
+    TO_FIND_MORE,
+    USEFUL,
+    WARM,
+    WIDEST,
+)
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers, advance, move_of
 from wirebayes.numeric.resampling import effective_number, next_power, truncated_rows
 from wirebayes.numeric.spread_rows import spread_rows
@@ -69,7 +94,7 @@ def init(
     learned = Learned(known, known, len(found.z), witness)
     state = BurnIn(Walkers(*places, random.get_state()), learned, rng, target.evaluations - before)
     if seen is not None:
-        state = _fitted(target, state, policy, *seen, proposal.ROUGH_SHARES)
+        state = _fitted(target, state, policy, *seen, ROUGH_SHARES)
         if state.learned.proposal is not known:
             state = replace(state.knowing(acceptance=1.0), seen=None)  # assumed good until draws show otherwise
     return state
@@ -91,7 +116,7 @@ def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampli
         After the last round the proposal is frozen and walkers are placed.
     """
     state = replace(state, round=state.round + 1)
-    if state.learned.acceptance < _USEFUL:
+    if state.learned.acceptance < USEFUL:
         state, walk = _walked(target, state, policy)
         state = _fitted(target, state, policy, *_weighted_twice(*walk))
     state, (z, value, base) = _drawn(target, state, policy)
@@ -100,14 +125,14 @@ def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampli
     acceptance = float(np.exp(np.minimum(weight - state.generator.permutation(typical), 0.0)).mean())
     state = state.knowing(acceptance=acceptance)
     middle, high = np.quantile(typical, [0.5, 0.999])
-    settled = acceptance >= _GOOD_ACCEPTANCE and high - middle < policy.tail
+    settled = acceptance >= GOOD_ACCEPTANCE and high - middle < policy.tail
     last = state.round >= policy.rounds and settled or state.round >= policy.most_rounds
-    if acceptance >= _USEFUL:
+    if acceptance >= USEFUL:
         seen = _weighted_twice(z, value, base)
-        state = _fitted(target, state, policy, *seen, points=proposal.ENOUGH if last else _PASSING)
+        state = _fitted(target, state, policy, *seen, points=POINTS if last else PASSING_POINTS)
         state = _with_excess(state, z, value, weight)
     # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
-    steps = int(np.clip(np.exp(high - middle), 1, _LONGEST_SETTLING))
+    steps = int(np.clip(np.exp(high - middle), 1, LONGEST_SETTLING))
     return _frozen(target, state, policy, (z, value, base), steps) if last else state
 
 
@@ -130,7 +155,7 @@ def _with_excess(state: BurnIn, z: Array, value: Array, log_weight: Array) -> Bu
     drawn = drawn.worth(effective_number(drawn.weight))
     if state.drawn is not None:
         drawn = state.drawn.joined(drawn)
-        drawn = Points(drawn.z[-_REMEMBERED:], drawn.weight[-_REMEMBERED:])
+        drawn = Points(drawn.z[-REMEMBERED:], drawn.weight[-REMEMBERED:])
     state = replace(state, drawn=drawn)
     if not isinstance(state.learned.proposal, Proposal):
         return state
@@ -149,7 +174,7 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     """
     learned, done = replace(state.learned, again=state.learned.again + 1, previous=None), policy.rounds - 1
     if _hard_to_find(learned):  # few rounds of many draws: what is overlooked is rare
-        done = max(done, policy.most_rounds - _FEW_ROUNDS)
+        done = max(done, policy.most_rounds - FEW_ROUNDS)
     return _of_kept(target, replace(state, learned=learned), policy, done)
 
 
@@ -185,21 +210,21 @@ def _climbed(target: LogPosterior, state: Sampling, known: Optimum) -> Optimum:
     """Where climbs end that begin at kept draws of which the proposal makes least, but for those near known modes."""
     z, value = state.all_kept.flat
     over = value - state.learned.proposal.log_density(z)
-    least = np.unique(z[over >= np.quantile(over, 1.0 - _LEAST_OF)], axis=0)
-    begin = least[spread_rows(least / z.std(axis=0), _CLIMBS, state.generator)]
+    least = np.unique(z[over >= np.quantile(over, 1.0 - LEAST_OF)], axis=0)
+    begin = least[spread_rows(least / z.std(axis=0), CLIMBS, state.generator)]
     density, residuals = target.rowwise()
     found = climb(density, begin, residuals, of=np.zeros(len(begin), np.int64), known=[known])
     return found.rows(found.converged & np.isfinite(found.log_density))
 
 
 def _overdispersed(modes: Optimum) -> Mixture:
-    return mixture.from_modes(modes.z, modes.covariance * _OVERDISPERSED, modes.log_evidence)
+    return mixture.from_modes(modes.z, modes.covariance * OVERDISPERSED, modes.log_evidence)
 
 
 def _modes_of(target: LogPosterior, start: Mixture) -> Optimum:
     """The modes that `_overdispersed` gave this mixture of."""
     inverse = np.linalg.inv(start.factors)
-    curvature = _OVERDISPERSED * np.swapaxes(inverse, 1, 2) @ inverse
+    curvature = OVERDISPERSED * np.swapaxes(inverse, 1, 2) @ inverse
     return Optimum(start.centres, target(start.centres), curvature, np.ones(len(start.centres), bool))
 
 
@@ -215,7 +240,7 @@ def _as_frozen(learned: Learned) -> Learned:
     """With the shares of the proposal's parts as they are once it no longer learns."""
     if not isinstance(learned.proposal, Proposal):
         return learned
-    return replace(learned, proposal=replace(learned.proposal, shares=proposal.SHARES))
+    return replace(learned, proposal=replace(learned.proposal, shares=SHARES))
 
 
 def overlooked(learned: Learned, z: Array, value: Array) -> tuple[float, float]:
@@ -245,7 +270,7 @@ def overlooked(learned: Learned, z: Array, value: Array) -> tuple[float, float]:
     if learned.witness is None:
         return float(high - middle), 0.0
     z, value = learned.witness
-    matters = value + z.shape[1] * _WIDEST > middle + _NEXT_TO_NOTHING
+    matters = value + z.shape[1] * WIDEST > middle + NEXT_TO_NOTHING
     left = np.where(matters, value - learned.proposal.log_density(z), middle)
     return float(high - middle), float(np.quantile(left, 0.99) - middle)
 
@@ -257,8 +282,8 @@ def _hard_to_find(learned: Learned) -> bool:
 
 def _walked(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, tuple[Array, Array, Array]]:
     """Where walkers of the warm density come by: places (n, d), their log densities and the log density walked."""
-    power = _WARM[min(state.learned.walks, len(_WARM) - 1)]
-    steps = policy.round_draws // _walking(target, policy) * 2 ** min(state.learned.walks, len(_WARM) - 1)
+    power = WARM[min(state.learned.walks, len(WARM) - 1)]
+    steps = policy.round_draws // _walking(target, policy) * 2 ** min(state.learned.walks, len(WARM) - 1)
     move = move_of(state.learned, 1, steps, frozen=False)
     done = advance(target, state.walkers, move, steps, power)
     walked = done.sampler.get_log_prob(discard=steps // 2, flat=True)
@@ -270,8 +295,8 @@ def _walked(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn
 def _drawn(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, tuple[Array, Array, Array]]:
     """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
     drawn_from = state.learned.proposal
-    most = policy.round_draws * (_TO_FIND_MORE if _hard_to_find(state.learned) else 1)
-    n = max(most >> max(_IN_FULL - state.round, 0), min(most, _LEAST_DRAWS * state.learned.modes))
+    most = policy.round_draws * (TO_FIND_MORE if _hard_to_find(state.learned) else 1)
+    n = max(most >> max(IN_FULL - state.round, 0), min(most, LEAST_DRAWS * state.learned.modes))
     points = net.even(n, len(target.problem.names) + 1, state.generator)
     z = proposal.components(drawn_from).from_cube(points, state.generator)
     before = target.evaluations
@@ -287,18 +312,18 @@ def _fitted(
     policy: Policy,
     hot: Points,
     cold: Points,
-    shares: proposal.Shares = proposal.EXPLORING,
-    points: int = proposal.ENOUGH,
+    shares: proposal.Shares = EXPLORING_SHARES,
+    points: int = POINTS,
 ) -> BurnIn:
     """Fit the proposal to points of the warm density and of the density, and to those of the round before."""
     learned, before, state = state.learned, state.seen, replace(state, seen=(hot, cold))
     if before is not None:
         hot, cold = before[0].joined(hot), before[1].joined(cold)
-    components = policy.components * (_MORE_COMPONENTS if learned.again else 1)
+    components = policy.components * (MORE_COMPONENTS if learned.again else 1)
     try:
         new = proposal.fit_proposal(
             hot, cold, learned.start, target.coordinates.order, state.generator, shares,
-            most=max(components, min(learned.modes, _MOST_COMPONENTS)), points=points,
+            most=max(components, min(learned.modes, MOST_COMPONENTS)), points=points,
             before=learned.proposal if isinstance(learned.proposal, Proposal) else None,
         )  # fmt: skip
     except np.linalg.LinAlgError:
@@ -317,8 +342,8 @@ def _weighted_twice(z: Array, value: Array, base: Array) -> tuple[Points, Points
     ----------
     A. Korba and F. Portier, Adaptive importance sampling meets mirror descent: a bias-variance tradeoff, AISTATS 2022.
     """
-    wanted = [power * value - base for power in (_HOT, 1.0)]
-    hot, cold = (Points.weighted(z, next_power(weight, 1.0, _EFFECTIVE) * weight) for weight in wanted)
+    wanted = [power * value - base for power in (HOT, 1.0)]
+    hot, cold = (Points.weighted(z, next_power(weight, 1.0, EFFECTIVE) * weight) for weight in wanted)
     return hot, cold
 
 
@@ -346,24 +371,3 @@ def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> 
         good = np.isfinite(value)
         drawn, values = np.vstack([drawn, z[good]]), np.concatenate([values, value[good]])
     return drawn[:n], values[:n]
-
-
-_REMEMBERED = 50_000  # places of all rounds
-# nats a coordinate from the density at a typical place of a normal hill to its mass, where it is as wide as the prior
-_WIDEST = 0.5 * float(1.0 + np.log(2.0 * np.pi / LEAST_CURVATURE))
-_NEXT_TO_NOTHING = float(np.log(1e-3))  # share of the mass: far less than shows in any summary
-# of the covariance at a mode: too narrow a start misses what is bent, too wide a one costs some draws
-_OVERDISPERSED = 1.7
-_WARM = (0.5, 0.6, 0.7, 0.8)  # powers of the density that burn-in walks, the longer the more often it has to
-_HOT = 0.4  # power of the density that the wide part of the proposal is fitted to
-_EFFECTIVE = 0.1  # of the places that a proposal is learned from
-_USEFUL = 0.05  # acceptance from which on draws of the proposal teach more than a walk
-_GOOD_ACCEPTANCE = 0.25  # burn-in goes on below it; with a quarter accepted, independent draws are some 7 steps apart
-_PASSING = 4000  # points for a proposal that only the next round draws from
-_IN_FULL, _LEAST_DRAWS = 4, 1024  # the round from which on there are all draws; the fewest for each mode before
-_TO_FIND_MORE, _FEW_ROUNDS = 4, 4  # times as many draws, and rounds, where places are hard to find
-# steps; a proposal within `Policy.tail` (1.5 nats) needs 4.5, one that was given up on gets no more than 8
-_LONGEST_SETTLING = 8
-_MOST_COMPONENTS = 24  # however many modes there are
-_LEAST_OF, _CLIMBS = 0.002, 6  # share of the kept draws that climbs begin from, and how many begin there
-_MORE_COMPONENTS = 2  # times as many for a proposal that has proved too poor: arms that hold a hundredth of the mass

@@ -9,11 +9,10 @@ import numpy as np
 from scipy.special import gammaln
 
 from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.settings import DEGREES, EM_GAIN, EM_STEPS, LEAST_EVIDENCE
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.spread_rows import spread_rows
 from wirebayes.numeric.typing import Array
-
-DEGREES = 5.0  # heavy enough to reach every tail of a posterior, light enough to be accepted
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixtur
     -------
     Mixture
     """
-    weights = np.maximum(np.exp(log_weights - log_weights.max()), 0.05)
+    weights = np.maximum(np.exp(log_weights - log_weights.max()), LEAST_EVIDENCE)
     return Mixture(weights / weights.sum(), centres, np.linalg.cholesky(covariances))
 
 
@@ -201,7 +200,6 @@ def _em(
     x: Array,
     weight: Array,
     mixture: Mixture,
-    iterations: int = 60,
     *,
     kind: type[np.floating[Any]] = np.float32,
     of_the_whole: float = 3.0,
@@ -217,7 +215,7 @@ def _em(
     (n, d), k, degrees = x.shape, len(mixture.weights), mixture.degrees
     squares = (x[:, :, None] * x[:, None, :]).reshape(n, d * d)
     last = -np.inf
-    for _ in range(iterations):
+    for _ in range(EM_STEPS):
         distances = mixture._distances(x)
         logs = mixture.log_parts(distances)
         total = log_sum(logs)
@@ -234,7 +232,7 @@ def _em(
         factors = np.linalg.cholesky(scale / (members + of_the_whole)[:, None, None])
         mixture = Mixture(members / members.sum(), centres, factors, degrees)
         log_likelihood = float(weight @ total)
-        if log_likelihood - last < 4e-3 * members.sum():
+        if log_likelihood - last < EM_GAIN * members.sum():
             break
         last = log_likelihood
     return mixture

@@ -19,18 +19,21 @@ from wirebayes.inference.sampler import mixture, transport_map
 from wirebayes.inference.sampler.components import Components
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.settings import (
+    ELSEWHERE,
+    EXCESS_COMPONENTS,
+    LIGHT_DEGREES,
+    POINTS,
+    TAKEN_AS_IT_IS,
+    TOO_FEW,
+    WIDER,
+)
 from wirebayes.inference.sampler.transport_map import Straight
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.resampling import effective_number
 from wirebayes.numeric.typing import Array
 
 Shares = tuple[float, float, float, float, float]
-# of the close part, the wide one, the plain one, the start's and that of the excess; without it the others share all
-SHARES = (0.684, 0.114, 0.114, 0.038, 0.05)
-# while it learns: draws of the other parts teach what lies far out
-EXPLORING = (0.44, 0.16, 0.16, 0.04, 0.2)
-ENOUGH = 12000  # points that settle a mixture in a handful of dimensions; more only take time
-ROUGH_SHARES = (0.3, 0.1, 0.1, 0.5, 0.0)  # while nothing but the start is sure
 
 
 @dataclass(frozen=True)
@@ -120,7 +123,7 @@ def fit_proposal(
     shares: Shares,
     *,
     most: int,
-    points: int = ENOUGH,
+    points: int = POINTS,
     before: Proposal | None = None,
     along_tails: bool = True,
 ) -> Proposal:
@@ -157,13 +160,13 @@ def fit_proposal(
         If the points do not span their space.
     """
     hot, cold = hot.thinned(points, rng), cold.thinned(points, rng)
-    elsewhere = before is None or (hot.spread > _ELSEWHERE * cold.spread).any()
+    elsewhere = before is None or (hot.spread > ELSEWHERE * cold.spread).any()
     straight = transport_map.fit_map(hot if along_tails and not elsewhere else cold, order)
     near, far = (replace(each, z=straight.forward(each.z)[0]) for each in (cold, hot))
     far, plain = far.thinned(points // 2, rng), hot.thinned(points // 2, rng)
     return Proposal(
         shares, straight,
-        mixture.fit_mixture(near, rng, most=most, degrees=_LIGHT, before=before.close if before else None),
+        mixture.fit_mixture(near, rng, most=most, degrees=LIGHT_DEGREES, before=before.close if before else None),
         mixture.fit_mixture(far, rng, most=most // 2, before=before.wide if before else None),
         mixture.fit_mixture(plain, rng, most=most // 2, before=before.plain if before else None),
         start,
@@ -197,23 +200,16 @@ def with_excess(of: Proposal, drawn: Points, value: Array, rng: np.random.Genera
     of = replace(of, excess=None)
     over = value - of.log_density(drawn.z)
     over -= np.quantile(over, 0.5, weights=drawn.weight, method="inverted_cdf")
-    weight = drawn.weight * -np.expm1(np.minimum(_TAKEN_AS_IT_IS - over, 0.0))
+    weight = drawn.weight * -np.expm1(np.minimum(TAKEN_AS_IT_IS - over, 0.0))
     some = weight > 0.0
     u = of.straight.forward(drawn.z[some])[0]
-    if some.sum() < _TOO_FEW or not np.isfinite(u).all():
+    if some.sum() < TOO_FEW or not np.isfinite(u).all():
         return of
     points = Points(u, weight[some]).worth(effective_number(weight[some]))
     try:
-        return replace(of, excess=mixture.fit_around(points, of.close, rng, most=_EXCESS_COMPONENTS, wider=_WIDER))
+        return replace(of, excess=mixture.fit_around(points, of.close, rng, most=EXCESS_COMPONENTS, wider=WIDER))
     except np.linalg.LinAlgError:
         return of
 
 
 _PARTS = ("close", "wide", "plain", "start", "excess")
-# times as wide: a normal density to the power 0.4 is 1.6 times as wide, those of the paper's wires, with effects of
-# bent tails, up to 4 times, a funnel 6 to 400 times
-_ELSEWHERE = 5.0
-_TAKEN_AS_IT_IS = 1.0  # nats over the typical ratio of posterior to proposal: less holds no walker for long
-_TOO_FEW = 5  # places of excess: they may be chance
-_EXCESS_COMPONENTS, _WIDER = 4, 1.5  # two necks and two tails; wide, for places seen are fewer than there are
-_LIGHT = 40.0  # degrees of freedom where the wide mixtures look after the tails

@@ -18,10 +18,8 @@ from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
 from wirebayes.inference.sampler.points import Points
 from wirebayes.inference.sampler.proposal import Proposal
+from wirebayes.inference.sampler.settings import POOL, POOL_IN_BURN_IN
 from wirebayes.numeric.typing import Array
-
-POOL = 64  # steps of which one does not trust the proposal; more gain little
-_EXPLORING = 4  # the same in burn-in, which looks for what the proposal leaves out
 
 
 @dataclass(frozen=True)
@@ -260,7 +258,12 @@ def move_of(learned: Learned, ensembles: int, steps: int, *, frozen: bool) -> Mo
     if not learned.trusted:
         return EvolutionMove(ensembles)
     straight = learned.proposal.straight if isinstance(learned.proposal, Proposal) else None
-    return PoolMove(learned.proposal, EvolutionMove(ensembles, straight), steps, POOL if frozen else _EXPLORING)
+    return PoolMove(
+        learned.proposal,
+        EvolutionMove(ensembles, straight),
+        steps,
+        POOL if frozen else POOL_IN_BURN_IN,
+    )
 
 
 def by_ensemble(blocks: Sequence[Array], policy: Policy) -> Array:

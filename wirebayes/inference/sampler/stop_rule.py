@@ -11,7 +11,18 @@ from wirebayes.inference.convergence import ENOUGH, farthest_apart, nested_r_hat
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in
-from wirebayes.inference.sampler.state import POOL, Diagnostics, Kept, Sampling, by_ensemble
+from wirebayes.inference.sampler.settings import (
+    DISAGREE,
+    FOR_MORE,
+    LITTLE,
+    MISSED,
+    MOST_AGAIN,
+    OUTWEIGHS,
+    POOR,
+    SLOW,
+    USUAL,
+)
+from wirebayes.inference.sampler.state import Diagnostics, Kept, Sampling, by_ensemble
 from wirebayes.numeric.typing import Array
 
 
@@ -43,7 +54,7 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
             least, most = float(found.ess.min()), float(found.r_hat.max())
             why = f"after {steps} steps: smallest ESS {least:.0f}, largest nested R-hat {most:.4f}"
             return replace(state, finished=True, converged=True, why=why)
-        if learned.again >= _MOST_AGAIN:
+        if learned.again >= MOST_AGAIN:
             why = (
                 f"not converged after {steps} steps: the proposal makes too little of some places, by a factor of "
                 f"e^{beyond:.1f} (allowed e^{OUTWEIGHS:.1f}); a narrow neck or a far mode may be missing"
@@ -73,14 +84,14 @@ def _contradicted(state: Sampling, policy: Policy, z: Array, values: Array) -> b
     too little is looked at itself.
     """
     before, previous = state.earlier.steps, state.learned.previous
-    if farthest_apart(values[:, :before], values[:, before:]) > _DISAGREE:
+    if farthest_apart(values[:, :before], values[:, before:]) > DISAGREE:
         return True
     if previous is None:
         return False
     log_proposal = previous.log_density(z.reshape(-1, z.shape[-1])).reshape(z.shape[:-1])
     over = by_ensemble(state.all_kept.log_density, policy) - log_proposal
-    little = over > np.median(over) + _LITTLE
-    return bool(little[:, before:].mean() - little[:, :before].mean() > _MISSED)
+    little = over > np.median(over) + LITTLE
+    return bool(little[:, before:].mean() - little[:, :before].mean() > MISSED)
 
 
 def _diagnosed(values: Array) -> Diagnostics:
@@ -99,10 +110,7 @@ def worth_a_new_start(state: Sampling) -> bool:
     assert state.diagnostics is not None
     known, least = state.learned, state.diagnostics.ess.min()
     return bool(
-        known.lost
-        and known.again < _MOST_AGAIN
-        or known.again < _FOR_MORE
-        and least < _POOR * state.all_kept.evaluations
+        known.lost and known.again < MOST_AGAIN or known.again < FOR_MORE and least < POOR * state.all_kept.evaluations
     )
 
 
@@ -116,23 +124,12 @@ def worth_refining(state: Sampling, policy: Policy) -> bool:
     going_on = state.all_kept.evaluations * (policy.ess / least - 1.0)
     wanted = policy.ess - (0.0 if slow_at_first(state, policy) else least)
     promising = going_on > wanted / USUAL + policy.round_draws
-    needed = known.again < _MOST_AGAIN and known.overlooked > 0.0
-    return bool(known.trusted and (needed or known.again < _FOR_MORE and promising))
+    needed = known.again < MOST_AGAIN and known.overlooked > 0.0
+    return bool(known.trusted and (needed or known.again < FOR_MORE and promising))
 
 
 def slow_at_first(state: Sampling, policy: Policy) -> bool:
     """Whether so few of the first block's draws are effective that walkers hardly left where they were placed."""
     assert state.diagnostics is not None
     first = state.learned.again == 0 and state.all_kept.steps <= policy.block
-    return bool(first and state.diagnostics.ess.min() < _SLOW * state.all_kept.evaluations)
-
-
-OUTWEIGHS = float(np.log(POOL / 2))  # nats: a place worth half a pool of typical ones keeps its walker for long
-# times that the proposal may be learned again for more draws, and for what it overlooks
-_FOR_MORE, _MOST_AGAIN = 3, 8
-# standard errors between draws of two proposals: thirty numbers of which all agree exceed it in two of a thousand cases
-_DISAGREE = 4.0
-# nats over the typical ratio of posterior to proposal: walkers seldom find such places, or stay; and how much of the
-# mass, found there later, says that too little had been found before
-_LITTLE, _MISSED = 3.0, 0.01
-USUAL, _SLOW, _POOR = 0.6, 0.35, 0.2  # effective draws per kept evaluation
+    return bool(first and state.diagnostics.ess.min() < SLOW * state.all_kept.evaluations)

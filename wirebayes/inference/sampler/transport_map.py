@@ -21,6 +21,18 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.settings import (
+    ALTERNATIONS,
+    CLEAR,
+    FEW,
+    MOST_PAIRS,
+    POINTS_A_TERM,
+    RESERVE,
+    RIDGE,
+    SCORES,
+    SETTLED,
+    SKEWNESSES,
+)
 from wirebayes.numeric.typing import Array
 
 
@@ -123,13 +135,13 @@ def fit_map(points: Points, order: NDArray[np.int64]) -> Straight:
         raise np.linalg.LinAlgError("the points do not span their space")
     v = (x - centre) / scale
     constant, linear, quadratic, log_scale = np.zeros(d), np.zeros((d, d)), np.zeros((d, d, d)), np.zeros((d, d + 1))
-    clear = _CLEAR * np.sqrt(worth / points.distinct)  # draws that repeat know no more
-    every = d**3 / 6.0 < worth / _POINTS_A_TERM
+    clear = CLEAR * np.sqrt(worth / points.distinct)  # draws that repeat know no more
+    every = d**3 / 6.0 < worth / POINTS_A_TERM
     spread, left = np.zeros((n, d)), np.zeros((n, d))
     for j in range(d):
         lines = np.column_stack([np.ones(n), v[:, :j]])
-        one, other = np.triu_indices(j if every or d > _FEW else 0)
-        if not every and d > _FEW:
+        one, other = np.triu_indices(j if every or d > FEW else 0)
+        if not every and d > FEW:
             one, other = _seen_at_once(v, lines, one, other, v[:, j], weight, clear)
         terms = np.column_stack([lines, v[:, one] * v[:, other]])
         of_mean, of_scale, t = _regress(terms, lines, v[:, j], weight)
@@ -168,7 +180,7 @@ def _seen_at_once(
     left = both - basis @ (basis.T @ both)
     size = np.maximum(np.sqrt((left**2).sum(axis=0)), 1e-300)
     t = np.abs(left[:, :-1].T @ left[:, -1]) / (size[:-1] * size[-1]) * np.sqrt(weight.sum())
-    best = np.argsort(-t, kind="stable")[:_MOST_PAIRS]
+    best = np.argsort(-t, kind="stable")[:MOST_PAIRS]
     best = np.sort(best[t[best] > clear])
     return one[best], other[best]
 
@@ -190,16 +202,16 @@ def _shapes(x: Array, weight: Array) -> Array:
     """
     middle = weight @ x / weight.sum()
     spread = np.maximum(np.sqrt(weight @ (x - middle) ** 2 / weight.sum()), 1e-12)
-    quantiles = (_quantiles(x, weight, ndtr(_SCORES)) - middle) / spread
-    inner = np.arcsinh(_SCORES) + _SKEWNESSES[:, None]
-    curve, slope = np.sinh(inner), np.cosh(inner) / np.sqrt(1.0 + _SCORES**2)
+    quantiles = (_quantiles(x, weight, ndtr(SCORES)) - middle) / spread
+    inner = np.arcsinh(SCORES) + SKEWNESSES[:, None]
+    curve, slope = np.sinh(inner), np.cosh(inner) / np.sqrt(1.0 + SCORES**2)
     lines = np.stack([np.ones_like(curve), curve], axis=-1) / slope[..., None]
     weighted = quantiles / slope[..., None]
     line = np.linalg.pinv(lines) @ weighted
     location, width = line[:, 0], np.maximum(line[:, 1], 1e-3)
-    off = ((weighted - lines @ line) ** 2).sum(axis=1) / width**2 + (_RESERVE * _SKEWNESSES[:, None]) ** 2
+    off = ((weighted - lines @ line) ** 2).sum(axis=1) / width**2 + (RESERVE * SKEWNESSES[:, None]) ** 2
     best, m = np.argmin(off, axis=0), np.arange(x.shape[1])
-    return np.array([middle + spread * location[best, m], spread * width[best, m], _SKEWNESSES[best]])
+    return np.array([middle + spread * location[best, m], spread * width[best, m], SKEWNESSES[best]])
 
 
 def _quantiles(x: Array, weight: Array, shares: Array) -> Array:
@@ -219,38 +231,23 @@ def _regress(
     """
     worth = points.sum()
     of_scale = np.zeros(lines.shape[1]) if of_scale is None else of_scale
-    bend = _RIDGE * worth * np.eye(terms.shape[1])
-    information = 2.0 * (lines.T * points) @ lines + _RIDGE * worth * np.eye(lines.shape[1])
+    bend = RIDGE * worth * np.eye(terms.shape[1])
+    information = 2.0 * (lines.T * points) @ lines + RIDGE * worth * np.eye(lines.shape[1])
 
     def weights() -> Array:
         weight = points * np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0))
         return np.asarray(weight * (worth / weight.sum()))
 
-    for _ in range(_ALTERNATIONS):
+    for _ in range(ALTERNATIONS):
         weighted = terms.T * weights()
         of_mean = np.linalg.solve(weighted @ terms + bend, weighted @ y)
         # a point far out says where the scale grows, but no single one decides
         square = np.minimum((y - terms @ of_mean) ** 2 * np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0)), 9.0)
         step = np.linalg.solve(information, lines.T @ (points * (square - 1.0)))
         of_scale = of_scale + step
-        if points @ (lines @ step) ** 2 < _SETTLED**2 * worth:
+        if points @ (lines @ step) ** 2 < SETTLED**2 * worth:
             break
     weight = weights()
     inverse = np.linalg.inv((terms.T * weight) @ terms + bend)
     variance = weight @ (y - terms @ of_mean) ** 2 / worth
     return of_mean, of_scale, of_mean / np.sqrt(variance * np.diag(inverse))
-
-
-# a usual figure for regressions; with fewer the d³/6 bends are tried one by one instead of together
-_POINTS_A_TERM = 20
-# of the information in all points: terms that say nearly the same stay solvable, and others lose a thousandth
-_RIDGE = 1e-3
-_CLEAR = 4.0  # standard errors
-_FEW, _MOST_PAIRS = 12, 30  # dimensions in which rough points settle no bends; bends of a coordinate in more
-_ALTERNATIONS = 6  # of mean and scale; the map need not be the best one, because the sampler is exact with any
-_SETTLED = 0.02  # root mean square change of the log scale: two in a hundred of a width are no worse a map
-# normal scores of the quantiles compared, 0.3 % to 99.7 %: further out a few points decide
-_SCORES = np.linspace(-2.8, 2.8, 15)
-# tried in steps of 0.05; finer ones would gain nothing, as the sampler is exact with any map
-_SKEWNESSES = np.linspace(-2.0, 2.0, 81)
-_RESERVE = 0.1  # against a shape that is only noise
