@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wirebayes.errors import InputError
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 
 EXAMPLE = Path(__file__).parent / "example"
 

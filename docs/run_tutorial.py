@@ -23,7 +23,7 @@ from wirebayes.report.blocks import save
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, corner
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.report.pictures.discover import left_over
-from wirebayes.results.store import Stored, load
+from wirebayes.results.read_back import Stored, load
 
 DOCS = Path(__file__).parent
 README = DOCS.parent / "README.md"

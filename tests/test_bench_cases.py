@@ -11,7 +11,8 @@ import pytest
 
 import wirebayes as wb
 from wirebayes.io import data_checks
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.views.posterior import Posterior
 
 CASES = Path(__file__).parent / "data" / "bench"

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from wirebayes.io.bench import labview
 from wirebayes.io.bench.convert import About, Choices, convert
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.paper import FOLDER
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate

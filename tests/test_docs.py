@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from wirebayes.cli import COMMANDS, main
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.robot.mechanics import schema
 from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire import compiled

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from wirebayes.inference.policy import Policy as Policy
     from wirebayes.io.arrays import from_arrays as from_arrays
     from wirebayes.io.experiment import Experiment as Experiment
-    from wirebayes.io.experiment import read_experiments as read_experiments
+    from wirebayes.io.experiment_file import read_experiments as read_experiments
     from wirebayes.prediction.table import Prediction as Prediction
     from wirebayes.robot.history.live import LiveEstimator as LiveEstimator
     from wirebayes.robot.history.live import LivePose as LivePose

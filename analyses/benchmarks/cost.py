@@ -21,8 +21,9 @@ from analyses.benchmarks.plain import ours
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.fit import fit
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.io.experiment import Experiment, Hold
+from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
+from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.problem import Likelihood, build
 from wirebayes.wire import compiled

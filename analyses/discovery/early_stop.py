@@ -21,7 +21,8 @@ from wirebayes.discovery import global_test
 from wirebayes.discovery.screening import GlobalTest
 from wirebayes.discovery.settings import ALPHA, SIMULATIONS
 from wirebayes.effects import CATALOGUE
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 
 DELTAS = (3.0, 5.0)  # so small that many lie near the level
 

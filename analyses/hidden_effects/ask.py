@@ -42,7 +42,7 @@ def _answer(spec: Spec, file: Path, how: str, without: tuple[str, ...], simulati
     seed = int(spec.key, 16) % 2**31
     if how in ("api", "apart"):
         from wirebayes.discovery.search import discover
-        from wirebayes.io.experiment import read_experiments
+        from wirebayes.io.experiment_file import read_experiments
 
         # posteriors are not judged here and cost minutes: left out where the function offers to
         options: dict[str, Any] = {"posterior": False} if "posterior" in inspect.signature(discover).parameters else {}

@@ -12,7 +12,7 @@ import numpy as np
 from wirebayes.comparison.candidates import BASE, Candidate, candidates, effects_of, problem_of
 from wirebayes.effects import catalogue
 from wirebayes.inference.fit import fit, seed_of
-from wirebayes.io.experiment import select
+from wirebayes.io.experiment_file import select
 from wirebayes.io.paper import experiments
 from wirebayes.prediction.leave_one_hold_out import LARGEST_K, smoothed_leave_one_hold_out
 

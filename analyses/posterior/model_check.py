@@ -24,7 +24,8 @@ from analyses.resumable import records
 from wirebayes.discovery.model_check import check_model
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.fit import seed_of
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.results.jobs import Job
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect, EventEffect

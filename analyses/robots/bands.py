@@ -28,7 +28,7 @@ from tests.robot import independent
 from wirebayes.commands.wires import read_wires
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.results.jobs import Job, one
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot

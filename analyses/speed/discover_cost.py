@@ -25,7 +25,7 @@ def cost_of(name: str, seed: int, simulations: int) -> dict[str, Any]:
     from wirebayes.discovery.settings import Settings
     from wirebayes.effects import CATALOGUE
     from wirebayes.io import paper
-    from wirebayes.io.experiment import read_experiments
+    from wirebayes.io.experiment_file import read_experiments
 
     experiments = [paper.experiments()[int(name)]] if name.isdigit() else read_experiments(Path(name))
     begin = time.process_time()

@@ -24,7 +24,7 @@ PAPER = tuple(f"paper:{i}" for i in range(4))
 def experiments_of(case: str) -> Any:
     """The experiments of a case: a wire of the paper, or a file."""
     from wirebayes.io import paper
-    from wirebayes.io.experiment import read_experiments
+    from wirebayes.io.experiment_file import read_experiments
 
     return [paper.experiments()[int(case[-1])]] if case in PAPER else read_experiments(Path(case))
 

@@ -16,7 +16,7 @@ from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.discovery.screening import GlobalTest, Scale
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.likelihoods import reading_variance
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect

@@ -17,7 +17,8 @@ from wirebayes.discovery.search import discover
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import fitted
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.results.jobs import Job
 from wirebayes.simulation.synthetic import Bench, Truth, write
 

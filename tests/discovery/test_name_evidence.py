@@ -14,7 +14,7 @@ from wirebayes.discovery.power import amplitude_80
 from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.search import discover
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.inference.modes import Optimum
+from wirebayes.inference.climb import Optimum
 from wirebayes.simulation.synthetic import Bench, Truth
 
 NORM = 25.0  # δ per unit of amplitude in these scans

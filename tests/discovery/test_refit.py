@@ -11,7 +11,7 @@ from scipy import stats
 from wirebayes.discovery import refit
 from wirebayes.discovery.refit import occam
 from wirebayes.effects import named
-from wirebayes.inference.modes import Optimum
+from wirebayes.inference.climb import Optimum
 
 TWO_SIDED = named("strain_stiffening")
 

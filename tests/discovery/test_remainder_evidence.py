@@ -20,7 +20,7 @@ from wirebayes.discovery.remainder_evidence import (
 )
 from wirebayes.effects import named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.simulation.synthetic import Bench, Truth
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}

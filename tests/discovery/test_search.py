@@ -15,7 +15,8 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io import paper
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.processes import workers
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect

@@ -12,7 +12,8 @@ from wirebayes.discovery.sharing import _known, _table, alike, informed
 from wirebayes.effects import named
 from wirebayes.effects.instrument import ScrewError
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.scales import scales_of
 from wirebayes.simulation.synthetic import Bench, Truth, write
 

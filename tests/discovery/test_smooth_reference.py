@@ -12,7 +12,7 @@ from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.remainder_evidence import reference_of, remainder_evidence
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io import paper
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.simulation.synthetic import Bench, Truth, write
 
 WIRE = paper.experiments()[2]

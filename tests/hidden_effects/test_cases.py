@@ -12,7 +12,7 @@ from analyses.hidden_effects.catalogue import EFFECTS
 from analyses.hidden_effects.optimal import judge
 from analyses.hidden_effects.run import append_line, main, read_lines
 from analyses.hidden_effects.truth import PROTOCOLS
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 
 SLIP = Spec("single", "paper", ("grip_slip",), 20.0, 0)
 

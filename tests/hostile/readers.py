@@ -12,7 +12,7 @@ from wirebayes.commands.import_robot import import_robot
 from wirebayes.io import plan_file
 from wirebayes.io.bench.convert import About, convert
 from wirebayes.io.bench.undecided import Choices
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.readings import protocol_holds, protocol_table
 from wirebayes.model.problem import build
 from wirebayes.robot.mechanics import schema

@@ -7,9 +7,11 @@ import pytest
 
 from tests.statistical.targets import Silent
 from wirebayes.effects import named
+from wirebayes.inference import climb as climbing
 from wirebayes.inference import modes
+from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.inference.modes import climb, search
+from wirebayes.inference.modes import search
 from wirebayes.io.paper import experiments
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import build, with_readings
@@ -238,8 +240,8 @@ def test_further_climbs_begin_with_the_noises_held_near_those_of_the_best_mode(l
     found = one.climbed([modes._prior(target, 3, np.random.default_rng(1))], [])
     begun = []
     monkeypatch.setattr(one, "climbed", lambda begin, before: begun.extend(begin) or found)
-    by, look = [], modes._by_residuals
-    monkeypatch.setattr(modes, "_by_residuals", lambda of, z, *more: by.append(z.shape[1]) or look(of, z, *more))
+    by, look = [], climbing._by_residuals
+    monkeypatch.setattr(climbing, "_by_residuals", lambda of, z, *more: by.append(z.shape[1]) or look(of, z, *more))
     begin = modes._prior(target, 20, np.random.default_rng(2))
     assert one.further(found, [begin])[0].z == pytest.approx(found[0].z)
     best = found[0].z[np.argmax(found[0].log_evidence)]
@@ -325,7 +327,7 @@ def test_of_climbs_on_one_density_those_that_come_to_the_same_place_are_given_up
 )
 def test_a_place_is_near_an_end_within_two_standard_deviations_and_below_it(apart, higher, which, near):
     end = modes.Optimum(np.array([[1.0, 2.0]]), np.array([5.0]), np.diag([4.0, 1.0])[None], np.ones(1, bool))
-    ends = modes._Ends.of([end])
+    ends = climbing._Ends.of([end])
     for place in ([1.0 + 0.5 * apart, 2.0], [1.0, 2.0 - apart]):
         assert ends.near(np.array([which]), np.array([place]), np.array([5.0 + higher]))[0] == near
 

@@ -10,7 +10,7 @@ from scipy import stats
 
 from wirebayes.inference import importance
 from wirebayes.inference import weighted_posterior as module
-from wirebayes.inference.modes import Optimum
+from wirebayes.inference.climb import Optimum
 from wirebayes.inference.weighted_posterior import overlooked, weighted_posterior, witnessed
 from wirebayes.io.paper import experiments
 from wirebayes.model.problem import build

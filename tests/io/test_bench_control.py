@@ -8,7 +8,7 @@ from tests.io.bench_files import convert
 from wirebayes.io import data_checks
 from wirebayes.io.bench.convert import About
 from wirebayes.io.bench.undecided import Choices, Undecided
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 
 MINUTES = np.array([0.0, 1, 2, 5, 10, 20, 30]) * 60.0
 

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from wirebayes.errors import InputError
-from wirebayes.io.experiment import read_experiments, select
+from wirebayes.io.experiment_file import read_experiments, select
 from wirebayes.io.readings import protocol_holds, protocol_table, readings_of, readings_table
 from wirebayes.model.problem import build
 

@@ -7,7 +7,7 @@ import pytest
 
 import wirebayes as wb
 from wirebayes.io import data_checks, gross_events, paper
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 WIRE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 0.9, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}

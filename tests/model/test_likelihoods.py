@@ -16,7 +16,7 @@ from tests.model.dense import (
 )
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import named
-from wirebayes.model import likelihoods
+from wirebayes.model import likelihoods, single_holds
 from wirebayes.wire import compiled
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import linearise, simulate
@@ -176,7 +176,7 @@ def test_held_out_holds_are_given_those_before_them_alone():
 
 def by_hold(p, theta, y, model=None):
     variance = np.array([theta["sensor_sd"] ** 2])
-    return likelihoods.hold_by_hold(p, columns(theta), model or Model(), y[..., None], variance)[:, 0]
+    return single_holds.hold_by_hold(p, columns(theta), model or Model(), y[..., None], variance)[:, 0]
 
 
 @pytest.mark.parametrize("late", [0.0, 7.0])
@@ -208,7 +208,7 @@ def test_with_an_effect_too_every_hold_is_a_test_of_its_own_through_its_first_re
     model = Model(effects=(named(key),))
     theta = columns(PLAIN | STRONG)
     first = np.linspace(1.0, 6.0, len(LOADING.setting))[:, None]
-    for j, course in enumerate(likelihoods.hold_courses(LOADING, theta, model, first)):
+    for j, course in enumerate(single_holds.hold_courses(LOADING, theta, model, first)):
         if course is None:
             continue
         tension, slope, _ = course

@@ -13,7 +13,7 @@ from wirebayes.effects import named
 from wirebayes.effects.event import GripSlip
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
-from wirebayes.model import likelihoods
+from wirebayes.model import single_holds
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Likelihood, build, with_protocols, with_readings
 from wirebayes.simulation.synthetic import Bench, Truth
@@ -33,7 +33,7 @@ def test_rounding_is_part_of_the_error_of_every_reading():
     experiment = simulated_tests([bench], Truth(WIRE), seed=1)[0]
     problem = build([experiment], likelihood="hold")
     sample = problem.samples[0]
-    courses = likelihoods.hold_courses(sample.protocol, columns(WIRE), Model(), sample.readings[:, 0])
+    courses = single_holds.hold_courses(sample.protocol, columns(WIRE), Model(), sample.readings[:, 0])
     expected = 0.0
     for course, readings in zip(courses, experiment.tension(), strict=True):
         tension, slope, _ = course

@@ -10,7 +10,7 @@ from tests.model.dense import log_density, normal
 from tests.model.test_likelihoods import SINGLE_STATE, STRONG, filtered, measured, models, noises
 from tests.wire.protocols import PLAIN, columns, parameters, protocol, protocols
 from wirebayes.effects import named
-from wirebayes.model import likelihoods
+from wirebayes.model import single_holds
 from wirebayes.wire.model import Model
 
 TIMES = [0.0, 30.0, 60.0, 120.0]
@@ -51,7 +51,7 @@ def test_hold_by_hold_the_first_reading_fixes_the_offset_and_its_error_counts():
     y = measured(WEIGHTS, PLAIN | ERRORS)
     p, variance = WEIGHTS, ERRORS["sensor_sd"] ** 2
     theta = {name: value for name, value in columns(**PLAIN).items() if name not in ("k1", "preload")}
-    found = likelihoods.hold_by_hold(p, theta, Model(), y[..., None], np.array([variance]))[:, 0]
+    found = single_holds.hold_by_hold(p, theta, Model(), y[..., None], np.array([variance]))[:, 0]
     for j, weight in enumerate(p.setting):
         if not p.recorded[j]:
             assert found[j] == 0.0
@@ -60,7 +60,7 @@ def test_hold_by_hold_the_first_reading_fixes_the_offset_and_its_error_counts():
         later = (y[j] - y[j, 0])[1:] - (grown - grown[0])[1:]
         covariance = variance * (np.eye(3) + np.ones((3, 3)))
         assert found[j] == pytest.approx(stats.multivariate_normal(np.zeros(3), covariance).logpdf(later), rel=1e-9)
-    total, residuals = likelihoods.standardised_hold_by_hold(p, theta, Model(), y[..., None], np.array([variance]))
+    total, residuals = single_holds.standardised_hold_by_hold(p, theta, Model(), y[..., None], np.array([variance]))
     assert total[0] == pytest.approx(found.sum(), rel=1e-12) and np.isfinite(residuals).all()
 
 
@@ -68,7 +68,7 @@ def test_hold_by_hold_an_offset_of_the_gauge_changes_nothing():
     y = measured(WEIGHTS, PLAIN | ERRORS)
     theta = columns(**PLAIN)
     one, other = (
-        likelihoods.hold_by_hold(WEIGHTS, theta, Model(), (y + offset)[..., None], np.array([1e-4]))
+        single_holds.hold_by_hold(WEIGHTS, theta, Model(), (y + offset)[..., None], np.array([1e-4]))
         for offset in (0.0, -37.0)
     )
     np.testing.assert_allclose(one, other, rtol=1e-9)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wirebayes.inference.climb import climb
 from wirebayes.inference.fit import fit
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.inference.modes import climb
 from wirebayes.inference.policy import Policy
 from wirebayes.model.problem import build, with_readings
 from wirebayes.model.replicate import readings

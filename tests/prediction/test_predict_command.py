@@ -16,7 +16,8 @@ from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
 from wirebayes.model.problem import build
-from wirebayes.results.store import load, save
+from wirebayes.results.read_back import load
+from wirebayes.results.store import save
 from wirebayes.robot.mechanics.draws import warnings
 
 QUICK = Policy(ensembles=2, walkers=64, ess=300.0, r_hat=1.1, most_steps=80)

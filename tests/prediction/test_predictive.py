@@ -9,7 +9,7 @@ from tests.model.dense import jacobian, normal
 from wirebayes.effects import named
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
-from wirebayes.model import likelihoods
+from wirebayes.model import single_holds
 from wirebayes.model.problem import build
 from wirebayes.prediction import predictive
 from wirebayes.prediction.predictive import PredictionRequest, _regressed, predict, settings_given_readings
@@ -299,7 +299,7 @@ def test_hold_by_hold_each_hold_follows_from_its_own_first_reading() -> None:
     request = PredictionRequest(protocol, 0, requested, first)
     drawn = predict(problem, theta, sample, request, np.random.default_rng(0))
     own = {name: np.array([value]) for name, value in TRUTH.items()}
-    courses = likelihoods.hold_courses(protocol, own, sample.model, first[:, None])
+    courses = single_holds.hold_courses(protocol, own, sample.model, first[:, None])
     for j, course in enumerate(courses):
         if course is None or not requested[j]:
             assert not drawn[j].any()

@@ -7,11 +7,11 @@ import pytest
 
 from wirebayes.effects import named
 from wirebayes.errors import InputError
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.readings import protocol_table
 from wirebayes.model.problem import build
 from wirebayes.prediction.request import request_of
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.strict.table import Table
 
 TRAINED = """hold,displacement_mm,time_s,tension_N,temperature_C

@@ -13,7 +13,7 @@ from wirebayes.model.problem import build
 from wirebayes.prediction import table as module
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.model import Model
 

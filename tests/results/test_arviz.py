@@ -16,10 +16,11 @@ from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.problem import build
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out
-from wirebayes.results import store
+from wirebayes.results import read_back, store
 
 HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=12)
 # With effects the tails of a hasty proposal are so heavy that two versions of Pareto smoothing differ by up to 0.14 in
@@ -164,7 +165,7 @@ def test_a_protocol_comes_back_as_it_was(
     stored: dict[str, tuple[Path, Fit]], experiments: list[Experiment], kind: str
 ) -> None:
     for experiment in experiments if kind == "together" else experiments[:1]:
-        sample = store.load(stored[kind][0], experiment.name).sample
+        sample = read_back.load(stored[kind][0], experiment.name).sample
         expected = experiment.protocol()
         for name, value in vars(expected).items():
             assert np.array_equal(getattr(sample.protocol, name), value), name
@@ -290,4 +291,4 @@ def test_a_reading_without_its_time_is_refused(stored: dict[str, tuple[Path, Fit
     with h5py.File(copy, "a") as file:
         file["constant_data/time_s"][0, 1] = np.nan
     with pytest.raises(InputError, match="readings and times that do not belong together"):
-        store.load(tmp_path)
+        read_back.load(tmp_path)

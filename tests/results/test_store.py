@@ -9,9 +9,9 @@ from wirebayes.effects.creep import SecondRelaxation, SteadyCreep
 from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.problem import build
-from wirebayes.results import jobs, store
+from wirebayes.results import jobs, read_back, store
 from wirebayes.results.jobs import Job
 from wirebayes.simulation.synthetic import Bench, Truth, draw, write
 from wirebayes.wire.staircase import simulate
@@ -33,7 +33,7 @@ def test_what_is_read_back_predicts_as_the_joint_fit_does(fitted, sample, apart,
     joint = fitted.problem
     here = joint.samples[sample]
     store.save(fitted, tmp_path, {}, sample=here if apart else None)
-    stored = store.load(tmp_path, here.name)
+    stored = read_back.load(tmp_path, here.name)
     theta = np.concatenate(list(fitted.theta))[:20]
     read = {name: values[:20] for name, values in stored.draws.items()}
     expected = simulate(here.protocol, joint.parameters(theta, here), here.model)
@@ -53,7 +53,7 @@ def test_the_summary_s_figures_of_a_fresh_sample_include_all_effects_of_the_wire
         return slow + mode + own["steady_creep.a"] * load * t
 
     draws = joint.parameters(fitted.flat, here)
-    for key, time in store.CREEP_TIMES_S.items():
+    for key, time in summary.CREEP_TIMES_S.items():
         values = creep(draws, time)
         assert [derived[key][q] for q in ("q05", "q50", "q95")] == pytest.approx(np.quantile(values, [0.05, 0.5, 0.95]))
         assert derived[key]["mean"] == pytest.approx(values.mean(), rel=1e-12)
@@ -98,7 +98,7 @@ def test_the_reference_temperature_is_stored_for_each_sample(tmp_path):
     (tmp_path / "long.csv").write_text("\n".join(logged) + "\n")
     experiments = read_experiments(tmp_path / "experiments.toml")
     store.save(fit(build(experiments), 1, policy=HASTY), tmp_path, {})
-    short, long = (store.load(tmp_path, e.name).sample.protocol for e in experiments)
+    short, long = (read_back.load(tmp_path, e.name).sample.protocol for e in experiments)
     assert short.reference_C is None and short.warming_K is None
     assert long.reference_C == 21.5
     assert np.array_equal(long.warming_K, experiments[1].protocol().warming_K)

@@ -6,7 +6,7 @@ import pytest
 
 from wirebayes.cli import main
 from wirebayes.model.problem import Sample
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics import schema
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
@@ -32,7 +32,7 @@ def fitted(tmp_path, monkeypatch):
         Sample("made-up", "made up", PROTOCOL, np.array([[0.85, 0.8], [7.65, 7.3]])[..., None], 0.01, Model()),
         "chain",
     )
-    monkeypatch.setattr("wirebayes.results.store.load", lambda folder, experiment=None, own_effects=None: stored)
+    monkeypatch.setattr("wirebayes.results.read_back.load", lambda folder, experiment=None, own_effects=None: stored)
     folder = tmp_path / "fit"
     folder.mkdir()
     (folder / "posterior.nc").write_bytes(b"made up")
@@ -153,10 +153,10 @@ def test_a_folder_without_a_posterior_is_refused(tmp_path, capsys):
 def test_a_fit_hold_by_hold_is_refused_for_it_leaves_k1_open(fitted, tmp_path, monkeypatch, capsys, command):
     from dataclasses import replace
 
-    from wirebayes.results import store
+    from wirebayes.results import read_back
 
-    stored = replace(store.load(fitted), likelihood="hold")
-    monkeypatch.setattr("wirebayes.results.store.load", lambda folder, experiment=None, own_effects=None: stored)
+    stored = replace(read_back.load(fitted), likelihood="hold")
+    monkeypatch.setattr("wirebayes.results.read_back.load", lambda folder, experiment=None, own_effects=None: stored)
     assert main([*command, "--wires", str(fitted), "--output", str(tmp_path / "o")]) == 2
     line = capsys.readouterr().err.strip()
     assert "does not determine the stiffness k1" in line

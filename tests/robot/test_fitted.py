@@ -12,7 +12,7 @@ from wirebayes.effects import catalogue
 from wirebayes.inference.fit import fit
 from wirebayes.io import paper
 from wirebayes.model.problem import build
-from wirebayes.results import store
+from wirebayes.results import read_back, store
 from wirebayes.robot.mechanics import rotation, schema
 
 OWN = Path(__file__).parents[2] / "docs" / "own_effect.py"
@@ -55,7 +55,7 @@ def test_pose_bends_the_wires_as_the_fitted_effect_does(fitted, tmp_path, effect
     robot = schema.read("cogiro-desk")
     points = robot.platform_m @ rotation.matrix(robot.home_rotation_rad).T
     stretched = np.linalg.norm(robot.home_m + points - robot.exit_m, axis=1) + robot.beyond_m
-    sample = store.load(fitted[effect], own_effects=own).draws
+    sample = read_back.load(fitted[effect], own_effects=own).draws
     pick = np.linspace(0, len(sample["k1"]) - 1, 50).round().astype(int)
     k1, amplitude = sample["k1"][pick, None], sample[f"{effect}.{column}"][pick, None]
     zero = stretched / (1 + strain(np.array(message["inverse"]["tension_N"]) / k1, amplitude))

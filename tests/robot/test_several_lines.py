@@ -163,13 +163,13 @@ def test_names_and_folders_are_read(tmp_path):
 
 
 def test_lines_of_two_laws_are_refused(fitted, monkeypatch):  # noqa: F811
-    from wirebayes.results import store
+    from wirebayes.results import read_back
 
-    hooke = store.load(fitted)
+    hooke = read_back.load(fitted)
     other = replace(hooke, sample=replace(hooke.sample, model=replace(hooke.sample.model, law="modified")))
     laws = {"a": hooke, "b": other}
     monkeypatch.setattr(
-        "wirebayes.results.store.load", lambda folder, experiment=None, own_effects=None: laws[folder.name]
+        "wirebayes.results.read_back.load", lambda folder, experiment=None, own_effects=None: laws[folder.name]
     )
     with pytest.raises(InputError, match="found a fitted with --elastic-law hooke and b with modified"):
         draws_of({"a": "a", "b": "b"}, 10)
@@ -199,7 +199,7 @@ def test_legs_are_new_specimens_where_several_were_tested():
 def test_commands_take_several_tests_of_one_line(fitted, tmp_path, capsys, monkeypatch):  # noqa: F811
     known = wire_defaults(1000.0, Scales(step_mm=1.0, range_mm=12.0, tension_N=4.0, hold_s=120.0, step_N=0.35))
     before = {name: known[name].rvs(500, random_state=i) for i, name in enumerate(draws.CORE)}
-    monkeypatch.setattr("wirebayes.results.store.prior_draws", lambda folder, experiment=None: before)
+    monkeypatch.setattr("wirebayes.results.read_back.prior_draws", lambda folder, experiment=None: before)
     way = tmp_path / "way.csv"
     way.write_text("time_s,x_m,y_m,z_m\n0,0,0,.6\n60,0,0,.6\n")
     arguments = ["pose", "linear-6", "--trajectory", str(way), "--draws", "10", "--output", str(tmp_path / "out")]

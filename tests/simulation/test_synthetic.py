@@ -9,7 +9,7 @@ import pytest
 
 from wirebayes.cli import main
 from wirebayes.effects import named
-from wirebayes.io.experiment import read_experiments
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, write
 
 TRUE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 1.0, "preload": 0.3, "sensor_sd": 0.005, "setting_sd": 0.01}

@@ -17,7 +17,7 @@ from wirebayes.effects.instrument import ReadingDelay
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.paper import experiments
-from wirebayes.model import likelihoods
+from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.problem import build
 from wirebayes.wire import compiled
 from wirebayes.wire.effect import Effect, EventEffect
@@ -101,8 +101,8 @@ def test_readings_and_derivatives_are_those_of_numpy(p, model, rows, seed):
 def test_single_holds_are_those_of_numpy(p, model, rows, seed):
     theta = drawn(model, rows, seed)
     first = np.random.default_rng(seed).uniform(-0.5, 8.0, (len(p.setting), 1))
-    found = likelihoods.hold_courses(p, theta, model, first)
-    expected = by_numpy(lambda: likelihoods.hold_courses(p, theta, model, first))
+    found = single_holds.hold_courses(p, theta, model, first)
+    expected = by_numpy(lambda: single_holds.hold_courses(p, theta, model, first))
     for one, other, recorded in zip(found, expected, p.recorded, strict=True):
         assert (one is not None) == (other is not None) == recorded
         if one is not None:

@@ -18,7 +18,8 @@ from wirebayes.discovery.settings import SIMULATIONS
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes, write_csv, write_json, write_parquet
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.model.problem import MATERIAL, SAMPLE, build

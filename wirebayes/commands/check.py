@@ -8,7 +8,8 @@ from wirebayes.discovery.preview import preview
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.fit import seed_of
 from wirebayes.io import data_checks
-from wirebayes.io.experiment import Experiment, Hold
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
 from wirebayes.json_files.read_units import in_unit

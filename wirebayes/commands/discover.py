@@ -37,7 +37,7 @@ from wirebayes.notice import from_json, named, to_json
 from wirebayes.processes.workers import computing, workers
 from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
-from wirebayes.results.store import load
+from wirebayes.results.read_back import load
 from wirebayes.strict.files import PathLike
 from wirebayes.views.findings import Findings
 from wirebayes.views.result import ResultFolder

@@ -9,7 +9,8 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io import gross_events
-from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings, read_experiments, select
+from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings
+from wirebayes.io.experiment_file import read_experiments, select
 from wirebayes.strict.files import PathLike
 from wirebayes.strict.hint import hint
 

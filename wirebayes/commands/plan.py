@@ -16,7 +16,8 @@ from wirebayes.discovery.next_measurement import alternatives
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
-from wirebayes.io.experiment import Experiment, read_experiments, select
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments, select
 from wirebayes.io.plan_file import PlanFile, PlannedTest, is_plan, read_plan
 from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import open_run, read_json, write_json
@@ -32,7 +33,7 @@ from wirebayes.planning.ranking import Judged, ranked, too_long
 from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
 from wirebayes.planning.widths import HOUR_S, at_centre, expected_widths, typical_tension
 from wirebayes.processes.workers import computing
-from wirebayes.results import store
+from wirebayes.results import read_back
 from wirebayes.robot.mechanics import draws as robot_draws
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -244,7 +245,7 @@ def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: 
 def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, dict[str, Any], Sample]:
     discovered = bool(list(folder.glob("**/plain/posterior.nc")))
     which, place = find_posterior(folder, name, "plain" if discovered else None)
-    stored = store.load(place, which, own)
+    stored = read_back.load(place, which, own)
     if stored.likelihood == "hold":
         message = "found a fit with --likelihood hold, which knows no preload and no setting error, expected a chain"
         raise InputError(f"{folder}: {message}")

@@ -21,9 +21,9 @@ from wirebayes.prediction.table import (
     mixture_table,
     unlikely_readings,
 )
-from wirebayes.results import store
+from wirebayes.results import read_back
 from wirebayes.results.mixture import members_of
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.strict.columns import is_table
 from wirebayes.strict.files import PathLike
 from wirebayes.views.findings import Findings
@@ -178,7 +178,7 @@ def stored_posteriors(
     """
     if isinstance(posterior, str | os.PathLike):
         name, folder = find_posterior(Path(posterior), experiment, model)
-        return [(p, store.load(place, name, own_effects)) for p, place in members_of(folder)]
+        return [(p, read_back.load(place, name, own_effects)) for p, place in members_of(folder)]
     if isinstance(posterior, Findings):
         posteriors: Mapping[str, Posterior] = posterior.plain if model == "plain" else posterior.final
         one, experiment = one_of(posteriors, experiment), None
@@ -188,7 +188,7 @@ def stored_posteriors(
         one = posterior
     else:
         raise InputError(f"posterior: found {type(posterior).__name__}, expected a Posterior, Findings or a folder")
-    return [(p, store.load(place, experiment, one.own_effects)) for p, place in members_of(one.folder)]
+    return [(p, read_back.load(place, experiment, one.own_effects)) for p, place in members_of(one.folder)]
 
 
 def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Posterior:
@@ -230,7 +230,7 @@ def find_posterior(folder: Path, experiment: str | None = None, model: str | Non
     found: dict[str, list[Path]] = {}
     levels = ("posterior.nc", "*/posterior.nc", "*/*/posterior.nc")
     for path in sorted(path for level in levels for path in folder.glob(level)):
-        for name in store.experiments_in(path):
+        for name in read_back.experiments_in(path):
             found.setdefault(name, []).append(path.parent)
     if not found:
         raise InputError(f"{folder}: found no posterior.nc in it, expected a folder written by fit or discover")

@@ -16,8 +16,8 @@ from wirebayes.effects import source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.between_specimens import between_specimens
 from wirebayes.json_files.plain import plain
-from wirebayes.results import store
-from wirebayes.results.store import Stored
+from wirebayes.results import read_back
+from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, lines_of, material
@@ -195,7 +195,7 @@ def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effec
     folders = [folder_of(line, experiment) for line in lines]
     if len(folders) < 2:
         raise InputError(f"--wires: found {len(folders)} specimen, expected two or more")
-    tests = [store.load(folder, experiment, own_effects) for folder in folders]
+    tests = [read_back.load(folder, experiment, own_effects) for folder in folders]
     ones = [_usable(stored, str(folder), count) for folder, stored in zip(folders, tests, strict=True)]
     first = ones[0]
     for folder, one in zip(folders, ones, strict=True):
@@ -211,7 +211,7 @@ def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effec
         values = np.log(np.column_stack([stored.draws[name] for name in CORE]))
         values[:, CORE.index("B")] += np.log(first.length_mm / one.length_mm)  # creep is a strain
         logarithms.append(values)
-    before = store.prior_draws(folders[0], experiment)
+    before = read_back.prior_draws(folders[0], experiment)
     log_prior = np.log(np.column_stack([before[name] for name in CORE]))
     prior = log_prior.mean(0), np.cov(log_prior.T)
     found = between_specimens(logarithms, prior, count, np.random.default_rng(0))
@@ -276,7 +276,7 @@ def read_wires(folder: Path, count: int, experiment: str | None = None, own_effe
     below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
     if below and not (folder / POSTERIOR).is_file():
         raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
-    return _usable(store.load(folder, experiment, own_effects), str(folder), count)
+    return _usable(read_back.load(folder, experiment, own_effects), str(folder), count)
 
 
 def _usable(stored: Stored, where: str, count: int) -> WireDraws:

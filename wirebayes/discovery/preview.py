@@ -21,8 +21,8 @@ from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
 from wirebayes.results import hold_ends
 from wirebayes.results.contraction import contraction, source
+from wirebayes.results.parameters import unit_of
 from wirebayes.results.posterior_checks import of_posterior
-from wirebayes.results.store import unit_of
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.protocol import Control
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from wirebayes.discovery.sharing import alike
+from wirebayes.inference.climb import Optimum, together
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
-from wirebayes.inference.modes import Optimum, together
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 

@@ -16,8 +16,8 @@ from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, 
 from wirebayes.discovery.refit import occam
 from wirebayes.discovery.settings import ABOVE_COUNT, ONE_NAT, UPPER
 from wirebayes.effects.elastic import LengthDependence
+from wirebayes.inference.climb import climb
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.inference.modes import climb
 from wirebayes.model.problem import LENGTH_EXPONENT
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.numeric.typing import Array

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.inference.chain_statistics import pareto_smoothed
-from wirebayes.inference.modes import Optimum, climb, distinct
+from wirebayes.inference.climb import Optimum, climb, distinct
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import Points

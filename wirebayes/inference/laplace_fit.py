@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from wirebayes.inference.climb import Optimum, climb, curved
 from wirebayes.inference.log_posterior import Density, LogPosterior
-from wirebayes.inference.modes import Optimum, climb, curved, modes
+from wirebayes.inference.modes import modes
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem, build, unit_of_column

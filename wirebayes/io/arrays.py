@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.experiment import Experiment, experiment_of
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import experiment_of
 from wirebayes.io.readings import OPTIONAL, READ, REQUIRED, protocol_columns
 from wirebayes.strict.columns import columns_table, is_table, names_of
 from wirebayes.strict.table import Header, Table

@@ -6,7 +6,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 
 FOLDER = Path(str(files("wirebayes"))) / "data" / "paper"
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import shown
-from wirebayes.io.experiment import ENOUGH, LEAST_READINGS, SHORTEST, control_of
+from wirebayes.io.experiment import ENOUGH, LEAST_READINGS
+from wirebayes.io.experiment_file import SHORTEST, control_of
 from wirebayes.io.readings import READ, STRETCH
 from wirebayes.strict.files import read_text
 from wirebayes.strict.hint import hint

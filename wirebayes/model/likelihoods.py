@@ -5,7 +5,6 @@ readings by all setting errors. One hold passes a single number on to the next, 
 factors hold by hold in linear time: a Kalman filter whose state is that number.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,14 +12,12 @@ import numpy as np
 
 from wirebayes.numeric.typing import Array
 from wirebayes.wire import compiled
-from wirebayes.wire.model import Model
-from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Linearised, Theta, Walk, simulate_alone
+from wirebayes.wire.staircase import Linearised
 
 if TYPE_CHECKING:
     from wirebayes.wire._kernel import Staircases
 
-_LOG_2PI = float(np.log(2.0 * np.pi))
+LOG_2PI = float(np.log(2.0 * np.pi))
 
 
 @dataclass(frozen=True)
@@ -173,7 +170,7 @@ class _Noise:
 
     @classmethod
     def of(cls, variance: Array, setting_sd: Array) -> "_Noise":
-        return cls(1.0 / variance, np.log(variance) + _LOG_2PI, setting_sd * setting_sd)
+        return cls(1.0 / variance, np.log(variance) + LOG_2PI, setting_sd * setting_sd)
 
     def where_read(self, readings: Array, mask: Array) -> "_Noise":
         """The same, with readings (R, n) of a hold that are NaN as if their errors were without bound."""
@@ -393,154 +390,4 @@ class _Later:
         return _Later(np.maximum(precision, 0.0), pull, constant, self.square + rr)
 
 
-def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array) -> Array:
-    """Probability of each hold's later readings given its first, every hold an experiment of its own.
-
-    The stretched length is where the first reading puts it, found by Newton steps; the first reading carries the
-    sensor's error too, so the later ones have covariance ``variance (I + a aᵀ)``, a the ratio of slopes. A hold whose
-    first reading is not above zero says nothing of its length and contributes nothing.
-
-    Parameters
-    ----------
-    protocol : Protocol
-    theta : mapping of name to (n,) array
-        ``k1 B U k2 N`` and the amplitudes of the model's effects; `preload` plays no part.
-    model : Model
-    readings : (H, R, n) or (H, R, 1) array
-        Tensions, N; what the protocol's mask leaves out is ignored.
-    variance : (n,) array
-        Of one reading, rounding included, N².
-
-    Returns
-    -------
-    (H, n) array
-        Log densities; zero for a hold with fewer than two readings.
-    """
-    holds, _, n = np.broadcast_shapes(readings.shape, (1, 1, len(variance)))
-    out = np.zeros((holds, n))
-    for j, valid, left, best, aa in _single_holds(protocol, theta, model, readings):
-        square = (np.einsum("rn,rn->n", left, left) + best * best) / variance
-        value = -0.5 * (square + len(left) * (np.log(variance) + _LOG_2PI) + np.log1p(aa))
-        out[j] = np.where(valid, value, 0.0)
-    return out
-
-
-def standardised_hold_by_hold(
-    protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array
-) -> tuple[Array, Array]:
-    """Log-likelihood of `hold_by_hold`, and residuals whose derivatives J give its curvature nearly, as J'J.
-
-    Parameters
-    ----------
-    protocol, theta, model, readings, variance
-        As for `hold_by_hold`.
-
-    Returns
-    -------
-    (n,) and (m, n) arrays
-    """
-    total, out, sd = np.zeros(len(variance)), [np.zeros((0, len(variance)))], np.sqrt(variance)
-    for _, valid, left, best, aa in _single_holds(protocol, theta, model, readings):
-        every = np.vstack([left, best[None]]) / sd
-        log_sd = 0.5 * np.sqrt(len(left)) * np.log(variance)
-        value = -0.5 * ((every**2).sum(axis=0) + len(left) * (np.log(variance) + _LOG_2PI) + np.log1p(aa))
-        total = total + np.where(valid, value, 0.0)
-        out.append(np.where(valid, np.vstack([every, log_sd[None]]), 0.0))
-    return total, np.concatenate(out)
-
-
-def _single_holds(
-    protocol: Protocol, theta: Theta, model: Model, readings: Array
-) -> Iterator[tuple[int, Array, Array, Array, Array]]:
-    """Of each hold with several readings: where its length is known, residuals and first reading's error at their best.
-
-    The last is the squared ratio of slopes, summed over the readings.
-    """
-    for j, fitted in enumerate(hold_courses(protocol, theta, model, readings[:, 0])):
-        if fitted is None:
-            continue
-        tension, slope, valid = fitted
-        keep = np.flatnonzero(protocol.mask[j])[1:]
-        if not len(keep):
-            continue
-        ratio = slope[keep] / np.where(valid, slope[0], 1.0)
-        r = readings[j][keep] - tension[keep]
-        aa = np.einsum("rn,rn->n", ratio, ratio)
-        best = np.einsum("rn,rn->n", ratio, r) / (1.0 + aa)
-        yield j, valid, r - ratio * best, best, aa
-
-
-def hold_courses(
-    protocol: Protocol, theta: Theta, model: Model, first: Array
-) -> list[tuple[Array, Array, Array] | None]:
-    """Each hold's course when its first reading alone says where the hold begins.
-
-    Of a step, how far the wire is stretched; of a weight, which is known, the offset of the displacement.
-
-    Parameters
-    ----------
-    protocol : Protocol
-    theta : mapping of name to (n,) array
-        ``k1 B U k2 N`` and the amplitudes of the model's effects; `preload` plays no part, nor does `k1` under weights.
-    model : Model
-    first : (H, n) or (H, 1) array
-        First reading of each hold, N, or mm under weights.
-
-    Returns
-    -------
-    list of (reading, slope, valid) or None
-        For each hold the readings (R, n), their derivatives by what the first reading determines (R, n), and whether
-        it does (n,); None for a hold without readings.
-    """
-    n = np.shape(theta["B"])[0]
-    theta = dict(theta) | {"preload": np.zeros(n)}
-    if protocol.control == "force":
-        return _under_weights(protocol, theta | {"k1": np.full(n, np.inf)}, model, first)
-    call = compiled.call(protocol, theta, model)
-    if call is not None:
-        first = np.broadcast_to(first, (len(protocol.setting), n))
-        tension, slope = compiled.kernel.courses(*call, first, _NEWTON_STEPS)
-        valid = (first > 0) & (slope[:, 0] > 0)
-        recorded = protocol.recorded
-        return [(t, s, v) if known else None for t, s, v, known in zip(tension, slope, valid, recorded, strict=True)]
-    walk = Walk(protocol, theta, model)
-    out: list[tuple[Array, Array, Array] | None] = []
-    for j in range(len(protocol.setting)):
-        if not protocol.mask[j].any():
-            out.append(None)
-            continue
-        target = np.broadcast_to(first[j], (n,))
-        valid = target > 0
-        target = np.where(valid, target, 1.0)
-        strain = target / walk.k1
-        displacement = protocol.length_mm * strain
-        if model.law == "modified":
-            displacement = displacement / np.maximum(1.0 - strain, 0.1)
-        for _ in range(_NEWTON_STEPS):
-            tension, slope = walk.fresh(j, displacement, slice(1))
-            # A slack guess has no slope: go out until it pulls.
-            pulls = slope[0] > 0
-            move = np.where(pulls, (target - tension[0]) / np.where(pulls, slope[0], 1.0), strain * protocol.length_mm)
-            displacement = displacement + move
-            if np.max(np.abs(move)) < 1e-12 * protocol.length_mm:
-                break
-        tension, slope = walk.fresh(j, displacement)
-        out.append((tension, slope, valid & (slope[0] > 0)))
-    return out
-
-
-def _under_weights(
-    protocol: Protocol, theta: Theta, model: Model, first: Array
-) -> list[tuple[Array, Array, Array] | None]:
-    """`hold_courses` where the tension is set: a wire that does not stretch creeps from its first reading on."""
-    courses = simulate_alone(protocol, theta, model)
-    out: list[tuple[Array, Array, Array] | None] = []
-    for j, course in enumerate(courses):
-        grown = course - course[0]
-        valid = np.isfinite(grown).all(axis=0)
-        out.append((first[j] + grown, np.ones_like(grown), valid) if protocol.recorded[j] else None)
-    return out
-
-
 _ABSURD = 1e13  # sum of squared residuals in variances: its rounding reaches some hundredths of a nat
-_NEWTON_STEPS = 30  # a limit for absurd parameters: others reach the tolerance after a few

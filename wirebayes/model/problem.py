@@ -12,7 +12,7 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
-from wirebayes.model import likelihoods
+from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.prior import Power, Prior, from_table, possible, scaled, wire_defaults
 from wirebayes.model.scales import NATURAL, Scales, Units, scales_of
 from wirebayes.numeric.means import geometric_mean
@@ -139,7 +139,7 @@ class Problem:
             y = sample.readings if readings is None else readings[i]
             variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
             if self.likelihood == "hold":
-                out.append(likelihoods.hold_by_hold(sample.protocol, own, sample.model, y, variance))
+                out.append(single_holds.hold_by_hold(sample.protocol, own, sample.model, y, variance))
             else:
                 line = streamed(sample.protocol, own, sample.model)
                 out.append(likelihoods.chain(line, y, sample.protocol.mask, variance, own["setting_sd"]).log_likelihood)
@@ -163,7 +163,7 @@ class Problem:
                 own = self.parameters(theta, sample)
                 variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
                 if self.likelihood == "hold":
-                    found = likelihoods.standardised_hold_by_hold(sample.protocol, own, sample.model, y, variance)
+                    found = single_holds.standardised_hold_by_hold(sample.protocol, own, sample.model, y, variance)
                 else:
                     line = streamed(sample.protocol, own, sample.model)
                     found = likelihoods.standardised(line, y, sample.protocol.mask, variance, own["setting_sd"])

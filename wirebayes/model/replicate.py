@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from wirebayes.model.likelihoods import hold_courses
 from wirebayes.model.problem import Problem, Sample
+from wirebayes.model.single_holds import hold_courses
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.staircase import simulate
 

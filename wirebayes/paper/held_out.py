@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.likelihoods import hold_courses
+from wirebayes.model.single_holds import hold_courses
 from wirebayes.numeric.typing import Array
 from wirebayes.prediction.predictive import PredictionRequest, predict
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.likelihoods import hold_courses
 from wirebayes.model.problem import MATERIAL, Likelihood, default_prior
 from wirebayes.model.scales import scales_of
+from wirebayes.model.single_holds import hold_courses
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.model import Model

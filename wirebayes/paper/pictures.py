@@ -17,7 +17,7 @@ from wirebayes.paper.held_out import HeldOut, last_hold_course, published_course
 from wirebayes.paper.least_squares import Variant, at, residuals
 from wirebayes.report import figures
 from wirebayes.report.blocks import number, svg
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.wire.laws import creep_fraction
 
 INDEX = "index.json"

@@ -21,7 +21,7 @@ from wirebayes.processes.workers import workers
 from wirebayes.report.page import write as write_page
 from wirebayes.results.jobs import Job
 from wirebayes.results.jobs import run as run_jobs
-from wirebayes.results.store import Stored, load
+from wirebayes.results.read_back import Stored, load
 
 Row = dict[str, Any]
 LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")

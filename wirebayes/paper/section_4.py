@@ -18,7 +18,7 @@ from wirebayes.report.blocks import number
 from wirebayes.report.pictures.robot import scene_points
 from wirebayes.report.pictures.robot_lines import budgets, drifts_in_time
 from wirebayes.report.pictures.robot_space import workspace_maps
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix

@@ -12,7 +12,8 @@ import numpy as np
 from wirebayes.model.problem import MATERIAL
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import MOST, contraction, interval
-from wirebayes.results.store import CREEP_TIMES_S, unit_of
+from wirebayes.results.parameters import unit_of
+from wirebayes.results.summary import CREEP_TIMES_S
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.model import Model
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import Density, LogPosterior
-from wirebayes.inference.modes import climb
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import ExpectedWidth
 from wirebayes.model.problem import MATERIAL, Problem, build

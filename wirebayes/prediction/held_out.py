@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 
 from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
-from wirebayes.model import likelihoods
+from wirebayes.model import likelihoods, single_holds
 from wirebayes.numeric.typing import Array
 from wirebayes.prediction.leave_one_hold_out import thinned
 from wirebayes.prediction.predictive import PredictionRequest, given_first, predict
@@ -225,7 +225,9 @@ def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, request
     own = problem.parameters(thinned(fitted.flat), here)
     own = own | {"preload": 0.0 * own["B"]}
     variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution)
-    log_p = likelihoods.hold_by_hold(experiment.protocol(), own, here.model, experiment.readings()[..., None], variance)
+    log_p = single_holds.hold_by_hold(
+        experiment.protocol(), own, here.model, experiment.readings()[..., None], variance
+    )
     return _log_mean(log_p[requested])
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.model import likelihoods
+from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.problem import Problem, Sample
 from wirebayes.numeric.linear_algebra import eigh, solve
 from wirebayes.numeric.typing import Floats
@@ -172,7 +172,7 @@ def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: F
     """Every hold from its own first reading, which carries the sensor's error too and stays as it was given."""
     given = request.first[:, None] - error[:, 0]
     out = np.zeros_like(error)
-    for j, course in enumerate(likelihoods.hold_courses(request.protocol, own, model, given)):
+    for j, course in enumerate(single_holds.hold_courses(request.protocol, own, model, given)):
         if course is not None and request.requested[j]:
             reading, _, valid = course
             out[j] = np.where(valid, reading, 0.0) + error[j]

@@ -12,7 +12,7 @@ from wirebayes.io.experiment import protocol_of
 from wirebayes.io.readings import READ, SET, Hold, protocol_holds
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.sentences import counted
 from wirebayes.strict.table import Table
 from wirebayes.wire.effect import EventEffect

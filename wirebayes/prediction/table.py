@@ -13,7 +13,7 @@ from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import predict
 from wirebayes.prediction.request import ProtocolRequest
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control
 

@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter
 from wirebayes.json_files.summary import ExtrapolatedCreep
 from wirebayes.numeric.typing import Array
 from wirebayes.report.blocks import unit_text
-from wirebayes.results.store import unit_of
+from wirebayes.results.parameters import unit_of
 from wirebayes.wire.protocol import Control, Protocol
 
 CHAIN, HOLD, QUIET, INK = "#30506d", "#c8553d", "#b9bec4", "#1d2226"

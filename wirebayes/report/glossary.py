@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from wirebayes.effects import CATALOGUE
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.report.blocks import Block, Definitions, Section, Text, unit_text
-from wirebayes.results.store import unit_of
+from wirebayes.results.parameters import unit_of
 from wirebayes.wire.effect import Effect
 
 SYMBOLS = {

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.inference.modes import climb
 from wirebayes.json_files.hold_ends import HoldEnds, MovedByHoldEnds
 from wirebayes.json_files.values import UNITS
 from wirebayes.model.linear_amplitudes import integrated

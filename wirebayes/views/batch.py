@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from wirebayes import answers
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
-from wirebayes.results import store
+from wirebayes.results import read_back
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +57,7 @@ class Batch(Result[BatchJson]):
     def to_datatree(self) -> "xr.DataTree":
         """One tree with a branch for each stored posterior."""
         both = [*self.plain.values(), *self.final.values()]
-        return store.datatrees({posterior.within: posterior.folder for posterior in both})
+        return read_back.datatrees({posterior.within: posterior.folder for posterior in both})
 
     @property
     def messages(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from wirebayes import answers
 from wirebayes.errors import InputError
 from wirebayes.json_files.discovery import DiscoveryJson
-from wirebayes.results import store
+from wirebayes.results import read_back
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +48,7 @@ class Findings(Result[DiscoveryJson]):
     def to_datatree(self) -> "xr.DataTree":
         """One tree with a branch ``NAME/plain`` and ``NAME/final`` for each experiment."""
         both = [*self.plain.values(), *self.final.values()]
-        return store.datatrees({posterior.within: posterior.folder for posterior in both})
+        return read_back.datatrees({posterior.within: posterior.folder for posterior in both})
 
     def plot(self, experiment: str | None = None, axes: Any = None) -> Any:
         """Draw an experiment's readings with the curves of the plain and of the final model through them.

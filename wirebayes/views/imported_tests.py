@@ -5,7 +5,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 from wirebayes import answers
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.json_files.imported import ImportJson
 from wirebayes.sentences import counted
 

@@ -12,8 +12,8 @@ from wirebayes.io.run_folder import CONFIGURATION, stored_results
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.notice import Notice, from_json
 from wirebayes.numeric.typing import Floats
-from wirebayes.results import store
-from wirebayes.results.store import Stored
+from wirebayes.results import read_back
+from wirebayes.results.read_back import Stored
 from wirebayes.sentences import unit_text
 from wirebayes.strict.files import PathLike
 
@@ -62,7 +62,7 @@ class Posterior(Result[SummaryJson]):
     @cached_property
     def experiments(self) -> tuple[str, ...]:
         """Names of the experiments whose parameters it holds."""
-        return store.experiments_in(self.folder / POSTERIOR)
+        return read_back.experiments_in(self.folder / POSTERIOR)
 
     def draws(self, experiment: str | None = None) -> dict[str, Floats]:
         """Draws of one experiment's parameters.
@@ -80,11 +80,11 @@ class Posterior(Result[SummaryJson]):
 
     def stored(self, experiment: str | None = None) -> Stored:
         """Draws, readings and model of one experiment, as the toolkit computes with them."""
-        return store.load(self.folder, experiment, self.own_effects)
+        return read_back.load(self.folder, experiment, self.own_effects)
 
     def to_datatree(self) -> "xr.DataTree":
         """All groups of ``posterior.nc`` in memory, as ArviZ takes them."""
-        return store.datatree(self.folder)
+        return read_back.datatree(self.folder)
 
     def plot(self, experiment: str | None = None, axes: Any = None) -> Any:
         """Draw the readings, hold after hold, with the curve of the model through them and its 90 % band.
@@ -208,7 +208,7 @@ class Posteriors(Result[dict[str, SummaryJson]], Mapping[str, Posterior]):
 
     def to_datatree(self) -> "xr.DataTree":
         """One tree with a branch for each."""
-        return store.datatrees({name: posterior.folder for name, posterior in self.members.items()})
+        return read_back.datatrees({name: posterior.folder for name, posterior in self.members.items()})
 
     @property
     def warnings(self) -> tuple[Notice, ...]:

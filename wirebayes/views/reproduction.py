@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, read_json
 from wirebayes.notice import Notice
-from wirebayes.results import store
+from wirebayes.results import read_back
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,7 +47,7 @@ class Reproduction(Result[dict[str, Any]]):
 
     def to_datatree(self) -> "xr.DataTree":
         """One tree with a branch for each fit."""
-        return store.datatrees({name: posterior.folder for name, posterior in self.posteriors.items()})
+        return read_back.datatrees({name: posterior.folder for name, posterior in self.posteriors.items()})
 
     @property
     def warnings(self) -> tuple[Notice, ...]:

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.json_files.truth import TruthJson
 
 if TYPE_CHECKING:

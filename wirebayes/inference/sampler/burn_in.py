@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.inference.climb import Optimum, climb, distinct
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.inference.modes import Optimum, climb, distinct, search
+from wirebayes.inference.modes import search
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, net, proposal
 from wirebayes.inference.sampler.mixture import Mixture

@@ -30,7 +30,8 @@ from wirebayes.io.bench.turned import turned
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
 from wirebayes.io.bench.unread import unread
 from wirebayes.io.data_checks import falls
-from wirebayes.io.experiment import Experiment, experiment_of
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import experiment_of
 from wirebayes.io.readings import OPTIONAL, REQUIRED
 from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import counted, listed

@@ -28,7 +28,7 @@ from wirebayes.report.blocks import (
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.batch import specimens_of_materials
 from wirebayes.results.outliers import FALSE_ALARMS, LEAST_SPECIMENS
-from wirebayes.results.store import unit_of
+from wirebayes.results.parameters import unit_of
 
 _MOST_WARNINGS = 10  # shown at once; more push the summary's pictures off the screen
 _MOST_ROWS = 500  # a page of more takes seconds to open; the CSV holds all

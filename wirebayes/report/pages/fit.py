@@ -36,7 +36,8 @@ from wirebayes.report.blocks import (
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.curve import through_the_readings
 from wirebayes.results.contraction import MOST, contraction
-from wirebayes.results.store import Stored, load_with_priors, unit_of
+from wirebayes.results.parameters import unit_of
+from wirebayes.results.read_back import Stored, load_with_priors
 from wirebayes.sentences import counted, listed
 from wirebayes.wire.effect import Effect
 

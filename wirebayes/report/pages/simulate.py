@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.effects import CATALOGUE, named
-from wirebayes.io.experiment import Experiment, read_experiments
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.truth import TrueWire, TruthJson
 from wirebayes.report import figures
@@ -22,7 +23,7 @@ from wirebayes.report.blocks import (
     unit_text,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning, spoken
-from wirebayes.results.store import unit_of
+from wirebayes.results.parameters import unit_of
 from wirebayes.sentences import counted, listed
 
 _MOST = 12  # tests of which a page shows the readings

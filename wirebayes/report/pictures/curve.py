@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest, chain_course
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol
 

@@ -15,7 +15,7 @@ from wirebayes.model import likelihoods
 from wirebayes.numeric.typing import Array, Floats
 from wirebayes.report.blocks import save
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
-from wirebayes.results.store import Stored
+from wirebayes.results.read_back import Stored
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.staircase import Linearised, linearise
 

@@ -1,0 +1,73 @@
+"""Parameters of a fit under the names and in the units in which they are stored."""
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from wirebayes.json_files.values import UNITS
+from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample
+from wirebayes.numeric.typing import Array
+from wirebayes.wire.control import READ_UNIT, SET_UNIT
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.protocol import Control
+
+
+def variables(problem: Problem, theta: Array, sample: Sample | None) -> dict[str, Array]:
+    """Parameters (chains, draws), of one sample, or of all with those of one sample each along a last axis."""
+    if sample is None:
+        return _together_variables(problem, theta)
+    own = _own(problem, theta.reshape(-1, theta.shape[-1]), sample)
+    return {name: values.reshape(theta.shape[:2]) for name, values in own.items()}
+
+
+def _own(problem: Problem, theta: Array, sample: Sample) -> dict[str, Array]:
+    """A sample's parameters as they are at its own length, with which it can stand alone."""
+    reference = sample.model.length_ref_mm or sample.protocol.length_mm
+    return by_length(problem.parameters(theta, sample), sample.model.effects, sample.protocol.length_mm, reference)
+
+
+def by_length(
+    own: dict[str, Array], effects: Sequence[Effect], length_mm: float, reference_mm: float
+) -> dict[str, Array]:
+    """Parameters that depend on the length as they are at this one: alone, a sample has no other to compare with."""
+    hold: Any = SimpleNamespace(length_mm=length_mm, length_ref_mm=reference_mm)
+    out: Any = own
+    for effect in (e for e in effects if e.compares_lengths):
+        amplitudes = {a.name: own[c] for a, c in zip(effect.amplitudes, effect.columns(), strict=True)}
+        out = effect.apply(out, amplitudes, hold)
+    return dict(out)
+
+
+def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:
+    """Columns under their plain names; those of one sample each, or of one instrument, by sample along a last axis."""
+    columns = dict(zip(problem.names, np.moveaxis(theta, -1, 0), strict=True))
+    out: dict[str, Array] = {}
+    for name in problem.names:
+        plain = name.split("[")[0]
+        if plain == name:
+            out[plain] = columns[name]
+        elif plain not in out:
+            of_samples = [problem.column(plain, sample) for sample in problem.samples]
+            fixed = {c: np.full(theta.shape[:-1], value) for c, value in problem.prior.fixed.items() if c in of_samples}
+            out[plain] = np.stack([(columns | fixed)[c] for c in of_samples], axis=-1)
+    return out
+
+
+def unit_of(name: str, effects: tuple[Effect, ...] = (), controls: Sequence[Control] = ("displacement",)) -> str:
+    """Unit of a parameter; where several controls differ in it, of each in turn.
+
+    Parameters
+    ----------
+    name : str
+    effects : tuple of Effect
+    controls : sequence of {"displacement", "force"}
+        What was set in the tests that it belongs to.
+    """
+    each = []
+    for control in controls:
+        errors = {"sensor_sd": READ_UNIT[control], "setting_sd": SET_UNIT[control]}
+        own = {c: e.unit_under(a, control) for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True)}
+        each.append((UNITS | {LENGTH_EXPONENT: "1"} | errors | own).get(name, "1"))
+    return " or ".join(dict.fromkeys(each))

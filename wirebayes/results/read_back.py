@@ -1,0 +1,268 @@
+"""A posterior read back from ``posterior.nc``, with what its fit says against using it.
+
+The only module that makes objects of xarray.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wirebayes.effects import catalogue, named
+from wirebayes.errors import InputError
+from wirebayes.io.readings import READ, SET
+from wirebayes.io.run_folder import read_json, stored_results
+from wirebayes.model.prior import Prior
+from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
+from wirebayes.notice import Notice
+from wirebayes.numeric.typing import Array
+from wirebayes.results import netcdf
+from wirebayes.results.content import READING, SETTING
+from wirebayes.results.netcdf import Group
+from wirebayes.results.parameters import by_length
+from wirebayes.results.stored_check import check
+from wirebayes.wire.model import Model
+from wirebayes.wire.protocol import Control, Protocol
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_MODEL = ("posterior", "observed_data", "constant_data")  # groups that say what was fitted, and the draws
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A posterior read back.
+
+    Attributes
+    ----------
+    draws : dict of name to (n,) array
+        Parameters of one experiment, at its own length.
+    sample : Sample
+        Its holds and readings, law, history and effects.
+    likelihood : {"chain", "hold"}
+    length_exponent : (n,) array or None
+        Where samples of two lengths were fitted together: creep grows as length to this power.
+    doubts : tuple of Notice
+        What the fit itself says against using it: that it has not converged, that its model failed the check.
+    """
+
+    draws: dict[str, Array]
+    sample: Sample
+    likelihood: str
+    length_exponent: Array | None = None
+    doubts: tuple[Notice, ...] = ()
+
+    @property
+    def problem(self) -> Problem:
+        """A problem whose columns are the stored draws (its prior is not known any more)."""
+        model = Model(self.sample.model.law, self.sample.model.history, self.sample.model.effects,
+                      self.sample.model.tension_ref_N)  # fmt: skip
+        names: dict[str, Any] = dict.fromkeys(self.draws)
+        return Problem(
+            (Sample(self.sample.name, self.sample.material, self.sample.protocol, self.sample.readings,
+                    self.sample.resolution, model),),
+            Prior(names, {}, frozenset()),
+            self.likelihood,  # type: ignore[arg-type]
+        )  # fmt: skip
+
+    @property
+    def theta(self) -> Array:
+        """(n, d) draws in the problem's order."""
+        return np.column_stack(list(self.draws.values()))
+
+
+def experiments_in(path: Path) -> tuple[str, ...]:
+    """The experiments whose posterior a ``posterior.nc`` of ours holds; an `InputError` where it is none."""
+    with _opened(path, "posterior") as groups:
+        return tuple(str(name) for name in json.loads(groups["posterior"].attributes["experiments"]))
+
+
+@contextmanager
+def _opened(path: Path, *groups: str) -> Iterator[dict[str, Group]]:
+    """Some groups of a ``posterior.nc``, for each costs time to read; whatever is wrong there is an `InputError`."""
+    with stored_results(path):
+        yield netcdf.read(path, groups)
+
+
+def load(folder: Path, experiment: str | None = None, own_effects: Path | None = None) -> Stored:
+    """Read the posterior of one experiment from a folder that `save` wrote.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``posterior.nc``.
+    experiment : str, optional
+        Which sample, where several were fitted together.
+    own_effects : Path, optional
+        The user's Python file of effects, where the fit used one of them.
+
+    Raises
+    ------
+    InputError
+        No posterior there, not one of ours, or the experiment is not in it.
+    """
+    path = folder / "posterior.nc"
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected the posterior of a fit")
+    with _opened(path, *_MODEL) as groups:
+        names = _names_in(groups, path)
+        if experiment is None and len(names) > 1:
+            raise InputError(f"{path}: holds {', '.join(names)}; say which with --experiment")
+        if experiment is not None and experiment not in names:
+            raise InputError(f"--experiment {experiment}: not in {path}; it holds {', '.join(names)}")
+        stored = _stored(groups, path, names.index(experiment or names[0]), own_effects)
+        return replace(stored, doubts=_doubts(groups, stored.sample.name, folder / "summary.json"))
+
+
+def _doubts(groups: Mapping[str, Group], name: str, summary: Path) -> tuple[Notice, ...]:
+    """What a fit says against using it, and its check, which is in the summary beside it if there was one."""
+    out = []
+    if not groups["posterior"].attributes.get("converged", 1):
+        text = f"the fit of {name} has not converged: nothing that follows from it is to be relied on"
+        out.append(Notice("not-converged", text))
+    check = read_json(summary).get("model_check") if summary.is_file() else None
+    if check and check["passed"] is False:
+        text = (
+            f"the model fitted to {name} does not describe its readings (p = {check['p']:.2g}): what follows from it "
+            "can be wrong by more than is said; wirebayes discover looks for what is missing"
+        )
+        out.append(Notice("model-check", text))
+    return tuple(out)
+
+
+def load_with_priors(folder: Path) -> list[tuple[Stored, dict[str, Array]]]:
+    """The posterior of each experiment in a folder that `save` wrote, beside draws of its prior, each (n,)."""
+    path = folder / "posterior.nc"
+    with _opened(path, *_MODEL, "prior") as groups:
+        return [(_stored(groups, path, at), _prior(groups, at)) for at in range(len(_names_in(groups, path)))]
+
+
+def _names_in(groups: Mapping[str, Group], path: Path) -> list[str]:
+    about = groups["posterior"].attributes
+    if "wirebayes_version" not in about:
+        raise InputError(f"{path}: not a posterior of wirebayes")
+    names: list[str] = json.loads(about["experiments"])
+    return names
+
+
+def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path | None = None) -> Stored:
+    """The posterior of the experiment at this place among those of the file."""
+    posterior, observed, constant = (groups[name] for name in _MODEL)
+    about = posterior.attributes
+    names = json.loads(about["experiments"])
+    draws = _one_of(posterior, at)
+    lengths = json.loads(about["lengths_mm"])
+    keys, known = json.loads(about["effects"]), catalogue(own_effects)
+    model = Model(about["elastic_law"], about["history"], tuple(named(k, known) for k in keys),
+                  float(about["tension_ref_N"]))  # fmt: skip
+    exponent = draws.pop(LENGTH_EXPONENT, None)
+    if len(names) > 1:
+        reference = float(np.exp(np.mean(np.log(lengths))))
+        draws = at_length(draws, model.effects, lengths[at] / reference, 1.0 if exponent is None else exponent)
+        draws = by_length(draws, model.effects, lengths[at], reference)
+    if "reference_C" not in constant.attributes:
+        raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
+    reference_C = json.loads(constant.attributes["reference_C"])[at]
+    if "controls" not in about:
+        raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
+    control = json.loads(about["controls"])[at]
+    protocol, readings = _measured(constant, observed, names[at], float(lengths[at]), reference_C, control)
+    resolutions = json.loads(about["resolutions"])
+    sample = Sample(names[at], about["material"], protocol, readings[..., None], float(resolutions[at]), model)
+    check(draws, sample, about["likelihood"])
+    return Stored(draws, sample, about["likelihood"], exponent)
+
+
+def _one_of(group: Group, at: int) -> dict[str, Array]:
+    """Draws of each parameter, (n,), of the experiment at this place, where there are several."""
+    draws = {}
+    for name, (dims, values) in group.variables.items():
+        own = values.take(at, axis=dims.index("experiment")) if "experiment" in dims else values
+        draws[name] = np.ascontiguousarray(own.reshape(-1))
+    return draws
+
+
+def _measured(
+    constant: Group, observed: Group, name: str, length_mm: float, reference_C: float | None, control: Control
+) -> tuple[Protocol, Array]:
+    """One experiment's holds, unrecorded ones at their place, and its (H, R) readings, padded with zeros."""
+    read_as = READ[control] if READ[control] in observed else READING
+    set_as = SET[control] if SET[control] in constant else SETTING
+    holds = constant["hold"]
+    own = constant["experiment"] == name if "experiment" in constant else np.full(len(holds), True)
+    if not np.array_equal(observed["hold"], holds):
+        raise ValueError("readings and holds that do not belong together")
+    here = {key: constant[key][own] for key in (set_as, "duration_s", "time_s")}
+    measured = observed[read_as][own]
+    width = int(np.isfinite(measured).sum(axis=1).max())
+    before, unrecorded = np.zeros(0, int), dict[str, Array]()
+    if "unrecorded_before_hold" in constant:
+        mine = constant["unrecorded_experiment"] == name
+        before = constant["unrecorded_before_hold"][mine]
+        unrecorded = {key: constant[f"unrecorded_{key}"][mine] for key in (set_as, "duration_s")}
+    number = constant["number" if "number" in constant else "hold"][own]
+    # An unrecorded hold stands before the recorded one it names; several keep their order.
+    place = np.argsort(np.concatenate([before - 0.5, number]), kind="stable")
+
+    def whole(recorded: Array, others: Array | None = None) -> Array:
+        none = np.full((len(before), *recorded.shape[1:]), np.nan) if others is None else others
+        return np.concatenate([none, recorded])[place]
+
+    readings, times = (whole(values)[:, :width] for values in (measured, here["time_s"]))
+    mask = np.isfinite(readings)
+    if not np.array_equal(mask, np.isfinite(times)):
+        raise ValueError("readings and times that do not belong together")
+    setting, duration = (whole(here[key], unrecorded.get(key)) for key in (set_as, "duration_s"))
+    protocol = Protocol(
+        length_mm,
+        setting,
+        np.nan_to_num(times),
+        mask,
+        duration,
+        whole(number, np.full(len(before), -1)).astype(np.int64),
+        None if reference_C is None else np.nan_to_num(whole(constant["warming_K"][own])[:, :width]),
+        reference_C,
+        control,
+    )
+    padding = protocol.mask.shape[1] - readings.shape[1]  # a column where a hold went on after its last reading
+    return protocol, np.pad(np.nan_to_num(readings), [(0, 0), (0, padding)])
+
+
+def datatree(folder: Path) -> "xr.DataTree":
+    """The whole content of a folder's ``posterior.nc``, in memory."""
+    import xarray as xr  # for users; no command makes such objects
+
+    path = folder / "posterior.nc"
+    with stored_results(path), xr.open_datatree(path, engine="h5netcdf") as tree:
+        loaded: xr.DataTree = tree.load()
+        return loaded
+
+
+def datatrees(folders: Mapping[str, Path]) -> "xr.DataTree":
+    """The content of several ``posterior.nc`` in memory, each a branch under its name."""
+    import xarray as xr  # as above
+
+    groups = {
+        f"{name}{path}".rstrip("/"): group
+        for name, folder in folders.items()
+        for path, group in datatree(folder).to_dict().items()
+    }
+    return xr.DataTree.from_dict(groups)
+
+
+def prior_draws(folder: Path, experiment: str | None = None) -> dict[str, Array]:
+    """The prior: draws of the prior of one experiment's parameters, each (n,)."""
+    path = folder / "posterior.nc"
+    with _opened(path, "posterior", "prior") as groups:
+        names = _names_in(groups, path)
+        return _prior(groups, names.index(experiment or names[0]))
+
+
+def _prior(groups: Mapping[str, Group], at: int) -> dict[str, Array]:
+    """Draws of the prior of the experiment at this place among those of the file."""
+    return _one_of(groups["prior"], at)

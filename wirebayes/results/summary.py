@@ -1,0 +1,109 @@
+"""The summary of a fit in JSON: parameters with intervals, what follows from them, and what is suspicious."""
+
+import numpy as np
+
+from wirebayes.inference.chain_statistics import bulk_ess, r_hat, tail_ess
+from wirebayes.inference.fit import Fit
+from wirebayes.json_files.hold_ends import HoldEnds
+from wirebayes.json_files.summary import Derived, Mixed, Parameter, SummaryJson
+from wirebayes.json_files.values import Statistics
+from wirebayes.model.problem import Sample
+from wirebayes.notice import Notice, NoticeJson, to_json
+from wirebayes.numeric.typing import Array
+from wirebayes.results import hold_ends, posterior_checks
+from wirebayes.results.identifiability import extrapolation, identifiability
+from wirebayes.results.parameters import unit_of, variables
+from wirebayes.wire.fresh import FreshSample
+
+# a hold of the paper, and what a robot on the wire works through
+CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
+
+
+def derived(wire: FreshSample, tension_N: float) -> Derived:
+    """Quantities people compare: creep at a tension after some times and in the end, its speed, stiffness."""
+    two_minutes, hour, day = wire.creep_mm(tension_N, np.array(list(CREEP_TIMES_S.values())))
+    return {
+        "tension_N": tension_N,
+        "creep_2min_mm": band(two_minutes),
+        "creep_1h_mm": band(hour),
+        "creep_1day_mm": band(day),
+        "final_creep_mm": band(wire.final_creep_mm(tension_N)),
+        "median_creep_time_s": band(wire.median_creep_time_s(tension_N)),
+        "stiffness_N": band(wire.stiffness_N(tension_N)),
+    }
+
+
+def band(values: Array) -> Statistics | None:
+    """Mean, sd and quantiles of draws; None where a draw has no finite value (creep that never ends)."""
+    if not np.isfinite(values).all():
+        return None
+    low, middle, high = (float(q) for q in np.quantile(values, [0.05, 0.5, 0.95]))
+    return {"mean": float(values.mean()), "sd": float(values.std(ddof=1)), "q05": low, "q50": middle, "q95": high}
+
+
+def statistics(values: Array) -> Mixed:
+    """Mean, sd, quantiles, effective sample sizes and R-hat of (chains, draws)."""
+    q05, q50, q95 = np.quantile(values, [0.05, 0.5, 0.95])
+    with np.errstate(invalid="ignore"):
+        return {
+            "mean": float(values.mean()), "sd": float(values.std(ddof=1)),
+            "q05": float(q05), "q50": float(q50), "q95": float(q95),
+            "ess_bulk": bulk_ess(values),
+            "ess_tail": tail_ess(values),
+            "r_hat": r_hat(values),
+        }  # fmt: skip
+
+
+def _warnings(fit: Fit, sample: Sample | None) -> list[NoticeJson]:
+    """That the fit has not converged, and what is suspicious, with the experiment's name where there are several."""
+    found = [] if fit.chains.converged else [Notice("not-converged", fit.chains.why)]
+    if sample is not None:
+        found += posterior_checks.warnings(fit, sample)
+    else:
+        found += [notice.of(s.name) for s in fit.problem.samples for notice in posterior_checks.warnings(fit, s)]
+    return to_json(found)
+
+
+def _hold_ends(fit: Fit) -> HoldEnds | None:
+    best = fit.flat[int(fit.log_density.argmax())]
+    return hold_ends.cost(fit.problem, best, fit.flat.std(axis=0, ddof=1))
+
+
+def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
+    first = sample or fit.problem.samples[0]
+    controls = [s.protocol.control for s in ([sample] if sample else fit.problem.samples)]
+    parameters: dict[str, Parameter] = {}
+    for name, values in variables(fit.problem, fit.theta, sample).items():
+        unit = unit_of(name, first.model.effects, controls)
+        if values.ndim == 2:
+            parameters[name] = {"unit": unit, **statistics(values)}
+        else:
+            for i, s in enumerate(fit.problem.samples):
+                own = unit_of(name, first.model.effects, [s.protocol.control])
+                parameters[f"{name}[{s.name}]"] = {"unit": own, **statistics(values[..., i])}
+    tension = round(first.model.tension_ref_N, 3)
+    wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
+    chains = fit.chains
+    return {
+        "experiment": sample.name if sample else first.material.replace(" ", "-"),
+        "likelihood": fit.problem.likelihood,
+        "elastic_law": first.model.law,
+        "history": first.model.history,
+        "effects": [e.key for e in first.model.effects],
+        "converged": chains.converged,
+        "convergence": chains.why,
+        "warnings": _warnings(fit, sample),
+        "parameters": parameters,
+        "derived": derived(wire, tension),
+        "identifiability": identifiability(fit),
+        "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).to_dict(),
+        "hold_ends": _hold_ends(fit),
+        "likelihood_evaluations": chains.evaluations,
+        "kept_evaluations": chains.kept_evaluations,
+        "autocorrelation_steps": float(chains.autocorrelation_steps.max()),
+        "smallest_ess": float(chains.ess.min()),
+        "largest_nested_r_hat": float(chains.r_hat.max()),
+        "acceptance": chains.acceptance,
+        "learned_move": chains.learned,
+        "modes_found": chains.modes,
+    }
