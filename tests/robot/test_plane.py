@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from wirebayes.commands.pose import _refuse_off_plane
+from wirebayes.commands.asked_pose import _refuse_off_plane
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import plane, rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires

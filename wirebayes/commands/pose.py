@@ -1,13 +1,14 @@
 """A pose of a robot on creeping wires."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from wirebayes.commands.asked_pose import AskedPose, asked_place, loaded, spelled
 from wirebayes.commands.options import (
     Numbers,
     Progress,
@@ -20,7 +21,7 @@ from wirebayes.commands.options import (
     silent,
     text_of,
 )
-from wirebayes.commands.pose_history import calibrated_errors, checked_errors, pose_history
+from wirebayes.commands.pose_history import Begun, calibrated_errors, checked_errors, pose_along, pose_from_joints
 from wirebayes.commands.wires import (
     RobotLike,
     Wires,
@@ -34,13 +35,9 @@ from wirebayes.commands.wires import (
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.json_files.plain import plain
-from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import computing
-from wirebayes.robot.history.history import with_payload
-from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import typical_spread
-from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
 from wirebayes.robot.pose.answer import Answer, answer
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
 from wirebayes.robot.pose.orientation import orientation
@@ -53,7 +50,6 @@ from wirebayes.views.result import ResultFolder
 
 # an option; closest in the minute that the paper speaks of, and on to an hour
 TIMES_S = (0.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
-OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded
 DRAWS, OVER_TIME = 1000, 200  # of the posterior; over time each is followed through every row
 
 
@@ -171,48 +167,74 @@ def pose(
     draws = (OVER_TIME if over_time else DRAWS) if draws is None else draws
     _refuse_calibration(calibration is not None and not over_time)
     payload, bare = float(payload), robot_of(robot)
-    machine = _loaded(bare, payload, payload_at)
+    machine = loaded(bare, payload, payload_at)
     line = draws_for(machine, wires, draws, experiment, own)
-    where = machine.home_m if position is None else numbers("--position", position, 3)
-    turned = asked_rotation(rotation)
-    if turned is not None and np.isnan(turned).any() and machine.freedom == "orientation":
-        raise InputError("--rotation: found free components for a platform on a ball joint, expected three numbers")
-    _refuse_off_plane(machine, where, _start(machine, turned))
-    moments = rising_times(times)
-    tolerance, tolerance_tilt = float(tolerance), float(tolerance_tilt)
+    asked = AskedPose(machine, line, *asked_place(machine, position, rotation), seed, own)
+    moments, tolerance, tolerance_tilt = rising_times(times), float(tolerance), float(tolerance_tilt)
     above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
     specimen_spread = typical_spread(line, check_spread(specimen_spread, alike=False))
-    carried = {"--payload": payload, **_spelled({"--payload-at": payload_at})}
-    at = _spelled({"--position": position, "--rotation": rotation})
+    carried = {"--payload": payload, **spelled({"--payload-at": payload_at})}
+    at = spelled({"--position": position, "--rotation": rotation})
+
+    def begun(options: dict[str, Any]) -> Begun:
+        every = {"--experiment": experiment, **options}
+        decides = configuration("pose", robot, posterior_of(wires, experiment), draws, seed, own, every)
+        return Begun(decides, ResultFolder.at(output), progress)
+
     if over_time:
         _refuse_beside_history("--map-heights and --map-rotation", map_heights is not None or map_rotations is not None)
         _refuse_beside_history("--times and --other-fit", other_fit is not None or text_of(times) != text_of(TIMES_S))
         errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
         errors = calibrated_errors(errors, calibration, bare, line, wires, experiment)
-        options = {"--experiment": experiment, **carried, **at}
-        decides = configuration("pose", robot, posterior_of(wires, experiment), draws, seed, own, options)
-        return pose_history(machine, line, joints, trajectory, errors, (where, _start(machine, turned)), seed, decides,
-                            ResultFolder.at(output), own, progress)  # fmt: skip
+        if joints is None:
+            return pose_along(asked, trajectory, errors, begun({**carried, **at}))
+        _refuse_both(trajectory is not None)
+        return pose_from_joints(asked, joints, errors, begun({**carried, **at}))
     slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
-    there = orientation(machine, where, turned)
-    request = PoseRequest(there.position_m, there.rotation, moments, 1e-3 * tolerance, math.radians(tolerance_tilt),
-                          specimen_spread, seed, slices, there)  # fmt: skip
-    options = {
-        "--experiment": experiment, **at, "--times": text_of(times), "--tolerance": tolerance,
-        "--tolerance-tilt": tolerance_tilt, "--specimen-spread": specimen_spread,
-        "--other-fit": None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR), **carried,
-    }  # fmt: skip
+    fitted_otherwise = None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR)
+    options = at | {
+        "--times": text_of(times),
+        "--tolerance": tolerance,
+        "--tolerance-tilt": tolerance_tilt,
+        "--specimen-spread": specimen_spread,
+        "--other-fit": fitted_otherwise,
+        **carried,
+    }
     if slices is not LEVEL:
         options["--map-heights, --map-rotation"] = plain(asdict(slices))
-    place, posterior = ResultFolder.at(output), posterior_of(wires, experiment)
-    decides = configuration("pose", robot, posterior, draws, seed, own, options)
-    with open_run(place.path, decides) as run, computing():
+    there = orientation(machine, asked.position_m, asked.rotation_rad)
+    request = PoseRequest(
+        there.position_m,
+        there.rotation,
+        moments,
+        tolerance_m=1e-3 * tolerance,
+        tolerance_rad=math.radians(tolerance_tilt),
+        specimen_spread=specimen_spread,
+        seed=seed,
+        slices=slices,
+        orientation=there,
+    )
+    return pose_at(asked, request, other, begun(options))
+
+
+def pose_at(asked: AskedPose, request: PoseRequest, other: WireDraws | None, begun: Begun) -> Pose:
+    """One pose: ``pose.json``, the mapped workspace and pictures.
+
+    Parameters
+    ----------
+    asked : AskedPose
+    request : PoseRequest
+    other : WireDraws or None
+        Another fit of the line, which one more controller uses.
+    begun : Begun
+    """
+    with open_run(begun.place.path, begun.decides) as run, computing():
         if run.state == "done":
-            return Pose(place, own, computed=False)
-        _write(run.directory, machine, request, answer(machine, line, request, other))
+            return Pose(begun.place, asked.own_effects, computed=False)
+        _write(run.directory, asked.robot, request, answer(asked.robot, asked.line, request, other))
         run.finish()
-    return Pose(place, own)
+    return Pose(begun.place, asked.own_effects)
 
 
 def _write(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -> None:
@@ -224,57 +246,14 @@ def _write(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -> N
     pictures.save_pose(folder, robot, request, found)
 
 
-def _spelled(options: Mapping[str, Numbers | None]) -> dict[str, str | None]:
-    """Options as the command line spells them; None where they were not given."""
-    return {name: None if values is None else text_of(values) for name, values in options.items()}
-
-
-def asked_rotation(rotation: Numbers | None) -> Floats | None:
-    """Components of a rotation vector, NaN where ``free`` (in Python None); None where nothing is asked for."""
-    if rotation is None:
-        return None
-    text = text_of(rotation)
-    words = ["free" if word.strip() in ("free", "None") else word for word in text.split(",")]
-    if "free" not in words:
-        return np.asarray(numbers("--rotation", text, 3))
-    try:
-        found = np.array([np.nan if word == "free" else float(word) for word in words])
-    except ValueError:
-        found = np.array([np.inf])
-    if len(found) != 3 or np.isinf(found).any():
-        raise InputError(f"--rotation: found {text!r}, expected three finite numbers or free, separated by commas")
-    return found if np.isfinite(found).any() else None
-
-
-def _refuse_off_plane(robot: Robot, position_m: Floats, rotation: Floats) -> None:
-    far = float(plane.off(robot, position_m[None], rotation[None])[0])
-    if robot.freedom == "orientation" and far > 0:
-        home = ", ".join(f"{v:g}" for v in robot.home_m)
-        raise InputError(f"--position: found a position {far:.3g} m off the ball joint, expected {home}")
-    if robot.plane is not None and far > OFF_PLANE * robot.span_m:
-        home, normal = (", ".join(f"{v:g}" for v in values) for values in (robot.home_m, robot.plane.normal))
-        raise InputError(
-            f"--position, --rotation: found a pose {far:.3g} m off the plane, expected one in the plane through the "
-            f"home position ({home}) with the normal ({normal}), turned about it only"
-        )
-
-
-def _start(robot: Robot, asked_rad: Floats | None) -> Floats:
-    """About how the platform is turned when a history begins."""
-    home = robot.home_rotation_rad
-    return matrix(home if asked_rad is None else np.where(np.isfinite(asked_rad), asked_rad, home))
-
-
-def _loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:
-    """The robot with a payload, at its own centre of mass where no other place is given."""
-    if not 0 <= payload_kg < math.inf:
-        raise InputError(f"--payload: found {payload_kg:g}, expected kilograms, 0 or more")
-    return with_payload(robot, payload_kg, robot.centre_of_mass_m if at is None else numbers("--payload-at", at, 3))
-
-
 def _refuse_beside_history(options: str, given: bool) -> None:
     if given:
         raise InputError(f"{options}: found beside a history, expected them for a single pose only")
+
+
+def _refuse_both(given: bool) -> None:
+    if given:
+        raise InputError("--joints and --trajectory: found both, expected one (a file of --joints may hold poses too)")
 
 
 def _refuse_calibration(alone: bool) -> None:

@@ -1,18 +1,18 @@
 """A robot's measured or commanded history: what `pose` does where it is given one."""
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from wirebayes.commands.asked_pose import OFF_PLANE, AskedPose
 from wirebayes.commands.calibrate import calibrated_of
 from wirebayes.commands.options import Progress, above_zero
 from wirebayes.commands.wires import Wires, content, hash_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json
-from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import computing
 from wirebayes.robot.history import table
 from wirebayes.robot.history.answer import answer
@@ -27,8 +27,6 @@ from wirebayes.strict.files import PathLike
 from wirebayes.views.calibration import Calibration
 from wirebayes.views.pose import Pose
 from wirebayes.views.result import ResultFolder
-
-_OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded
 
 
 def checked_errors(reference_sd: float, specimen_spread: float, tension_sd: float, tilt_sd: float) -> Uncertain:
@@ -100,53 +98,68 @@ def calibrated_errors(
     return replace(errors, spread=known.prior.spread, calibrated=known)
 
 
-def pose_history(
-    robot: Robot,
-    line: WireDraws,
-    joints: Any,
-    trajectory: Any,
-    errors: Uncertain,
-    start: tuple[Floats, Floats],
-    seed: int,
-    decides: dict[str, Any],
-    place: ResultFolder,
-    own_effects: Path | None,
-    progress: Progress,
-) -> Pose:
-    """Poses over time from `joints` or for `trajectory`: ``pose.json``, two tables and pictures.
+@dataclass(frozen=True)
+class Begun:
+    """A command that knows what decides its results, and where they go.
+
+    Attributes
+    ----------
+    decides : dict
+        For ``configuration.json``.
+    place : ResultFolder
+        Folder of the results.
+    progress : callable
+        Called with a name, what is done and the total.
+    """
+
+    decides: dict[str, Any]
+    place: ResultFolder
+    progress: Progress
+
+
+def pose_from_joints(asked: AskedPose, joints: Any, errors: Uncertain, begun: Begun) -> Pose:
+    """Poses over time from measured joint values: ``pose.json``, two tables and pictures.
 
     Parameters
     ----------
-    robot : Robot
-    line : WireDraws
-    joints, trajectory : path, columns or None
-        One of them: measured joint values, or commanded poses.
-    errors : Uncertain
-    start : (position, rotation)
+    asked : AskedPose
         The pose near which the first row's is sought.
-    seed : int
-    decides : dict
-        What else decides the results, for ``configuration.json``.
-    place : ResultFolder
-        Folder of the results.
-    own_effects : Path or None
-        File of a user's own effects.
-    progress : callable
-        Called with a name, what is done and the total.
-
-    Returns
-    -------
-    Pose
+    joints : path of a CSV, DataFrame, or mapping of name to (t,) array
+    errors : Uncertain
+    begun : Begun
 
     Raises
     ------
     InputError
-        Both were given, or a table is wrong (line and column).
+        The table is wrong (line and column).
     """
-    if joints is not None and trajectory is not None:
-        raise InputError("--joints and --trajectory: found both, expected one (a file of --joints may hold poses too)")
-    option, given = ("--joints", joints) if joints is not None else ("--trajectory", trajectory)
-    columns = table.measured if joints is not None else table.commanded
+    return _followed(asked, "--joints", joints, errors, begun)
+
+
+def pose_along(asked: AskedPose, trajectory: Any, errors: Uncertain, begun: Begun) -> Pose:
+    """Poses over time for commanded ones: ``pose.json``, two tables and pictures.
+
+    Parameters
+    ----------
+    asked : AskedPose
+        The pose near which the first row's is sought.
+    trajectory : path of a CSV, DataFrame, or mapping of name to (t,) array
+    errors : Uncertain
+    begun : Begun
+
+    Raises
+    ------
+    InputError
+        The table is wrong (line and column).
+    """
+    return _followed(asked, "--trajectory", trajectory, errors, begun)
+
+
+_COLUMNS = {"--joints": table.measured, "--trajectory": table.commanded}
+
+
+def _followed(asked: AskedPose, option: str, given: Any, errors: Uncertain, begun: Begun) -> Pose:
+    robot, columns = asked.robot, _COLUMNS[option]
     if isinstance(given, str | os.PathLike):
         history = table.read(Path(given), robot, columns)
         read = content(Path(given))
@@ -165,19 +178,19 @@ def pose_history(
     }
     if errors.calibrated is not None:
         lasting["--calibration"] = hash_of(to_dict(errors.calibrated))
-    with open_run(place.path, decides | {"history": lasting}) as run:
-        if run.state == "done":
-            return Pose(place, own_effects, computed=False)
+    with open_run(begun.place.path, begun.decides | {"history": lasting}) as opened:
+        if opened.state == "done":
+            return Pose(begun.place, asked.own_effects, computed=False)
         with computing(), np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
-            found = answer(robot, line, history, errors, start, seed, progress)
-        write_json(run.directory / "pose.json", found.content)
+            found = answer(robot, asked.line, history, errors, asked.start, asked.seed, begun.progress)
+        write_json(opened.directory / "pose.json", found.content)
         for name, (header, rows) in found.tables.items():
-            write_csv(run.directory / name, header, rows)
+            write_csv(opened.directory / name, header, rows)
         from wirebayes.report.pictures import robot_history as pictures  # matplotlib only where it is needed
 
-        pictures.save(run.directory, robot, history, found)
-        run.finish()
-    return Pose(place, own_effects)
+        pictures.save(opened.directory, robot, history, found)
+        opened.finish()
+    return Pose(begun.place, asked.own_effects)
 
 
 def _refuse_off_plane(robot: Robot, option: str, history: History) -> None:
@@ -185,7 +198,7 @@ def _refuse_off_plane(robot: Robot, option: str, history: History) -> None:
     if robot.motions is None or history.position_m is None or history.rotation is None:
         return
     far = plane.off(robot, history.position_m, history.rotation)
-    if far.max() > _OFF_PLANE * robot.span_m:
+    if far.max() > OFF_PLANE * robot.span_m:
         when = history.times_s[int(far.argmax())]
         raise InputError(
             f"{option}: found a pose {far.max():.3g} m off the robot's plane or ball joint at {when:g} s, expected none"

@@ -27,7 +27,18 @@ _CHUNK = 2000  # draws at a time: bounds the memory
 def groups_of(
     fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: np.random.Generator
 ) -> dict[str, Group]:
-    """The content of ``posterior.nc``: of one sample as if it stood alone, or of all samples."""
+    """The content of ``posterior.nc``: of one sample as if it stood alone, or of all samples.
+
+    Parameters
+    ----------
+    fit : Fit
+    sample : Sample or None
+        None for all.
+    provenance : mapping
+        Stored as attributes.
+    rng : numpy Generator
+        Draws from the prior and of the predictive distribution.
+    """
     problem, (m, draws, _) = fit.problem, fit.theta.shape
     members = list(problem.samples) if sample is None else [sample]
     few = np.unique(np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS)).astype(int))

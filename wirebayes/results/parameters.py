@@ -15,7 +15,15 @@ from wirebayes.wire.protocol import Control
 
 
 def variables(problem: Problem, theta: Array, sample: Sample | None) -> dict[str, Array]:
-    """Parameters (chains, draws), of one sample, or of all with those of one sample each along a last axis."""
+    """Parameters (chains, draws), of one sample, or of all with those of one sample each along a last axis.
+
+    Parameters
+    ----------
+    problem : Problem
+    theta : (chains, draws, d) array
+    sample : Sample or None
+        None for all.
+    """
     if sample is None:
         return _together_variables(problem, theta)
     own = _own(problem, theta.reshape(-1, theta.shape[-1]), sample)
@@ -31,7 +39,15 @@ def _own(problem: Problem, theta: Array, sample: Sample) -> dict[str, Array]:
 def by_length(
     own: dict[str, Array], effects: Sequence[Effect], length_mm: float, reference_mm: float
 ) -> dict[str, Array]:
-    """Parameters that depend on the length as they are at this one: alone, a sample has no other to compare with."""
+    """Parameters that depend on the length as they are at this one: alone, a sample has no other to compare with.
+
+    Parameters
+    ----------
+    own : dict of name to (n,) array
+    effects : sequence of Effect
+    length_mm, reference_mm : float
+        Of the sample, and of those that it was fitted with.
+    """
     hold: Any = SimpleNamespace(length_mm=length_mm, length_ref_mm=reference_mm)
     out: Any = own
     for effect in (e for e in effects if e.compares_lengths):

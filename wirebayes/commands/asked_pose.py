@@ -1,0 +1,125 @@
+"""A robot with its payload on its wires, and the pose that is asked of it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wirebayes.commands.options import Numbers, numbers, text_of
+from wirebayes.errors import InputError
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.history.history import with_payload
+from wirebayes.robot.mechanics import plane
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.rotation import matrix
+
+OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded
+
+
+@dataclass(frozen=True)
+class AskedPose:
+    """A robot on its wires, and where its platform is asked to be.
+
+    Attributes
+    ----------
+    robot : Robot
+        With its payload.
+    line : WireDraws
+    position_m : (3,) array
+    rotation_rad : (3,) array or None
+        Components of the rotation vector, NaN where balance decides; None where nothing is asked for.
+    seed : int
+    own_effects : Path or None
+    """
+
+    robot: Robot
+    line: WireDraws
+    position_m: Floats
+    rotation_rad: Floats | None
+    seed: int
+    own_effects: Path | None
+
+    @property
+    def start(self) -> tuple[Floats, Floats]:
+        """Position and rotation matrix near which a history begins."""
+        return self.position_m, about(self.robot, self.rotation_rad)
+
+
+def asked_place(robot: Robot, position: Numbers | None, rotation: Numbers | None) -> tuple[Floats, Floats | None]:
+    """Position and rotation vector that are asked for, as `AskedPose` holds them.
+
+    Parameters
+    ----------
+    robot : Robot
+    position, rotation : numbers or None
+
+    Raises
+    ------
+    InputError
+        They are no numbers, or the robot cannot be there.
+    """
+    where = robot.home_m if position is None else numbers("--position", position, 3)
+    turned = asked_rotation(rotation)
+    if turned is not None and np.isnan(turned).any() and robot.freedom == "orientation":
+        raise InputError("--rotation: found free components for a platform on a ball joint, expected three numbers")
+    _refuse_off_plane(robot, where, about(robot, turned))
+    return where, turned
+
+
+def asked_rotation(rotation: Numbers | None) -> Floats | None:
+    """Components of a rotation vector, NaN where ``free`` (in Python None); None where nothing is asked for."""
+    if rotation is None:
+        return None
+    text = text_of(rotation)
+    words = ["free" if word.strip() in ("free", "None") else word for word in text.split(",")]
+    if "free" not in words:
+        return np.asarray(numbers("--rotation", text, 3))
+    try:
+        found = np.array([np.nan if word == "free" else float(word) for word in words])
+    except ValueError:
+        found = np.array([np.inf])
+    if len(found) != 3 or np.isinf(found).any():
+        raise InputError(f"--rotation: found {text!r}, expected three finite numbers or free, separated by commas")
+    return found if np.isfinite(found).any() else None
+
+
+def about(robot: Robot, asked_rad: Floats | None) -> Floats:
+    """(3, 3) how the platform is turned as asked, and as at home where nothing is asked."""
+    home = robot.home_rotation_rad
+    return matrix(home if asked_rad is None else np.where(np.isfinite(asked_rad), asked_rad, home))
+
+
+def _refuse_off_plane(robot: Robot, position_m: Floats, rotation: Floats) -> None:
+    far = float(plane.off(robot, position_m[None], rotation[None])[0])
+    if robot.freedom == "orientation" and far > 0:
+        home = ", ".join(f"{v:g}" for v in robot.home_m)
+        raise InputError(f"--position: found a position {far:.3g} m off the ball joint, expected {home}")
+    if robot.plane is not None and far > OFF_PLANE * robot.span_m:
+        home, normal = (", ".join(f"{v:g}" for v in values) for values in (robot.home_m, robot.plane.normal))
+        raise InputError(
+            f"--position, --rotation: found a pose {far:.3g} m off the plane, expected one in the plane through the "
+            f"home position ({home}) with the normal ({normal}), turned about it only"
+        )
+
+
+def loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:
+    """The robot with a payload, at its own centre of mass where no other place is given.
+
+    Parameters
+    ----------
+    robot : Robot
+    payload_kg : float
+    at : numbers or None
+        Centre of mass of the payload in the platform's frame, m.
+    """
+    if not 0 <= payload_kg < math.inf:
+        raise InputError(f"--payload: found {payload_kg:g}, expected kilograms, 0 or more")
+    return with_payload(robot, payload_kg, robot.centre_of_mass_m if at is None else numbers("--payload-at", at, 3))
+
+
+def spelled(options: Mapping[str, Numbers | None]) -> dict[str, str | None]:
+    """Options as the command line spells them; None where they were not given."""
+    return {name: None if values is None else text_of(values) for name, values in options.items()}
