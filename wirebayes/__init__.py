@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from wirebayes.views.simulated_tests import SimulatedTests as SimulatedTests
 
 _PLACES = {
-    "read_experiments": "wirebayes.io.experiment",
+    "read_experiments": "wirebayes.io.experiment_file",
     "from_arrays": "wirebayes.io.arrays",
     "import_bench": "wirebayes.commands.import_bench",
     "new_experiment": "wirebayes.commands.new_experiment",

@@ -25,7 +25,7 @@ from wirebayes.io.bench.undecided import Choices
 from wirebayes.model.scales import NATURAL
 from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import workers
-from wirebayes.wire.laws import creep_fraction, creep_target, strain
+from wirebayes.wire.laws import LAWS, creep_fraction, creep_target
 
 WIRES = {
     "k1": stats.lognorm(0.5, scale=900.0), "B": stats.lognorm(0.5, scale=0.3), "U": stats.lognorm(0.3, scale=0.6),
@@ -69,7 +69,7 @@ def record(
         done = np.searchsorted(parts, time[now], "right") / PARTS
         setting = level + rng.normal(0.0, wire["setting_sd"])
         x[now], stretch[now] = there + done * (level - there), place + done * (setting - place)
-        tension = wire["k1"] * strain(np.array(base + setting), np.array(length_mm + creep))
+        tension = wire["k1"] * LAWS["hooke"].strain(np.array(base + setting), np.array(length_mm + creep))
         amount = creep_target(np.maximum(tension, 0.0), np.array(wire["B"]), np.array(wire["U"])) - creep
 
         def at(t: Floats, parts: Floats = parts, k2: Floats = k2, N: Floats = N) -> Floats:
@@ -79,7 +79,7 @@ def record(
         crept[now] = creep + amount * at(time[now])
         creep += float(amount) * float(at(starts[j + 1 : j + 2])[0])
         place, there = setting, level
-    tension = wire["k1"] * np.maximum(strain(base + stretch, length_mm + crept), 0.0)
+    tension = wire["k1"] * np.maximum(LAWS["hooke"].strain(base + stretch, length_mm + crept), 0.0)
     measured = x + rng.normal(0.0, drive.noise_mm, len(x)) if drive.noise_mm else x
     return time, measured, tension + rng.normal(0.0, wire["sensor_sd"], len(x))
 

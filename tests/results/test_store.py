@@ -13,6 +13,7 @@ from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.problem import build
 from wirebayes.results import jobs, read_back, store
 from wirebayes.results.jobs import Job
+from wirebayes.results.summary import CREEP_TIMES_S
 from wirebayes.simulation.synthetic import Bench, Truth, draw, write
 from wirebayes.wire.staircase import simulate
 
@@ -53,7 +54,7 @@ def test_the_summary_s_figures_of_a_fresh_sample_include_all_effects_of_the_wire
         return slow + mode + own["steady_creep.a"] * load * t
 
     draws = joint.parameters(fitted.flat, here)
-    for key, time in summary.CREEP_TIMES_S.items():
+    for key, time in CREEP_TIMES_S.items():
         values = creep(draws, time)
         assert [derived[key][q] for q in ("q05", "q50", "q95")] == pytest.approx(np.quantile(values, [0.05, 0.5, 0.95]))
         assert derived[key]["mean"] == pytest.approx(values.mean(), rel=1e-12)

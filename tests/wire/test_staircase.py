@@ -93,11 +93,25 @@ def test_without_creep_every_reading_of_a_hold_is_the_same(theta, law):
 @given(st.floats(1e-6, 1e-3))
 def test_laws_1_and_3_agree_at_small_strain(strain):
     """1 - 1/(1+s) = s - s² + ..., so they differ by one strain, and by less than that."""
-    hooke = laws.strain(np.array(1.0 + strain), np.array(1.0), "hooke")
-    modified = laws.strain(np.array(1.0 + strain), np.array(1.0), "modified")
+    lengths = np.array(1.0 + strain), np.array(1.0)
+    hooke, modified = (law.strain(*lengths) for law in laws.LAWS.values())
     assert 0.99 * strain <= (hooke - modified) / hooke <= strain
-    by_s, by_l = laws.strain_slopes(np.array(1.0 + strain), np.array(1.0), "modified")
+    by_s, by_l = laws.LAWS["modified"].by_stretched(*lengths), laws.LAWS["modified"].by_zero(*lengths)
     assert by_s == pytest.approx(-by_l, rel=2 * strain)
+
+
+@pytest.mark.parametrize("law", laws.LAWS.values(), ids=laws.LAWS)
+def test_slopes_inverses_and_energy_belong_to_the_strain(law):
+    stretched, zero, step = 1.3, 1.1, 1e-6
+    strain = law.strain(stretched, zero)
+    by_stretched = (law.strain(stretched + step, zero) - law.strain(stretched - step, zero)) / (2 * step)
+    by_zero = (law.strain(stretched, zero + step) - law.strain(stretched, zero - step)) / (2 * step)
+    work = (law.energy(stretched + step, zero) - law.energy(stretched - step, zero)) / (2 * step)
+    assert law.by_stretched(stretched, zero) == pytest.approx(by_stretched, rel=1e-8)
+    assert law.by_zero(stretched, zero) == pytest.approx(by_zero, rel=1e-8)
+    assert work == pytest.approx(strain, rel=1e-8) and law.energy(zero, zero) == 0.0
+    assert law.stretched(np.array(strain), zero) == pytest.approx(stretched)
+    assert law.zero_length(stretched, strain) == pytest.approx(zero)
 
 
 def cut(p, at):

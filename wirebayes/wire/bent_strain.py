@@ -17,7 +17,7 @@ def bent(effects: Placed, strain: Array, hold: HoldContext) -> tuple[Array, Arra
     effects : Placed
         Those at ``strain`` take part.
     strain : array
-        Geometric strain, as `laws.strain` gives it.
+        Geometric strain, as `wirebayes.wire.laws` gives it.
     hold : HoldContext
 
     Returns

@@ -3,9 +3,9 @@
 import numpy as np
 
 from wirebayes.numeric.typing import Array
-from wirebayes.wire import laws
 from wirebayes.wire.bent_strain import strain_of
 from wirebayes.wire.effect import HoldContext, Placed
+from wirebayes.wire.laws import LAWS, ElasticLaw
 
 
 class Elastic:
@@ -21,8 +21,8 @@ class Elastic:
     law : {"hooke", "modified"}
     """
 
-    def __init__(self, effects: Placed, k1: Array, length_mm: float, law: laws.ElasticLaw) -> None:
-        self.effects, self.k1, self.length_mm, self.law = effects, k1, length_mm, law
+    def __init__(self, effects: Placed, k1: Array, length_mm: float, law: ElasticLaw) -> None:
+        self.effects, self.k1, self.length_mm, self.law = effects, k1, length_mm, LAWS[law]
 
     def tension(self, position_mm: Array, elongation_mm: Array, hold: HoldContext) -> Array:
         """Tension at a stretched length, N; zero when slack.
@@ -36,7 +36,7 @@ class Elastic:
         hold : HoldContext
         """
         hold.zero_mm = self._zero(elongation_mm, hold)
-        strain = self.effects.change("strain", laws.strain(position_mm, hold.zero_mm, self.law), hold)
+        strain = self.effects.change("strain", self.law.strain(position_mm, hold.zero_mm), hold)
         return np.where(strain.real > 0, self.k1 * strain, 0.0)
 
     def position(self, tension_N: Array, elongation_mm: Array, hold: HoldContext) -> Array:
@@ -50,7 +50,7 @@ class Elastic:
         hold : HoldContext
         """
         hold.zero_mm = self._zero(elongation_mm, hold)
-        return laws.stretched(strain_of(self.effects, tension_N / self.k1, hold), hold.zero_mm, self.law)
+        return self.law.stretched(strain_of(self.effects, tension_N / self.k1, hold), hold.zero_mm)
 
     def _zero(self, elongation_mm: Array, hold: HoldContext) -> Array:
         zero: Array = self.effects.change("zero_length", self.length_mm + elongation_mm, hold)

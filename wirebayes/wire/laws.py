@@ -1,9 +1,9 @@
-"""The paper's laws of one wire, each a plain function of arrays.
+"""The paper's laws of one wire.
 
 Equation numbers are those of the paper the toolkit reproduces (see ``docs``).
 """
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,65 +13,67 @@ ElasticLaw = Literal["hooke", "modified"]
 History = Literal["saturating", "additive"]
 
 
-def strain(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke") -> Array:
-    """Strain whose product with k1 is the tension: eq (1) ``L/L0 - 1``, eq (3) ``1 - L0/L``.
+class Hooke:
+    """Eq (1): strain relative to the zero-tension length, ``L/L0 - 1``; its product with k1 is the tension.
 
-    Negative when slack; the caller clips the tension, so that the slope stays available.
-
-    Parameters
-    ----------
-    stretched_mm : array
-        Distance between the wire's ends, L.
-    zero_tension_mm : array
-        Length under no tension, L0, creep included.
-    law : {"hooke", "modified"}
-        Eq (1) or eq (3).
-
-    Returns
-    -------
-    array
-        The broadcast of both; real or complex.
+    Arguments are arrays, real or complex, or balls of interval arithmetic, in one unit of length: the stretched length
+    L, the distance between the wire's ends; the zero-tension length L0, creep included. A negative strain is slack; the
+    caller clips the tension, so that the slope stays available.
     """
-    if law == "hooke":
-        return stretched_mm / zero_tension_mm - 1.0
-    return 1.0 - zero_tension_mm / stretched_mm
+
+    def strain(self, stretched: Any, zero: Any) -> Any:
+        """Strain at a stretched length."""
+        return stretched / zero - 1
+
+    def by_stretched(self, stretched: Any, zero: Any) -> Any:
+        """Derivative of the strain by the stretched length."""
+        return 1 / zero
+
+    def by_zero(self, stretched: Any, zero: Any) -> Any:
+        """Derivative of the strain by the zero-tension length."""
+        by_stretched = 1 / zero
+        return -stretched * by_stretched * by_stretched
+
+    def stretched(self, strain: Array, zero: Array) -> Array:
+        """Stretched length at a strain."""
+        return zero * (1.0 + strain)
+
+    def zero_length(self, stretched: Array, strain: Array) -> Array:
+        """Zero-tension length of what has a strain at a stretched length."""
+        return stretched / (1.0 + strain)
+
+    def energy(self, stretched: Array, zero: Array) -> Array:
+        """Elastic energy for a k1 of one: the integral of the strain from the zero-tension length."""
+        stretch = stretched - zero
+        return 0.5 * stretch * stretch / zero
 
 
-def stretched(strain: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke") -> Array:
-    """Stretched length at a strain, the inverse of `strain`, mm; NaN where eq (3) has none.
+class Modified(Hooke):
+    """Eq (3): strain relative to the stretched length, ``1 - L0/L``."""
 
-    Parameters
-    ----------
-    strain, zero_tension_mm : array
-    law : {"hooke", "modified"}
+    def strain(self, stretched: Any, zero: Any) -> Any:
+        return 1 - zero / stretched
 
-    Returns
-    -------
-    array
-        The broadcast of both; real or complex.
-    """
-    if law == "hooke":
-        return zero_tension_mm * (1.0 + strain)
-    return zero_tension_mm / np.where(strain.real < 1.0, 1.0 - strain, np.nan)
+    def by_stretched(self, stretched: Any, zero: Any) -> Any:
+        by_zero = 1 / stretched
+        return zero * by_zero * by_zero
+
+    def by_zero(self, stretched: Any, zero: Any) -> Any:
+        return -1 / stretched
+
+    def stretched(self, strain: Array, zero: Array) -> Array:
+        """Stretched length at a strain; NaN where there is none."""
+        return zero / np.where(strain.real < 1.0, 1.0 - strain, np.nan)
+
+    def zero_length(self, stretched: Array, strain: Array) -> Array:
+        return stretched * (1.0 - strain)
+
+    def energy(self, stretched: Array, zero: Array) -> Array:
+        x = (stretched - zero) / zero
+        return np.asarray(zero * (x - np.log1p(x)))
 
 
-def strain_slopes(stretched_mm: Array, zero_tension_mm: Array, law: ElasticLaw = "hooke") -> tuple[Array, Array]:
-    """Derivatives of `strain` by stretched and by zero-tension length, 1/mm.
-
-    Parameters
-    ----------
-    stretched_mm, zero_tension_mm : array
-    law : {"hooke", "modified"}
-
-    Returns
-    -------
-    by_stretched, by_zero_tension : array
-    """
-    if law == "hooke":
-        by_stretched = 1.0 / zero_tension_mm
-        return by_stretched, -stretched_mm * by_stretched * by_stretched
-    by_stretched = 1.0 / stretched_mm
-    return zero_tension_mm * by_stretched * by_stretched, -by_stretched
+LAWS: dict[ElasticLaw, Hooke] = {"hooke": Hooke(), "modified": Modified()}
 
 
 def creep_target(tension_N: Array, B: Array, U: Array) -> Array:

@@ -314,10 +314,10 @@ class Walk:
         carried, carry_by_setting, carry_by_creep : (n,) arrays
             Creep carried out, mm, and its derivatives by the same two.
         """
-        law, length, k1 = self.model.law, self.protocol.length_mm, self.k1
+        law, length, k1 = laws.LAWS[self.model.law], self.protocol.length_mm, self.k1
         zero = length + creep
-        first = k1 * laws.strain(stretched, zero, law)
-        by_s, by_l = laws.strain_slopes(stretched, zero, law)
+        first = k1 * law.strain(stretched, zero)
+        by_s, by_l = law.by_stretched(stretched, zero), law.by_zero(stretched, zero)
         taut = first > 0
         safe = np.where(taut, first, 1.0)
         target = np.where(taut, self.B * np.power(safe, self.U), 0.0)
@@ -327,8 +327,8 @@ class Walk:
         every = self.fraction[self.where[j]]
         fraction = every[rows]
         zero = zero + amount * fraction
-        tension = k1 * laws.strain(stretched, zero, law)
-        by_s, by_l = laws.strain_slopes(stretched, zero, law)
+        tension = k1 * law.strain(stretched, zero)
+        by_s, by_l = law.by_stretched(stretched, zero), law.by_zero(stretched, zero)
         stiff = np.where(tension > 0, k1, 0.0)
         by_setting = stiff * (by_s + by_l * (amount_s * fraction))
         by_creep = stiff * (by_l * (1.0 + amount_c * fraction))

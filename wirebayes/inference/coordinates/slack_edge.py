@@ -31,7 +31,7 @@ class SlackEdge:
     stretch_mm : float
         By so much the wire is longer at a strain of one: its length.
     modified : bool
-        Whether strain is relative to the stretched length (`wirebayes.wire.laws.strain`).
+        Whether strain is relative to the stretched length (`wirebayes.wire.laws.Modified`).
     k1, threshold : int or float
         Columns, or the numbers at which stiffness and threshold tension are fixed; 0.0 without a threshold.
     """

@@ -46,6 +46,11 @@ class Wires:
     effects: tuple[Effect, ...] = ()
     tension_ref_N: float = 1.0
 
+    @property
+    def elastic(self) -> laws.Hooke:
+        """The elastic law of the wires without effects."""
+        return laws.LAWS[self.law]
+
     @cached_property
     def placed(self) -> Placed:
         """The effects by place, with their amplitudes."""
@@ -134,12 +139,7 @@ def tension(wires: Wires, stretched_m: Floats, zero_m: Floats) -> tuple[Floats, 
     -------
     tension_N, slope_N_m : (w, n) arrays
     """
-    if wires.law == "hooke":
-        ratio = stretched_m / zero_m
-        strain, slope = ratio - 1.0, 1.0 / zero_m
-    else:
-        ratio = zero_m / stretched_m
-        strain, slope = 1.0 - ratio, ratio / stretched_m
+    strain, slope = wires.elastic.strain(stretched_m, zero_m), wires.elastic.by_stretched(stretched_m, zero_m)
     k1 = wires.theta["k1"]
     if wires.at("strain"):
         strain, bend = bent_strain(wires, strain, zero_m)
@@ -160,16 +160,14 @@ def energy(wires: Wires, stretched_m: Floats, zero_m: Floats) -> Floats:
     -------
     (w, n) array
     """
-    stretch = np.maximum(stretched_m - zero_m, 0.0)
+    longer = np.maximum(stretched_m, zero_m)
     if wires.at("strain"):
+        stretch = longer - zero_m
         total = np.zeros(np.broadcast_shapes(stretch.shape, zero_m.shape))
         for node, weight in zip(*_GAUSS, strict=True):
             total += 0.5 * weight * tension(wires, zero_m + stretch * (0.5 * (node + 1.0)), zero_m)[0]
         return total * stretch
-    if wires.law == "hooke":
-        return np.asarray(0.5 * wires.theta["k1"] * stretch * stretch / zero_m)
-    x = stretch / zero_m
-    return np.asarray(wires.theta["k1"] * zero_m * (x - np.log1p(x)))
+    return np.asarray(wires.theta["k1"] * wires.elastic.energy(longer, zero_m))
 
 
 def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) -> Floats:
@@ -191,18 +189,13 @@ def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) ->
         hold = hold_context(wires)
 
         def bends(strain: Floats) -> Floats:
-            hold.zero_mm = 1e3 * _unstretched(stretched_m, strain, wires.law)
+            hold.zero_mm = 1e3 * wires.elastic.zero_length(stretched_m, strain)
             return np.asarray(wires.placed.change("strain", strain, hold))
 
         strain = inverse(bends, effective)
     with np.errstate(invalid="ignore"):
-        length = _unstretched(stretched_m, strain, wires.law)
+        length = wires.elastic.zero_length(stretched_m, strain)
         return np.where(length > 0, length, np.nan)
-
-
-def _unstretched(stretched_m: Floats, strain: Floats, law: laws.ElasticLaw) -> Floats:
-    """Zero-tension length of a wire that has a strain at a stretched length."""
-    return stretched_m / (1.0 + strain) if law == "hooke" else stretched_m * (1.0 - strain)
 
 
 def stretched_length(wires: Wires, zero_m: Floats, tension_N: Floats) -> Floats:
@@ -221,4 +214,4 @@ def stretched_length(wires: Wires, zero_m: Floats, tension_N: Floats) -> Floats:
     effective = tension_N / wires.theta["k1"] + 0.0 * zero_m
     if wires.at("strain"):
         effective = strain_of(wires.placed, effective, _hold_at(wires, zero_m))
-    return laws.stretched(effective, zero_m, wires.law)
+    return wires.elastic.stretched(effective, zero_m)

@@ -11,7 +11,7 @@ import numpy as np
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
-from wirebayes.wire.laws import ElasticLaw
+from wirebayes.wire.laws import LAWS, ElasticLaw
 
 Bounds = tuple[Floats, Floats]  # lower and upper, (w,) each
 
@@ -40,7 +40,7 @@ class Balance:
     ) -> None:
         import flint
 
-        self.robot, self.law, self.arb = robot, law, flint.arb
+        self.robot, self.law, self.arb = robot, LAWS[law], flint.arb
         self.k1 = [self._hull(*pair) for pair in zip(*k1, strict=True)]
         self.zero = [self._hull(*pair) for pair in zip(*zero, strict=True)]
         self.offset = [flint.arb(float(v)) for v in offset]
@@ -163,13 +163,8 @@ class Balance:
         return Span(rho * wrap + straight, u, bends)
 
     def strain(self, i: int, S: Any) -> Any:
-        """Strain at a stretched length, eq (1) or (3)."""
-        return S / self.zero[i] - 1 if self.law == "hooke" else 1 - self.zero[i] / S
-
-    def strain_slopes(self, i: int, S: Any) -> tuple[Any, Any]:
-        """Strain by the stretched and by the zero-tension length."""
-        zero = self.zero[i]
-        return (1 / zero, -S / (zero * zero)) if self.law == "hooke" else (zero / (S * S), -1 / S)
+        """Strain at a stretched length."""
+        return self.law.strain(S, self.zero[i])
 
     def pull(self, i: int, strain: Any, S: Any) -> tuple[Any, Any]:
         """Tension and its derivative by the stretched length; the hull of taut and slack where both are possible.
@@ -186,7 +181,7 @@ class Balance:
         tension, slope : ball
             N and N/m.
         """
-        slope = self.k1[i] * self.strain_slopes(i, S)[0]
+        slope = self.k1[i] * self.law.by_stretched(S, self.zero[i])
         if strain > 0:
             return self.k1[i] * strain, slope
         if strain < 0:
@@ -208,7 +203,7 @@ class Balance:
         by_stiffness, by_zero_length : ball
             The first is the strain, the second in N/m.
         """
-        by_zero = self.k1[i] * self.strain_slopes(i, S)[1]
+        by_zero = self.k1[i] * self.law.by_zero(S, self.zero[i])
         if strain > 0:
             return strain, by_zero
         if strain < 0:

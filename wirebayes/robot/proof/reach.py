@@ -197,7 +197,8 @@ def _wire_in_box(middle: Balance, wide: Balance, i: int, box: _Box, G: Floats, H
 def _strain(middle: Balance, wide: Balance, i: int, strand: Strand, box: _Box, H: Floats) -> Any:
     """Strain of wire `i`, by the mean value theorem in pose and parameters at once, so that what cancels does."""
     arb = wide.arb
-    by_strain, by_own = wide.strain_slopes(i, strand.length)
+    by_strain = wide.law.by_stretched(strand.length, wide.zero[i])
+    by_own = wide.law.by_zero(strand.length, wide.zero[i])
     strain = middle.strain(i, middle.strand(i, [arb(0)] * len(box.whole)).length)
     for j, h in enumerate(H):
         stretch = sum((slope * box.line[k, j] for k, slope in enumerate(strand.slope)), arb(0))
