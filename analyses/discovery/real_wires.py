@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from wirebayes.discovery import held_out
-from wirebayes.discovery.search import final_models, investigate
+from wirebayes.discovery.investigation import final_models
+from wirebayes.discovery.search import investigate
 from wirebayes.discovery.settings import Settings
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted

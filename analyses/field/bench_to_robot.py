@@ -27,7 +27,8 @@ import numpy as np
 from analyses.hidden_effects.truth import draw_wire
 from analyses.resumable import records
 from wirebayes.commands.wires import wire_draws
-from wirebayes.discovery.search import final_models, investigate
+from wirebayes.discovery.investigation import final_models
+from wirebayes.discovery.search import investigate
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.fit import seed_of

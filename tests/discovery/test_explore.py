@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wirebayes.discovery import stepwise
+from wirebayes.discovery import fitted_sets, stepwise
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence
 from wirebayes.discovery.settings import LEFT_OVER, MORE, MOST_EFFECTS, MOST_LOOKS, REACH, Settings
@@ -245,8 +245,8 @@ class Fits:
             return self.evidence
 
         remainders = {"e0": 3.0, "e1": 4.0, 0: 5.0, 1: 6.0}
-        monkeypatch.setattr(stepwise, "fitted", fitted)
-        monkeypatch.setattr(stepwise, "informed", informed)
+        monkeypatch.setattr(fitted_sets, "fitted", fitted)
+        monkeypatch.setattr(fitted_sets, "informed", informed)
         monkeypatch.setattr(stepwise, "weigh_names", weighed)
         monkeypatch.setattr(stepwise, "remainder_evidence", lambda block, reference: remainders[block.target])
         monkeypatch.setattr(stepwise, "expand", lambda target, z, trials: None)

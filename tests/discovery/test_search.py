@@ -9,7 +9,8 @@ import pytest
 from analyses.hidden_effects.cases import Spec, seal
 from wirebayes import cli
 from wirebayes.discovery import held_out, linear_scan, next_measurement, power, screening
-from wirebayes.discovery.search import discover, final_models, investigate
+from wirebayes.discovery.investigation import final_models
+from wirebayes.discovery.search import discover, investigate
 from wirebayes.discovery.settings import REMAINS, Settings
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.errors import InputError

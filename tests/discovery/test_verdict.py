@@ -6,13 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wirebayes.discovery import global_test, held_out, verdict
+from wirebayes.discovery import alternatives, global_test, held_out, retest, verdict
+from wirebayes.discovery import gains as gains_module
+from wirebayes.discovery.fitted_sets import Accepted, Explored, FittedSet
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.judgement import judge
 from wirebayes.discovery.model_space import EffectSet, log_prior
+from wirebayes.discovery.retest import Retest
 from wirebayes.discovery.settings import Settings
-from wirebayes.discovery.stepwise import Accepted, Explored, FittedSet
-from wirebayes.discovery.verdict import Retest, accepted_effects, decide, evidence
+from wirebayes.discovery.verdict import accepted_effects, decide, evidence
 
 ONE = np.ones(1)
 UNLIKELIER = -log_prior(2, 20)  # nats by which a set of two has less prior weight than one of one, of twenty names
@@ -45,9 +47,11 @@ def decided(
     def retested(best: Any, *others: Any) -> Retest:
         return Retest(p.get("".join(best.effects.names), 0.5), [[]])
 
-    monkeypatch.setattr(verdict, "_name_gain", gain)
-    monkeypatch.setattr(verdict, "_family_gain", gain)
-    monkeypatch.setattr(verdict, "_retested", retested)
+    for module in (verdict, gains_module):
+        monkeypatch.setattr(module, "name_gain", gain)
+        monkeypatch.setattr(module, "family_gain", gain)
+    for module in (verdict, retest):
+        monkeypatch.setattr(module, "retested", retested)
     settings = Settings(kinds=dict.fromkeys("abcdefghijklmnopqrst"))  # type: ignore[arg-type]
     rng = np.random.default_rng(0)
     plain: Any = [SimpleNamespace(experiments=[SimpleNamespace(recorded_holds=range(12))])]
@@ -151,10 +155,10 @@ def test_sets_that_failed_the_second_test_lose_their_weight_to_the_one_that_pass
 def test_nothing_left_to_add_passes_the_second_test() -> None:
     """No candidate is left that could be missing, so no simulation is needed."""
     whole = SimpleNamespace(probed=([], []), blocks=[None, None])
-    found = verdict._retested(whole, np.random.default_rng(0), map)  # type: ignore[arg-type]
+    found = retest.retested(whole, np.random.default_rng(0), map)  # type: ignore[arg-type]
     assert found == Retest(None, [[], []])
-    assert not verdict._fails(found)
-    assert verdict._fails(Retest(0.03, [[]])) and not verdict._fails(Retest(0.0301, [[]]))
+    assert not retest.fails(found)
+    assert retest.fails(Retest(0.03, [[]])) and not retest.fails(Retest(0.0301, [[]]))
 
 
 class Scored:
@@ -180,7 +184,7 @@ def test_the_gain_of_an_effect_is_against_the_set_without_it_where_it_acts(monke
     names = SimpleNamespace(key=frozenset("ab"), names=("a", "b"))
     accepted = (Accepted("a", (0, 1, 2), {}), Accepted("b", (1, 2), {}))
     best: Any = SimpleNamespace(effects=names, accepted=accepted, blocks=[[10.0], [20.0, 20.0], [30.0]])
-    assert verdict._name_gain(best, "b", fits, scored(monkeypatch)) == 28.0 + 23.0
+    assert gains_module.name_gain(best, "b", fits, scored(monkeypatch)) == 28.0 + 23.0
 
 
 def test_the_gain_of_a_family_is_that_of_the_mixture_over_its_members(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,15 +195,15 @@ def test_the_gain_of_a_family_is_that_of_the_mixture_over_its_members(monkeypatc
     fits: Any = Scored({"a": [[1.0, 2.0]], "ac": [[3.0, 1.0]], "ad": [[90.0, 90.0]], "b": [[9.0, 9.0]]})
     accepted = (Accepted("a", (0,), {}), Accepted("b", (0,), {}))
     best: Any = SimpleNamespace(effects=sets[0], accepted=accepted, blocks=[[2.0, 4.0]])
-    gain = verdict._family_gain(best, ("b", "c", "d"), found, fits, scored(monkeypatch))
+    gain = gains_module.family_gain(best, ("b", "c", "d"), found, fits, scored(monkeypatch))
     each = [0.9 / (0.6 / np.exp(one) + 0.3 / np.exp(other)) for one, other in ((2.0, 3.0), (4.0, 1.0))]
     assert gain == pytest.approx(np.log(each).sum() - 3.0)
 
 
 def test_a_mixture_of_one_model_is_that_model_and_otherwise_between_the_two() -> None:
     elpd = np.array([[1.0, -2.0], [3.0, -9.0]])
-    assert verdict.mixed(np.zeros(1), elpd[:1]) == pytest.approx(elpd[0])
-    found = verdict.mixed(np.log([0.5, 0.5]), elpd)
+    assert gains_module.mixed(np.zeros(1), elpd[:1]) == pytest.approx(elpd[0])
+    found = gains_module.mixed(np.log([0.5, 0.5]), elpd)
     assert (found > elpd.min(axis=0)).all() and (found < elpd.max(axis=0)).all()
 
 
@@ -242,7 +246,7 @@ def test_of_a_set_only_established_families_are_accepted(monkeypatch: pytest.Mon
 def test_too_few_holds_establish_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     sets = explored({"a": 30.0})
     few: Any = [SimpleNamespace(experiments=[SimpleNamespace(recorded_holds=range(2))])]
-    monkeypatch.setattr(verdict, "_retested", lambda *given: Retest(0.5, [[]]))
+    monkeypatch.setattr(verdict, "retested", lambda *given: Retest(0.5, [[]]))
     rng = np.random.default_rng(0)
     settings = Settings(kinds=dict.fromkeys("abcdefghijklmnopqrst"))  # type: ignore[arg-type]
     found = decide(few, sets, [], settings, LeftOut(rng, map), rng, map)
@@ -263,7 +267,7 @@ def alternative_models(weights: dict[str, float]) -> tuple[Any, Any, Any]:
 
 def test_more_models_than_three_beside_the_final_one_are_not_listed() -> None:
     decision, fits, final = alternative_models({"a": 0.3, "b": 0.2, "c": 0.17, "d": 0.13, "e": 0.11, "f": 0.09})
-    found = verdict.alternatives(decision, fits, 0, final("b"), "abcdef", False)
+    found = alternatives.alternatives(decision, fits, 0, final("b"), "abcdef", False)
     assert [a.block.effects[0].key for a in found] == ["b", "a", "c", "d"]
     assert sum(a.probability for a in found) == pytest.approx(1.0)
     assert found[1].probability == pytest.approx(0.3 / 0.8) and not found[1].remains
@@ -271,9 +275,9 @@ def test_more_models_than_three_beside_the_final_one_are_not_listed() -> None:
 
 def test_improbable_models_and_those_that_differ_elsewhere_are_not_sampled_beside_it() -> None:
     decision, fits, final = alternative_models({"a": 0.04, "b": 0.9, "c": 0.06, "bd": 0.5})
-    found = verdict.alternatives(decision, fits, 0, final("b"), "abc", True)
+    found = alternatives.alternatives(decision, fits, 0, final("b"), "abc", True)
     assert [a.block.effects[0].key for a in found] == ["b", "c"] and all(a.remains for a in found)
-    assert verdict.alternatives(decision, fits, 0, final("b"), "ab", False) == []
+    assert alternatives.alternatives(decision, fits, 0, final("b"), "ab", False) == []
 
 
 def test_an_effect_that_gains_exactly_four_does_not_predict(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -312,15 +316,13 @@ def retested(monkeypatch: pytest.MonkeyPatch, p: float) -> tuple[Any, list[Any],
 
     monkeypatch.setattr(global_test, "simulated_with_patterns", simulated)
     monkeypatch.setattr(global_test.screening, "joined_replicates", joined)
-    monkeypatch.setattr(
-        verdict.residual_patterns, "patterns", lambda problem: (f"{problem} list", f"{problem} columns")
-    )
-    monkeypatch.setattr(verdict.residual_patterns, "findings", findings)
-    monkeypatch.setattr(verdict.screening, "global_test", tested)
-    monkeypatch.setattr(verdict, "expand", expand)
-    monkeypatch.setattr(verdict, "scan", lambda x: x)
+    monkeypatch.setattr(retest.residual_patterns, "patterns", lambda problem: (f"{problem} list", f"{problem} columns"))
+    monkeypatch.setattr(retest.residual_patterns, "findings", findings)
+    monkeypatch.setattr(retest.screening, "global_test", tested)
+    monkeypatch.setattr(retest, "expand", expand)
+    monkeypatch.setattr(retest, "scan", lambda x: x)
     best: Any = SimpleNamespace(blocks=blocks, probed=(["t1", "t2"], ["candidate"]))
-    return blocks, asked, verdict._retested(best, np.random.default_rng(0), map)
+    return blocks, asked, retest.retested(best, np.random.default_rng(0), map)
 
 
 def test_the_second_test_has_the_effects_of_the_set_inside(monkeypatch: pytest.MonkeyPatch) -> None:

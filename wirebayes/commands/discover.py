@@ -17,14 +17,8 @@ from wirebayes.commands.options import (
     silent,
     words,
 )
-from wirebayes.discovery import search
-from wirebayes.discovery.search import (
-    JointModel,
-    alternative_models,
-    catalogue_without,
-    final_models,
-    investigate,
-)
+from wirebayes.discovery.investigation import Investigation, JointModel, alternative_models, final_models
+from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
@@ -139,7 +133,7 @@ def discover(
     return Findings(place, own)
 
 
-def write_findings(found: search.Investigation, output: Path, own_effects: Path | None) -> None:
+def write_findings(found: Investigation, output: Path, own_effects: Path | None) -> None:
     """Beside the fits: what is undecided, pictures, and ``discovery.json`` with the final posteriors' amplitudes.
 
     Parameters
@@ -159,7 +153,7 @@ def write_findings(found: search.Investigation, output: Path, own_effects: Path 
     write_json(output / "discovery.json", found.report)
 
 
-def jobs_of(found: search.Investigation, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
+def jobs_of(found: Investigation, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
     """Plain fit of every experiment, and the final ones.
 
     Parameters
@@ -189,7 +183,7 @@ def jobs_of(found: search.Investigation, law: ElasticLaw, history: History, own_
     return out
 
 
-def _others(found: search.Investigation) -> list[tuple[int, JointModel]]:
+def _others(found: Investigation) -> list[tuple[int, JointModel]]:
     """The undecided models beside the final ones, each with its number among those of its experiments."""
     out, count = [], dict[str, int]()
     for models in alternative_models(found):
@@ -199,7 +193,7 @@ def _others(found: search.Investigation) -> list[tuple[int, JointModel]]:
     return out
 
 
-def _mixtures(found: search.Investigation, output: Path) -> None:
+def _mixtures(found: Investigation, output: Path) -> None:
     """Say beside each final posterior which other models it shares the probability with."""
     for block, others in zip(found.final, found.undecided, strict=True):
         for e in block.experiments if others else ():
@@ -209,7 +203,7 @@ def _mixtures(found: search.Investigation, output: Path) -> None:
             write_mixture(output / e.name / "final", list(zip(folders, weights, keys, strict=True)))
 
 
-def _posterior_amplitudes(found: search.Investigation, output: Path) -> None:
+def _posterior_amplitudes(found: Investigation, output: Path) -> None:
     """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
     for e in (e for block in found.final for e in block.experiments):
         summary: SummaryJson = read_json(output / e.name / "final" / "summary.json")
@@ -220,7 +214,7 @@ def _posterior_amplitudes(found: search.Investigation, output: Path) -> None:
             amplitude |= {"mean": of_posterior["mean"], "q05": of_posterior["q05"], "q95": of_posterior["q95"]}
 
 
-def _parameters(found: search.Investigation, output: Path) -> None:
+def _parameters(found: Investigation, output: Path) -> None:
     """Every parameter before and after, as the two posteriors have it."""
     for name, report in found.report["experiments"].items():
         plain, final = (read_json(output / name / model / "summary.json")["parameters"] for model in ("plain", "final"))
@@ -236,7 +230,7 @@ def _interval(entry: Parameter | None) -> Interval | None:
     return None if entry is None else {"mean": entry["mean"], "q05": entry["q05"], "q95": entry["q95"]}
 
 
-def _warnings(found: search.Investigation, output: Path) -> None:
+def _warnings(found: Investigation, output: Path) -> None:
     """What the fits say against themselves joins what the search says; of the same readings it is said once."""
     reports = found.report["experiments"]
     for name, report in reports.items():
@@ -247,7 +241,7 @@ def _warnings(found: search.Investigation, output: Path) -> None:
     found.report["warnings"] = named(reports)
 
 
-def _pictures(found: search.Investigation, output: Path, own_effects: Path | None) -> None:
+def _pictures(found: Investigation, output: Path, own_effects: Path | None) -> None:
     """Before and after, hold by hold, and one of each finding."""
     from wirebayes.report.pictures.discover import (  # matplotlib only where it is needed
         before_and_after,

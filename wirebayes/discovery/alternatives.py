@@ -1,0 +1,75 @@
+"""The models between which the readings do not decide."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from wirebayes.discovery.fitted_sets import Fits, Key
+from wirebayes.discovery.settings import (
+    LEAST_ALTERNATIVE,
+    MOST_ALTERNATIVES,
+)
+from wirebayes.discovery.verdict import Decision
+from wirebayes.inference.laplace_fit import LaplaceFit
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """One of several models between which the readings do not decide.
+
+    Attributes
+    ----------
+    block : LaplaceFit
+    remains : bool
+        Whether something unknown remains beside its effects.
+    probability : float
+    """
+
+    block: LaplaceFit
+    remains: bool
+    probability: float
+
+
+def alternatives(
+    decision: Decision, fits: Fits, i: int, final: LaplaceFit, undecided: Sequence[str], remains: bool
+) -> list[Alternative]:
+    """The final model of block `i` and the others that share the probability with it, at most `MOST_ALTERNATIVES`.
+
+    Parameters
+    ----------
+    decision : Decision
+    fits : Fits
+    i : int
+        Number of the block among the materials.
+    final : LaplaceFit
+        The block's final model.
+    undecided : sequence of str
+        Names between which the verdict is undecided: the others differ from the final model in these alone.
+    remains : bool
+        Whether a discrepancy stands beside the effects.
+
+    Returns
+    -------
+    list of Alternative
+        The final model first, probabilities summing to one; empty where it stands alone.
+    """
+    found = decision.posterior
+    names = frozenset(effect.name for effect in final.effects)
+    weights: dict[Key, float] = {}
+    for s, weight in zip(found.sets, (found.without + found.beside).tolist(), strict=True):
+        acting = frozenset(name for name in s.names if s.presence[name][i] > 0.5)
+        swaps = acting - names <= set(undecided) and names - acting <= set(undecided)
+        if acting and acting != names and swaps and s.key == acting and fits.knows(s.key):
+            weights[s.key] = weights.get(s.key, 0.0) + weight
+        elif acting == names:
+            weights[names] = weights.get(names, 0.0) + weight
+    total = sum(weights.values())
+    others = sorted(
+        (k for k, w in weights.items() if k != names and w >= LEAST_ALTERNATIVE * total), key=lambda k: -weights[k]
+    )
+    kept = [names, *others[:MOST_ALTERNATIVES]]
+    weights.setdefault(names, 0.0)
+    total = sum(weights[k] for k in kept)
+    if total <= 0.0 or len(kept) == 1:
+        return []
+    blocks = [final, *(fits.of(k)[i] for k in kept[1:])]
+    return [Alternative(block, remains, weights[k] / total) for block, k in zip(blocks, kept, strict=True)]

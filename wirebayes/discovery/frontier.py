@@ -1,0 +1,118 @@
+"""Which sets of effects to fit next: those that may come close to the best, and the way to those not met yet."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wirebayes.discovery.families import Family
+from wirebayes.discovery.fitted_sets import FittedSet, Key
+from wirebayes.discovery.model_space import EffectSet, family_of, log_prior
+from wirebayes.discovery.name_evidence import NameEvidence
+from wirebayes.discovery.settings import (
+    MORE,
+    REACH,
+    SAME_EVIDENCE,
+)
+
+
+@dataclass
+class Frontier:
+    """Sets known by evidence alone, and which of them have been fitted."""
+
+    names: int
+    families: Sequence[Family] = ()
+    known: dict[Key, EffectSet] = field(default_factory=dict)
+    fitted: dict[Key, FittedSet] = field(default_factory=dict)
+    parents: dict[Key, tuple[Key, str]] = field(default_factory=dict)
+    credit: dict[Key, float] = field(default_factory=dict)
+    towards: list[Key] = field(default_factory=list)
+
+    def add(self, parent: EffectSet, name: str, found: NameEvidence, credit: float = -np.inf) -> None:
+        """A set that a refit found, unless another order of the same names is better.
+
+        Of orders that found the same, the one with the strongest parent stays: the weakest effect has to prove itself.
+
+        Parameters
+        ----------
+        parent : EffectSet
+            The set that was refitted with one more effect.
+        name : str
+            Of that effect.
+        found : NameEvidence
+            What the refit says of it beside the parent.
+        credit : float
+            Log Bayes factor that the set may come to with a remainder beside it, as far as is known.
+        """
+        key = parent.key | {name}
+        value = parent.log_bayes + found.log_bayes[name]
+        known = self.known.get(key)
+        if key in self.fitted:  # its fit searched from many starts; of what its refits found, the better counts
+            assert known is not None
+            if value > known.log_bayes + SAME_EVIDENCE:
+                self.fitted[key] = self.fitted[key].weighing(value)
+                self.known[key] = self.fitted[key].effects
+        else:
+            ahead = np.inf if known is None else value - known.log_bayes
+            if abs(ahead) < SAME_EVIDENCE:
+                ahead = parent.log_bayes - self.known[self.parents[key][0]].log_bayes
+            if ahead > 0.0:
+                presence = {**parent.presence, name: found.presence[name]}
+                self.known[key] = EffectSet((*parent.names, name), value, presence, None)
+                self.parents[key] = parent.key, name
+        self.credit[key] = max(self.credit.get(key, -np.inf), credit)
+
+    def promise(self, key: Key) -> float:
+        """The largest log weight that a set may come to, by what is known so far."""
+        with_remainder = self.credit[key] + np.log(MORE)
+        return log_prior(len(key), self.names) + float(np.logaddexp(self.known[key].log_bayes, with_remainder))
+
+    def kinds(self, key: Key) -> tuple[Family, ...]:
+        """The families of a set's names."""
+        return tuple(sorted(family_of(name, self.families) for name in key))
+
+    def next_looks(self, most: int) -> list[Key]:
+        """Sets to be fitted next: of those close enough to the best one each combination of families first.
+
+        Look-alikes would use up all looks, and what only shows beside one of them would never be met.
+
+        Parameters
+        ----------
+        most : int
+            How many at most.
+        """
+        promises = {key: self.promise(key) for key in self.known}
+        best = max(promises.values(), default=-np.inf)
+        near = [k for k, promise in promises.items() if k not in self.fitted and promise > best - REACH]
+        near.sort(key=lambda k: (-promises[k], sorted(k)))
+        looked = [self.kinds(key) for key in self.fitted]
+        rank = {}
+        for key in near:
+            rank[key] = looked.count(self.kinds(key))
+            looked.append(self.kinds(key))
+        near.sort(key=lambda k: rank[k])  # the order within a rank stays
+        waiting = [k for k in self.towards if k not in self.fitted]
+        # as many at once whatever the number of cores, so that the sets are the same
+        wave = list(dict.fromkeys([*waiting, *near]))[:most]
+        return wave or [k for k in near if promises[k] == best][:1]  # the best set is always fitted
+
+    def step_aside(self, key: Key) -> None:
+        """From a set close to the best, go towards one where a name of it may give way to another of its family.
+
+        A look-alike that explains little by itself is not met beside the others of the set.
+        """
+        if self.promise(key) < max(map(self.promise, self.known)) - REACH:
+            return
+        for name in sorted(key):
+            rest = key - {name}
+            others = [rest | {other} for other in family_of(name, self.families) if other not in key]
+            if rest in self.known and rest not in self.fitted and not all(k in self.known for k in others):
+                self.towards.append(rest)
+
+    def step_back(self, key: Key) -> None:
+        """Go towards the sets that lack one effect of a fitted set and that no step forward has met."""
+        for name in sorted(key):
+            fewer = key - {name}
+            before = [fewer - {other} for other in sorted(fewer)]  # from these the smaller set is one step forward
+            if fewer not in self.known and not any(k in self.fitted for k in before):
+                self.towards += sorted((k for k in before if k in self.known), key=self.promise)[-1:]

@@ -1,0 +1,71 @@
+"""What a search has found in a file, and the models of it that are sampled."""
+
+from dataclasses import dataclass
+
+from wirebayes.discovery import shrinking
+from wirebayes.discovery.alternatives import Alternative
+from wirebayes.inference.laplace_fit import LaplaceFit
+from wirebayes.io.experiment import Experiment
+from wirebayes.json_files.discovery import (
+    DiscoveryJson,
+)
+from wirebayes.wire.effect import Effect
+
+
+@dataclass(frozen=True)
+class Investigation:
+    """What was found in a file.
+
+    Attributes
+    ----------
+    report : dict
+        The content of ``discovery.json``.
+    final : tuple of LaplaceFit
+        The samples of each material, gross errors struck out, with the effects that were accepted.
+    undecided : tuple of list of Alternative
+        For each material the models that the readings leave undecided, the final one first; empty where nothing is.
+    """
+
+    report: DiscoveryJson
+    final: tuple[LaplaceFit, ...]
+    undecided: tuple[list[Alternative], ...] = ()
+
+
+@dataclass(frozen=True)
+class JointModel:
+    """What is sampled at once: some experiments with some effects, and where the best parameters are, if known."""
+
+    experiments: tuple[Experiment, ...]
+    effects: tuple[Effect, ...] = ()
+    near: dict[str, float] | None = None
+
+
+def final_models(findings: Investigation) -> list[JointModel]:
+    """The final model of every experiment.
+
+    Samples of one material share what they are, and the amplitude of what was added. Where nothing was, each stands for
+    itself; where something unknown remains, with the flexible discrepancy beside what was added.
+    """
+    out = []
+    for block in findings.final:
+        reports = [findings.report["experiments"][name] for name in block.names]
+        remains = reports[0]["verdict"] in ("partial", "unknown")
+        out += _sampled(block, remains)
+    return out
+
+
+def alternative_models(findings: Investigation) -> list[list[JointModel]]:
+    """The other models that stay undecided beside the final ones, each as what is sampled for it."""
+    return [_sampled(other.block, other.remains) for others in findings.undecided for other in others[1:]]
+
+
+def _sampled(block: LaplaceFit, remains: bool) -> list[JointModel]:
+    """What is sampled for a block, with a smooth discrepancy beside its effects where something remains."""
+    if block.effects and not remains:
+        return [JointModel(block.experiments, block.effects, block.best)]
+    out = []
+    for e in block.experiments:
+        own = shrinking.alone(block.effects, e)
+        smooth = (shrinking.discrepancy(e, shrinking.left_over(block, e.name)),) if remains else ()
+        out.append(JointModel((e,), (*own, *smooth), block.parameters(e.name)))
+    return out

@@ -1,0 +1,126 @@
+"""The global test once more, with effects inside: whether they leave something over, and a set that does not."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wirebayes.discovery import residual_patterns, screening
+from wirebayes.discovery.fitted_sets import Explored, FittedSet, Key
+from wirebayes.discovery.global_test import is_close, with_more
+from wirebayes.discovery.linear_scan import expand, scan
+from wirebayes.discovery.model_space import ModelPosterior
+from wirebayes.discovery.screening import Replicates
+from wirebayes.discovery.settings import (
+    ALPHA_AFTER,
+    GIVE_WAY,
+    MOST_RETESTS,
+    RETESTS,
+)
+from wirebayes.json_files.discovery import Disagreement
+from wirebayes.processes.workers import ParallelMap
+
+
+@dataclass(frozen=True)
+class Retest:
+    """The global test once more, with effects inside.
+
+    Attributes
+    ----------
+    p : float or None
+        None where nothing could be added any more.
+    where : list of list of dict
+        Residual patterns beside the effects, a list a block (`wirebayes.discovery.residual_patterns.findings`).
+    """
+
+    p: float | None
+    where: list[list[Disagreement]]
+
+
+def fails(retest: Retest) -> bool:
+    """Whether something is left over."""
+    return retest.p is not None and retest.p <= ALPHA_AFTER
+
+
+@dataclass(frozen=True)
+class _Passing:
+    """A set that leaves nothing over, its test, and the sets that were tried before it."""
+
+    best: FittedSet
+    retest: Retest
+    failed: set[Key]
+
+
+def complete(
+    found: ModelPosterior,
+    explored: Explored,
+    best: FittedSet,
+    predicts: Callable[[FittedSet], bool],
+    rng: np.random.Generator,
+    parallel_map: ParallelMap,
+) -> _Passing | None:
+    """A set nearly as probable as the best one that leaves nothing over where that does; None where there is none.
+
+    It must predict as the best one had to; one that does not has failed without a test.
+
+    Parameters
+    ----------
+    found : ModelPosterior
+        Weights of the sets.
+    explored : Explored
+        Those that were fitted.
+    best : FittedSet
+        The best one, which leaves something over.
+    predicts : function of a FittedSet
+        Whether its last family predicts holds that are left out.
+    rng : numpy.random.Generator
+    parallel_map : function
+        The built-in `map`, or one over processes.
+    """
+    weights = {s.key: float(w) for s, w in zip(found.sets, found.without + found.beside, strict=True)}
+    least = weights[best.effects.key] * np.exp(-GIVE_WAY)
+    near = [k for k, w in sorted(weights.items(), key=lambda item: -item[1]) if k in explored.fitted and w > least]
+    failed: set[Key] = set()
+    for key in near[:MOST_RETESTS]:
+        candidate = explored.fitted[key]
+        if candidate is best:
+            continue
+        if predicts(candidate):
+            retest = retested(candidate, rng, parallel_map)
+            if not fails(retest):
+                return _Passing(candidate, retest, failed)
+        failed.add(key)
+    return None
+
+
+def retested(best: FittedSet, rng: np.random.Generator, parallel_map: ParallelMap) -> Retest:
+    """The global test with the set inside, and where its residuals still depend on something.
+
+    Half of the simulations decide where p is clearly above the level; below it, the odds depend on how small p is.
+
+    Parameters
+    ----------
+    best : FittedSet
+    rng : numpy.random.Generator
+    parallel_map : function
+        The built-in `map`, or one over processes.
+    """
+    trials, candidates = best.probed
+    if not candidates:
+        return Retest(None, [[] for _ in best.blocks])
+    patterns = [residual_patterns.patterns(block.target.problem) for block in best.blocks]
+    data = [
+        scan(expand(block.target, block.modes.z[:1], trials, columns=columns))
+        for block, (_, columns) in zip(best.blocks, patterns, strict=True)
+    ]
+    simulated: list[Replicates] = []
+    for n in ((RETESTS + 1) // 2, RETESTS // 2):
+        simulated = with_more(simulated, best.blocks, trials, n, rng, parallel_map)
+        test = screening.global_test(candidates, data, [s.scan for s in simulated])
+        if test.p > ALPHA_AFTER and not is_close(test.p, ALPHA_AFTER, len(test.null)):
+            break
+    where = [
+        residual_patterns.findings(listed, len(trials), here, s.scan, ", ".join(block.names))
+        for block, (listed, _), here, s in zip(best.blocks, patterns, data, simulated, strict=True)
+    ]
+    return Retest(test.p, where)
