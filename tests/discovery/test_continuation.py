@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wirebayes.discovery import continuation, linear_scan, refit, screening
-from wirebayes.discovery.continuation import Continuation, climb, ladders, start, strengths
-from wirebayes.discovery.linear_scan import RATIOS, Scan, Tangent, expand, scan
+from wirebayes.discovery import ascent, continuation, linear_scan, path_weights, refit, screening
+from wirebayes.discovery.ascent import PathEvidence, Start, lead, start
+from wirebayes.discovery.continuation import Continuation, strengths
+from wirebayes.discovery.ladders import AmplitudePath, ladders
+from wirebayes.discovery.linear_scan import RATIOS, expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
+from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import GlobalTest, Scale
+from wirebayes.discovery.tangent import Tangent, moving_columns
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment_file import read_experiments
@@ -50,7 +54,7 @@ def test_a_ladder_finds_what_refits_of_the_whole_density_find(tmp_path: Path, na
     block = block_of(tmp_path, {effect.columns()[0]: size}, [effect], 1)
     trials, candidates, data = scanned(block, {name: CATALOGUE[name]})
     ways = ladders([block], trials, candidates, [data])
-    found = strengths(ways, [{0: climb(block, way, start(block, block.modes.z[:1]))} for way in ways])
+    found = strengths(ways, [{0: lead(block, way, start(block, block.modes.z[:1]))} for way in ways])
     best = max(range(len(trials)), key=lambda k: data.effects[0, k])
     per_delta = 1.0 / float(data.norm[0, best])
     truth = refit.refit([block], (0,), trials[best].effect, per_delta, float(data.amplitude[0, best]))
@@ -64,7 +68,7 @@ def test_a_wire_that_goes_slack_in_every_hold_is_climbed_past() -> None:
     block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
     trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
     (way,) = ladders([block], trials, candidates, [data])
-    found = climb(block, way, start(block, block.modes.z[:1]))
+    found = lead(block, way, start(block, block.modes.z[:1]))
     assert np.isfinite([found.log_bayes, found.amplitude, found.norm]).all() and found.log_bayes.max() > -2.0
 
 
@@ -87,10 +91,10 @@ def test_rows_climb_alone(tmp_path: Path) -> None:
     trials, candidates, data = scanned(block, {"toe": CATALOGUE["toe"]})
     drawn = screening.replicated(block, trials, 30, np.random.default_rng(0))
     way = ladders([block], trials, candidates, [data])[0]
-    together = climb(block, way, start(block, drawn.z, drawn.readings)).log_bayes
+    together = lead(block, way, start(block, drawn.z, drawn.readings)).log_bayes
     for i in (0, 11, 22):
         own = start(block, drawn.z[i : i + 1], [y[..., i : i + 1] for y in drawn.readings])
-        alone = climb(block, way, own).log_bayes
+        alone = lead(block, way, own).log_bayes
         np.testing.assert_allclose(together[:, i], alone[:, 0], rtol=1e-4, atol=1e-3)
 
 
@@ -116,7 +120,7 @@ def test_all_noise_ratios_at_once_are_what_dense_algebra_says_of_each() -> None:
     parameters, signature = rng.normal(size=(n, readings, p)), rng.normal(size=(n, readings))
     one = np.ones(n)
     x = Tangent(residual, parameters, left, singular, one, gradient, precision, 1e-6 * one, one)
-    found = continuation._weigh(x, signature, -0.1, 0.2, degrees)
+    found = path_weights.weigh(x, signature, -0.1, 0.2, degrees)
     for i in (0, n - 1):  # of several pieces
         heights, moves, steps, promises = [], [], [], []
         for ratio in RATIOS:
@@ -149,7 +153,7 @@ def test_no_step_is_tried_that_promises_too_little(
     block = block_of(tmp_path, {}, [], 3)
     trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
     way = ladders([block], trials, candidates, [data])[0]
-    weigh, follow, tried = continuation._weigh, continuation._follow, []
+    weigh, follow, tried = ascent.weigh, ascent._follow, []
 
     def promising(*arguments: Any) -> Any:
         found = weigh(*arguments)
@@ -159,12 +163,12 @@ def test_no_step_is_tried_that_promises_too_little(
         tried.append(len(arguments[1]))
         return follow(*arguments)
 
-    monkeypatch.setattr(continuation, "_weigh", promising)
-    monkeypatch.setattr(continuation, "_follow", followed)
+    monkeypatch.setattr(ascent, "weigh", promising)
+    monkeypatch.setattr(ascent, "_follow", followed)
     begin = start(block, block.modes.z[:1])
     assert bool(tried) == goes_on
     tried.clear()
-    climb(block, way, begin)
+    lead(block, way, begin)
     assert bool(tried) == goes_on
 
 
@@ -190,11 +194,11 @@ def test_simulations_that_come_later_are_climbed_and_the_others_kept(
     both = screening.joined_replicates(drawn)
     rows: list[int] = []
 
-    def counted(block: LaplaceFit, way: continuation.AmplitudePath, begin: continuation.Start) -> continuation.Climbed:
+    def counted(block: LaplaceFit, way: AmplitudePath, begin: Start) -> PathEvidence:
         rows.append(begin.data_sets)
-        return climb(block, way, begin)
+        return lead(block, way, begin)
 
-    monkeypatch.setattr(continuation, "climb", counted)
+    monkeypatch.setattr(continuation, "lead", counted)
     larger, anew = (Continuation([block], trials, candidates, [data]) for _ in range(2))
     monkeypatch.setattr(continuation, "BY_LARGER", 1.0)  # no surprise is too small to be found out
     for each in (larger, anew):
@@ -302,7 +306,7 @@ def test_a_ladder_broken_off_keeps_the_places_of_its_rungs(tmp_path: Path) -> No
     block = block_of(tmp_path, {}, [], 3)
     trials, candidates, data = scanned(block, {"permanent_creep": CATALOGUE["permanent_creep"]})
     way = ladders([block], trials, candidates, [data])[0]
-    found = climb(block, way, start(block, block.modes.z[:1]))
+    found = lead(block, way, start(block, block.modes.z[:1]))
     rungs, starts = way.amplitudes.shape
     assert found.log_bayes.shape == found.amplitude.shape == found.norm.shape == ((rungs + 1) * starts, 1)
     assert (found.log_bayes < -1e200).any()  # it was broken off: no more than all creep can be permanent
@@ -346,11 +350,11 @@ def test_an_effect_gets_no_credit_for_what_the_plain_fit_gains_nearby(tmp_path: 
     trials, candidates, data = scanned(block, {"toe": CATALOGUE["toe"]})
     way = ladders([block], trials, candidates, [data])[0]
     best, beside = start(block, block.modes.z[:1]), block.modes.z[:1].copy()
-    free = linear_scan.moving_columns(block.target.problem)
+    free = moving_columns(block.target.problem)
     beside[:, free] += 0.3 / np.sqrt(np.diag(block.modes.curvature[0]))[free]
     moved = start(block, beside)
     assert moved.log_density[0] == pytest.approx(best.log_density[0], abs=0.06)
-    climbed = [climb(block, way, begin).log_bayes.max() for begin in (best, moved)]
+    climbed = [lead(block, way, begin).log_bayes.max() for begin in (best, moved)]
     assert climbed[0] == pytest.approx(climbed[1], abs=0.12)  # each settles within .05
 
 

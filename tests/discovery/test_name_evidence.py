@@ -9,8 +9,9 @@ from scipy import integrate, stats
 
 from tests.simulated import simulated_tests
 from wirebayes.discovery import name_evidence, refit, screening
-from wirebayes.discovery.linear_scan import Pieces, Probe, Scan, probes
 from wirebayes.discovery.power import amplitude_80
+from wirebayes.discovery.probes import Probe, probes
+from wirebayes.discovery.scans import Pieces, Scan
 from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.search import discover
 from wirebayes.effects import CATALOGUE, named

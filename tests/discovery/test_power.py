@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from wirebayes.discovery import power
-from wirebayes.discovery.linear_scan import Pieces, Probe, Scan, joined
 from wirebayes.discovery.power import group_of, similarity
+from wirebayes.discovery.probes import Probe
+from wirebayes.discovery.scans import Pieces, Scan, joined
 from wirebayes.discovery.screening import Candidate
 from wirebayes.effects import named
 

@@ -10,7 +10,7 @@ from scipy.special import logsumexp
 
 from analyses.hidden_effects.cases import Spec, seal
 from tests.simulated import simulated_tests
-from wirebayes.discovery.linear_scan import RATIOS, SIZES, evidences, expand, moving_columns, residuals, scan
+from wirebayes.discovery.linear_scan import RATIOS, SIZES, evidences, expand, scan
 from wirebayes.discovery.remainder_evidence import (
     Reference,
     _most_probable,
@@ -18,6 +18,7 @@ from wirebayes.discovery.remainder_evidence import (
     reference_of,
     remainder_evidence,
 )
+from wirebayes.discovery.tangent import moving_columns, residuals
 from wirebayes.effects import named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment_file import read_experiments

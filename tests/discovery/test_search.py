@@ -10,6 +10,7 @@ from analyses.hidden_effects.cases import Spec, seal
 from wirebayes import cli
 from wirebayes.discovery import held_out, linear_scan, next_measurement, power, screening
 from wirebayes.discovery.investigation import final_models
+from wirebayes.discovery.probes import probes
 from wirebayes.discovery.search import discover, investigate
 from wirebayes.discovery.settings import REMAINS, Settings
 from wirebayes.effects import CATALOGUE, named
@@ -260,7 +261,7 @@ def test_the_linear_scan_sees_what_a_regression_on_the_dense_covariance_sees(tmp
     block = fitted(
         made(tmp_path, [Bench()], {"toe.w": 1.0}, [named("toe")]), (), "hooke", "saturating", np.random.default_rng(0)
     )
-    trials = linear_scan.probes(named("strain_stiffening"))
+    trials = probes(named("strain_stiffening"))
     x = linear_scan.expand(block.target, block.modes.z[:1], trials)
     whitened = linear_scan.projected(x, float(x.ratio[0]))[:, 0]
     k = np.sqrt(float(x.ratio[0])) * x.left[0] * x.singular[0]

@@ -9,9 +9,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wirebayes.discovery.linear_scan import Probe, expand, moving_columns, projected, tangent
+from wirebayes.discovery.linear_scan import expand, projected
 from wirebayes.discovery.power import ALIKE, cosines
+from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import Refit
+from wirebayes.discovery.tangent import moving_columns, tangent
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.numeric.typing import Array

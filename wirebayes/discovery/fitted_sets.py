@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.discovery.linear_scan import Probe
 from wirebayes.discovery.model_space import EffectSet
 from wirebayes.discovery.name_evidence import NameEvidence
+from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import Refit
 from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.settings import (

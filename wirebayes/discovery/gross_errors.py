@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.discovery.linear_scan import Scan, expand, scan
+from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.refit import occam
+from wirebayes.discovery.scans import Scan
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import GrossError

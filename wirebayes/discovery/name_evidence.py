@@ -7,8 +7,10 @@ from functools import partial
 import numpy as np
 from scipy.special import logsumexp
 
-from wirebayes.discovery.linear_scan import Probe, Scan, expand, projected
+from wirebayes.discovery.linear_scan import expand, projected
+from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import LARGEST, Refit, refit
+from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import Candidate, best_probes, log_bayes
 from wirebayes.discovery.subsets import over_subsets
 from wirebayes.inference.laplace_fit import LaplaceFit

@@ -6,8 +6,8 @@ import numpy as np
 
 from wirebayes.discovery import next_measurement, power
 from wirebayes.discovery.global_test import Gate
-from wirebayes.discovery.linear_scan import Probe
 from wirebayes.discovery.material_answer import MaterialAnswer
+from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.settings import Settings
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.json_files.discovery import (

@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from wirebayes.discovery.linear_scan import Expansion, Probe, Scan, expand, projected
+from wirebayes.discovery.linear_scan import Expansion, expand, projected
+from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import LARGEST, occam
+from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import Candidate, GlobalTest
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.inference.laplace_fit import LaplaceFit

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.discovery.linear_scan import Scan
+from wirebayes.discovery.scans import Scan
 from wirebayes.json_files.discovery import Disagreement
 from wirebayes.model.problem import Problem, Sample
 from wirebayes.numeric.typing import Array

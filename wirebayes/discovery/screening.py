@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from wirebayes.discovery.linear_scan import Probe, Scan, expand, forms, joined, plain_reference, probes, scan
+from wirebayes.discovery.linear_scan import expand, plain_reference, scan
+from wirebayes.discovery.probes import Probe, forms, probes
 from wirebayes.discovery.refit import occam
+from wirebayes.discovery.scans import Scan, joined
 from wirebayes.discovery.settings import ABOVE_COUNT, ONE_NAT, UPPER
 from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.climb import climb

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.special import logsumexp
 
-from wirebayes.discovery.linear_scan import ABSORBED, RATIOS, SIZES, Expansion, damp
+from wirebayes.discovery.linear_scan import ABSORBED, RATIOS, SIZES, Expansion
+from wirebayes.discovery.tangent import damp
 from wirebayes.numeric.linear_algebra import eigh, solve
 from wirebayes.numeric.typing import Array
 

@@ -1,0 +1,101 @@
+"""What a linear scan has found, and what it is made of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.typing import Array
+
+_PIECES_OF = 300  # simulations whose pieces are kept, for they are large: enough for what 80 % of them show
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Log Bayes factors against the plain model, and the geometry behind them.
+
+    Attributes
+    ----------
+    effects : (n, m)
+        Of each probe, its amplitude at its best.
+    flexible : (n,)
+        Of the flexible reference, averaged over its processes and `SIZES`.
+    amplitude : (n, m)
+        Best amplitude (distance from neutral).
+    norm : (n, m)
+        Length of the projected signature per unit amplitude, at the most probable noise: δ per amplitude.
+    pieces : Pieces
+    """
+
+    effects: Array
+    flexible: Array
+    amplitude: Array
+    norm: Array
+    pieces: "Pieces"
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """What decides the log Bayes factor of a probe at each ratio ρ of the grid ``(k, ...)``.
+
+    Of many simulations it is kept for the first `_PIECES_OF` alone.
+
+    Attributes
+    ----------
+    shared, rss : (k, n)
+    along, square : (k, n, m)
+        Inner product of projected signature and residual, and the signature with itself.
+    degrees : int
+    least : (n,)
+    one_sided : (m,) bool
+    """
+
+    shared: Array
+    rss: Array
+    along: Array
+    square: Array
+    degrees: int
+    least: Array
+    one_sided: Array
+
+    def of(self, probe: int) -> "Pieces":
+        """One probe's pieces."""
+        one = slice(probe, probe + 1)
+        return replace(self, along=self.along[..., one], square=self.square[..., one], one_sided=self.one_sided[one])
+
+    def log_bayes(self, added: float) -> Array:
+        """(n,) of the only probe, had its amplitude `added` been in the data besides."""
+        c = np.where(np.isfinite(self.square[..., 0]), self.square[..., 0], 0.0)
+        rss = self.rss + 2.0 * added * self.along[..., 0] + added**2 * c
+        b = self.along[..., 0] + added * c
+        b = np.where(self.one_sided[0], np.maximum(b, 0.0), b)
+        left = rss - b**2 / np.where(c > 0, c, np.inf)
+        half = -0.5 * self.degrees
+        with_it = self.shared + half * np.log(np.maximum(left, self.least))
+        without = self.shared + half * np.log(np.maximum(rss, self.least))
+        return np.asarray(log_sum(with_it, axis=0) - log_sum(without, axis=0))
+
+
+def joined(scans: Sequence[Scan]) -> Scan:
+    """Scans of consecutive rows as one."""
+    if len(scans) == 1:
+        return scans[0]
+    parts = [s.pieces for s in scans]
+    ends = np.cumsum([len(p.least) for p in parts])
+    few = parts[: 1 + int(np.searchsorted(ends, _PIECES_OF))]
+    pieces = replace(
+        parts[0],
+        shared=np.concatenate([p.shared for p in few], axis=1)[:, :_PIECES_OF],
+        rss=np.concatenate([p.rss for p in few], axis=1)[:, :_PIECES_OF],
+        along=np.concatenate([p.along for p in few], axis=1)[:, :_PIECES_OF],
+        square=np.concatenate([p.square for p in few], axis=1)[:, :_PIECES_OF],
+        least=np.concatenate([p.least for p in few])[:_PIECES_OF],
+    )
+    return Scan(
+        effects=np.concatenate([s.effects for s in scans]),
+        flexible=np.concatenate([s.flexible for s in scans]),
+        amplitude=np.concatenate([s.amplitude for s in scans]),
+        norm=np.concatenate([s.norm for s in scans]),
+        pieces=pieces,
+    )

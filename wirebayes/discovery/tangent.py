@@ -1,0 +1,308 @@
+"""Samples made linear in their parameters, in the metric of their noise."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Self
+
+import numpy as np
+
+from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.model import likelihoods
+from wirebayes.model.problem import Problem
+from wirebayes.numeric.typing import Array
+from wirebayes.wire.staircase import linearise, simulate
+
+LARGEST_SLOPE = 1e100  # of any derivative: the square of a larger one overflows
+_NOISE = ("sensor_sd", "setting_sd")
+
+
+_STEP = 1e-5  # of sampled coordinates, which are of order one: truncation and rounding both stay below 1e-5 of a slope
+
+
+_PRIOR_STEP = 1e-3  # of the same, for second differences of the prior, which rounding spoils before
+
+
+_FLAT = 1e-3  # of a bend: less is rounding, and would put the prior's own best anywhere
+
+
+_LEAST_SQUARE = 1e-14  # share of the largest squared singular value: less is rounding
+
+
+_LEAST_NOISE = 1e-6  # of the fitted variance: rounding errors of the arithmetic must not pass for a perfect fit
+
+
+@dataclass(frozen=True)
+class Tangent:
+    """A block of samples made linear at n parameter sets, rows scaled by each sample's reading error.
+
+    Attributes
+    ----------
+    residual : (n, N)
+    parameters : (n, N, p)
+        Derivatives by the sampled coordinates that move the mean.
+    left, singular : (n, N, H), (n, H)
+        Left singular vectors and values of K.
+    ratio : (n,)
+        The fitted ρ.
+    prior_gradient, prior_precision : (n, p), (n, p, p)
+    floor : (n,)
+        Rounding's share of the scaled variance: noise cannot be smaller.
+    prior : (n,)
+        Log density of the prior in the sampled coordinates.
+    """
+
+    residual: Array
+    parameters: Array
+    left: Array
+    singular: Array
+    ratio: Array
+    prior_gradient: Array
+    prior_precision: Array
+    floor: Array
+    prior: Array
+
+    def of(self, rows: Array) -> Self:
+        """That of some parameter sets."""
+        every = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("one_sided", "processes")}
+        return replace(self, **{name: value[rows] for name, value in every.items()})
+
+    @property
+    def degrees(self) -> int:
+        """Readings less parameters."""
+        return int(self.parameters.shape[1] - self.parameters.shape[2])
+
+    @property
+    def least(self) -> Array:
+        """(n,) below which a sum of squares counts as rounding error."""
+        return np.asarray(self.degrees * np.maximum(self.floor, _LEAST_NOISE))
+
+    @property
+    def prior_square(self) -> Array:
+        """(n,) squared distance of the point from the prior's own best, as a parabola sees it."""
+        along = np.linalg.solve(self.prior_precision, self.prior_gradient[..., None])[..., 0]
+        return np.asarray((self.prior_gradient * along).sum(axis=1))
+
+
+def moving_columns(problem: Problem) -> list[int]:
+    """The columns of parameters that move the mean of the readings."""
+    return [i for i, name in enumerate(problem.names) if name.split("[")[0] not in _NOISE]
+
+
+def tangent(target: LogPosterior, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Tangent:
+    """Linearise a block by some of its columns, without signatures.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    z : (n, d) array
+        Parameters, in the coordinates that are sampled.
+    readings : sequence of (H, R, n) arrays or None
+        As in `expand`.
+    moving : list of int
+        Columns of `z` by which the tensions are differentiated.
+
+    Returns
+    -------
+    Tangent
+    """
+    around = around_points(target, z, moving)
+    return tangent_of(target, around, list(points_of(target, around, readings)))
+
+
+@dataclass(frozen=True)
+class Around:
+    """Points and steps from each along p coordinates: sampled and natural parameters ((1 + 3 p) n, d).
+
+    The points come first, then the steps by which tensions are differentiated, then those for the prior, both ways.
+    """
+
+    z: Array
+    theta: Array
+    columns: int
+
+    @property
+    def points(self) -> int:
+        return len(self.z) // (1 + 3 * self.columns)
+
+
+def around_points(target: LogPosterior, z: Array, moving: list[int]) -> Around:
+    """Points with their steps along some coordinates.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    z : (n, d) array
+    moving : list of int
+        Columns of the coordinates.
+    """
+    p = len(moving)
+    every = np.repeat(z[None], 1 + 3 * p, axis=0)
+    steps = np.repeat([_STEP, _PRIOR_STEP, -_PRIOR_STEP], p)
+    every[np.arange(1, 1 + 3 * p), :, moving * 3] += steps[:, None]
+    flat = every.reshape(-1, z.shape[1])
+    return Around(flat, target.coordinates.to_natural(flat), p)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One sample at n parameter sets: tension (H, R, n), derivatives (H, R, n, p), reading error (n,), and rows."""
+
+    tension: Array
+    slopes: Array
+    sd: Array
+    residual: Array
+    parameters: Array
+    by_setting: Array
+    floor: Array
+
+    def rows(self, values: Array, mask: Array) -> Array:
+        """(H, R, n) to (n, N) in units of the reading error."""
+        return np.asarray((values[mask] / self.sd).T)
+
+
+def points_of(target: LogPosterior, around: Around, readings: Sequence[Array] | None) -> Iterator[Point]:
+    """Each sample at the points.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    around : Around
+    readings : sequence of (H, R, n) arrays or None
+        Replicates that stand in for the measured readings, an array a sample.
+    """
+    problem, n = target.problem, around.points
+    both = around.theta[: n * (1 + around.columns)]
+    theta = both[:n]
+    for at, sample in enumerate(problem.samples):
+        mask = sample.protocol.mask
+        own = problem.parameters(theta, sample)
+        sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution))
+        line = linearise(sample.protocol, own, sample.model)
+        y = sample.readings if readings is None else readings[at]
+        moved = simulate(sample.protocol, problem.parameters(both, sample), sample.model)
+        moved = moved.reshape(*moved.shape[:2], 1 + around.columns, n)
+        slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
+        scaled = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
+        jac = np.moveaxis(likelihoods.jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
+        floor = np.broadcast_to(sample.resolution**2 / 12.0, sd.shape) / sd**2
+        yield Point(line.reading, slopes, sd, ((y - line.reading)[mask] / sd).T, scaled, jac, floor)
+
+
+def tangent_of(target: LogPosterior, around: Around, points: Sequence[Point]) -> Tangent:
+    """The samples put together.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    around : Around
+    points : sequence of Point
+        Of every sample there.
+    """
+    k = block_diagonal([p.by_setting for p in points])
+    beyond = ~(np.abs(k) < LARGEST_SLOPE).all(axis=(1, 2))  # what the model cannot compute has no tangent
+    k[beyond] = 1.0
+    # K's size is what ρ measures: give it a typical column of length one. It has none where the wire is slack
+    # throughout: then no setting error moves any reading.
+    ratio = (k**2).sum(axis=(1, 2)) / k.shape[2]
+    left, singular = _directions(k / np.sqrt(np.where(ratio > 0, ratio, 1.0))[:, None, None])
+    prior, gradient, precision = _prior(target, around)
+    residual = np.concatenate([p.residual for p in points], axis=1)
+    residual[beyond] = np.nan
+    parameters = np.concatenate([p.parameters for p in points], axis=1)
+    floor = np.min([p.floor for p in points], axis=0)
+    return Tangent(residual, parameters, left, singular, ratio, gradient, precision, floor, prior)
+
+
+def _directions(k: Array) -> tuple[Array, Array]:
+    """Left singular vectors and values of matrices (n, N, H) with few columns, from their squares: half the work.
+
+    What is lost are digits of directions in which a setting error moves nothing to speak of: they become zero.
+    """
+    square, right = np.linalg.eigh(np.swapaxes(k, 1, 2) @ k)
+    seen = square > _LEAST_SQUARE * square[:, -1:]
+    singular = np.sqrt(np.where(seen, square, 0.0))
+    return k @ (right / np.where(seen, singular, np.inf)[:, None]), singular
+
+
+def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None = None) -> tuple[Array, Array]:
+    """Readings less tensions, in units of the reading error, and the log density of the prior.
+
+    Parameters
+    ----------
+    target : LogPosterior
+    z : (n, d) array
+        Parameters, in the coordinates that are sampled.
+    readings : sequence of (H, R, n) arrays, optional
+        Replicates that stand in for the measured readings.
+
+    Returns
+    -------
+    (n, N) and (n,) arrays
+        All samples' readings one after the other; the density in the sampled coordinates.
+    """
+    theta = target.coordinates.to_natural(z)
+    parts = []
+    with np.errstate(all="ignore"):
+        for at, sample in enumerate(target.problem.samples):
+            own = target.problem.parameters(theta, sample)
+            sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution))
+            y = sample.readings if readings is None else readings[at]
+            left = y - simulate(sample.protocol, own, sample.model)
+            parts.append((left[sample.protocol.mask] / sd).T)
+    return np.concatenate(parts, axis=1), _prior_density(target, theta, z)
+
+
+def _prior_density(target: LogPosterior, theta: Array, z: Array) -> Array:
+    """(n,) log density of the prior in the sampled coordinates, at points whose natural parameters are known."""
+    with np.errstate(all="ignore"):  # a parameter that underflows to zero has no density
+        return np.asarray(target.log_prior(theta) + target.coordinates.log_jacobian(theta, z))
+
+
+def _prior(target: LogPosterior, around: Around) -> tuple[Array, Array, Array]:
+    """Log density of the prior; its gradient and (diagonal, positive) precision by the coordinates stepped along."""
+    n, p, h = around.points, around.columns, _PRIOR_STEP
+    rows = np.r_[:n, n * (1 + p) : len(around.z)]
+    values = _prior_density(target, around.theta[rows], around.z[rows])
+    centre, plus, minus = values[:n, None], *values[n:].reshape(2, p, n).swapaxes(1, 2)
+    # A boundary of the prior has no slope that means anything: there the column keeps a weak precision alone.
+    inside = np.isfinite(plus) & np.isfinite(minus) & np.isfinite(centre)
+    with np.errstate(invalid="ignore"):
+        gradient = np.where(inside, (plus - minus) / (2 * h), 0.0)
+        bend = -(plus + minus - 2 * centre) / h**2
+        # Along an edge the density falls without a bend, as an exponential: its width is that of its slope.
+        bend = np.where(bend > _FLAT, bend, np.maximum(gradient**2, _FLAT))
+        diagonal = np.where(inside, bend, 1.0)
+    precision = np.zeros((n, p, p))
+    precision[:, np.arange(p), np.arange(p)] = diagonal
+    return values[:n], gradient, precision
+
+
+def damp(singular: Array, ratio: Array | float) -> Array:
+    """How much of what moves whole holds the noise takes, at a ratio ρ, along each singular vector of K."""
+    with np.errstate(over="ignore"):
+        return np.asarray(ratio * singular**2 / (1.0 + ratio * singular**2))
+
+
+def whitened(x: Tangent, columns: Array, ratio: float) -> Array:
+    """(N, m) columns in the metric of the noise, as the first row has it.
+
+    Parameters
+    ----------
+    x : Tangent
+    columns : (N, m) array
+    ratio : float
+        Size of the setting errors against the sensor's, ρ.
+    """
+    shrink = 1.0 - 1.0 / np.sqrt(1.0 + ratio * x.singular[0] ** 2)
+    return np.asarray(columns - x.left[0] @ (shrink[:, None] * (x.left[0].T @ columns)))
+
+
+def block_diagonal(blocks: Sequence[Array]) -> Array:
+    """Batched (n, rows, columns) blocks along a diagonal."""
+    n = max(b.shape[0] for b in blocks)
+    out = np.zeros((n, sum(b.shape[1] for b in blocks), sum(b.shape[2] for b in blocks)))
+    row = column = 0
+    for b in blocks:
+        out[:, row : row + b.shape[1], column : column + b.shape[2]] = b
+        row, column = row + b.shape[1], column + b.shape[2]
+    return out
