@@ -26,8 +26,13 @@ def shares(rows: list[Row]) -> Iterator[Target]:
     for kind, label in (("two", "two effects"), ("periodic", "a periodic error and an elastic curve")):
         apart = [r for r in of[kind] if all(visible_beside(r))]
         yield _share(f"{label}: both accepted", apart, lambda r: all(accepted_of_group(r)), "all")
+        yield _share(
+            f"{label}: both accepted, where it is as sure", apart, lambda r: all(accepted_of_group(r)), "all_sure"
+        )
     known = [r for r in of["mixed"] if visible_beside(r)[0]]
     yield _share("beside a foreign effect: the known one accepted", known, lambda r: accepted_of_group(r)[0], "known")
+    accepted = "beside a foreign effect: the known one accepted, where it is as sure"
+    yield _share(accepted, known, lambda r: accepted_of_group(r)[0], "known_sure")
     yield _share("beside a foreign effect: a remainder is likely", of["mixed"], _remainder_is_likely, "remains")
     for kind, label in (("without", "effect removed"), ("foreign", "effect in no catalogue")):
         seen = [r for r in of[kind] if r["delta"] >= 8 and r["detected"]]

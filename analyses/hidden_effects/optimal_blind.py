@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.special import gammaln, logsumexp
 
-from wirebayes.discovery.settings import MORE, UNKNOWN_WEIGHT
+from wirebayes.discovery.settings import INCLUSION, MORE, UNKNOWN_WEIGHT
 
 from .baselines import gaussian_process
 from .delta import Geometry, derivatives
@@ -132,19 +132,31 @@ class Answers:
 
     Attributes
     ----------
-    names : of the most probable set.
+    sets : names of each set, the empty one first.
+    weights : (m, sets) probability of each, with or without a remainder.
     remains : (m,) whether a remainder is likely.
     odds : (m,) log odds of anything hidden against nothing, before any prior of nothing.
     """
 
-    names: list[list[str]]
+    sets: list[list[str]]
+    weights: Array
     remains: Mask
     odds: Array
+
+    @property
+    def names(self) -> list[list[str]]:
+        """Of the most probable set, a data set each."""
+        return [self.sets[i] for i in np.argmax(self.weights, axis=1)]
+
+    def inclusion(self, groups: list[list[str]]) -> Array:
+        """(m, groups) probability that a name of each group is missing."""
+        has = np.array([[any(name in group for name in names) for group in groups] for names in self.sets])
+        return np.asarray(self.weights @ has)
 
     def above(self, odds: float) -> Answers:
         """Those on data sets in which more than that speaks for something hidden."""
         rows = np.flatnonzero(self.odds > odds)
-        return Answers([self.names[i] for i in rows], self.remains[rows], self.odds[rows])
+        return Answers(self.sets, self.weights[rows], self.remains[rows], self.odds[rows])
 
     def rates(self, groups: list[list[str]]) -> dict[str, float]:
         """How often what counts is said, as shares of the data sets.
@@ -155,15 +167,18 @@ class Answers:
 
         Returns
         -------
-        ``all``: a name from every group, ``known``: one from the first; ``named``: that, and no remainder; ``remains``:
-        a remainder; ``right``: a remainder or a name from the first group; ``other``: no remainder and a name from no
-        group.
+        ``all``: a name from every group, ``known``: one from the first; ``all_sure``, ``known_sure``: the same with a
+        probability that `discover` asks for; ``named``: one from the first, and no remainder; ``remains``: a remainder;
+        ``right``: a remainder or a name from the first group; ``other``: no remainder and a name from no group.
         """
+        sure = self.inclusion(groups) >= INCLUSION
         named = np.array([[any(n in group for n in names) for group in groups] for names in self.names])
         other = np.array([any(not any(n in g for g in groups) for n in names) for names in self.names])
         said = {
             "all": named.all(axis=1),
             "known": named[:, 0],
+            "all_sure": sure.all(axis=1),
+            "known_sure": sure[:, 0],
             "named": named[:, 0] & ~self.remains,
             "remains": self.remains,
             "right": self.remains | named[:, 0],
@@ -190,11 +205,12 @@ def answers(geo: Geometry, directions: Directions, z: Array, rng: np.random.Gene
         size = sets.members.shape[1]
         prior = (size - 1) * np.log(MORE) + np.log(len(every[1].effects) / len(sets.effects))
         without.append(log_evidence(bare, sets, degrees) + prior)
-    weights = UNKNOWN_WEIGHT, MORE  # of a remainder alone, and beside one effect
-    beside = [log_evidence(more, sets, degrees) + np.log(w) for sets, w in zip(every, weights, strict=False)]
+    of_remainder = UNKNOWN_WEIGHT, MORE  # alone, and beside one effect
+    beside = [log_evidence(more, sets, degrees) + np.log(w) for sets, w in zip(every, of_remainder, strict=False)]
     alone, remainder = np.concatenate(without, axis=1), np.concatenate(beside, axis=1)
     either = alone.copy()
     either[:, : remainder.shape[1]] = np.logaddexp(alone[:, : remainder.shape[1]], remainder)
     remains = logsumexp(remainder, axis=1) > logsumexp(alone, axis=1)
     odds = np.asarray(logsumexp(either, axis=1) - nothing)
-    return Answers([names[i] for i in np.argmax(either, axis=1)], np.asarray(remains), odds)
+    weights = np.exp(either - logsumexp(either, axis=1, keepdims=True))
+    return Answers(names, weights, np.asarray(remains), odds)

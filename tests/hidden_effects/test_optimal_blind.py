@@ -87,12 +87,20 @@ def test_each_metric_with_a_smooth_remainder_is_that_of_the_dense_covariance():
 
 
 def test_what_counts_as_said():
-    said = Answers([["a", "c"], ["b"], ["c"], ["b"]], np.array([False, False, False, True]), np.arange(4.0))
+    weights = np.array([[0.05, 0.9, 0.05], [0.05, 0.06, 0.89], [0.89, 0.06, 0.05], [0.08, 0.02, 0.9]])
+    remains = np.array([False, False, False, True])
+    said = Answers([["c"], ["a", "c"], ["b"]], weights, remains, np.arange(4.0))
+    assert said.names == [["a", "c"], ["b"], ["c"], ["b"]]
     found = said.rates([["a", "b"], ["c"]])
-    assert found == {"all": 0.25, "known": 0.75, "named": 0.5, "remains": 0.25, "right": 0.75, "other": 0.0}
+    assert found == {
+        "all": 0.25, "known": 0.75, "all_sure": 0.25, "known_sure": 0.75,
+        "named": 0.5, "remains": 0.25, "right": 0.75, "other": 0.0,
+    }  # fmt: skip
+    assert said.rates([["a"], ["c"]])["all_sure"] == 0.25 and said.rates([["b"]])["known_sure"] == 0.25
     assert said.rates([["a"]])["other"] == 0.75
     assert said.above(2.0).rates([["a", "b"]]) == {
-        "all": 1.0, "known": 1.0, "named": 0.0, "remains": 1.0, "right": 1.0, "other": 0.0
+        "all": 1.0, "known": 1.0, "all_sure": 1.0, "known_sure": 1.0,
+        "named": 0.0, "remains": 1.0, "right": 1.0, "other": 0.0,
     }  # fmt: skip
 
 
@@ -122,12 +130,14 @@ def test_the_judge_names_what_the_test_sees(kind, names, share, monkeypatch):
 
     def half(geo, directions, z, rng, draws):
         odds = np.full(draws, 2.0) if not z.any() else np.resize([5.0, 1.0], draws)
-        return Answers([names] * draws, np.ones(draws, bool), odds)
+        return Answers([names], np.ones((draws, 1)), np.ones(draws, bool), odds)
 
     monkeypatch.setattr(optimal, "answers", half)
     found = judge(build(Spec(kind, "unloading", tuple(names), 10.0, 0)), draws=16)["blind"]
     assert found["remains"] == share
-    monkeypatch.setattr(optimal, "answers", lambda *given: Answers([names], np.ones(1, bool), np.zeros(1)))
+    monkeypatch.setattr(
+        optimal, "answers", lambda *given: Answers([names], np.ones((1, 1)), np.ones(1, bool), np.zeros(1))
+    )
     unseen = judge(build(Spec(kind, "unloading", tuple(names), 10.0, 0)), draws=16)["blind"]
     assert unseen.get("remains", 0.0) == 0.0
 
