@@ -5,7 +5,8 @@ import pytest
 from scipy import stats
 
 from wirebayes.errors import InputError
-from wirebayes.model.prior import Power, Prior, fast_logpdf, from_table, possible, wire_defaults
+from wirebayes.model.distributions import fast_logpdf
+from wirebayes.model.prior import Power, Prior, from_table, possible, wire_defaults
 from wirebayes.model.scales import Scales
 
 SCALES = Scales(step_mm=0.5, range_mm=6.0, tension_N=4.0, hold_s=90.0, step_N=1.0)

@@ -9,6 +9,7 @@ from wirebayes.effects.rivals import Logarithmic, PowerLaw, TwoModes
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.mechanics.wires import Wires, tension
 from wirebayes.robot.motion import drift, forward, inverse
+from wirebayes.robot.motion.course import Course
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
@@ -234,7 +235,7 @@ def test_rotation_angle_keeps_small_and_large_angles():
 
     angle = np.array([1e-9, 1e-3, 1.0, 3.0])
     R = matrix(angle[:, None] * np.array([0.6, 0.0, 0.8]))[:, None]
-    course = drift.Course(np.zeros(1), np.zeros((4, 1, 3)), R, np.zeros((4, 1, 6)), np.zeros((4, 1), int), fresh(6, 4))
+    course = Course(np.zeros(1), np.zeros((4, 1, 3)), R, np.zeros((4, 1, 6)), np.zeros((4, 1), int), fresh(6, 4))
     np.testing.assert_allclose(drift.moved(course, np.zeros(3), np.eye(3))[1][:, 0], angle, rtol=1e-9)
 
 

@@ -11,7 +11,7 @@ from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import claim, control, drift, forward
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
-from wirebayes.robot.motion.drift import Course, Falls
+from wirebayes.robot.motion.course import Course, Falls
 from wirebayes.robot.pose import answer, controllers, stability
 from wirebayes.robot.pose.request import PoseRequest, band
 

@@ -10,6 +10,7 @@ import pytest
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, drift, forward, inverse
+from wirebayes.robot.motion.course import Course
 from wirebayes.robot.proof import proofs
 
 TIMES = np.array([0.0, 60.0, 600.0])
@@ -27,7 +28,7 @@ def hung() -> Any:
     return robot, wires, drift.from_command(robot, wires, robot.home_m, np.eye(3), TIMES)
 
 
-def bands(wires: Wires, course: drift.Course, share: float) -> list[tuple[np.ndarray, np.ndarray]]:
+def bands(wires: Wires, course: Course, share: float) -> list[tuple[np.ndarray, np.ndarray]]:
     """Least and largest stiffness and creep of each wire, in a share of the 90 % about its middle."""
     out = []
     for values in (np.broadcast_to(wires.theta["k1"], (4, 30)), course.end.strain(wires)):
@@ -43,7 +44,7 @@ def commanded(robot: Any, wires: Wires) -> tuple[np.ndarray, np.ndarray]:
     return commands.zero_m[0], commands.offset_m[0]
 
 
-def way(robot: Any, wires: Wires, course: drift.Course) -> proofs._Way:
+def way(robot: Any, wires: Wires, course: Course) -> proofs._Way:
     k1, strain = bands(wires, course, 1.0)
     return proofs._Way(robot, wires.law, k1, strain, *commanded(robot, wires))
 

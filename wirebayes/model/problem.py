@@ -13,7 +13,8 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods, single_holds
-from wirebayes.model.prior import Power, Prior, from_table, possible, scaled, wire_defaults
+from wirebayes.model.distributions import scaled
+from wirebayes.model.prior import Power, Prior, from_table, possible, wire_defaults
 from wirebayes.model.scales import NATURAL, Scales, Units, scales_of
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Array

@@ -14,7 +14,7 @@ import numpy as np
 from wirebayes.inference.chain_statistics import pareto_smoothed, power_scaled, power_sensitivity
 from wirebayes.inference.fit import Fit
 from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability, IdentifiabilityFigures
-from wirebayes.model.prior import fast_logpdf
+from wirebayes.model.distributions import fast_logpdf
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import contraction, source
 from wirebayes.wire.fresh import FreshSample

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from wirebayes.model.prior import Prior, fast_logpdf, logit_normal
+from wirebayes.model.distributions import fast_logpdf, logit_normal
+from wirebayes.model.prior import Prior
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
 from wirebayes.sentences import listed

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
 
-from wirebayes.model.prior import fast_logpdf
+from wirebayes.model.distributions import fast_logpdf
 from wirebayes.numeric.typing import Array
 
 _NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite

@@ -19,7 +19,7 @@ from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, pane
 from wirebayes.report.pictures.robot_space import orientation, workspace_maps
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.pulleys import traced
-from wirebayes.robot.motion.drift import Course
+from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose.answer import Answer
 from wirebayes.robot.pose.request import PoseRequest
 

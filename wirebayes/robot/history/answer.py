@@ -26,8 +26,8 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.drums import motor_angle
 from wirebayes.robot.motion import drift as drifting
 from wirebayes.robot.motion import inverse
+from wirebayes.robot.motion.course import Course
 from wirebayes.robot.motion.creep import fresh
-from wirebayes.robot.motion.drift import Course
 from wirebayes.robot.pose.answer import unheld
 from wirebayes.robot.pose.request import band
 

@@ -3,8 +3,7 @@
 A fixed set of posterior draws, each with its own creep, integrated as it goes: their spread is the band, whatever its
 shape, and nothing is sampled while the robot runs. A step is short, so that one Newton step on the balance of forces is
 the forward solution. Where tensions or angles are read, columns beside the draws give the derivatives by everything
-unknown, and the draws are moved by what the readings so far say (`readings`): the batch estimate, without its repeated
-passes.
+unknown, and the draws are moved by what the readings so far say (`readings`): the batch estimate in one pass.
 """
 
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
+from wirebayes.robot.history.live_input import checked_number, checked_reading, checked_vector, refuse_bad
 from wirebayes.robot.history.readings import Information, sensors, weight
 from wirebayes.robot.history.unknowns import Uncertain, slopes, unknowns
 from wirebayes.robot.mechanics import firmware
@@ -158,7 +158,7 @@ class LiveEstimator:
         """
         if self.robot.is_linear.any():
             raise InputError(f"straight_m: found lengths, expected displacements of the actuators of {self.robot.name}")
-        return firmware.wire_of(self.robot, _vector("straight_m", straight_m, self.robot.legs))
+        return firmware.wire_of(self.robot, checked_vector("straight_m", straight_m, self.robot.legs))
 
     def load(self, mass_kg: float, centre_m: ArrayLike | None = None) -> None:
         """Set what the platform carries from now on beside its own mass.
@@ -174,12 +174,12 @@ class LiveEstimator:
         InputError
             A negative mass, or what is not finite; the load stays as it was.
         """
-        mass, centre = _number("mass_kg", mass_kg), self._bare.centre_of_mass_m
+        mass, centre = checked_number("mass_kg", mass_kg), self._bare.centre_of_mass_m
         if not 0 <= mass < np.inf:
             raise InputError(f"mass_kg: found {mass:g}, expected kilograms, 0 or more")
         if centre_m is not None:
-            centre = _vector("centre_m", centre_m, 3)
-            _check("centre_m", centre, np.isfinite(centre), "a finite number")
+            centre = checked_vector("centre_m", centre_m, 3)
+            refuse_bad("centre_m", centre, np.isfinite(centre), "a finite number")
         self.robot = with_payload(self._bare, mass, centre)
 
     def step(
@@ -216,7 +216,7 @@ class LiveEstimator:
             something is not finite or of a wrong shape. Nothing is taken in then, and the next step goes on from the
             last good one.
         """
-        time = _number("time_s", time_s)
+        time = checked_number("time_s", time_s)
         if not time > self._last:
             raise InputError(f"time_s: found {time:g} after {self._last:g}, expected a later time")
         if time == np.inf:
@@ -226,15 +226,17 @@ class LiveEstimator:
         joint = self._joints("joint_m", joint_m)
         nominal = joint if nominal_m is None else self._joints("nominal_m", nominal_m)
         legs = self.robot.legs
-        readings = np.concatenate([_reading("tension_N", tension_N, legs), _reading("tilt_rad", tilt_rad, 2)])
+        readings = np.concatenate(
+            [checked_reading("tension_N", tension_N, legs), checked_reading("tilt_rad", tilt_rad, 2)]
+        )
         with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
             return self._step(time, joint, nominal, readings)
 
     def _joints(self, name: str, values: ArrayLike) -> Floats:
         """Joint values as they can be: a drum has paid out some length, a linear actuator may stand on either side."""
-        given, linear = _vector(name, values, self.robot.legs), self.robot.is_linear
-        _check(name, given, np.isfinite(given) | ~linear, "a finite number")
-        _check(name, given, (np.isfinite(given) & (given > 0)) | linear, "a finite length above 0")
+        given, linear = checked_vector(name, values, self.robot.legs), self.robot.is_linear
+        refuse_bad(name, given, np.isfinite(given) | ~linear, "a finite number")
+        refuse_bad(name, given, (np.isfinite(given) & (given > 0)) | linear, "a finite length above 0")
         unlikely = plausible.wrong(self.robot, given[None]) if self._leaps(given) else None
         if unlikely is not None:
             (_, leg), expected = unlikely
@@ -369,39 +371,6 @@ class LiveEstimator:
             time_s, mean[:3], sd[:3], low, high, matrix(mean[3:6]) @ centre, sd[3:6], joint, sd[6 : 6 + w],
             joint - nominal, (joint - nominal) / self.robot.lines, mean[6 + w :], float(live.mean()),
         )  # fmt: skip
-
-
-def _number(name: str, value: float) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: found {value!r:.60}, expected a number") from None
-
-
-def _vector(name: str, values: ArrayLike, count: int) -> Floats:
-    """So many numbers: one alone is not meant for all."""
-    try:
-        given = np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: found what is not numbers, expected {count} numbers") from None
-    if given.shape != (count,):
-        found = {0: "a single number", 1: f"{given.size} in a list"}.get(given.ndim, f"an array {given.shape}")
-        raise InputError(f"{name}: found {found}, expected {count} numbers")
-    return given
-
-
-def _reading(name: str, values: ArrayLike | None, count: int) -> Floats:
-    """What sensors read, NaN where one was not read."""
-    given = np.full(count, np.nan) if values is None else _vector(name, values, count)
-    _check(name, given, ~np.isinf(given), "a finite number, or NaN where nothing was read")
-    return given
-
-
-def _check(name: str, given: Floats, good: NDArray[np.bool_], expected: str) -> None:
-    """Refuse the first number that is not good."""
-    if not good.all():
-        i = int(np.argmin(good))
-        raise InputError(f"{name}[{i}]: found {given[i]:g}, expected {expected}")
 
 
 def _beside(first: Wires, other: Wires) -> Wires:

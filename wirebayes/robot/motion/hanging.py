@@ -17,12 +17,21 @@ from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.motion import inverse
+from wirebayes.robot.motion.loose_balance import (
+    DEPENDENT,
+    equations,
+    largest_imbalance,
+    null_space,
+    scale_of,
+    slope_by_place,
+    stiffness_at_tension,
+    vector_by_turn,
+)
 
 _STEPS = 80  # of linearisation; a dozen are usual, and a family of solutions that bends much takes more
 _LONGEST_RAD = 0.3  # turned in a step: beyond, what was linearised means little
 _BALANCED = 1e-11  # of the weight: an imbalance of rounding
 _SETTLED = 1e-10  # rad: a step so small changes nothing
-_DEPENDENT = 1e-9  # singular value, of the largest, of equations that depend on each other
 _PLACE = 30.0  # weight of a position, in spans, that may move: it is what shall stay, before angles and tensions
 _LESSER = 1e-3  # weight of what decides only where the first aim, tensions or angles, leaves a choice
 _ALIKE = 1e-6  # rad, and of the robot's span: nearer, two solutions are one
@@ -141,9 +150,9 @@ def chosen(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats
     (k, 3) array
         Orthonormal; k components of the rotation can be chosen.
     """
-    _, by_turn, by_tension = _equations(robot, position_m[None], rotation[None], tension_N[None])
-    free = _null(np.concatenate([by_turn, by_tension], 2)[0])
-    ways = free[:3].T @ _vector_by_turn(turning.vector(rotation[None]))[0].T
+    _, by_turn, by_tension = equations(robot, position_m[None], rotation[None], tension_N[None])
+    free = null_space(np.concatenate([by_turn, by_tension], 2)[0])
+    ways = free[:3].T @ vector_by_turn(turning.vector(rotation[None]))[0].T
     return _basis(ways)
 
 
@@ -167,10 +176,10 @@ def commanded(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Flo
     """
     shape = statics.geometry(robot, position_m[:, None], rotation[..., None])
     tau = tension_N[:, None]
-    scale = _scale(robot)
-    K = _stiffness(robot, shape, rotation[..., None], tau)[0] * scale * scale[:, None]
+    scale = scale_of(robot)
+    K = stiffness_at_tension(robot, shape, rotation[..., None], tau)[0] * scale * scale[:, None]
     J = statics.jacobian(robot, shape)[..., 0] * (robot.lines * scale[:, None])
-    free = _null(np.concatenate([K / max(float(tension_N.max()), 1e-300), J], 1))[: robot.degrees].T
+    free = null_space(np.concatenate([K / max(float(tension_N.max()), 1e-300), J], 1))[: robot.degrees].T
     return _basis(free[:, :3]), len(_basis(free))
 
 
@@ -245,7 +254,7 @@ def _balance(
         newly = _newly_bound(tau[rows], bound[rows], (low, high), unit) & nearly[:, None]
         bound[rows] += np.where(newly, np.where(tau[rows] < low, -1, 1), 0)
         done[rows] = settled & ~newly.any(1)
-    left, size = _imbalance(robot, x, R, tau)
+    left, size = largest_imbalance(robot, x, R, tau)
     slack = 1e-9 * np.maximum(np.abs(tau).max(1), unit)
     inside = (tau.min(1) >= low - slack) & (tau.max(1) <= high + slack)
     reached = np.isnan(asked) | (np.abs(turning.vector(R) - asked) < 1e-8)
@@ -275,8 +284,8 @@ def _step(
     """
     x, R, tau = at
     n, legs = tau.shape
-    force, by_turn, by_tension = _equations(robot, x, R, tau)
-    by_place = _by_place(robot, x, R, tau) if movable else np.zeros((n, len(force[0]), 3))
+    force, by_turn, by_tension = equations(robot, x, R, tau)
+    by_place = slope_by_place(robot, x, R, tau) if movable else np.zeros((n, len(force[0]), 3))
     A = np.concatenate([by_place / unit, by_turn / unit, by_tension], 2)
     value = force / unit
     extra, more = _side_conditions(robot, R, tau, asked, bound, unit)
@@ -296,7 +305,7 @@ def _step(
     bad = ~(np.isfinite(A).all((1, 2)) & np.isfinite(value).all(1))  # a wire without length has no direction
     B = np.where(bad[:, None, None], 0.0, A / weigh)
     step = np.where(bad[:, None], np.nan, wish * weigh)
-    step = step - (np.linalg.pinv(B, rcond=_DEPENDENT) @ (value + (B @ step[..., None])[..., 0])[..., None])[..., 0]
+    step = step - (np.linalg.pinv(B, rcond=DEPENDENT) @ (value + (B @ step[..., None])[..., 0])[..., None])[..., 0]
     return step / weigh, np.abs(value).max(1)
 
 
@@ -308,7 +317,7 @@ def _side_conditions(
     rows, values = np.zeros((n, 3 + legs, 6 + legs)), np.zeros((n, 3 + legs))
     vector = turning.vector(R)
     wanted = np.isfinite(asked)
-    rows[:, :3, 3:6] = np.where(wanted[:, None], _vector_by_turn(vector), 0.0)
+    rows[:, :3, 3:6] = np.where(wanted[:, None], vector_by_turn(vector), 0.0)
     values[:, :3] = np.where(wanted, vector - np.where(wanted, asked, 0.0), 0.0)
     at = np.where(bound < 0, robot.rule.lowest_N, robot.rule.highest_N)
     rows[:, 3:, 6:] = np.eye(legs) * (bound != 0)[:, None]
@@ -341,78 +350,25 @@ def _reference(robot: Robot) -> float:
     return 0.0 if rule.choice == "minimum_norm" else 0.5 * (rule.lowest_N + rule.highest_N)
 
 
-def _scale(robot: Robot) -> Floats:
-    """(d,) What makes turns of metres at the platform's edge."""
-    out = np.ones(robot.degrees)
-    out[3:] = 1.0 / robot.size_m
-    return out
-
-
-def _stiffness(robot: Robot, shape: statics.Geometry, turn: Floats, tau: Floats) -> Floats:
-    """(n, d, d) Stiffness of wires whose tension does not change: what turns and swings leave of the balance."""
-    return np.moveaxis(statics.unbalance_and_stiffness(robot, shape, turn, tau, np.zeros_like(tau))[1], -1, 0)
-
-
-def _equations(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
-    """Imbalance (n, d), N; its change by a turn, (n, d, 3), N/rad, and by tensions, (n, d, w); moments in newtons."""
-    turn = np.moveaxis(R, 0, -1)
-    shape = statics.geometry(robot, x.T, turn)
-    force, H = statics.unbalance_and_stiffness(robot, shape, turn, tau.T, np.zeros_like(tau.T))
-    scale = _scale(robot)
-    by_turn = np.moveaxis(H, -1, 0)[:, :, 3:] * scale[:, None]
-    by_tension = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0) * scale[:, None]
-    return (force * scale[:, None]).T, by_turn, by_tension
-
-
-def _by_place(robot: Robot, x: Floats, R: Floats, tau: Floats) -> Floats:
-    """Change of the imbalance by a displacement, (n, d, 3), N/m."""
-    turn = np.moveaxis(R, 0, -1)
-    shape = statics.geometry(robot, x.T, turn)
-    return np.asarray(_stiffness(robot, shape, turn, tau.T)[:, :, :3] * _scale(robot)[:, None])
-
-
-def _imbalance(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, Floats]:
-    """Largest force left over, and the largest at all, (n,) N."""
-    force, _, _ = _equations(robot, x, R, tau)
-    return np.abs(force).max(1), np.maximum(np.abs(tau).max(1) * robot.lines.max(), robot.mass_kg * GRAVITY)
-
-
 def _stable(robot: Robot, found: _Balances) -> NDArray[np.bool_]:
     """(n,) Whether every motion that stretches no wire raises the energy."""
     out = np.zeros(len(found.rotation), bool)
-    scale = _scale(robot)
+    scale = scale_of(robot)
     for k in np.flatnonzero(found.balanced):
         turn = found.rotation[k][..., None]
         shape = statics.geometry(robot, found.position_m[k][:, None], turn)
-        K = _stiffness(robot, shape, turn, found.tension_N[k][:, None])[0] * scale * scale[:, None]
+        K = stiffness_at_tension(robot, shape, turn, found.tension_N[k][:, None])[0] * scale * scale[:, None]
         pulled = found.tension_N[k] > 0
         J = statics.jacobian(robot, shape)[..., 0] * scale[:, None]
-        loose = _null(J[:, pulled].T)
+        loose = null_space(J[:, pulled].T)
         out[k] = loose.shape[1] == 0 or np.linalg.eigvalsh(loose.T @ K @ loose)[0] > 0
     return out
-
-
-def _null(matrix: Floats) -> Floats:
-    """Orthonormal columns that a matrix maps to zero."""
-    _, sizes, right = np.linalg.svd(matrix)
-    rank = int((sizes > _DEPENDENT * max(float(sizes[0]), 1e-300)).sum()) if sizes.size else 0
-    return np.asarray(right[rank:].T)
 
 
 def _basis(rows: Floats) -> Floats:
     """Orthonormal rows that span what rows of size one or less span."""
     _, sizes, right = np.linalg.svd(rows)
     return np.asarray(right[: int((sizes > _ALIKE).sum())])
-
-
-def _vector_by_turn(vector: Floats) -> Floats:
-    """(n, 3, 3) Change of rotation vectors (n, 3) by small turns in the world: the inverse left Jacobian of SO(3)."""
-    angle = np.linalg.norm(vector, axis=-1)[:, None, None]
-    half = 0.5 * angle
-    safe = np.where(angle > 1e-4, angle, 1.0)
-    share = np.where(angle > 1e-4, (1.0 - half / np.tan(np.where(angle > 1e-4, half, 1.0))) / safe**2, 1.0 / 12.0)
-    k = turning.cross_matrix(vector)
-    return np.asarray(np.eye(3) - 0.5 * k + share * (k @ k))
 
 
 def _distinct(rotation: Floats, rows: NDArray[np.intp]) -> NDArray[np.intp]:

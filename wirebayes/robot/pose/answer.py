@@ -26,6 +26,7 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, control, drift, forward, inverse, one_sided
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
+from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose import controllers, on_plane, stability, variance_shares
 from wirebayes.robot.pose.maps import Map, map_slices, summaries
 from wirebayes.robot.pose.orientation import Orientation
@@ -50,7 +51,7 @@ class Answer:
     """
 
     content: PoseJson
-    courses: dict[float, drift.Course]
+    courses: dict[float, Course]
     maps: tuple[Map, ...] = ()
 
 
@@ -260,7 +261,7 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.ra
     }
 
 
-def _drift(course: drift.Course, x: Floats, R: Floats) -> DriftBands:
+def _drift(course: Course, x: Floats, R: Floats) -> DriftBands:
     shift, angle = drift.moved(course, x, R)
     shift = np.where(course.found[:, None, None], shift, np.nan)
     return {
@@ -275,7 +276,7 @@ def _drift(course: drift.Course, x: Floats, R: Floats) -> DriftBands:
     }
 
 
-def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, request: PoseRequest) -> Claim:
+def _claim(courses: dict[float, Course], x: Floats, R: Floats, request: PoseRequest) -> Claim:
     """Probability, at this pose, of the paper's figures."""
     probability: list[ClaimHolds] = []
     for spread, course in courses.items():
@@ -290,7 +291,7 @@ def _claim(courses: dict[float, drift.Course], x: Floats, R: Floats, request: Po
     }  # fmt: skip
 
 
-def _shares(line: WireDraws, courses: dict[float, drift.Course], x: Floats, R: Floats) -> VarianceShares:
+def _shares(line: WireDraws, courses: dict[float, Course], x: Floats, R: Floats) -> VarianceShares:
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
     size = {s: np.linalg.norm(drift.moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
     held = np.isfinite(size[0.0])

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from wirebayes.json_files.pose import FallsReport, Times
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.motion.drift import Course, Falls
+from wirebayes.robot.motion.course import Course, Falls
 from wirebayes.robot.pose.request import band
 
 NEAR_SLACK, NEAR_LOOSE = 0.2, 0.3  # shares of first tension and stiffness: a builder wants to know below these

@@ -7,7 +7,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, forward, inverse
-from wirebayes.robot.motion.drift import Course
+from wirebayes.robot.motion.course import Course
 from wirebayes.robot.proof.certificate import certify
 from wirebayes.robot.proof.reach import Reach, apart, reach
 from wirebayes.wire.laws import ElasticLaw

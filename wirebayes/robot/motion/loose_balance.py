@@ -1,0 +1,92 @@
+"""The balance of a platform that the wires do not hold in every direction: its equations, slopes and stability."""
+
+import numpy as np
+
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+
+DEPENDENT = 1e-9  # singular value, of the largest, of equations that depend on each other
+
+
+def scale_of(robot: Robot) -> Floats:
+    """(d,) What makes turns of metres at the platform's edge."""
+    out = np.ones(robot.degrees)
+    out[3:] = 1.0 / robot.size_m
+    return out
+
+
+def stiffness_at_tension(robot: Robot, shape: statics.Geometry, turn: Floats, tau: Floats) -> Floats:
+    """(n, d, d) Stiffness of wires whose tension does not change: what turns and swings leave of the balance.
+
+    Parameters
+    ----------
+    robot : Robot
+    shape : Geometry
+    turn, tau : (3, 3, n) and (w, n) arrays
+        Rotations, and tensions, N.
+    """
+    return np.moveaxis(statics.unbalance_and_stiffness(robot, shape, turn, tau, np.zeros_like(tau))[1], -1, 0)
+
+
+def equations(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
+    """Imbalance (n, d), N; its change by a turn, (n, d, 3), N/rad, and by tensions, (n, d, w); moments in newtons.
+
+    Parameters
+    ----------
+    robot : Robot
+    x, R, tau : (n, 3), (n, 3, 3) and (n, w) arrays
+        Positions, m, rotations and tensions, N.
+    """
+    turn = np.moveaxis(R, 0, -1)
+    shape = statics.geometry(robot, x.T, turn)
+    force, H = statics.unbalance_and_stiffness(robot, shape, turn, tau.T, np.zeros_like(tau.T))
+    scale = scale_of(robot)
+    by_turn = np.moveaxis(H, -1, 0)[:, :, 3:] * scale[:, None]
+    by_tension = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0) * scale[:, None]
+    return (force * scale[:, None]).T, by_turn, by_tension
+
+
+def slope_by_place(robot: Robot, x: Floats, R: Floats, tau: Floats) -> Floats:
+    """Change of the imbalance by a displacement, (n, d, 3), N/m.
+
+    Parameters
+    ----------
+    robot : Robot
+    x, R, tau : (n, 3), (n, 3, 3) and (n, w) arrays
+        Positions, m, rotations and tensions, N.
+    """
+    turn = np.moveaxis(R, 0, -1)
+    shape = statics.geometry(robot, x.T, turn)
+    return np.asarray(stiffness_at_tension(robot, shape, turn, tau.T)[:, :, :3] * scale_of(robot)[:, None])
+
+
+def largest_imbalance(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, Floats]:
+    """Largest force left over, and the largest at all, (n,) N.
+
+    Parameters
+    ----------
+    robot : Robot
+    x, R, tau : (n, 3), (n, 3, 3) and (n, w) arrays
+        Positions, m, rotations and tensions, N.
+    """
+    force, _, _ = equations(robot, x, R, tau)
+    return np.abs(force).max(1), np.maximum(np.abs(tau).max(1) * robot.lines.max(), robot.mass_kg * GRAVITY)
+
+
+def null_space(matrix: Floats) -> Floats:
+    """Orthonormal columns that a matrix maps to zero."""
+    _, sizes, right = np.linalg.svd(matrix)
+    rank = int((sizes > DEPENDENT * max(float(sizes[0]), 1e-300)).sum()) if sizes.size else 0
+    return np.asarray(right[rank:].T)
+
+
+def vector_by_turn(vector: Floats) -> Floats:
+    """(n, 3, 3) Change of rotation vectors (n, 3) by small turns in the world: the inverse left Jacobian of SO(3)."""
+    angle = np.linalg.norm(vector, axis=-1)[:, None, None]
+    half = 0.5 * angle
+    safe = np.where(angle > 1e-4, angle, 1.0)
+    share = np.where(angle > 1e-4, (1.0 - half / np.tan(np.where(angle > 1e-4, half, 1.0))) / safe**2, 1.0 / 12.0)
+    k = turning.cross_matrix(vector)
+    return np.asarray(np.eye(3) - 0.5 * k + share * (k @ k))
