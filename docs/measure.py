@@ -54,9 +54,18 @@ STUDIES = {
         "scores.json",
     ),
     "robot_exact_geometry": ("-m analyses.robots.whole_calibration exact 240 --output {folder}/it.json", "it.json"),
+    "discover_hidden": (
+        "-m analyses.hidden_effects --size small --answer api --simulations 199 --judge-draws 40 --kinds single pair "
+        "without foreign two three mixed periodic --deltas 5 10 --seed 5002 --protocols paper unloading uneven dense "
+        "temperature slack --output {folder}",
+        "scores.json",
+    ),
     "real_wires": ("analyses/discovery/real_wires.py --together --output {folder}/wires.json", "wires.json"),
 }
-REDUCED = {"discover_clean": lambda scores: _clean_in_short(scores)}  # of results that hold every file's answer
+REDUCED = {  # of results that hold every file's answer
+    "discover_clean": lambda scores: _clean_in_short(scores),
+    "discover_hidden": lambda scores: _hidden_in_short(scores),
+}
 _BLOCK = re.compile(r"(<!-- measured -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -104,7 +113,28 @@ def texts() -> dict[Path, str]:
         + _exact_geometry(kept["robot_exact_geometry"]),
         DOCS / "real-wires.inc": _real_wires(kept["real_wires"]),
         DOCS / "discover-clean-said.inc": _clean(kept["discover_clean"]),
+        DOCS / "discover-hidden-said.inc": _hidden(kept["discover_hidden"]),
     }
+
+
+def _version_of(kept: dict[str, Any]) -> str:
+    """Which commit found a result, and when."""
+    return f"Commit {kept['commit']}, {kept['date']}"
+
+
+def _run_of(kept: dict[str, Any]) -> str:
+    """The command behind a result, with commit and date, as a sentence begins with it."""
+    return f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']})"
+
+
+def _head(*names: str) -> list[str]:
+    """The lines that a table begins with."""
+    return [".. list-table::", "   :header-rows: 1", "", *_row(*names)]
+
+
+def _row(first: Any, *others: Any) -> list[str]:
+    """The lines of a table's row."""
+    return [f"   * - {first}", *(f"     - {cell}" for cell in others)]
 
 
 def _four_figures(kept: dict[str, Any]) -> str:
@@ -132,19 +162,13 @@ def _any_scale(kept: dict[str, Any]) -> str:
     kinds = {"all": "all tests", "steps": "steps", "weights": "weights", "rests": "with recorded rests"}
     names = [name for name in found["all"] if name != "tests"]
     lines = [
-        f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}); {found['not_converged']} of "
+        f"{_run_of(kept)}; {found['not_converged']} of "
         f"{found['tests']} did not converge. Shares of 90 % intervals that hold the truth, in %:",
         "",
-        ".. list-table::",
-        "   :header-rows: 1",
-        "",
-        "   * - tests",
-        "     - number",
-        *(f"     - {name}" for name in names),
+        *_head("tests", "number", *names),
     ]
     for kind, words in kinds.items():
-        lines += [f"   * - {words}", f"     - {found[kind]['tests']}"]
-        lines += [f"     - {100 * found[kind][name]:.0f}" for name in names]
+        lines += _row(words, found[kind]["tests"], *(f"{100 * found[kind][name]:.0f}" for name in names))
     return "\n".join(lines) + "\n"
 
 
@@ -154,7 +178,7 @@ def _real_files(kept: dict[str, Any]) -> str:
         "tendon": "the relaxation of a tendon fascicle",
         "elastomer": "that of a strip of VHB 4910, which relaxes by a power law",
     }
-    lines = [f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}) reads two public recordings."]
+    lines = [f"{_run_of(kept)} reads two public recordings."]
     for file, found in kept["result"].items():
         plain, later = found["least_squares"], found["later"]
         known, free = (
@@ -189,7 +213,7 @@ def _weights(kept: dict[str, Any]) -> str:
     inside = f"{steps['inside']}, {weights['inside']} and {together['inside']} of {found['pairs']}"
     widths = " and ".join(f"{kind['median_width']:.3f}" for kind in (steps, weights))
     return (
-        f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}) fits {found['pairs']} such lines under "
+        f"{_run_of(kept)} fits {found['pairs']} such lines under "
         f"steps, under weights, and both together: the 90 % interval of the creep after a hold at the typical "
         f"tension holds the truth in {inside}; its median width, in the logarithm, is {widths}, together "
         f"{together['median_width']:.3f}, and both together are the sharpest in {found['together_sharpest']}.\n"
@@ -201,7 +225,7 @@ def _coverage(kept: dict[str, Any]) -> str:
     found = kept["result"]
     each = ", ".join(f"{name} {100 * share:.0f} %" for name, share in found["by_parameter"].items())
     return (
-        f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}) simulates {found['wires']} tests with varied "
+        f"{_run_of(kept)} simulates {found['wires']} tests with varied "
         f"lengths, steps, directions and reading times. {100 * found['interval_coverage']:.1f} % of "
         f"{found['intervals']} intervals of 90 % contained the truth ({each}), and 90 % bands for the last third of "
         f"the holds contained {100 * found['held_out_coverage']:.1f} % of {found['held_out_readings']} readings. "
@@ -218,30 +242,31 @@ def _clean_any_scale(kept: dict[str, Any]) -> str:
     searched, alpha = found["searched"], 100 * found["alpha"]
     names = f"names accepted: {named}" if named else "no name was accepted"
     lines = [
-        f"``{kept['command']}``",
-        f"(commit {kept['commit']}, {kept['date']}), at a level of {alpha:.0f} %. Where the check failed,",
+        f"{_run_of(kept)}, at a level of {alpha:.0f} %. Where the check failed,",
         f"``discover`` said: {verdicts}; {names}. In {searched['same_p']} of {searched['tests']} tests that both",
         "were asked, the two had the same p. If p is uniform, values as uneven have a probability of",
         f"{found['uniform_p']:.2f} (Kolmogorov-Smirnov).",
         "",
-        ".. list-table::",
-        "   :header-rows: 1",
-        "",
-        "   * - tests",
-        "     - number",
-        "     - the check fails, % [90 % interval]",
-        "     - upper bound, 95 %",
-        "     - ``discover`` finds something missing, %",
-        "     - upper bound, 95 %",
+        *_head(
+            "tests",
+            "number",
+            "the check fails, % [90 % interval]",
+            "upper bound, 95 %",
+            "``discover`` finds something missing, %",
+            "upper bound, 95 %",
+        ),
     ]
     for kind, words in kinds.items():
         alarms = found[kind]
-        lines += [f"   * - {words}", f"     - {alarms['tests']}"]
-        for of in ("check", "discover"):
-            rate = alarms[of]
-            lines += [f"     - {100 * rate['value']:.1f} [{100 * rate['low']:.1f}, {100 * rate['high']:.1f}]"]
-            lines += [f"     - {100 * rate['upper_95']:.1f} %"]
+        rates = [cell for of in ("check", "discover") for cell in _rate(alarms[of])]
+        lines += _row(words, alarms["tests"], *rates)
     return "\n".join(lines) + "\n"
+
+
+def _rate(rate: dict[str, float]) -> list[str]:
+    """A share with its interval, and its upper bound, %."""
+    value, low, high, upper = (100 * rate[key] for key in ("value", "low", "high", "upper_95"))
+    return [f"{value:.1f} [{low:.1f}, {high:.1f}]", f"{upper:.1f} %"]
 
 
 def _calibration(kept: dict[str, Any]) -> str:
@@ -257,7 +282,7 @@ def _calibration(kept: dict[str, Any]) -> str:
     )
     stopped = sum(map(len, found["not_converged"].values()))
     return (
-        f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}) does the same under weights, up to 8 N and "
+        f"{_run_of(kept)} does the same under weights, up to 8 N and "
         f"back, with holds of 600 s: {sets}. {inside} of {100 * found['joint']:.0f} %; the most extreme is {worst} "
         f"(tail probability {found['extremeness'][worst]:.1g}, the edge of the band is at {edge:.1g}). {stopped} of "
         f"{sum(found['data_sets'].values())} fits did not converge.\n"
@@ -270,8 +295,7 @@ def _wires_before(kept: dict[str, Any]) -> str:
     ratio, fits_of_a_seed = found["after_over_before"], len(found["fits"])
     stopped = sum(map(len, found["not_converged"].values()))
     lines = [
-        f"``{kept['command']}``",
-        f"(commit {kept['commit']}, {kept['date']}) repeats the {fits_of_a_seed} fits of ``wirebayes reproduce`` by",
+        f"{_run_of(kept)} repeats the {fits_of_a_seed} fits of ``wirebayes reproduce`` by",
         f"commit {found['against']}, the last one before, and by this one, with {found['seeds']} seeds:",
         f"{stopped} of {2 * found['seeds'] * fits_of_a_seed} did not converge. Effective draws an evaluation are",
         f"{ratio['mean']:.2f} [{ratio['low']:.2f}, {ratio['high']:.2f}] times those before (mean of the fits, 95 %).",
@@ -281,12 +305,9 @@ def _wires_before(kept: dict[str, Any]) -> str:
     for likelihood, words in {"chain": "The chain", "hold": "Hold by hold"}.items():
         fits = {name: parameters for name, parameters in found["fits"].items() if f", {likelihood}, " in name}
         names = list(next(iter(fits.values())))
-        lines += ["", f"{words}:", "", ".. list-table::", "   :header-rows: 1", "", "   * - wire"]
-        lines += [f"     - {name}" for name in names]
+        lines += ["", f"{words}:", "", *_head("wire", *names)]
         for fit, parameters in fits.items():
-            lines.append(f"   * - {fit.replace(f', {likelihood}', '')}")
-            for name in names:
-                lines += _before_and_after(parameters[name])
+            lines += _row(fit.replace(f", {likelihood}", ""), *(_before_and_after(parameters[name]) for name in names))
     differing = {
         fit: [name for name, p in parameters.items() if p["differs"]] for fit, parameters in found["fits"].items()
     }
@@ -296,11 +317,11 @@ def _wires_before(kept: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _before_and_after(parameter: dict[str, Any]) -> list[str]:
+def _before_and_after(parameter: dict[str, Any]) -> str:
     """Two lines of a cell."""
     mark = "**" if parameter["differs"] else ""
     before, after = (f"{mark}{parameter[when]}{mark}" for when in ("before", "after"))
-    return [f"     - | {before}", f"       | {after}"]
+    return f"| {before}\n       | {after}"
 
 
 def _three(value: float) -> str:
@@ -313,31 +334,22 @@ def _robot_calibration(kept: dict[str, Any], alone: dict[str, Any]) -> str:
     names = {"exit_points": "exit points", "references": "references", "lengths": "lengths", "poses": "poses"}
     found, blind = kept["result"], alone["result"]
     lines = [
-        f"``{kept['command']}``",
-        f"(commit {kept['commit']}, {kept['date']}) draws {found['robots']} robots of 2 to 9 wires",
+        f"{_run_of(kept)} draws {found['robots']} robots of 2 to 9 wires",
         f"and takes {found['median_seconds_each']:.1f} s each at the median. Shares of 90 % intervals that hold",
         "the truth, and of calibrations that converge and are usable, in %:",
         "",
-        ".. list-table::",
-        "   :header-rows: 1",
-        "",
-        "   * - poses",
-        "     - robots",
-        *(f"     - {words}" for words in names.values()),
-        "     - converged",
-        "     - usable",
+        *_head("poses", "robots", *names.values(), "converged", "usable"),
     ]
     for mode in ("all", "poses known", "poses roughly known", "some poses", "poses unknown"):
         share = found["shares"][mode]
-        lines += [f"   * - {mode}", f"     - {share['robots']}"]
-        lines += [f"     - {100 * share[name]:.0f}" for name in (*names, "converged", "usable")]
+        lines += _row(mode, share["robots"], *(f"{100 * share[name]:.0f}" for name in (*names, "converged", "usable")))
     right, wrong, error = (100 * blind[name] for name in ("found", "silently_wrong", "distance_error_over_before"))
     lines += [
         "",
         "Lengths alone, of 24 unknown poses, on four or five anchors that are 2 % of the span off, with unread",
-        "tensions that the robot's file bounds at 0.3 of what the lines may bear",
-        f"(``{alone['command']}``, commit {alone['commit']}, {alone['date']}): {right:.0f} % of {blind['robots']}",
-        "calibrations are usable with every coordinate within four standard errors,",
+        "tensions that the robot's file bounds at 0.3 of what the lines may bear:",
+        f"{_run_of(alone)} finds {right:.0f} % of {blind['robots']}",
+        "calibrations usable with every coordinate within four standard errors,",
         f"{wrong:.0f} % usable and wrong; the others are refused. Distances between anchors are then {error:.0f} %",
         "as wrong as before, at the median.",
     ]
@@ -374,8 +386,22 @@ def _clean(kept: dict[str, Any]) -> str:
     return (
         f"By protocol {min(others)} to {max(others)} of {found['files_a_protocol']} files raise an alarm, with "
         f"*{most.replace('_', ' ')}* {counts[most]}. Of the {found['alarms']} alarms the verdict is {verdicts}. "
-        f"Named: {names or 'nothing'}. A file takes {found['median_seconds']:.1f} s (median). Commit {kept['commit']}, "
-        f"{kept['date']}.\n"
+        f"Named: {names or 'nothing'}. A file takes {found['median_seconds']:.1f} s (median). {_version_of(kept)}.\n"
+    )
+
+
+def _hidden_in_short(scores: dict[str, Any]) -> dict[str, Any]:
+    """How many files with hidden effects were answered, and how long one takes."""
+    rows = scores["api"]["rows"]
+    return {"files": len(rows), "median_seconds": median(row["seconds"] for row in rows)}
+
+
+def _hidden(kept: dict[str, Any]) -> str:
+    """Two sentences on the files that the table is of."""
+    found = kept["result"]
+    return (
+        f"{found['files']} files of one test each, their truth sealed until all had been answered; a file takes "
+        f"{found['median_seconds']:.1f} s (median). {_version_of(kept)}.\n"
     )
 
 
@@ -388,9 +414,9 @@ def _exact_geometry(kept: dict[str, Any]) -> str:
         return f"{round(one['share'] * one['of'])} of {one['of']} [{100 * one['low']:.0f}, {100 * one['high']:.0f} %]"
 
     return (
-        f"\nAnchors held exact (``{kept['command']}``, commit {kept['commit']},\n"
-        f"{kept['date']}; {found['robots']} robots, joint values exact or of a stated error, anchors right or off by\n"
-        "0.01 to 1 % of the span; 95 % intervals): where all is right,\n"
+        f"\nAnchors held exact: {_run_of(kept)},\n"
+        f"{found['robots']} robots, joint values exact or of a stated error, anchors right or off by\n"
+        "0.01 to 1 % of the span; 95 % intervals. Where all is right,\n"
         f"{said('usable_where_all_is_right')} calibrations are usable. Of wrong anchors that a\n"
         "chi-squared test of all readings, which knows every error, would see with 99 % power,\n"
         f"{said('not_usable_where_power_is_99_percent')} are not usable; where its power is less,\n"
@@ -400,30 +426,24 @@ def _exact_geometry(kept: dict[str, Any]) -> str:
 
 def _real_wires(kept: dict[str, Any]) -> str:
     """A table of the paper's wires."""
-    lines = [f"``{kept['command']}`` (commit {kept['commit']}, {kept['date']}):", "", ".. list-table::"]
-    lines += [
-        "   :header-rows: 1",
-        "",
-        "   * - wire",
-        "     - verdict",
-        "     - accepted",
-        "     - rms of later holds, N",
-    ]
-    lines += ["     - in the 90 % band"]
+    lines = [f"{_run_of(kept)}:", ""]
+    lines += _head("wire", "verdict", "accepted", "rms of later holds, N", "in the 90 % band")
     for name, wire in kept["result"]["first holds to the rest"].items():
-        lines += [f"   * - {name}", f"     - {wire['verdict']}"]
-        lines += [f"     - {', '.join(wire['accepted']).replace('_', ' ') or '–'}"]
-        lines += [f"     - {wire['plain_rmse_N']:.3f} → {wire['final_rmse_N']:.3f}"]
-        lines += [f"     - {100 * wire['plain_inside_90']:.0f} → {100 * wire['final_inside_90']:.0f} %"]
+        rms = f"{wire['plain_rmse_N']:.3f} → {wire['final_rmse_N']:.3f}"
+        inside = f"{100 * wire['plain_inside_90']:.0f} → {100 * wire['final_inside_90']:.0f} %"
+        lines += _row(name, wire["verdict"], _spoken(wire["accepted"]), rms, inside)
     for title, words in {"all holds": "All holds, each wire by itself", "all four": "The four judged together"}.items():
-        lines += ["", f"{words}:", "", ".. list-table::", "   :header-rows: 1", ""]
-        lines += ["   * - wire", "     - verdict", "     - accepted", "     - families established", "     - remainder"]
+        lines += ["", f"{words}:", "", *_head("wire", "verdict", "accepted", "families established", "remainder")]
         for name, wire in kept["result"][title].items():
             families = [f"{family['name']} ({family['inclusion']:.2f})" for family in wire["families"]]
-            lines += [f"   * - {name}", f"     - {wire['verdict']}"]
-            lines += [f"     - {', '.join(wire['accepted']).replace('_', ' ') or '–'}"]
-            lines += [f"     - {', '.join(families).replace('_', ' ') or '–'}", f"     - {wire['remainder']:.2f}"]
+            accepted, established = _spoken(wire["accepted"]), _spoken(families)
+            lines += _row(name, wire["verdict"], accepted, established, f"{wire['remainder']:.2f}")
     return "\n".join(lines) + "\n"
+
+
+def _spoken(names: list[str]) -> str:
+    """Names of effects as people say them."""
+    return ", ".join(names).replace("_", " ") or "–"
 
 
 if __name__ == "__main__":

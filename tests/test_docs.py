@@ -195,6 +195,30 @@ def test_the_readme_states_no_figure_by_hand():
     assert README.index("my-wire: converged") < README.index("## ")
 
 
+def figures_typed_by_hand(page: Path) -> list[str]:
+    """Numbers with a unit, shares and counts in a page's own text: not in what it includes, literal or in tables."""
+    text = re.sub(r"::\n\n(?:(?: {2,}.*)?\n)+", "\n", page.read_text(encoding="utf-8"))
+    text = re.sub(r"``[^`]*``|:width: .*|^ +\* .*|^ +- .*", "", text, flags=re.MULTILINE)
+    return FIGURE.findall(text)
+
+
+FIGURE = re.compile(r"\d[\d.,]*(?: ?%| (?:mm|N|s|ms|min|h|MB|times|of \d[\d,]*|files|tests|wires|robots|holds)\b)")
+
+
+def test_no_page_has_more_figures_typed_by_hand_than_it_had():
+    """A figure that a run found is included from what the run wrote; the list of what was typed may only shrink."""
+    lines = (Path(__file__).parent / "typed_figures.txt").read_text(encoding="utf-8").splitlines()
+    listed = {name: int(count) for name, count in (line.split() for line in lines if not line.startswith("#"))}
+    typed = {path.name: figures_typed_by_hand(path) for path in sorted(DOCS.glob("*.rst"))}
+    assert {name: found for name, found in typed.items() if len(found) > listed.get(name, 0)} == {}
+
+
+def test_a_figure_typed_by_hand_would_be_found(tmp_path):
+    page = tmp_path / "page.rst"
+    page.write_text("In 175 files of one test, ``12 s`` apart, 8.5 s each::\n\n    run 30 files\n\n* - 5 %\n  - 6 mm\n")
+    assert figures_typed_by_hand(page) == ["175 files", "8.5 s", "5 %"]
+
+
 @pytest.mark.parametrize(
     "page", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", "data/README.md", "data/robots/README.md"]
 )

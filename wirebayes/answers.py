@@ -1,12 +1,13 @@
 """The answer of every result in a few lines, with units: on a terminal, and in Python with `print`."""
 
 from collections import Counter
+from collections.abc import Sequence
 from textwrap import wrap
 from typing import cast
 
 import numpy as np
 
-from wirebayes.json_files.batch import BatchJson
+from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckedExperiment, EffectSize, ParameterRange
 from wirebayes.json_files.comparison import ComparedModels
@@ -55,7 +56,8 @@ def of_fit(summary: SummaryJson) -> list[str]:
     checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
     names = [n for n in summary["parameters"] if n.split("[")[0].split(".")[0] in (*_SHOWN, *_effects(summary))]
     parameters = ", ".join(f"{name} {_with_unit(summary['parameters'][name])}" for name in names)
-    creep = f"creep after 2 min at {derived['tension_N']:g} N {_band(derived['creep_2min_mm'])} mm"
+    tension = f"{float(format(derived['tension_N'], '.4g')):g} N"
+    creep = f"creep after 2 min at {tension} {_band(derived['creep_2min_mm'])} mm"
     return [f"{summary['experiment']}: {state}, {checked}", f"  {parameters}", f"  {creep} (medians, 90 % intervals)"]
 
 
@@ -188,8 +190,9 @@ def check_in_a_sentence(name: str, test: CheckedExperiment) -> str:
     test : dict
     """
     alone = [parameter for parameter, p in test["parameters"].items() if p["determined_by"] == "prior"]
-    known = "k1" in test["parameters"] and "k1" not in alone
-    said = [f"k1 is about {_with_unit(test['parameters']['k1'])}"] if known else []
+    known = "k1" not in alone
+    k1 = test["parameters"].get("k1")
+    said = [f"k1 is about {quantity(k1['q50'], k1['q05'], k1['q95'], k1['unit'])}"] if k1 and known else []
     said += [f"it does not determine {listed(alone)}"] if alone else ["every parameter is determined by the readings"]
     shown = sum(effect["shows"] == "yes" for effect in test["effects"].values())
     said.append(f"it would show {shown} of {counted(len(test['effects']), 'effect')}")
@@ -295,9 +298,10 @@ def fit_in_a_sentence(summary: SummaryJson) -> str:
         return f"{doubt}{summary['experiment']}: the readings do not say how much this wire creeps."
     stretched = quantity(creep["q50"], creep["q05"], creep["q95"], "mm")
     stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
+    tension = f"{number(derived['tension_N'])} N"
     return (
-        f"{doubt}{summary['experiment']} creeps by {stretched} within two minutes under {derived['tension_N']:g} N, "
-        f"and its stiffness is {stiff} per unit of strain; intervals hold 90 %."
+        f"{doubt}{summary['experiment']} creeps by {stretched} within two minutes under {tension}, and its "
+        f"stiffness is {stiff} per unit of strain; intervals hold 90 %."
     )
 
 
@@ -374,7 +378,7 @@ def batch_in_sentences(found: BatchJson) -> list[str]:
     failed = [row["name"] for row in rows if row["error"]]
     many = _count(len(rows), "test")
     converged = sum(bool(row["converged"]) for row in rows)
-    out = [f"{many[:1].upper()}{many[1:]} of {kinds}: {converged} converged."]
+    out = [f"{many[:1].upper()}{many[1:]} of {kinds}, {converged} converged{_stiffnesses(rows)}."]
     out += [f"Not fitted: {_some(failed)}."] if failed else []
     clean = [row["name"] for row in rows if row["verdict"] == "nothing-missing"]
     out += [f"Nothing is missing in {_count(len(clean), 'test')}."] if clean else []
@@ -388,6 +392,27 @@ def batch_in_sentences(found: BatchJson) -> list[str]:
     out += [f"The model does not describe the readings of {_some(refused)}."] if refused else []
     out += [outlier["sentence"].rstrip(".") + "." for outlier in found["outliers"][:_MOST_LINES]]
     return out
+
+
+def _stiffnesses(rows: Sequence[Row]) -> str:
+    """Of the materials with most specimens: k1, and how far specimens differ, or how well a single one is known."""
+    known = [row for row in rows if row["material"] and "k1" in row["parameters"]]
+    materials = [material for material, _ in Counter(row["material"] for row in known).most_common(_MOST_MATERIALS)]
+    said = []
+    for material in materials:
+        stiff = [row["parameters"]["k1"] for row in known if row["material"] == material]
+        medians = [each["q50"] for each in stiff]
+        if len(stiff) == 1:
+            of, among = f"k1 of {material}", "90 % interval"
+            shown = quantity(medians[0], stiff[0]["q05"], stiff[0]["q95"], "N")
+        else:
+            of, among = f"median k1 of {material}", "least to largest specimen"
+            shown = quantity(float(np.median(medians)), min(medians), max(medians), "N")
+        said.append(f"{of} {shown[:-1]}, {among})")
+    return f"; {', '.join(said)}" if said else ""
+
+
+_MOST_MATERIALS = 2  # whose stiffness a first sentence has room for
 
 
 def _count(number_of: int, what: str) -> str:

@@ -19,6 +19,15 @@ def counted(count: int, what: str) -> str:
     return f"{count} {what}{'s' * (count != 1)}"
 
 
+def lasting(seconds: float) -> str:
+    """A time as people say it: 45 s, 12 min, 24 h."""
+    unit, size = next((unit, size) for unit, size in _TIMES if seconds >= size or size == 1.0)
+    return f"{seconds / size:.3g} {unit}"
+
+
+_TIMES = (("h", 3600.0), ("min", 60.0), ("s", 1.0))
+
+
 def likely(found: Answer, spoken: Callable[[str], str] = str) -> str:
     """Names of the set among which the largest share lies, each with its probability; empty where there is no name.
 

@@ -163,14 +163,23 @@ def test_nothing_is_cut_off_or_asked_from_outside(kind, pages, tab):
     assert pages[kind].stat().st_size < 1_500_000
 
 
+@pytest.mark.parametrize("width", [1280, 390])
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_first_screen_of_a_desk_holds_the_answer(kind, pages, tab):
-    """Everything that is rendered within 900 px: the sentence that answers, whole, with its numbers."""
-    tab.open(pages[kind], 1280)
-    lead = tab.run("document.querySelector('.lead').textContent")
-    seen = tab.run(FIRST_SCREEN)
-    assert " ".join(lead.split()) in seen
-    assert any(c.isdigit() for c in lead)
+def test_the_first_screen_holds_the_answer_and_then_its_picture(kind, width, pages, tab):
+    """Within 900 px: one sentence with number, unit and how sure that is; then the picture, before tables and cards."""
+    tab.open(pages[kind], width)
+    lead = " ".join(tab.run("document.querySelector('.lead').textContent").split())
+    assert lead in tab.run(FIRST_SCREEN)
+    assert len(SENTENCE_END.findall(lead)) == 1 and NUMBER_WITH_UNIT.search(lead), lead
+    assert kind in ("import", "simulate") or HOW_SURE.search(lead), lead  # these two state what is known exactly
+    shown = tab.run("[...document.querySelectorAll('main img, main table, main .columns')].map(e => e.tagName)")
+    top = tab.run("document.querySelector('main img').getBoundingClientRect().top")
+    assert shown[0] == "IMG" and top < 900, (shown[:3], top)
+
+
+SENTENCE_END = re.compile(r"[.!?](?= [A-Z]|$)")
+NUMBER_WITH_UNIT = re.compile(r"\d[\d.\u202f]*( …|\))? (mm|N|s|min|degrees|elpd|in elpd)\b|p [=<] 0?\.\d")
+HOW_SURE = re.compile(r" … | ± |\[.+, .+\]|p [=<] 0?\.\d|standard error")
 
 
 # the text whose lines all end above the fold

@@ -56,8 +56,22 @@ def test_a_file_in_no_known_words_says_how_it_was_read(tmp_path):
     with pytest.raises(wb.InputError, match="the file is not UTF-8 and was read as CP1252: if names look wrong, save"):
         read(path)
     path.write_text("slide (mm),when (s),pulling (N)\n" + body())
-    with pytest.raises(wb.InputError, match=r"header has no unit\)$"):
+    named = r'--map "slide \(mm\)=displacement" --map "when \(s\)=time" --map "pulling \(N\)=tension"$'
+    with pytest.raises(wb.InputError, match=named):  # what each unit says; the user decides
         read(path)
+    path.write_text("slide (mm),width (mm),when (s),pulling (N)\n" + body())
+    with pytest.raises(wb.InputError, match=r'"HEADER=displacement \[mm\]".*header has no unit\)$'):
+        read(path)
+
+
+@pytest.mark.parametrize("header", ["Minutes at load", "minutes", "Minuten", "hours since the step"])
+def test_a_time_may_begin_with_its_unit(tmp_path, header):
+    path = tmp_path / "raw.csv"
+    path.write_text(f"{header},Stage,Extension (mm),Load (kN)\n" + "".join(
+        f"{minute},{stage},{stage},{stage + 0.1 / (1 + minute)}\n" for stage in (1, 2) for minute in (0, 1, 3)
+    ))  # fmt: skip
+    scale = 3600.0 if "hours" in header else 60.0
+    assert [row[2] for row in read(path).rows] == [0.0, scale, 3.0 * scale] * 2
 
 
 def test_all_columns_that_are_missing_are_said_at_once(tmp_path):

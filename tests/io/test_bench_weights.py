@@ -23,6 +23,17 @@ def test_masses_and_a_dial_gauge_are_known_by_their_names(tmp_path):
     assert [hold.setting for hold in test.recorded_holds] == pytest.approx([0.2 * 9.80665, 0.4 * 9.80665])
 
 
+def test_a_rest_in_which_nothing_was_read_is_no_reading(tmp_path):
+    """An empty displacement is filled where it was set, as in merged cells; under weights it was not read."""
+    rows = [*ROWS[:3], (2, 0.01, 400, ""), *((3, *row[1:]) for row in ROWS[3:])]
+    file = written(tmp_path / "log.csv", "step,mass (kg),time (s),dial (mm)", rows)
+    with pytest.raises(InputError, match=r"line 5, column 4 \(dial \(mm\)\): found an empty cell, expected a reading"):
+        wb.import_bench(file, length_mm=1500, material="Kevlar", output=tmp_path / "out")
+    bare = written(tmp_path / "bare.csv", "step,mass (kg),time (s),dial (mm)", [(0, 0, 0, 1.0), *ROWS])
+    with pytest.raises(InputError, match="expected a tension above 0 N: of a rest, the weight of the empty hook"):
+        wb.import_bench(bare, length_mm=1500, material="Kevlar", output=tmp_path / "out", control="force")
+
+
 def test_a_column_that_speaks_of_a_force_comes_before_a_mass(tmp_path):
     rows = [(step, mass, time, float(step), 3.0 * step - 0.001 * time) for step, mass, time, _ in ROWS]
     file = written(tmp_path / "log.csv", "step,mass (kg),time (s),Position (mm),Load (N)", rows)

@@ -1,6 +1,6 @@
 """What a page says first: grave warnings, then the answer with number, unit and interval."""
 
-from wirebayes import answers
+from wirebayes import answers, sentences
 from wirebayes.notice import Notice
 from wirebayes.report.blocks import Notices, Page, Section, Text
 from wirebayes.report.page import render
@@ -48,12 +48,26 @@ def test_a_comparison_is_a_ranking_in_words() -> None:
 
 
 def test_a_batch_says_a_sentence_a_finding_and_no_plural_of_one() -> None:
+    stiff = [{"k1": {"q50": middle, "q05": middle - 20.0, "q95": middle + 20.0}} for middle in (900.0, 930.0, 990.0)]
     row = {"error": None, "check": None, "verdict": "nothing-missing", "material": "m", "converged": True}
     row = row | {"effects": list[str]()}
-    rows = [row | {"name": "a"}, row | {"name": "b", "verdict": "named", "effects": ["toe"]}]
+    rows = [
+        row | {"name": "a", "parameters": stiff[0]},
+        row | {"name": "b", "parameters": stiff[1], "verdict": "named", "effects": ["toe"]},
+    ]
     found = {"experiments": rows, "outliers": []}
     assert answers.batch_in_sentences(found) == [  # type: ignore[arg-type]
-        "2 tests of one material: 2 converged.",
+        "2 tests of one material, 2 converged; median k1 of m 915 N (900 … 930, least to largest specimen).",
         "Nothing is missing in one test.",
         "Toe: in one test (b).",
     ]
+    rows.append(row | {"name": "c", "parameters": stiff[2], "material": "other"})
+    assert answers.batch_in_sentences(found)[0] == (  # type: ignore[arg-type]
+        "3 tests of 2 materials, 3 converged; median k1 of m 915 N (900 … 930, least to largest specimen), "
+        "k1 of other 990 N (970 … 1\u202f010, 90 % interval)."
+    )
+
+
+def test_times_are_said_in_the_unit_that_people_use() -> None:
+    said = [sentences.lasting(seconds) for seconds in (0.5, 59.0, 60.0, 3599.0, 3600.0, 86400.0)]
+    assert said == ["0.5 s", "59 s", "1 min", "60 min", "1 h", "24 h"]

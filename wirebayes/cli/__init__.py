@@ -168,7 +168,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(arguments)
     called = next((word for word in _typed(arguments) if not word.startswith("-")), None)
     if called is None and arguments in (["-h"], ["--help"]):
-        print(overview(shutil.get_terminal_size().columns))  # typer alone takes twice as long to load as all else
+        _print(overview(shutil.get_terminal_size().columns))  # typer alone takes twice as long to load as all else
         return 0
 
     import typer  # only now: Ctrl-C is welcome during imports, too
@@ -184,6 +184,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
     return 0
+
+
+def _print(text: str) -> None:
+    """Print and flush; a reader that has seen enough, as ``head`` has, ends it without a traceback."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the flush at the end of the process
 
 
 _ABOUT = "A Bayesian toolkit for wires that creep: posteriors, missing effects, robot drift."

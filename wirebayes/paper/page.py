@@ -34,13 +34,9 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections.append(Section("The robot in three dimensions", robot_view(folder / "figures")))
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     sections.append(meaning(_TERMS))
-    about = (
-        "A paper measured four wires that are held at a stretch and lose tension, and published five numbers for each. "
-        "Here are its tables again, with what they leave open: how well each number is known."
-    )
     return Page(
         "Four wires that creep",
-        f"{answer(tables['creep'])} {about}" if tables.get("creep") else about,
+        answer(tables["creep"]) if tables.get("creep") else _ABOUT,
         [section for section in sections if section.blocks],
         f"Seed {configuration.get('seed')}. The tables beside this page (CSV and JSON) hold every number shown; each "
         "fit has a folder with posterior.nc, which opens with ArviZ.",
@@ -60,7 +56,13 @@ def _gallery(folder: Path) -> Gallery:
 
 
 def _summary(tables: Tables, gallery: Gallery) -> Section:
-    return Section("Summary", [in_a_minute(tables)])
+    return Section("Summary", [*gallery("measured"), Text(_ABOUT), in_a_minute(tables)])
+
+
+_ABOUT = (
+    "A paper measured four wires that are held at a stretch and lose tension, and published five numbers for each. "
+    "Here are its tables again, with what they leave open: how well each number is known."
+)
 
 
 def _measured(tables: Tables, gallery: Gallery) -> Section:
@@ -69,7 +71,7 @@ def _measured(tables: Tables, gallery: Gallery) -> Section:
         "are absent from the print and taken as held for two minutes. The data's README lists every correction and "
         "doubt."
     )
-    return Section("What was measured", [*gallery("measured"), paper_tables.measured(tables["measured"]), doubts])
+    return Section("What was measured", [paper_tables.measured(tables["measured"]), doubts], folded=True)
 
 
 def _table_4(tables: Tables, gallery: Gallery) -> Section:

@@ -4,7 +4,7 @@ from typing import Any
 
 from wirebayes.paper.page_tables import LEAST_COVERAGE, Rows
 from wirebayes.report.blocks import Columns, Points, number, span
-from wirebayes.sentences import listed
+from wirebayes.sentences import counted, listed
 
 
 def in_a_minute(tables: dict[str, Rows]) -> Columns:
@@ -33,11 +33,16 @@ def _measured(rows: Rows) -> Points:
     return Points(
         "What was measured",
         [
-            f"{len(rows)} samples: {samples}.",
+            f"{counted(len(rows), 'sample')}: {samples}.",
             f"Each was stretched step by step and held: {readings} tensions, from {low:.2f} to {high:.2f} N.",
-            f"Within one hold a wire typically lost {min(losses):.0f} to {max(losses):.0f} % of its tension.",
+            f"Within one hold a wire typically lost {_percent(min(losses), max(losses))} of its tension.",
         ],
     )
+
+
+def _percent(low: float, high: float) -> str:
+    """A range, or one number where both ends round to it."""
+    return f"{low:.0f} %" if f"{low:.0f}" == f"{high:.0f}" else f"{low:.0f} to {high:.0f} %"
 
 
 def _known(tables: dict[str, Rows]) -> Points:
@@ -49,9 +54,9 @@ def _known(tables: dict[str, Rows]) -> Points:
     whole = sum(row["published"] == 1 for row in exponents if row["likelihood"] == "chain")
     points = [
         f"Stiffness k1, once the holds are taken as one history (90 % intervals): {intervals}.",
-        f"The published k1 lies outside for {outside} of {len(stiff)} wires.",
+        f"The published k1 lies outside for {outside} of {counted(len(stiff), 'wire')}.",
         f"Creep follows a stretched exponential: N is below 1 in {below} of {len(exponents)} fits. "
-        f"The paper has N = 1 on {whole} of {len(stiff)} wires.",
+        f"The paper has N = 1 on {whole} of {counted(len(stiff), 'wire')}.",
     ]
     rows = of_table_4(tables.get("least_squares", []), "published")
     if rows:
@@ -79,7 +84,7 @@ def _open(tables: dict[str, Rows]) -> Points:
         wires = len({row["experiment"] for row in tables["held_out"]})
         points.append(
             "The model is incomplete: fitted to the first five holds as one history, it misses the later ones "
-            f"on {len(poor)} of {wires} wires."
+            f"on {len(poor)} of {counted(wires, 'wire')}."
         )
     points.append("No hold was read for longer than two minutes: creep after an hour or a day is extrapolated.")
     return Points("What is not known", points)

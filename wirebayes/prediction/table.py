@@ -162,7 +162,8 @@ class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __ini
             axes.fill_between(time, low, high, color=line.get_color(), alpha=0.25, lw=0)
         axes.set_xlabel("time in the hold, s")
         axes.set_ylabel(f"{_READ_WORD[control]}, {unit}")
-        axes.set_title(f"{self.attrs['experiment']}: predicted, 90 % band")
+        axes.set_title(f"{self.attrs['experiment']}: predicted, 90 % band", loc="left")
+        axes.spines[["top", "right"]].set_visible(False)
         # the best place is looked for among all points of all lines
         axes.legend(frameon=False, loc="best" if len(holds) <= _MOST_NAMED else "upper right")
         return axes

@@ -67,7 +67,7 @@ _IN_WORDS = (
 def meaning(
     terms: Iterable[str] = (), effects: Iterable[str] = (), own: Mapping[str, Effect] | None = None, model: bool = True
 ) -> Section:
-    """The section that ends a page: the model, its symbols, the effects named on the page and other terms.
+    """The folded section that ends a page: the model, its symbols, the effects named on the page and other terms.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def meaning(
     blocks += [Definitions("Effects named here", named)] if named else []
     defined = [(term, TERMS[term]) for term in terms]
     blocks += [Definitions("Other words", defined)] if defined else []
-    return Section("What the words and symbols mean", blocks)
+    return Section("What the words and symbols mean", blocks, folded=True)
 
 
 def spoken(effect: str) -> str:

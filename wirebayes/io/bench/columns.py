@@ -36,7 +36,8 @@ _WORDS: dict[Role, tuple[str, ...]] = {
         "変位", "伸び", "ストローク", "位移", "伸长", "伸長", "變形", "变形", "행정", "변위", "신율",
     ),
     "time": (
-        "time", "elapsed", "seconds", "timestamp", "clock", "zeit", "uhrzeit", "zeitpunkt", "temps", "duree", "heure",
+        "time", "elapsed", "seconds", "minutes", "hours", "timestamp", "clock", "stopwatch", "zeit", "uhrzeit",
+        "zeitpunkt", "sekunden", "minuten", "stunden", "temps", "duree", "heure",
         "tiempo", "tempo", "hora", "tijd", "czas", "tid", "aika", "cas", "zaman",
         "время", "時間", "时间", "時刻", "시간",
     ),
@@ -74,6 +75,7 @@ _OF_RIG: dict[Role, tuple[str, ...]] = {
 _NO_UNIT = ("", "-", "–", "1")  # what stands in a row of units where there is none
 _COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg or Prüfzeit
 _BRACKET = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
+_UNIT_FIRST = re.compile(r"(seconds|minutes|hours|sekunden|minuten|stunden|secondes|heures|segundos|minutos)\b", re.I)
 _TAILS = (r"(.+?)\s*/\s*(\S+)$", r"(.+),\s*(\S+)$", r"(.+?)\s+in\s+(\S+)$", r"(.+)[_\s]+(\S+)$")
 
 
@@ -197,7 +199,10 @@ def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
 
 
 def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
-    """A header without its unit, and the unit: in brackets, after a slash, a comma, ``in``, ``_`` or a space."""
+    """A header without its unit, and the unit: in brackets, after a slash, a comma, ``in``, ``_`` or a space.
+
+    A time may begin with its unit in full: hours at load.
+    """
     bracket = _BRACKET.match(header)
     if bracket and unit_of(bracket[2], role):
         return bracket[1], unit_of(bracket[2], role)
@@ -205,7 +210,8 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
         tail = re.match(pattern, header)
         if tail and unit_of(tail[2], role):
             return tail[1], unit_of(tail[2], role)
-    return header, None
+    first = _UNIT_FIRST.match(header) if role == "time" else None
+    return header, unit_of(first[1], role) if first else None
 
 
 def ignored(table: RawTable, mapping: Sequence[str]) -> set[int]:
@@ -393,6 +399,14 @@ def _several(table: RawTable, likely: Sequence[int], role: Role, how: str = "") 
     )
 
 
+def _option(table: RawTable, unread: Sequence[int], role: Role) -> str:
+    """What to write for a missing quantity: the column in a unit of it, if there is one; it is the user who decides."""
+    likely = [i for i in unread if unit_of(table.units[i], role) or name_and_unit(table.header[i], role)[1]]
+    if len(likely) == 1:
+        return f'--map "{table.header[likely[0]]}={role}"'
+    return f'--map "HEADER={role} [{UNITS[role]}]"'
+
+
 def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missing: Sequence[Role]) -> Undecided:
     """The question which column is the first of the missing quantities, with the same question for the others."""
     role, *more = missing
@@ -405,10 +419,11 @@ def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missin
     if encoding not in ("utf-8", "utf-8-sig") and not " ".join(names).isascii():
         hint = f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"
     place = f"{table.sheet.path}, line {table.header_line}: found no column of"
-    with_units = " ".join(f'--map "HEADER={missed} [{UNITS[missed]}]"' for missed in missing)
+    options = [_option(table, unread, missed) for missed in missing]
+    about_units = " (a unit only where the header has no unit)" if any("HEADER=" in text for text in options) else ""
     message = (
         f"{place} {listed(missing, 'or')} among {', '.join(names)}, expected {'one of each' if more else 'one'}; "
-        f"say which with {with_units} (a unit only where the header has no unit){hint}"
+        f"say which with {' '.join(options)}{about_units}{hint}"
     )
     answers = {f"--map {table.header[i]}={role}": table.header[i] for i in unread}
     others = [_missing(table, free, unread, more)] if more else []

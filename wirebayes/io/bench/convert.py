@@ -162,6 +162,8 @@ def _convert(table: RawTable, about: About, choices: Choices) -> Converted:
     recorded, notes = _recorded(table, about, choices)
     table, columns, values = recorded.table, recorded.columns, recorded.values
     control = choices.control or _control(recorded)
+    if control == "force" and recorded.not_read is not None:  # a setting goes on, a reading does not
+        raise table.complain(recorded.not_read, columns["displacement"].index, "an empty cell", _NOT_READ)
     holds = cut(recorded.readings(control), choices.time_since)
     holds, thin = _thin(holds)
     notes += _what_was_set(control) + recorded.numbering + holds.notes + thin + _missing_holds(holds)
@@ -197,6 +199,8 @@ class _Recorded:
         Whether times are moments of a day.
     numbering : list of str
         How holds that have names were numbered, in a sentence.
+    not_read : int or None
+        The first line without a displacement, which has that of the line above.
     """
 
     table: RawTable
@@ -206,6 +210,7 @@ class _Recorded:
     hold: NDArray[np.int64] | None
     of_day: bool
     numbering: list[str]
+    not_read: int | None
 
     def complain(self, row: int, role: str, found: str, expected: str) -> InputError:
         """The error of a cell.
@@ -235,7 +240,9 @@ class _Recorded:
 def _recorded(table: RawTable, about: About, choices: Choices) -> tuple[_Recorded, list[str]]:
     """The numbers of a table, with what was understood on the way."""
     columns = _of_sample(table, understand(table, choices.mapping), about)
+    not_read = next((row.line for row in table.rows if not row.cell(columns["displacement"].index)), None)
     table, notes = _complete(table, columns)
+    not_read = not_read if not_read in {row.line for row in table.rows} else None  # below the readings
     decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
     notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes]
     texts: dict[Role, list[str]] = {
@@ -248,7 +255,7 @@ def _recorded(table: RawTable, about: About, choices: Choices) -> tuple[_Recorde
     values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
     notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
     hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
-    return _Recorded(table, columns, texts, values, hold, of_day, numbering), notes
+    return _Recorded(table, columns, texts, values, hold, of_day, numbering, not_read), notes
 
 
 def _control(recorded: _Recorded) -> Control:
@@ -264,6 +271,12 @@ def _control(recorded: _Recorded) -> Control:
     return recognised(
         by_tension, x, recorded.values["tension"], is_mass, place
     )  # fmt: skip
+
+
+_NOT_READ = (
+    "a reading, or no such line: a hold in which nothing was read stands in the experiment file, as "
+    "[[experiment.unrecorded_holds]]"
+)
 
 
 def _what_was_set(control: Control) -> list[str]:

@@ -12,18 +12,22 @@ from wirebayes.report.blocks import (
     Block,
     Columns,
     Page,
+    Picture,
+    Pictures,
     Points,
     Section,
     Table,
     Text,
     before_the_answer,
     beside_the_answer,
+    drawn,
     files_beside,
     number,
     span,
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
+from wirebayes.report.pictures.calibrate import reference_errors
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.sentences import counted
 
@@ -33,7 +37,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     found: CalibrateJson = read_json(folder / "calibration.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
     columns = Columns([_done(found), _known(found), _unknown(creep, hooke)])
-    first = [*before_the_answer(found), columns, *beside_the_answer(found)]
+    first = [*before_the_answer(found), *_errors(found), *beside_the_answer(found), columns]
     sections = [
         Section("Summary", first),
         *_geometry(found),
@@ -53,6 +57,22 @@ _FILES = (
     ("unknowns.json", "the posterior that pose --calibration starts from"),
     ("scene.json", "points of the view that can be turned"),
     ("configuration.json", "the options of this run, with version and seed"),
+)
+
+
+def _errors(found: CalibrateJson) -> list[Block]:
+    """The picture of what was wrong before; none where the search did not converge."""
+    creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
+    if not (creep["converged"] and hooke["converged"]):
+        return []
+    figure = reference_errors(creep, hooke, found["prior"]["reference_sd_mm"])
+    alt = "Error of each wire's reference length with its 90 % interval, by two models of the wires."
+    return [Pictures([Picture(drawn(figure), alt, _ERRORS)])]
+
+
+_ERRORS = (
+    "By how much each wire is longer than its joint value said. Where the two models differ by more than their "
+    "intervals, creep decides the lengths."
 )
 
 

@@ -25,6 +25,7 @@ from wirebayes.report.blocks import (
     picture_file,
     sentence,
     span,
+    unit_text,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning, spoken
 from wirebayes.sentences import counted
@@ -45,10 +46,12 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     files = Section("Raw results", [files_beside(folder, _FILES)])
     if configuration["command"] == "import":
         imported: ImportJson = read_json(folder / "import.json")
-        sections = [Section(name, _imported(e, _picture(folder, name))) for name, e in imported["experiments"].items()]
+        sections = [
+            Section(name, _imported(e, _picture(folder, name, " Is this the test that was done?")))
+            for name, e in imported["experiments"].items()
+        ]
         understood = "; ".join(of_import(name, e)[0] for name, e in imported["experiments"].items())
-        lead = f"{understood}. Look at the picture before you fit."
-        return Page("What was imported", lead, [*sections, files])
+        return Page("What was imported", f"{understood}.", [*sections, files])
     checked: CheckJson = read_json(folder / "check.json")
     found = checked["experiments"]
     sections = [Section(name, _checked(e, _picture(folder, name))) for name, e in found.items()]
@@ -66,16 +69,16 @@ def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:
     ]
     notes = [f"{note[:1].upper()}{note[1:]}." for note in e["notes"]] or ["Nothing had to be decided."]
     columns = [Points("What it is", about), Points("What was done", notes)]
-    return [*before_the_answer(e), Columns(columns), *picture, *beside_the_answer(e)]
+    return [*before_the_answer(e), *picture, *beside_the_answer(e), Columns(columns)]
 
 
 def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
     known, blind = Points("What it is", _about(e)), Points("What it cannot determine", _blind(e))
     return [
         *before_the_answer(e),
-        Columns([known, blind]),
-        *beside_the_answer(e),
         *picture,
+        *beside_the_answer(e),
+        Columns([known, blind]),
         _parameters(e),
         _effects(e),
         _holds(e),
@@ -113,15 +116,15 @@ def _parameters(e: CheckedExperiment) -> Table:
     for name, p in e["parameters"].items():
         after, before = span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"])
         by, meaning = _DETERMINED_BY[p["determined_by"]], SYMBOLS.get(name, "–")
-        rows.append([name, number(p["q50"]), after, before, by, meaning])
-    header = ["parameter", "median", "90 % interval", "prior's 90 %", "determined by", "what it is"]
+        rows.append([name, unit_text(p["unit"]) or "–", number(p["q50"]), after, before, by, meaning])
+    header = ["parameter", "unit", "median", "90 % interval", "prior's 90 %", "determined by", "what it is"]
     return Table(header, rows, "A first estimate by a short run of the sampler; fit gives the posterior.")
 
 
 def _effects(e: CheckedExperiment) -> Table:
     """How small an effect the test would show."""
     rows = [
-        [spoken(name), number(effect["amplitude_80"]), effect["unit"], effect["shows"]]
+        [spoken(name), number(effect["amplitude_80"]), unit_text(effect["unit"]) or "–", effect["shows"]]
         for name, effect in e["effects"].items()
         if effect["shows"] != "no"
     ]
@@ -143,10 +146,11 @@ def _holds(e: CheckedExperiment) -> Table:
     return Table(header, rows, "The holds as they were read; one without a number was not recorded.")
 
 
-def _picture(folder: Path, name: str) -> list[Block]:
+def _picture(folder: Path, name: str, question: str = "") -> list[Block]:
     file = picture_file(folder, name)
     if file is None:
         return []
     alt = f"Displacement and tension of {name} over the whole test."
     caption = "What was set above, what was read below, over the whole test. Shading marks every second hold."
+    caption += question
     return [Pictures([Picture(embedded(file), alt, caption, wide=True)])]

@@ -34,6 +34,7 @@ _CAPTIONS = {
     "above the region means bands that are too narrow, one below it bands that are too wide.",
     "pit-given-first": "The same, each hold's first reading given.",
 }
+_FIRST = 2  # pictures before the table: how much better each model predicts, and how well
 _MOST_SENTENCES = 3  # at the head of a page; more hide its first picture
 _FILES = (
     ("comparison.json", "every number of this page, and every held-out reading with its predicted quantiles"),
@@ -57,12 +58,12 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     rows = table["models"]
     good = [r for r in rows if r.get("failed") is None]
     blocks: list[Block] = before_the_answer(table)
+    pictures = pictures_in(folder / name, _CAPTIONS) if (folder / name).is_dir() else []
+    blocks += [Pictures(pictures[:_FIRST])] if pictures else []
     if good:
         advised = "" if good[0]["name"] == table["base"] else f" with the options of {good[0]['name']}"
         blocks.append(Text(f"Next: wirebayes fit{advised}, or wirebayes discover, which names what is missing."))
     blocks += beside_the_answer(table)
-    if (folder / name).is_dir() and (pictures := pictures_in(folder / name, _CAPTIONS)):
-        blocks.append(Pictures(pictures))
     scored = [r["held_out"]["given_first"] for r in good if r["held_out"]]
     unit = unit_read(scored[0] or {}) if scored else "N"
     header = ["model", "weight", f"elpd − {table['base']}", "standard error", f"held out: rms, {unit}"]
@@ -77,6 +78,7 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     blocks.append(
         Table(header, lines, "Best first. The weight is the model's share in the mixture with the best predictions.")
     )
+    blocks += [Pictures(pictures[_FIRST:])] if pictures[_FIRST:] else []
     failed = [[r["name"], str(r["failed"])] for r in rows if r.get("failed") is not None]
     if failed:
         blocks.append(Table(["model", "why it was not scored"], failed))

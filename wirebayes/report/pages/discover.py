@@ -1,5 +1,6 @@
 """The page of ``wirebayes discover``: what is missing in the model, how sure that is, and what to measure next."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ from wirebayes.answers import findings_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.discovery import Amplitude, DiscoveryJson, ExperimentFindings
 from wirebayes.json_files.read_units import read, unit_read
-from wirebayes.json_files.summary import SummaryJson
+from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -72,7 +73,7 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     blocks: list[Block] = [*before_the_answer(v), *_alone(v), *beside_the_answer(v)]
     file = picture_file(folder, name)
     if file is not None:
-        alt = f"Readings of {name} with both models' curves through them, and against the plain and the final model."
+        alt = f"Readings of {name} with each model's curve through them, and what it leaves over, hold after hold."
         blocks.append(Pictures([Picture(embedded(file), alt, _BEFORE_AND_AFTER, wide=True)]))
     if v.get("next_measurement"):
         blocks.append(Text(f"Measure next: {v['next_measurement']}"))
@@ -82,7 +83,8 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     known = [*beside, _held_out(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
     unknown = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
-    columns = [Points("Where model and measurement disagree", where), Points("What is known", [p for p in known if p])]
+    known = [point for point in known if point] or ["Nothing had to be added to the plain model."]
+    columns = [Points("Where model and measurement disagree", where), Points("What is known", known)]
     blocks.append(Columns([*columns, Points("What is not known", unknown or ["Nothing to report."])]))
     if (folder / name).is_dir() and (others := pictures_in(folder / name, _patterns(v))):
         blocks.append(Pictures(others))
@@ -123,8 +125,8 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
             caption += f" Something without a name remains beside them with probability {number(round(rest, 4), 2)}."
         blocks.append(Table(["candidate", "largest share", "missing at all"], lines, caption))
     if v.get("power"):
-        lines = [[spoken(e), number(p["amplitude_80"]), p["unit"]] for e, p in v["power"].items()]
-        caption = "The smallest amplitude of each effect that this test detects with 80 % power."
+        lines = [[spoken(e), number(p["amplitude_80"]), unit_text(p["unit"]) or "–"] for e, p in v["power"].items()]
+        caption = "The smallest amplitude of each effect that this test detects with 80 % power; a dash: none."
         blocks.append(Table(["effect", "amplitude", "unit"], lines, caption))
     if hidden:
         caption = "Not identifiable here: the readings would be nearly the same with or without it."
@@ -155,6 +157,8 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
         return []
     summaries: list[SummaryJson] = [read_json(file) for file in files]
     plain, final = (summary["parameters"] for summary in summaries)
+    if v["verdict"] == "nothing-missing":
+        return [_plain_parameters(plain)]
     rows = []
     for name, after in final.items():
         before = plain.get(name)
@@ -164,9 +168,17 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
             number(after["q50"]), span(after["q05"], after["q95"]), _means(name),
         ])  # fmt: skip
     header = ["parameter", "unit", "plain", "90 %", "with what was found", "90 %", "what it is"]
-    same = v["verdict"] == "nothing-missing"
-    caption = "Nothing was added: both are the same." if same else "Each parameter before and after, both on all holds."
-    return [Table(header, rows, caption)]
+    return [Table(header, rows, "Each parameter before and after, both on all holds.")]
+
+
+def _plain_parameters(parameters: Mapping[str, Parameter]) -> Table:
+    """Those of the plain model, to which nothing had to be added."""
+    rows = [
+        [name, unit_text(p["unit"]) or "–", number(p["q50"]), span(p["q05"], p["q95"]), _means(name)]
+        for name, p in parameters.items()
+    ]
+    header = ["parameter", "unit", "median", "90 % interval", "what it is"]
+    return Table(header, rows, "Of the plain model: nothing had to be added.")
 
 
 def _spoken(v: ExperimentFindings) -> str:
@@ -174,8 +186,8 @@ def _spoken(v: ExperimentFindings) -> str:
 
 
 _BEFORE_AND_AFTER = (
-    "Above: every reading with the curves of both models. Below: measured minus predicted readings, under the plain "
-    "model and with what was found. Shaded holds were kept apart to test the models; both are fitted to all holds here."
+    "Above: every reading with the curve of each model. Below: measured minus predicted readings. Shaded holds were "
+    "kept apart to test the models; all holds are fitted here."
 )
 
 
@@ -200,7 +212,7 @@ def _gap_closed(v: ExperimentFindings) -> str:
 
 def _held_out(v: ExperimentFindings) -> str:
     held = v.get("held_out") or {}
-    if not held.get("plain") or not held.get("final"):
+    if not held.get("plain") or not held.get("final") or v["verdict"] == "nothing-missing":
         return ""
     if not held["holds"]:
         return "No hold was held out: that needs three recorded holds of every test."

@@ -22,6 +22,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.creep_table import growth
+from wirebayes.sentences import lasting
 
 _FILES = (
     ("creep-table.csv", "growth of a new line under constant tension, with 90 % intervals"),
@@ -53,14 +54,16 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     ]
     caption = "Growth of a new line under a tension held constant, in mm per metre of line."
     words = Text(
-        "Firmware and simulators know springs but no creep. The files give them the line's spring constant; this table "
+        "Firmware and simulators know springs but no creep. The files give them the line's spring constant; the table "
         "says how much longer each metre of line will be after a time, which has to be corrected for by other means."
     )
     pictures = [_growth(wire, [row for row in rows if row.get("wire") == wire]) for wire in wires]
     header = _HEADER if wires == [None] else ("wire", *_HEADER)
+    creep = [*before_the_answer(summary), Pictures(pictures), *beside_the_answer(summary), words]
     sections = [
-        Section("Files", [*before_the_answer(summary), files_beside(folder, _FILES), *beside_the_answer(summary)]),
-        Section("Creep of the line", [words, Pictures(pictures), Table(header, lines, caption)]),
+        Section("Creep of the line", creep),
+        Section("Files", [files_beside(folder, _FILES)]),
+        Section("Table of the creep", [Table(header, lines, caption)]),
         meaning(("90 % interval",), model=False),
     ]
     last = rows[-1]
@@ -68,7 +71,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     interval = span(float(last["q05_mm_per_m"]), float(last["q95_mm_per_m"]))
     lead = (
         f"A metre of the line grows by {grown} ({interval}) under {float(last['tension_N']):g} N within "
-        f"{float(last['time_s']):g} s; the interval holds 90 %. Settings for firmware and simulators know springs only."
+        f"{lasting(float(last['time_s']))}; the interval holds 90 %."
     )
     return Page("Settings for a robot", lead, sections, f"Seed {configuration.get('seed')}.")
 

@@ -102,9 +102,9 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
         alt = f"Readings of {sample.name} with the fitted curve through them, hold after hold."
         blocks.append(_wide(through_the_readings(stored, sample.name), alt, _CURVE))
     blocks.append(Text(_next(summary)))
+    blocks.append(_parameters(draws, shrunk, sample))
     blocks.append(Columns([_measured(stored, summary.get("hold_ends")), *_known(draws, shrunk, sample, trusted)]))
     blocks.append(_readings(stored))
-    blocks.append(_parameters(draws, shrunk, sample))
     pairs = figures.corner({name: draws[name] for name in sampled}, sample.model.effects, sample.protocol.control)
     if pairs is not None:
         blocks.append(_wide(pairs, f"Posterior of {sample.name}, every pair of parameters.", _PAIRS))

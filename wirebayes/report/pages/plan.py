@@ -130,7 +130,7 @@ def _protocol(row: JudgedProtocol) -> list[Block]:
     }
     lines = [
         [
-            _words(n),
+            f"{_words(n)}, {unit}" if (unit := unit_text(UNITS.get(n, ""))) else _words(n),
             *(number(value, 2) for value in (q["sd"], q["width_90"])),
             span(q["width_90_low"], q["width_90_high"], 2),
             "given" if is_given(q) else number(q["guess_sd"], 2),
@@ -143,7 +143,7 @@ def _protocol(row: JudgedProtocol) -> list[Block]:
     blocks.append(Table(header, lines, caption + f"{number(creep['longest_hold_s'])} s."))
     if row["effects"]:
         shown = [
-            [_words(n), number(e["amplitude_80"], 2), e["unit"], number(e["delta_80"], 2),
+            [_words(n), number(e["amplitude_80"], 2), unit_text(e["unit"]) or "–", number(e["delta_80"], 2),
              ", ".join(map(_words, e["confused_with"])) or "–"]
             for n, e in row["effects"].items()
         ]  # fmt: skip

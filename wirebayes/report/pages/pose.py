@@ -136,8 +136,10 @@ def _answers(pose: PoseJson) -> list[Points]:
     space = pose.get("workspace")
     if space and claim:
         moved = f"{number(space['q50_drift_mm'])} mm ({span(space['q05_drift_mm'], space['q95_drift_mm'])})"
-        chance = number(space["probability"], 2)
-        known.append(f"Over the whole workspace it moves {moved} within {claim['time_s']:g} s; probability {chance}.")
+        known.append(
+            f"Anywhere in the workspace it moves {moved} within {claim['time_s']:g} s, and with probability "
+            f"{number(space['probability'], 2)} stays within both limits."
+        )
     unknown = ["How much specimens of one line differ is assumed, not measured, unless three or more were tested."]
     known = known or ["Nothing: the pose cannot be held."]
     return [Points("What is known", known), Points("What is not known", unknown)]

@@ -39,6 +39,7 @@ _FILES = (
     ("poses.csv", "the pose at every row, with bands"),
     ("corrections.csv", "the joint values that bring the platform back, at every row"),
 )
+_FIRST = ("drift", "rotation")  # the answer as a picture
 _WIDE = ("poses",)
 _ROWS = 12  # of the tables on the page
 _SMALLEST_MM = 1e-4  # less is shown as nothing: a tenth of what a dial gauge resolves, and often only rounding
@@ -64,16 +65,18 @@ def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> 
     lead = f"{of_pose(pose)[-1]}, {about}; the interval holds 90 %."
     if not pose["feasible"]:
         return Page(f"Robot {pose['robot']}", lead, [Section("Summary", before_the_answer(pose))])
-    columns = Columns([Points("What was computed", _requested(pose)), *_answers(pose)])
-    first = [*before_the_answer(pose), columns, *beside_the_answer(pose)]
     files = {name: picture_file(folder, name) for name in _CAPTIONS}
     pictures = {
         name: Picture(embedded(file), _CAPTIONS[name], _CAPTIONS[name], wide=name in _WIDE)
         for name, file in files.items()
         if file is not None
     }
+    shown = [pictures.pop(name) for name in _FIRST if name in pictures]
+    first = [*before_the_answer(pose), *([Pictures(shown)] if shown else []), *beside_the_answer(pose)]
+    first.append(Columns([Points("What was computed", _requested(pose)), *_answers(pose)]))
     wide = [Pictures([pictures.pop(name)]) for name in _WIDE if name in pictures]
-    sections = [Section("Summary", first), Section("Pictures", [*wide, Pictures(list(pictures.values()))])]
+    rest = [Pictures(list(pictures.values()))] if pictures else []
+    sections = [Section("Summary", first), Section("More pictures", [*wide, *rest])]
     sections += [Section("Poses", _poses(pose)), Section("Corrections", _corrections(pose))]
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     sections.append(meaning(("90 % interval", "drift", "specimen spread"), pose["wires"]["effects"]))

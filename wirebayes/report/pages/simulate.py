@@ -47,7 +47,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
     sections.append(meaning(("hold",), configuration["effects"]))
     stiff = listed([f"{number(truth['parameters']['k1'])} N" for truth in list(truths.values())[:_MOST]])
-    lead = f"Invented readings of {counted(len(experiments), 'test')}, whose true parameters are known: k1 is {stiff}."
+    lead = f"Simulated readings of {counted(len(experiments), 'test')}, whose true parameters are known: k1 is {stiff}."
     return Page("Simulated tests", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
@@ -70,8 +70,8 @@ def _section(e: Experiment, truth: TrueWire) -> Section:
         for name, value in truth["parameters"].items()
     ]
     blocks: list[Block] = [
-        Text(f"{e.material}, {e.length_mm:g} mm. Beyond the plain model: {beyond}."),
         Pictures([picture]),
+        Text(f"{e.material}, {e.length_mm:g} mm. Beyond the plain model: {beyond}."),
         Table(["parameter", "true value", "unit", "what it is"], lines, "What an analysis should find."),
     ]
     return Section(e.name, blocks)

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 
 from wirebayes.json_files.batch import OutlierRow, Row
 from wirebayes.json_files.values import INTERVAL
-from wirebayes.report.figures import logarithmic, verbatim
+from wirebayes.report.figures import CHAIN, HOLD, logarithmic, verbatim
 
-_SHOWN = {"k1": "k1 (N)", "B": "B (mm N⁻ᵁ) per m of length", "U": "U", "k2": "k2 (s⁻ᴺ)", "N": "N"}
+_SHOWN = {"k1": "k1, N", "B": "B, mm N⁻ᵁ per m of length", "U": "U", "k2": "k2, s⁻ᴺ", "N": "N"}
 _MOST_BARS = 200  # specimens of which intervals are drawn: more are a smear
 _MOST_MATERIALS = 12  # columns whose labels can be read
-_DOT, _FAR = "#4c78a8", "#d1495b"
+_MOST_UPRIGHT, _LONGEST_UPRIGHT = 3, 14  # materials, and letters of each, that stand side by side below a panel
 
 
 def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
@@ -36,7 +36,8 @@ def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
     count = Counter(row["material"] for row in rows if row["material"])
     materials = sorted(count, key=lambda material: -count[material])[:_MOST_MATERIALS]
     marked = {(outlier["experiment"], outlier["parameter"]) for outlier in far}
-    figure = Figure(figsize=(7.6, 5.0 if len(materials) < 5 else 6.4), layout="constrained")
+    upright = len(materials) <= _MOST_UPRIGHT and max(map(len, materials), default=0) <= _LONGEST_UPRIGHT
+    figure = Figure(figsize=(8.6, 5.0 if upright else 6.4), layout="constrained")
     axes = figure.subplots(2, 3).ravel()
     axes[-1].set_axis_off()
     for axis, (name, label) in zip(axes, _SHOWN.items(), strict=False):
@@ -44,7 +45,9 @@ def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
             members = [row for row in rows if row["material"] == material and name in row["parameters"]]
             _column(axis, at, name, members, marked)
         axis.set_title(label, fontsize=9, loc="left")
-        axis.set_xticks(range(len(materials)), [verbatim(m) for m in materials], rotation=90, fontsize=7)
+        axis.set_xticks(range(len(materials)), [verbatim(m) for m in materials])
+        axis.tick_params(axis="x", labelsize=7.5, rotation=0 if upright else 90)
+        axis.spines[["top", "right"]].set_visible(False)
         axis.set_xlim(-0.6, len(materials) - 0.4)
         axis.tick_params(axis="y", which="both", labelsize=7)
         if name in ("k1", "B", "k2"):
@@ -59,7 +62,7 @@ def _column(axis: Axes, at: int, name: str, members: list[Row], marked: set[tupl
         scale = 1e3 / row["length_mm"] if name == "B" and row["length_mm"] else 1.0
         low, middle, high = (scale * row["parameters"][name][q] for q in INTERVAL)
         apart = (row["name"], name) in marked
-        color = _FAR if apart else _DOT
+        color = HOLD if apart else CHAIN
         if len(members) <= _MOST_BARS or apart:
             axis.plot([x, x], [low, high], "-", color=color, lw=0.8, alpha=0.6)
         axis.plot([x], [middle], "o", color=color, ms=5 if apart else 3)

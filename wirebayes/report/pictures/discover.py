@@ -34,27 +34,36 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings, 
         The picture to write.
     """
     control = plain.sample.protocol.control
-    figure = Figure(figsize=(9.0, 8.0), layout="constrained")
-    above, *axes = figure.subplots(3, 1, sharex=True, height_ratios=(1.4, 1, 1))
-    axes[1].sharey(axes[0])
-    plain_curve, final_curve = curve(plain), curve(final)
-    draw_curve(above, plain, plain_curve, _WORSE, "plain model")
-    draw_curve(above, final, final_curve, _BAND, "final model, 90 % band")
-    draw_readings(above, plain, plain_curve)
+    shown = [("plain model", plain, _WORSE)]
+    if verdict["verdict"] != "nothing-missing":
+        shown.append((f"with {_added(verdict)}", final, _BAND))
+    figure = Figure(figsize=(9.0, 3.2 + 2.4 * len(shown)), layout="constrained")
+    above, *axes = figure.subplots(1 + len(shown), 1, sharex=True, height_ratios=(1.4, *[1] * len(shown)))
+    curves = [curve(stored) for _, stored, _ in shown]
+    for (title, stored, colour), found in zip(shown, curves, strict=True):
+        draw_curve(above, stored, found, colour, f"{title}, 90 % band")
+    draw_readings(above, plain, curves[0])
     above.set_title(f"{target.stem}: readings and curves", loc="left", fontsize=10)
     above.legend(fontsize=8, frameon=False)
-    unknown = ["something unknown"] if verdict["verdict"] in ("partial", "unknown") else []
-    added = " + ".join([e.replace("_", " ") for e in verdict["accepted"]] + unknown)
-    titles = "plain model", f"with {added}" if added else "nothing had to be added"
-    for axis, stored, title in zip(axes, (plain, final), titles, strict=True):
+    for axis, (title, stored, _) in zip(axes, shown, strict=True):
+        axis.sharey(axes[0])
         _residuals(axis, stored, verdict["held_out"]["holds"])
         axis.set_title(f"{target.stem}: {title}", loc="left", fontsize=10)
-        axis.set_ylabel(f"measured − predicted ({READ_UNIT[control]})")
-    above.set_ylabel(f"{READ[control]} ({READ_UNIT[control]})")
-    name_holds(axes[1], plain)
+        axis.set_ylabel(f"measured − predicted, {READ_UNIT[control]}")
+    above.set_ylabel(f"{READ[control]}, {READ_UNIT[control]}")
+    name_holds(axes[-1], plain)
+    for axis in (above, *axes):
+        axis.spines[["top", "right"]].set_visible(False)
     handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
     save(figure, target)
+
+
+def _added(verdict: ExperimentFindings) -> str:
+    """What the final model has beyond the plain one."""
+    unknown = ["something unknown"] if verdict["verdict"] in ("partial", "unknown") else []
+    names = [effect.replace("_", " ") for effect in verdict["accepted"]] + unknown
+    return " + ".join(names) or "what may be missing"
 
 
 def waterfall(verdict: ExperimentFindings) -> Figure:

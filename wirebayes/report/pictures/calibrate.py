@@ -1,0 +1,39 @@
+"""The picture of a calibration: by how much each wire's reference length is wrong."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wirebayes.json_files.calibrate import EstimatedLengths
+from wirebayes.report.figures import CHAIN, HOLD, QUIET, legend_below, panel
+
+_HALF = 1.645  # standard deviations on either side of a mean that hold 90 %
+_APART = 0.16  # of a wire's place, by which the two models stand beside each other
+
+
+def reference_errors(creep: EstimatedLengths, hooke: EstimatedLengths, prior_sd_mm: float) -> Figure:
+    """The error of every wire's reference length with its 90 % interval, by the creep model and by Hooke's law alone.
+
+    Parameters
+    ----------
+    creep, hooke : dict
+        Parts of ``calibration.json``.
+    prior_sd_mm : float
+        Standard deviation of these errors before the session, mm.
+    """
+    figure, axes = panel("wire", "error of the reference length, mm", size=(7.0, 3.4))
+    half = _HALF * prior_sd_mm
+    axes.axhspan(-half, half, color=QUIET, alpha=0.25, lw=0, label="before, 90 %")
+    axes.axhline(0.0, color=QUIET, lw=0.8)
+    for result, place, colour, label in (
+        (creep, -_APART, CHAIN, "with the creep model, 90 %"),
+        (hooke, _APART, HOLD, "with Hooke's law alone, 90 %"),
+    ):
+        error: Any = result["reference_error_mm"]
+        mean, sd = (np.array(error[key], float) for key in ("mean", "sd"))
+        wires = np.arange(1, len(mean) + 1)
+        axes.errorbar(wires + place, mean, _HALF * sd, fmt="o", ms=4, color=colour, label=label)
+    axes.set_xticks(wires, [str(wire) for wire in wires])
+    legend_below(figure, axes, 3)
+    return figure
