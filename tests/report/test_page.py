@@ -312,7 +312,7 @@ CHECKED = {
     "duration_s": 360.0, "warnings": [{"kind": "data", "text": "hold 2 repeats hold 1"}],
     "holds": [{"number": None, "displacement_mm": 5.0, "start_s": 0.0, "duration_s": 120.0, "readings": 0,
                "first_s": None, "first_N": None, "last_N": None}],
-    "parameters": {"k1": {"q05": 1.0, "q50": 2.0, "q95": 3.0, "prior_q05": 0.5, "prior_q95": 9.0,
+    "parameters": {"k1": {"unit": "N", "q05": 1.0, "q50": 2.0, "q95": 3.0, "prior_q05": 0.5, "prior_q95": 9.0,
                           "determined_by": "prior"}},
     "effects": {
         "toe": {"shows": "yes", "amplitude_80": 0.00123, "unit": "-", "reason": None},

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.errors import InputError
+from wirebayes.io.run_folder import write_json
 
 RAW, ABOUT = "raw", "about.json"
 ROBOTS = "robots"  # a folder for each robot of the user's own, with its file and a table of poses
@@ -50,7 +51,7 @@ class Test:
 
     def say(self, about: dict[str, Any]) -> None:
         """Keep ``length_mm``, ``material``, ``area_mm2``, ``control``, and ``options`` as the command line has them."""
-        write(self.folder / ABOUT, about)
+        write_json(self.folder / ABOUT, about)
 
     def place_for_robot(self, names: list[str]) -> Path:
         """An empty folder for files that were dropped together, named after the robot; an earlier one is replaced."""
@@ -120,13 +121,6 @@ class Shelf:
 def _bare(title: str, otherwise: str) -> str:
     """A title as the name of a folder and as part of an address."""
     return re.sub(r"[^A-Za-z0-9._-]+", "-", title).strip("-._")[:60] or otherwise
-
-
-def write(path: Path, content: dict[str, Any]) -> None:
-    """A small JSON file, whole or not at all."""
-    partial = path.with_suffix(".partial")
-    partial.write_text(json.dumps(content, indent=2, ensure_ascii=False), encoding="utf-8")
-    partial.replace(path)
 
 
 def _read(path: Path) -> dict[str, Any] | None:

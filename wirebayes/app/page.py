@@ -1,6 +1,5 @@
 """The pages of the app: where files are dropped, and one page for each test."""
 
-from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -120,14 +119,12 @@ class _TestPage:
             self.progress(job)
         if self.state() != self.shown:
             self.shown = self.state()
-            self.sample.refresh()
-            self.work.refresh()
-            self.results.refresh()
+            for part in (self.sample, self.work, self.results):
+                part.refresh()
 
     def start(self, step: str, **options: Any) -> None:
         """Begin a step with the options of all of them."""
-        about = self.test.about()
-        options = about if step == READ else {"seed": self.seed, **options}
+        options = self.test.about() if step == READ else {"seed": self.seed, **options}
         if self.jobs.start(self.test, step, options) is None:
             ui.notify("Something is being computed; stop it first")
         self.look()
@@ -157,7 +154,6 @@ class _TestPage:
                 for number, question in enumerate(asked)
             ]
             chosen = list(about.get("options", ()))
-            columns = None
             with ui.expansion("Say what a column is, where it was understood wrongly"):
                 columns = ui.textarea("HEADER=COLUMN or HEADER=COLUMN [UNIT], one a line", value="\n".join(chosen))
                 ui.label("COLUMN is hold, displacement, time, tension, temperature or ignore.").classes("text-sm")
@@ -192,10 +188,7 @@ class _TestPage:
         elif read is not None:
             with ui.row():
                 for step in ("check", "fit", "discover"):
-                    ui.button(TITLES[step] if step != "discover" else "Discover", on_click=self._starter(step))
-
-    def _starter(self, step: str) -> Callable[[], None]:
-        return lambda: self.start(step)
+                    ui.button(step.capitalize(), on_click=lambda step=step: self.start(step))
 
     def progress(self, job: Job) -> None:
         """A bar for each part of the work that has begun."""
@@ -203,8 +196,7 @@ class _TestPage:
             if name not in self.bars:
                 with self.place_of_bars:
                     ui.label(name).classes("text-sm")
-                    bar = ui.linear_progress(show_value=False).props(f'aria-label="{name}"')
-                    self.bars[name] = bar
+                    self.bars[name] = ui.linear_progress(show_value=False).props(f'aria-label="{name}"')
             self.bars[name].set_value(share)
 
     @ui.refreshable_method
@@ -249,17 +241,16 @@ class _TestPage:
                         link.props(f'download="{self.test.name}-{quote(name.replace("/", "-"))}"')
 
     def _robots(self) -> None:
-        read = self.test.record(READ) or {"experiments": []}
-        names = read["experiments"]
+        names = (self.test.record(READ) or {"experiments": []})["experiments"]
         with ui.card():
             _heading("A robot on this wire")
             with ui.row().classes("items-end"):
                 robot = ui.select(shipped(), value="linear-7", label="Robot")
-                experiment = ui.select(names, value=names[0], label="Experiment") if len(names) > 1 else None
+                wire = ui.select(names, value=next(iter(names), None), label="Experiment")
+                wire.set_visibility(len(names) > 1)
 
                 def drift() -> None:
-                    wire = names[0] if experiment is None else experiment.value
-                    self.start(f"pose-{robot.value}", robot=robot.value, experiment=wire)
+                    self.start(f"pose-{robot.value}", robot=robot.value, experiment=wire.value)
 
                 ui.button("Drift", on_click=drift)
             ui.label("Your own robot: drop its file (TOML), with a trajectory (CSV) beside it if there is one.")
@@ -268,8 +259,7 @@ class _TestPage:
                 place = self.test.place_for_robot([file.name for file in event.files])
                 for file in event.files:
                     await file.save(place / Path(file.name.replace("\\", "/")).name)
-                wire = names[0] if experiment is None else experiment.value
-                self.start(f"pose-{place.name}", robot=str(place), experiment=wire)
+                self.start(f"pose-{place.name}", robot=str(place), experiment=wire.value)
 
             ui.upload(multiple=True, auto_upload=True, on_multi_upload=dropped, label="Your robot").props("data-robot")
 

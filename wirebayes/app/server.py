@@ -21,7 +21,6 @@ from wirebayes.processes.workers import load_early
 
 ADDRESS = "127.0.0.1"
 PORT = 8137  # of no known service; another free one where it is taken and none was asked for
-_NAMES = (ADDRESS, "localhost")
 _PATIENCE_S = 1  # for open tabs, when the program ends
 
 Message = MutableMapping[str, Any]
@@ -56,9 +55,8 @@ def serve(folder: Path, port: int | None = None, *, seed: int = 0, browse: bool 
     logging.getLogger("nicegui").setLevel(logging.ERROR)  # an address that does not exist is nobody's business
     nicegui.ui.run_with(application, title="wirebayes", dark=False, show_welcome_message=False)
     own = _Own(application, listening.getsockname()[1])
-    server = uvicorn.Server(
-        uvicorn.Config(own, log_level="warning", timeout_graceful_shutdown=_PATIENCE_S, lifespan="on")
-    )
+    config = uvicorn.Config(own, log_level="warning", timeout_graceful_shutdown=_PATIENCE_S, lifespan="on")
+    server = uvicorn.Server(config)
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)  # the server has its own handlers, and sends the signal again at its end
     print(f"wirebayes app: {address} (results in {folder}; Ctrl-C ends it)", flush=True)
@@ -87,7 +85,7 @@ class _Own:
 
     def __init__(self, application: Any, port: int) -> None:
         self._application = application
-        self._hosts = {f"{name}:{port}" for name in _NAMES}
+        self._hosts = {f"{name}:{port}" for name in (ADDRESS, "localhost")}
         sockets = " ".join(f"ws://{host}" for host in sorted(self._hosts))
         inline = "'self' 'unsafe-inline' 'unsafe-eval' data: blob:"  # pages of results have all they need inside
         self._policy = f"default-src {inline}; connect-src 'self' {sockets}".encode()

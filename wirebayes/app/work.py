@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import wirebayes
-from wirebayes.app.folders import RAW, READ, ROBOTS, STEPS, Test, write
+from wirebayes.app.folders import RAW, READ, ROBOTS, STEPS, Test
 from wirebayes.errors import InputError
+from wirebayes.io.run_folder import write_json
 
 Progress = Callable[[str, float, float], None]
 
@@ -33,7 +34,7 @@ def do(send: Connection, folder: Path, step: str, options: dict[str, Any]) -> No
     try:
         run = _read if step == READ else _ask if step in STEPS else _pose
         record = run(test, step, options, lambda *report: send.send(("progress", report)))
-        write(folder / f"{step}.json", record)
+        write_json(folder / f"{step}.json", record)
         send.send(("done", None))
     except Undecided as question:
         asked = [question, *question.others]
@@ -109,9 +110,8 @@ def _read_experiment_file(test: Test, target: Path) -> dict[str, Any]:
     for experiment in experiments:
         understood(experiment, target / f"{experiment.name}.svg")
     warnings = [notice.of(e.name).text for e in experiments for notice in data_checks.of_experiment(e)]
-    names = [experiment.name for experiment in experiments]
     record = {"lines": [repr(e) for e in experiments], "warnings": warnings}
-    return record | _understood(files[0].name, names)
+    return record | _understood(files[0].name, [e.name for e in experiments])
 
 
 def _understood(file: str, names: list[str]) -> dict[str, Any]:
