@@ -25,7 +25,7 @@ def lasting(seconds: float) -> str:
     return f"{seconds / size:.3g} {unit}"
 
 
-_TIMES = (("h", 3600.0), ("min", 60.0), ("s", 1.0))
+_TIMES = (("h", 3600.0), ("min", 60.0), ("s", 1.0))  # s, the longest first
 
 
 def likely(found: Answer, spoken: Callable[[str], str] = str) -> str:
