@@ -7,6 +7,7 @@ from the forward statics with creep (`session.predict`), which the estimator doe
     python -m analyses.robots.whole_calibration coverage 200
     python -m analyses.robots.whole_calibration exact 120
     python -m analyses.robots.whole_calibration lengths 100
+    python -m analyses.robots.whole_calibration marks 60
 
 With ``--rows FILE`` every robot's row is kept as soon as it is there, rows of earlier runs are counted too, and a run
 that was stopped goes on with another seed.
@@ -28,7 +29,16 @@ from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.tensions import nearest
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration import answer, equations, session, whole, whole_answer
+from wirebayes.robot.self_calibration import (
+    answer,
+    descent,
+    equations,
+    holds_creep,
+    posterior,
+    residuals,
+    session,
+    whole_answer,
+)
 from wirebayes.robot.self_calibration.identified import identified
 from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.summary import Moment, summarised
@@ -37,6 +47,8 @@ from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 
 MODES = ("poses known", "poses roughly known", "poses unknown", "some poses")
 POINTS = ("point-4", "point-5")
+MARKS = "six marks"
+MARK = 1e-4  # of the span: half a millimetre of 5 m, as a nozzle meets a mark
 ENCODERS = (1e-5, 1e-4)  # error of a length over the span: .05 to .5 mm of 5 m
 OFF = (1e-4, 1e-2)  # of the span, .5 to 50 mm of 5 m: how far anchors are off that are held exact
 FEW = 8  # stops where poses are requests and all else is exact: the history is solved for every unknown, seconds a step
@@ -89,11 +101,12 @@ def case(
     tension = np.maximum(pull_N + rng.normal(size=pull_N.shape) * log.tension_sd_N, 0.0)
     tension = tension if tensions else np.full_like(pull_N, np.nan)
     position, turn = real.position_m[0].copy(), real.rotation[0].copy()
-    pose_sd = 1e-3 * span if mode == "poses roughly known" else 0.0
+    pose_sd = span * {"poses roughly known": 1e-3, MARKS: MARK}.get(mode, 0.0)
     position += pose_sd * rng.normal(size=position.shape)
     if robot.degrees == 6 and pose_sd:
         turn = turn @ rotation.matrix(pose_sd / robot.size_m * rng.normal(size=position.shape))
-    unknown = {"poses unknown": np.ones(stops, bool), "some poses": np.arange(stops) >= 5}.get(mode)
+    stop = np.arange(stops)
+    unknown = {"poses unknown": stop >= 0, "some poses": stop >= 5, MARKS: stop >= 6}.get(mode)
     if unknown is not None:
         position[unknown], turn[unknown] = np.nan, np.nan
     told = Unknowns(robot, prior, StatedErrors(exit_m=anchor * span, pose_m=pose_sd))
@@ -148,9 +161,9 @@ def _cases(
             yield asked, one
 
 
-def _verdict(found: whole.Whole) -> bool:
+def _verdict(found: posterior.Whole) -> bool:
     seen = identified(found)
-    return found.converged and whole.trust(found) >= SIGNIFICANT and (seen.determined > 0 or seen.of == 0)
+    return found.converged and residuals.trust(found) >= SIGNIFICANT and (seen.determined > 0 or seen.of == 0)
 
 
 def _inside(known: Moment, truth: np.ndarray, exact: float = 0.0) -> float:
@@ -178,18 +191,8 @@ def coverage(size: int, seed: int) -> Iterator[dict[str, Any]]:
         begun = time.process_time()
         with np.errstate(all="ignore"):
             found = best(one.told, one.holds, rng)
-        s = summarised(found)
         row = {"kind": asked.kind, "mode": asked.mode, "anchor": asked.anchor, "seconds": time.process_time() - begun}
-        row |= {"converged": bool(found.converged), "usable": bool(_verdict(found))}
-        if found.converged:
-            exact = 1e-6 * one.told.robot.span_m
-            row |= {
-                "exit_points": _inside(s.exit_m, one.exit_m),
-                "references": _inside(s.reference_m, one.reference_m),
-                "lengths": _inside(s.length_m, one.length_m),
-                "poses": _inside(s.position_m, one.position_m, exact),
-            }
-        yield row
+        yield row | {"converged": bool(found.converged), "usable": bool(_verdict(found))} | _held(found, one)
 
 
 def coverage_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -261,11 +264,11 @@ def _power(one: Case, errors: StatedErrors, log: session.Session) -> float:
     white[free.slices["exit"]] = shift
     state = equations.State(white, one.position_m, one.rotation, one.pull_N)
     holds = replace(one.holds, session=log)
-    creep = whole._creep(free, holds, state)
+    creep = holds_creep.creep_of(free, holds, state)
     noise = equations.Noise(max(errors.joint_m or 0.0, equations.EXACT * one.told.robot.span_m),
                             equations.FRICTIONLESS, 1.0, 0.0, 1e-3 * one.told.robot.rule.lowest_N)  # fmt: skip
     e = equations.linearised(free, holds, noise, state, creep, state)
-    covariance = np.linalg.inv(whole._eliminated(e, white, 0.0).matrix)
+    covariance = np.linalg.inv(descent.eliminated(e, white, 0.0).matrix)
     at = free.slices["exit"]
     information = np.linalg.inv(covariance[at, at]) - np.eye(len(shift))
     count = float(e.known.sum()) - e.by_hold.shape[0] * e.by_hold.shape[2]
@@ -318,6 +321,45 @@ def lengths_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
+def marks(size: int, seed: int) -> Iterator[dict[str, Any]]:
+    """Anchors from six marks at known places and stops at unknown ones, lengths alone."""
+    rng = np.random.default_rng(seed)
+
+    def of(made: int) -> Asked:
+        return Asked(POINTS[made % 2], MARKS, 2e-3, float(rng.choice(ENCODERS)), stops=30)
+
+    for asked, one in _cases(size, rng, of, False):
+        begun = time.process_time()
+        with np.errstate(all="ignore"):
+            found = best(one.told, one.holds, rng)
+        yield {
+            "kind": asked.kind, "mode": asked.mode, "seconds": time.process_time() - begun,
+            "converged": bool(found.converged), "usable": bool(_verdict(found)), **_held(found, one),
+        }  # fmt: skip
+
+
+def _held(found: posterior.Whole, one: Case) -> dict[str, float]:
+    """Shares of the 90 % intervals that hold the truth; none where nothing was found."""
+    if not found.converged:
+        return {}
+    s, exact = summarised(found), 1e-6 * one.told.robot.span_m
+    return {
+        "exit_points": _inside(s.exit_m, one.exit_m),
+        "references": _inside(s.reference_m, one.reference_m),
+        "lengths": _inside(s.length_m, one.length_m),
+        "poses": _inside(s.position_m, one.position_m, exact),
+    }
+
+
+def marks_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Shares of 90 % intervals that hold the truth, of all sessions that converged and of those called usable."""
+    return {
+        "median_seconds_each": float(np.median([r["seconds"] for r in rows])),
+        "all": _shares(rows),
+        "usable": _shares([r for r in rows if r["usable"]]),
+    }
+
+
 def _between(a: np.ndarray, b: np.ndarray) -> float:
     """Root mean square by which distances between anchors differ: free of where the whole robot stands."""
 
@@ -327,7 +369,12 @@ def _between(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.sqrt(np.mean((apart(a) - apart(b)) ** 2)))
 
 
-STUDIES = {"coverage": (coverage, coverage_of), "exact": (exact, exact_of), "lengths": (lengths, lengths_of)}
+STUDIES = {
+    "coverage": (coverage, coverage_of),
+    "exact": (exact, exact_of),
+    "lengths": (lengths, lengths_of),
+    "marks": (marks, marks_of),
+}
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.self_calibration.whole import Whole
+from wirebayes.robot.self_calibration.posterior import Whole
 
 _DETERMINED = 0.5  # of the standard deviation before
 _AXES = ("x", "y", "the vertical")

@@ -15,9 +15,9 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.equations import Equations, Holds, State, linearised, moved
+from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.strain import Grown
-from wirebayes.robot.self_calibration.whole import Whole
 
 _CANDIDATES = 150  # in the workspace: closer together they say the same
 

@@ -11,10 +11,12 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.equations import Holds, State, moved, scale
+from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.residuals import trust
 from wirebayes.robot.self_calibration.strain import stretch
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.robot.self_calibration.whole import Whole, estimate, trust, with_levels
+from wirebayes.robot.self_calibration.whole import estimate, with_levels
 
 _TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
 _SMALL = 1e-3  # N of imbalance for which a tension may be 1 N smaller: decides among those that carry alike

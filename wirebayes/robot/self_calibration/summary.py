@@ -13,7 +13,7 @@ from scipy.stats import t as student
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
-from wirebayes.robot.self_calibration.whole import Whole, at_joint_error
+from wirebayes.robot.self_calibration.posterior import Whole, at_joint_error
 
 _FACTOR = 1.05  # of the error of the joint values: a step for slopes of logarithms, which are smooth
 _MANY = 1e6  # degrees of freedom: more make no difference

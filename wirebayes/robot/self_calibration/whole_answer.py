@@ -19,17 +19,18 @@ from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration import whole
 from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
 from wirebayes.robot.self_calibration.identified import Identified, identified
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
+from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.residuals import misfit, trust
 from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole import Whole
+from wirebayes.robot.self_calibration.whole import estimate
 
 _RATHER = 3.0  # times smaller errors of the loops, before stated poses are taken for requests
 _WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
@@ -98,13 +99,13 @@ def answer(
     rng = np.random.default_rng(seed)
     found = best(unknowns, holds, rng)
     found, holds, requested = _rather_requests(found, holds, rng, requests)
-    p = whole.trust(found)
+    p = trust(found)
     inexact = errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
     if inexact:  # how far from exact the joint values are tells more than that there is no answer
         unknowns = replace(unknowns, errors=replace(errors, joint_m=None))
         found = best(unknowns, holds, rng)
     unknowns = found.unknowns
-    plain = whole.estimate(replace(unknowns, prior=replace(prior, creeps=False)), holds, found.state)
+    plain = estimate(replace(unknowns, prior=replace(prior, creeps=False)), holds, found.state)
     seen = identified(found)
     ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
     s = summarised(found)
@@ -121,7 +122,7 @@ def answer(
         "zero_tension_lengths_m": interval(*s.length_m),
         "references_m": interval(*s.reference_m),
         "poses": _poses(s, session),
-        "misfit": whole.misfit(found),
+        "misfit": misfit(found),
         "length_rms_mm": _length_rms(found),
         "joint_sd_mm": 1e3 * found.noise.joint_m,
         "identified": _identified(seen),
@@ -155,8 +156,8 @@ def _rather_requests(found: Whole, holds: Holds, rng: np.random.Generator, allow
     )
     blind = replace(holds, session=nowhere)
     state = replace(found.state, white=np.zeros_like(found.state.white))
-    other = whole.estimate(found.unknowns, blind, state)
-    clearer = other.noise.joint_m * _RATHER < found.noise.joint_m and whole.trust(other) >= SIGNIFICANT
+    other = estimate(found.unknowns, blind, state)
+    clearer = other.noise.joint_m * _RATHER < found.noise.joint_m and trust(other) >= SIGNIFICANT
     if too_good or (other.converged and clearer):
         return other, blind, True
     return found, holds, False
@@ -206,8 +207,8 @@ def _length_rms(found: Whole) -> float:
 def _lengths(found: Whole, s: Summary) -> EstimatedLengths:
     out: EstimatedLengths = {
         "converged": found.converged,
-        "misfit": whole.misfit(found),
-        "p_joint": whole.trust(found),
+        "misfit": misfit(found),
+        "p_joint": trust(found),
         "length_m": interval(*s.length_m),
         "creep_strain": s.strain,
         "reference_error_mm": {"mean": 1e3 * s.reference_m.mean, "sd": 1e3 * s.reference_m.sd},
