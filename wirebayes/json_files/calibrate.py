@@ -141,6 +141,19 @@ class NamedEstimates(TypedDict):
     identified: IdentifiedJson
 
 
+class SensorsAtFault(TypedDict):
+    """Tension sensors one of which would explain what contradicts, with the error that it would have.
+
+    `wires`, from 1, is empty where nothing contradicts, and where no single sensor explains it; `explains` is the share
+    that each does. `p_none` tests that no sensor has an error.
+    """
+
+    wires: list[int]
+    bias_N: MeanAndSd
+    explains: Numbers
+    p_none: float
+
+
 class CalibrateJson(CalibratedPoses, Observed, NamedEstimates, Warned):
     """The whole file."""
 
@@ -153,6 +166,7 @@ class CalibrateJson(CalibratedPoses, Observed, NamedEstimates, Warned):
     holds: int
     read: int
     usable: bool
+    sensors_at_fault: SensorsAtFault | None
     misfit: float
     prior: CalibrationPrior
     with_creep_model: EstimatedLengths

@@ -19,7 +19,7 @@ from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.motion import control, hanging, inverse
-from wirebayes.robot.self_calibration import observability
+from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import Calibration, calibrate, corrected
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
@@ -61,12 +61,14 @@ def answer(
         given["tension_bias_sd_N"] = prior.bias_sd_N
         given["tension_bias_sign"] = "constant" if session.motion is None else "motion"
     contradicted = _contradicted(robot, prior, session, known)
+    at_fault = None if usable(known) else _at_fault(robot, prior, session, readings)
     content: CalibrateJson = {
         "version": 2,
         "robot": robot.name,
         "holds": len(session.duration_s),
         "read": int(session.read.sum()),
         "usable": usable(known) and not contradicted,
+        "sensors_at_fault": sensors.to_json(at_fault),
         "misfit": float(known.misfit[0]),
         "prior": given,
         **_named(robot, prior, session, known),
@@ -77,7 +79,9 @@ def answer(
         "by_hooke_alone": _lengths(robot, prior, plain),
         **_poses(robot, prior, known),
         **_observed(robot, prior, session, np.random.default_rng(seed), visits),
-        "warnings": to_json([*_unsure(known, plain), *contradicted, *doubts(robot, prior.line)]),
+        "warnings": to_json(
+            [*_unsure(known, plain), *contradicted, *sensors.named(at_fault), *doubts(robot, prior.line)]
+        ),
     }
     return content, calibrated(robot, prior, session, known)
 
@@ -164,6 +168,19 @@ def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: Cal
         for i in np.flatnonzero(apart > plausible)
     ]
     return [Notice("misfit", text) for text in texts]
+
+
+def _at_fault(robot: Robot, prior: LengthPrior, session: Session, readings: Floats) -> sensors.Suspects | None:
+    """Which sensor would explain what contradicts; None where sensors have a bias already, or nothing converged."""
+    tensions = readings[: int(session.read.sum()) * robot.legs]
+    widest = session.tension_sd_N * float(tensions.max(initial=0.0))  # no sensor is off by more than it ever read
+    if prior.bias_sd_N > 0 or not widest > 0:
+        return None
+    other = calibrate(robot, replace(prior, bias_sd_N=widest), session, readings[None])
+    if not other.converged[0]:
+        return None
+    bias = slice(-robot.legs, None)
+    return sensors.weighed(other.unknowns[0, bias], other.covariance[0, bias, bias], widest)
 
 
 def _lengths(robot: Robot, prior: LengthPrior, known: Calibration) -> EstimatedLengths:

@@ -30,6 +30,16 @@ class Normal:
 
 
 def eliminated(e: Equations, white: Floats, damping: float) -> Normal:
+    """Normal equations of the robot's unknowns alone.
+
+    Parameters
+    ----------
+    e : Equations
+    white : (m,) array
+        The robot's unknowns in units of their prior.
+    damping : float
+        Levenberg-Marquardt's; 0 at the mode.
+    """
     z, g, r = e.by_hold, e.by_robot, e.residual[..., None]
     zt = z.swapaxes(1, 2)
     A = zt @ z

@@ -63,6 +63,18 @@ class Whole:
 
 
 def posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: Grown, last_m: Floats) -> Whole:
+    """The Gaussian about where a descent ended.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    down : Descent
+    noise : Noise
+    creep : Grown
+        What it descended with.
+    last_m : (w,) array
+        Lengths that the last joint values stand for, without reference errors.
+    """
     state, e, cost = down.state, down.equations, down.cost
     normal = eliminated(e, state.white, 0.0)
     covariance = inv(normal.matrix)

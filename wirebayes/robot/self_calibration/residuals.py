@@ -58,6 +58,12 @@ def noise_shown(found: Whole, usual_m: float, worth: float) -> tuple[Floats, flo
     """Logarithms of the noises of loops and balance that the residuals show, and the degrees of freedom of the first.
 
     Restricted maximum likelihood; the usual error of the loops, `usual_m`, is `worth` some degrees of freedom.
+
+    Parameters
+    ----------
+    found : Whole
+    usual_m, worth : float
+        What `usual_joint` returned.
     """
     e, robot, stated = found.equations, found.unknowns.robot, found.unknowns.errors.joint_m
 

@@ -19,6 +19,7 @@ from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.motion import inverse
+from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
 from wirebayes.robot.self_calibration.identified import Identified, identified
@@ -26,6 +27,7 @@ from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.residuals import misfit, trust
 from wirebayes.robot.self_calibration.seeds import best
+from wirebayes.robot.self_calibration.sensors import Suspects, suspects
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval, unlearnt, unlikely
@@ -34,7 +36,8 @@ from wirebayes.robot.self_calibration.whole import estimate
 
 _RATHER = 3.0  # times smaller errors of the loops, before stated poses are taken for requests
 _WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
-_UNEVEN = 0.05  # of the weight: balance that fails by more is worth a word
+_UNEVEN = 0.05  # of the weight: balance that fails by more shows that something else held the platform
+_UNSEEN = 1e-3  # of the weight: as long as the balance fails by less, no sensor is looked at
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,7 @@ def answer(
     found = best(unknowns, holds, rng)
     found, holds, requested = _rather_requests(found, holds, rng, requests)
     p = trust(found)
+    at_fault = _at_fault(found, holds, p)
     inexact = errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
     if inexact:  # how far from exact the joint values are tells more than that there is no answer
         unknowns = replace(unknowns, errors=replace(errors, joint_m=None))
@@ -110,7 +114,8 @@ def answer(
     ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
     s = summarised(found)
     learnt = seen.determined > 0 or seen.of == 0
-    usable = bool(found.converged and p >= SIGNIFICANT and learnt and not inexact)
+    uneven = found.noise.balance > _UNEVEN
+    usable = bool(found.converged and p >= SIGNIFICANT and learnt and not inexact and not uneven)
     content: CalibrateJson = {
         "version": 2,
         "robot": robot.name,
@@ -127,6 +132,7 @@ def answer(
         "joint_sd_mm": 1e3 * found.noise.joint_m,
         "identified": _identified(seen),
         "usable": usable,
+        "sensors_at_fault": sensors.to_json(at_fault),
         "with_creep_model": _lengths(found, s),
         "by_hooke_alone": _lengths(plain, summarised(plain)),
         **_now(robot, found, s, usable),
@@ -138,9 +144,17 @@ def answer(
         },
         "next_positions_m": ahead.position_m,
         "next_pose_sd_mm": 1e3 * ahead.pose_sd_m,
-        "warnings": to_json([*_warnings(found, p, requested, learnt, inexact), *doubts(robot, prior.line)]),
+        "warnings": to_json(
+            [*_warnings(found, p, requested, learnt, inexact), *sensors.named(at_fault), *doubts(robot, prior.line)]
+        ),
     }
     return WholeAnswer(content, moved(robot, unknowns.parts(found.state.white)), _known(found, session))
+
+
+def _at_fault(found: Whole, holds: Holds, p: float) -> Suspects | None:
+    """Which sensor would explain what contradicts; None where nothing does."""
+    contradicted = p < SIGNIFICANT or found.noise.balance > _UNSEEN
+    return suspects(found, holds) if contradicted else None
 
 
 def _rather_requests(found: Whole, holds: Holds, rng: np.random.Generator, allowed: bool) -> tuple[Whole, Holds, bool]:
@@ -275,9 +289,9 @@ def _warnings(found: Whole, p: float, requested: bool, learnt: bool, inexact: bo
     if found.noise.balance > _UNEVEN:
         text = (
             f"the tensions leave {100 * found.noise.balance:.2g} % of the weight unbalanced: the platform was held by "
-            "something else, or the tensions are not those of the wires"
+            "something else, or the tensions are not those of the wires; do not use these values"
         )
-        out.append(Notice("data", text))
+        out.append(Notice("misfit", text))
     return out
 
 

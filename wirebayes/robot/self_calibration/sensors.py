@@ -1,0 +1,143 @@
+"""Which tension sensor is at fault, where readings contradict each other: one whose constant error explains it.
+
+All sensors are given an unknown error at once. Estimates that are zero to their errors show no fault; where all but one
+are, given that one, it is the one; where that is true of several, the readings do not tell them apart. Real sensors
+have more errors than one: where none explains all, one that explains most of it is still named.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from wirebayes.json_files.calibrate import SensorsAtFault
+from wirebayes.notice import Notice
+from wirebayes.numeric.linear_algebra import inv, solve
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.self_calibration.equations import Holds
+from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT
+from wirebayes.robot.self_calibration.whole import estimate
+
+_MOST = 0.8  # of what contradicts: two sensors as bad as each other explain half of it each
+
+
+@dataclass(frozen=True)
+class Suspects:
+    """Sensors whose constant error explains what the others contradict.
+
+    Attributes
+    ----------
+    bias_N, sd_N : (w,) arrays
+        Error of every sensor, were it alone at fault, and its standard deviation.
+    p_none : float
+        Probability of errors as large where no sensor has one.
+    p_alone : (w,) array
+        Probability that the other sensors' errors are as large where this one alone has one.
+    explains : (w,) array
+        Share of the sum of squares of all errors that this one alone explains.
+    """
+
+    bias_N: Floats
+    sd_N: Floats
+    p_none: float
+    p_alone: Floats
+    explains: Floats
+
+    @property
+    def wires(self) -> list[int]:
+        """Wires, from 0, one of whose sensors is at fault; none where nothing or no single sensor explains it."""
+        if self.p_none >= SIGNIFICANT:
+            return []
+        alone = self.p_alone >= SIGNIFICANT
+        return [int(i) for i in np.flatnonzero(alone if alone.any() else self.explains >= _MOST)]
+
+
+def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
+    """What estimates of all sensors' errors say of each.
+
+    Parameters
+    ----------
+    bias_N : (w,) array
+        With a prior of mean zero.
+    covariance : (w, w) array
+    prior_sd_N : float
+        The prior's standard deviation, which is taken out.
+    """
+    w = len(bias_N)
+    precision = inv(covariance)
+    information = precision - np.eye(w) / prior_sd_N**2
+    score = precision @ bias_N  # of the readings alone: the prior's own is zero at zero
+    own = np.maximum(np.diag(information), 1e-300)
+    least = 1e-9 * np.trace(information) / w  # of a combination that the readings do not show
+    total = float(score @ solve(information + least * np.eye(w), score[:, None])[:, 0])
+    left = np.maximum(total - score**2 / own, 0.0)
+    alone = chi2.sf(left, w - 1) if w > 1 else np.ones(w)
+    share = np.clip(score**2 / own / max(total, 1e-300), 0.0, 1.0)
+    return Suspects(score / own, own**-0.5, float(chi2.sf(total, w)), alone, share)
+
+
+def suspects(found: Whole, holds: Holds) -> Suspects | None:
+    """Estimate an error of every sensor beside all else; None where they have one already, or nothing converged.
+
+    Parameters
+    ----------
+    found : Whole
+    holds : Holds
+    """
+    unknowns = found.unknowns
+    read = np.isfinite(holds.tension_N)
+    if unknowns.prior.bias_sd_N > 0 or not read.all(1).any():
+        return None
+    widest = float(holds.tension_N[read].max())  # no sensor is off by more than it ever read
+    if not widest > 0:
+        return None
+    # the error of the loops stays: it explains nothing that a sensor would, and the balance is exact
+    errors = replace(unknowns.errors, joint_m=found.noise.joint_m)
+    free = replace(unknowns, prior=replace(unknowns.prior, bias_sd_N=widest), errors=errors)
+    legs, at = unknowns.robot.legs, free.slices["wires"]
+    white = np.insert(found.state.white, at.stop - legs, np.zeros(legs))
+    other = estimate(free, holds, replace(found.state, white=white))
+    if not other.converged:
+        return None
+    sensors = slice(at.stop - legs, at.stop)
+    bias = widest * other.state.white[sensors]
+    return weighed(bias, widest**2 * other.covariance[sensors, sensors], widest)
+
+
+def to_json(found: Suspects | None) -> SensorsAtFault | None:
+    """What ``calibration.json`` holds of them.
+
+    Parameters
+    ----------
+    found : Suspects or None
+    """
+    if found is None:
+        return None
+    named_wires = found.wires
+    return {
+        "wires": [i + 1 for i in named_wires],
+        "bias_N": {"mean": found.bias_N[named_wires], "sd": found.sd_N[named_wires]},
+        "explains": found.explains[named_wires],
+        "p_none": found.p_none,
+    }
+
+
+def named(found: Suspects | None) -> list[Notice]:
+    """What to say of them.
+
+    Parameters
+    ----------
+    found : Suspects or None
+    """
+    if found is None or not found.wires:
+        return []
+    texts = [
+        f"wire {i + 1} (reads {abs(found.bias_N[i]):.3g} +- {found.sd_N[i]:.2g} N too "
+        f"{'much' if found.bias_N[i] > 0 else 'little'})"
+        for i in found.wires
+    ]
+    one = len(texts) == 1
+    share = 100 * found.explains[found.wires].min()
+    said = f"the tension sensor of {' or of '.join(texts)} would explain {share:.0f} % of what contradicts"
+    return [Notice("data", f"{said}: {'zero it' if one else 'find out which, zero it'}, or give --tension-bias")]
