@@ -8,6 +8,7 @@ from the forward statics with creep (`session.predict`), which the estimator doe
     python -m analyses.robots.whole_calibration exact 120
     python -m analyses.robots.whole_calibration lengths 100
     python -m analyses.robots.whole_calibration marks 60
+    python -m analyses.robots.whole_calibration sensors 60
 
 With ``--rows FILE`` every robot's row is kept as soon as it is there, rows of earlier runs are counted too, and a run
 that was stopped goes on with another seed.
@@ -49,6 +50,8 @@ MODES = ("poses known", "poses roughly known", "poses unknown", "some poses")
 POINTS = ("point-4", "point-5")
 MARKS = "six marks"
 MARK = 1e-4  # of the span: half a millimetre of 5 m, as a nozzle meets a mark
+SENSED = ("point-4", "point-5", "body-7", "body-8")
+BIAS = 10  # standard errors of a tension reading
 ENCODERS = (1e-5, 1e-4)  # error of a length over the span: .05 to .5 mm of 5 m
 OFF = (1e-4, 1e-2)  # of the span, .5 to 50 mm of 5 m: how far anchors are off that are held exact
 FEW = 8  # stops where poses are requests and all else is exact: the history is solved for every unknown, seconds a step
@@ -338,6 +341,42 @@ def marks(size: int, seed: int) -> Iterator[dict[str, Any]]:
         }  # fmt: skip
 
 
+def sensors(size: int, seed: int) -> Iterator[dict[str, Any]]:
+    """Which tension sensor is named, where one is off by many standard errors of a reading, and where none is."""
+    rng = np.random.default_rng(seed)
+
+    def of(made: int) -> Asked:
+        return Asked(SENSED[made // 2 % len(SENSED)], MODES[1], 2e-3, float(rng.choice(ENCODERS)))
+
+    for made, (asked, one) in enumerate(_cases(size, rng, of, True)):
+        robot, log = one.told.robot, one.holds.session
+        off = np.zeros(robot.legs)
+        if made % 2:
+            off[rng.integers(robot.legs)] = BIAS * log.tension_sd_N
+        readings = ((one.holds.tension_N + off) / log.tension_sd_N).ravel()
+        begun = time.process_time()
+        with np.errstate(all="ignore"):
+            told = one.told
+            found = whole_answer.answer(robot, told.prior, told.errors, log, readings, seed, False, 0).content
+        said = found["sensors_at_fault"]
+        yield {
+            "kind": asked.kind, "bad": (np.flatnonzero(off) + 1).tolist(), "usable": bool(found["usable"]),
+            "named": said["wires"] if said else [], "seconds": time.process_time() - begun,
+        }  # fmt: skip
+
+
+def sensors_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """How often the bad sensor is named alone or among others, and how often one is named that is not bad."""
+    bad = [r for r in rows if r["bad"]]
+    return {
+        "named_alone": _share([r["named"] == r["bad"] for r in bad]),
+        "named_among_others": _share([set(r["bad"]) <= set(r["named"]) for r in bad]),
+        "usable_all_the_same": _share([r["usable"] for r in bad]),
+        "named_where_none_is_bad": _share([bool(r["named"]) for r in rows if not r["bad"]]),
+        "median_seconds_each": float(np.median([r["seconds"] for r in rows])),
+    }
+
+
 def _held(found: posterior.Whole, one: Case) -> dict[str, float]:
     """Shares of the 90 % intervals that hold the truth; none where nothing was found."""
     if not found.converged:
@@ -374,6 +413,7 @@ STUDIES = {
     "exact": (exact, exact_of),
     "lengths": (lengths, lengths_of),
     "marks": (marks, marks_of),
+    "sensors": (sensors, sensors_of),
 }
 
 if __name__ == "__main__":

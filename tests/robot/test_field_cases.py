@@ -79,8 +79,10 @@ def test_a_real_printers_anchors_agree_with_an_independent_least_squares(run):
     off = np.abs(1e3 * np.array(exits["mean"]) - theirs) / (1e3 * np.array(exits["sd"]))
     assert off.max() < 5  # their references were exact: part of the difference
     assert found["length_rms_mm"] < 0.64
-    # tensions that motors report contradict the balance, and are said to
+    # tensions that motors report contradict the balance: those of the wire from above, by some 16 N
     assert not found["usable"]
+    assert found["sensors_at_fault"]["wires"] == [4]
+    assert found["sensors_at_fault"]["bias_N"]["mean"][0] == pytest.approx(16, abs=3)
 
 
 def test_lengths_alone_are_an_answer_that_says_what_it_does_not_know(run):

@@ -19,6 +19,7 @@ from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.whole import estimate
 
+_TRIES, _STILL = 3, 0.5  # searches, and standard deviations: along a narrow valley the last steps change little
 _MOST = 0.8  # of what contradicts: two sensors as bad as each other explain half of it each
 
 
@@ -97,12 +98,16 @@ def suspects(found: Whole, holds: Holds) -> Suspects | None:
     free = replace(unknowns, prior=replace(unknowns.prior, bias_sd_N=widest), errors=errors)
     legs, at = unknowns.robot.legs, free.slices["wires"]
     white = np.insert(found.state.white, at.stop - legs, np.zeros(legs))
-    other = estimate(free, holds, replace(found.state, white=white))
-    if not other.converged:
-        return None
-    sensors = slice(at.stop - legs, at.stop)
-    bias = widest * other.state.white[sensors]
-    return weighed(bias, widest**2 * other.covariance[sensors, sensors], widest)
+    sensors, state = slice(at.stop - legs, at.stop), replace(found.state, white=white)
+    bias, covariance = np.full(legs, np.inf), np.eye(legs)
+    for _ in range(_TRIES):
+        other = estimate(free, holds, state)
+        before, bias, state = bias, widest * other.state.white[sensors], other.state
+        covariance = widest**2 * other.covariance[sensors, sensors]
+        still = np.abs(bias - before) < _STILL * np.sqrt(np.diag(covariance))
+        if other.converged or still.all():
+            return weighed(bias, covariance, widest)
+    return None
 
 
 def to_json(found: Suspects | None) -> SensorsAtFault | None:
