@@ -72,3 +72,9 @@ def test_the_answer_says_which_and_by_how_much():
     assert said["wires"] == [4]
     np.testing.assert_allclose(said["bias_N"]["mean"], [15.0])
     assert named(None) == [] and to_json(None) is None
+
+
+def test_several_bad_sensors_are_said_without_a_name():
+    found = weighed(*_estimate(np.array([20.0, 20.0, 0, 0]), np.eye(4)), PRIOR_N)
+    assert [notice.text[:24] for notice in named(found)] == ["several tension sensors "]
+    assert to_json(found)["wires"] == []

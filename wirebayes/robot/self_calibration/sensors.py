@@ -135,8 +135,11 @@ def named(found: Suspects | None) -> list[Notice]:
     ----------
     found : Suspects or None
     """
-    if found is None or not found.wires:
+    if found is None or found.p_none >= SIGNIFICANT:
         return []
+    if not found.wires:
+        text = f"several tension sensors are off (p = {found.p_none:.2g} for none): do not use these values"
+        return [Notice("misfit", text)]
     texts = [
         f"wire {i + 1} (reads {abs(found.bias_N[i]):.3g} +- {found.sd_N[i]:.2g} N too "
         f"{'much' if found.bias_N[i] > 0 else 'little'})"
@@ -145,4 +148,5 @@ def named(found: Suspects | None) -> list[Notice]:
     one = len(texts) == 1
     share = 100 * found.explains[found.wires].min()
     said = f"the tension sensor of {' or of '.join(texts)} would explain {share:.0f} % of what contradicts"
-    return [Notice("data", f"{said}: {'zero it' if one else 'find out which, zero it'}, or give --tension-bias")]
+    advice = f"do not use these values; {'zero it' if one else 'find out which, zero it'}, or give --tension-bias"
+    return [Notice("misfit", f"{said}: {advice}")]

@@ -115,7 +115,9 @@ def answer(
     s = summarised(found)
     learnt = seen.determined > 0 or seen.of == 0
     uneven = found.noise.balance > _UNEVEN
-    usable = bool(found.converged and p >= SIGNIFICANT and learnt and not inexact and not uneven)
+    biased = at_fault is not None and at_fault.p_none < SIGNIFICANT
+    explained = p >= SIGNIFICANT and not (inexact or uneven or biased)
+    usable = bool(found.converged and learnt and explained)
     content: CalibrateJson = {
         "version": 2,
         "robot": robot.name,
