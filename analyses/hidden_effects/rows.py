@@ -115,8 +115,11 @@ def accepted_of_group(row: Row) -> list[bool]:
 
 
 def unknown_or_its_group(row: Row) -> bool:
-    """Whether an effect without a name was called unknown, or by a name whose signature is nearly the same."""
-    return row["chosen"] == "unknown" or bool(row["right_group"])
+    """Whether an effect without a name was called unknown, or by a name whose signature is nearly the same.
+
+    Called unknown it is by the verdict, or where *unknown* is more probable than any name.
+    """
+    return row["verdict"] == "unknown" or row["chosen"] == "unknown" or bool(row["right_group"])
 
 
 def visible_beside(row: Row) -> list[bool]:

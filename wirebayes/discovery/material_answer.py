@@ -69,8 +69,7 @@ class MaterialAnswer:
 
     @property
     def best(self) -> str | None:
-        if self.verdict == "unknown":
-            return "unknown"
+        """The most probable, which need not be established: *unknown* may be the verdict beside a likely name."""
         return max(self.shares, key=lambda name: self.shares[name]) if self.shares else None
 
     @property

@@ -114,7 +114,7 @@ def _table(rows: list[Row]) -> list[Block]:
         ]
         for row in rows[:_MOST_ROWS]
     ]
-    header = ["experiment", "material", "converged", *map(_with_unit, _SHOWN), "verdict", "best effect"]
+    header = ["experiment", "material", "converged", *map(_with_unit, _SHOWN), "verdict", "most probable"]
     more = f"The first {_MOST_ROWS} of {len(rows)}. " if len(rows) > _MOST_ROWS else ""
     return [Table(header, lines, more + "Posterior medians; intervals stand in summary.csv.")]
 
