@@ -85,6 +85,7 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
         at = "" if size["hold"] is None else f" at hold {size['hold']}"
         unit = "" if size["unit"] == "-" else f" {size['unit']}"
         lines.append(f"  {effect}{at} {size['mean']:.3g} [{size['q05']:.3g}, {size['q95']:.3g}]{unit}")
+    lines += [f"  {elsewhere}" for elsewhere in in_other_tests(report)]
     like = [other for other in report["group"] if other not in (*report["effects"], "unknown")]
     if like and verdict in ("named", "ambiguous"):
         lines.append(f"  hard to distinguish on this protocol: {', '.join(like)}")
@@ -93,6 +94,12 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     if report["effects"] and None not in (before, after):
         lines.append(f"  held-out holds: rmse {before:.3g} -> {after:.3g} {unit_read(gain['plain'])}")
     return lines
+
+
+def in_other_tests(report: ExperimentFindings) -> list[str]:
+    """Which accepted effects are those of other tests: an event there, or an instrument that reads only those."""
+    others = [effect for effect in report["accepted"] if effect not in report["amplitudes"]]
+    return [f"{effect}: in other tests of the same material, not in this one" for effect in others]
 
 
 def of_import(name: str, test: ImportedExperiment) -> list[str]:

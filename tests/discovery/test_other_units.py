@@ -5,15 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.rescaled import Drawn, drawn, factors, kind_of, likelihood_of
+from tests.rescaled import Drawn, drawn, factors, likelihood_of
 from wirebayes.discovery.search import discover
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.scales import NATURAL, Units
 
 SIMULATIONS = 59
-# a search takes chains of one control
-SEARCHED = [i for i in range(34) if likelihood_of(i) == "chain" and kind_of(i) != "steps and weights"]
+SEARCHED = [i for i in range(34) if likelihood_of(i) == "chain"]  # a search takes chains
 QUICK = 1  # under weights, misread, with an effect to find
 SOME = [pytest.param(index, marks=[] if index == QUICK else pytest.mark.slow) for index in SEARCHED]
 

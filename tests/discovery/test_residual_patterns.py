@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from wirebayes.discovery.residual_patterns import Pattern, _sentence
+from tests.rescaled import drawn
+from wirebayes.discovery.residual_patterns import COVARIATES, Pattern, _sentence
+from wirebayes.model.problem import build
 
 
 @pytest.mark.parametrize(
@@ -19,3 +21,18 @@ def test_a_parameter_that_moves_is_said_to_by_how_much(amplitude: float, words: 
     pattern = Pattern(covariate="displacement", moves="k1")
     assert words in _sentence(pattern, amplitude, 0.01, "wire")
     assert "no dependence on displacement" in _sentence(pattern, amplitude, 0.2, "wire")
+
+
+@pytest.mark.parametrize(("counts_as", "unit", "size"), [(2e3, "N", "1e+03 N"), (0.25, "mm", "0.125 mm")])
+def test_a_hold_that_lies_off_is_said_to_in_the_unit_of_what_is_read(counts_as: float, unit: str, size: str) -> None:
+    pattern = Pattern("hold", hold=3, counts_as=counts_as, unit=unit)
+    assert f"hold 3 lies {size} below what the others predict" in _sentence(pattern, -0.5, 0.01, "wire")
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_displacements_and_tensions_are_what_they_are_under_weights_too(index: int) -> None:
+    sample = build([drawn(index).experiments[0]]).samples[0]
+    set_, read = sample.protocol.setting[:, None], sample.readings[..., 0]
+    displacement, tension = (read, set_) if sample.protocol.control == "force" else (set_, read)
+    assert np.array_equal(COVARIATES["displacement"](sample), displacement)
+    assert np.array_equal(COVARIATES["tension"](sample), tension)

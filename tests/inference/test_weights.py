@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from tests.simulated import simulated_tests
-from wirebayes.commands.discover import check_one_control
 from wirebayes.effects import CATALOGUE
-from wirebayes.errors import InputError
 from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
@@ -73,9 +71,6 @@ def test_an_instrument_s_amplitude_is_not_shared_by_steps_and_weights(both: dict
     assert own <= set(build(list(both.values()), (drift,)).names)
     assert "strain_stiffening.c" in build(list(both.values()), (stiffening,)).names
     assert build([both["weights"]], (drift,)).names[-4:-3] == ("sensor_drift.a",)
-    with pytest.raises(InputError, match=r"found steps \(steps\) and weights \(weights\), expected one of the two"):
-        check_one_control(list(both.values()))
-    check_one_control([both["weights"]])
 
 
 @pytest.mark.parametrize("powers", [(10, 7, 6), (-20, 3, -4)])

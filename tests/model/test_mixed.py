@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 import wirebayes as wb
-from wirebayes.effects import named
+from wirebayes.discovery.linear_scan import forms
+from wirebayes.discovery.screening import candidate_probes
+from wirebayes.discovery.search import discover
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.errors import InputError
+from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.arrays import from_arrays
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.problem import build, unit_of_column
@@ -70,6 +75,48 @@ def test_the_likelihood_is_that_of_each_test_with_its_own_drift(pair):
         own = np.column_stack([columns[both.column(name, sample)] for name in one.names])
         expected += one.log_likelihood(own)
     assert both.log_likelihood(theta) == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_effect_of_one_kind_of_test_is_in_no_other(pair):
+    gauge = named("sensor_drift@force")
+    problem = build(pair, [gauge])
+    assert [name for name in problem.names if "." in name] == ["sensor_drift.a[force]"]
+    assert [[e.key for e in s.model.effects] for s in problem.samples] == [[], ["sensor_drift@force"]]
+    assert (gauge.key, gauge.acts_on("hung", "force"), gauge.acts_on("steps", "displacement")) == (
+        "sensor_drift@force", True, False
+    )  # fmt: skip
+    with pytest.raises(InputError, match="toe takes no '@'"):  # the wire is the same under both
+        named("toe@force")
+
+
+def test_a_search_looks_for_the_fault_of_each_instrument_apart(pair):
+    block = fitted(pair, (), "hooke", "saturating", np.random.default_rng(0))
+    kinds = {name: CATALOGUE[name] for name in ("sensor_drift", "toe")}
+    trials, candidates = candidate_probes([block], kinds)
+    assert all(c.blocks == (0,) and c.shared for c in candidates)
+    of_key = {trial.effect.key: k for k, trial in enumerate(trials)}
+    seen = forms(block.target, block.modes.z[:1], trials)
+    assert {key: [bool(np.any(shape[..., k])) for shape in seen] for key, k in of_key.items()} == {
+        "toe": [True, True], "sensor_drift@displacement": [True, False], "sensor_drift@force": [False, True],
+    }  # fmt: skip
+    units = {key: block.unit(trials[k].effect) for key, k in of_key.items()}
+    assert units == {"toe": "mm", "sensor_drift@displacement": "N/s", "sensor_drift@force": "mm/s"}
+
+
+def test_tests_of_one_kind_are_searched_as_one(pair):
+    block = fitted(pair[:1], (), "hooke", "saturating", np.random.default_rng(0))
+    trials, _ = candidate_probes([block], {"sensor_drift": CATALOGUE["sensor_drift"]})
+    assert [t.effect.key for t in trials] == ["sensor_drift"]
+
+
+@pytest.mark.slow
+def test_a_gauge_that_drifts_is_named_where_it_reads():
+    tests = [test_of("displacement", "steps", 0.0, 1), test_of("force", "hung", 8.0 * DRIFT_MM, 2)]
+    steps, hung = discover(tests, simulations=199)["experiments"].values()
+    assert (hung["verdict"], hung["effects"]) == ("named", ["sensor_drift"])
+    size = hung["amplitudes"]["sensor_drift"]
+    assert size["unit"] == "mm/s" and size["q05"] < 8.0 * DRIFT_MM < size["q95"]
+    assert steps["amplitudes"] == {}
 
 
 @pytest.mark.slow

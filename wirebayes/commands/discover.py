@@ -21,9 +21,7 @@ from wirebayes.discovery.investigation import Investigation, JointModel, alterna
 from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
-from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
-from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.json_files.discovery import Interval
 from wirebayes.json_files.summary import Parameter, SummaryJson
@@ -108,7 +106,6 @@ def discover(
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     if train_holds is not None:
         experiments = [e.first(train_holds) for e in experiments]
-    check_one_control(experiments)
     kinds = catalogue_without(left_out, catalogue(own))
     configuration = {
         "command": "discover", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
@@ -253,16 +250,3 @@ def _pictures(found: Investigation, output: Path, own_effects: Path | None) -> N
         plain, final = (load(output / e.name / model, own_effects=own_effects) for model in ("plain", "final"))
         before_and_after(plain, final, verdict, output / f"{e.name}.svg")
         pictures_of_findings(plain, verdict, output / e.name)
-
-
-def check_one_control(experiments: Sequence[Experiment]) -> None:
-    """Refuse steps and weights in one search: effects of their instruments are not the same.
-
-    Raises
-    ------
-    InputError
-    """
-    names = {control: [e.name for e in experiments if e.control == control] for control in ("displacement", "force")}
-    if all(names.values()):
-        found = f"steps ({', '.join(names['displacement'])}) and weights ({', '.join(names['force'])})"
-        raise InputError(f"{experiments[0].source}: found {found}, expected one of the two, chosen with --experiment")

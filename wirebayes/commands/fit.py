@@ -203,6 +203,11 @@ def _check_possible(
             f"--effect {effect.key}: found --history additive, expected saturating: "
             "creep that is added anew in every hold has no total"
         )
+    if effect.control is not None:
+        found = f"an effect of the tests under {effect.control} alone"
+        raise InputError(
+            f"--effect {effect.key}: found {found}, expected {effect.name}: a fit has one amplitude a kind"
+        )
     protocols = [e.protocol() for e in members]
     if effect.name not in known:
         return  # the flexible discrepancy shows anywhere

@@ -47,7 +47,10 @@ class MeasurementPlan:
         return _holds(self.setting, self.times_s, self.length_mm, self.control)
 
 
-def alternatives(p: Protocol, alone: bool, units: Units = NATURAL) -> list[MeasurementPlan]:
+_SETTINGS = {"displacement": "displacements", "force": "weights"}
+
+
+def alternatives(p: Protocol, alone: bool, units: Units = NATURAL, settings: str = "") -> list[MeasurementPlan]:
     """What could be done with a sample instead.
 
     Parameters
@@ -58,9 +61,11 @@ def alternatives(p: Protocol, alone: bool, units: Units = NATURAL) -> list[Measu
         Whether there is no other sample, whose displacements would differ.
     units : Units
         In which the protocol is written; words are in mm or N, and s.
+    settings : str
+        What is set in all the samples; displacements or weights, as in this one, when left out.
     """
     recorded = p.recorded
-    unit, settings = SET_UNIT[p.control], "weights" if p.control == "force" else "displacements"
+    unit, settings = SET_UNIT[p.control], settings or _SETTINGS[p.control]
     one, second = units.of(unit), units.time_s
     x = p.setting[recorded]
     down = x[-2::-1] if len(x) > 1 else x
@@ -173,7 +178,8 @@ def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tup
     problem = block.target.problem
     planned = [_another_length(problem)]
     alone = len(problem.samples) == 1
-    each = [alternatives(s.protocol, alone, problem.units) for s in problem.samples]
+    settings = " and ".join(sorted({_SETTINGS[s.protocol.control] for s in problem.samples}))
+    each = [alternatives(s.protocol, alone, problem.units, settings) for s in problem.samples]
     for plans in zip(*each, strict=True):
         protocols = [plan.protocol for plan in plans]
         empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]

@@ -14,6 +14,7 @@ from wirebayes.discovery.settings import ALPHA
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+from wirebayes.wire.protocol import Control
 
 ALIKE = 0.95  # |cos| from which names form a group: an effect of δ = 10 then differs from its twin by δ = 3 only
 
@@ -181,9 +182,12 @@ class _Compliance(Effect):
 _ABSORBABLE: tuple[type[Effect], ...] = (_SensorGain, _ForceOffset, _DisplacementScale, _Compliance)
 
 
-def _of_sensor(name: str, weights: bool) -> str:
+WORD: dict[Control, str] = {"displacement": "steps", "force": "weights"}
+
+
+def _of_sensor(name: str, control: Control) -> str:
     """What is read under weights are displacements."""
-    return name.replace("force", "displacement") if weights else name
+    return name.replace("force", "displacement") if control == "force" else name
 
 
 def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible: Sequence[str]) -> list[str]:
@@ -201,21 +205,25 @@ def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible:
     -------
     list of str
     """
-    weights = block.experiments[0].control == "force"
-    known: list[type[Effect]] = [_Compliance] if "fixture_compliance" in possible else []
-    if weights:
-        known.append(_DisplacementScale)  # there it is the gain of the sensor
-    absorbable = [kind for kind in _ABSORBABLE if kind not in known]
-    trials = [Probe(kind(), {kind().columns()[0]: 1e-3}, 1e-3, False) for kind in absorbable]
-    x = expand(block.target, block.modes.z[:1], trials)
-    wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
-    left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
-    out = [
-        f"{_of_sensor(t.effect.name, weights)}: {100 * (1 - rest / whole):.1f} % of it is absorbed by the model's own "
-        "parameters"
-        for t, whole, rest in zip(trials, wholes, left, strict=True)
-        if rest < 0.1 * whole
-    ]
+    controls: list[Control] = sorted({e.control for e in block.experiments})
+    out = []
+    for control in controls:
+        known: list[type[Effect]] = [_Compliance] if "fixture_compliance" in possible else []
+        if control == "force":
+            known.append(_DisplacementScale)  # there it is the gain of the sensor
+        absorbable = [kind() for kind in _ABSORBABLE if kind not in known]
+        of_this_bench = [effect.under(control) for effect in absorbable]
+        trials = [Probe(effect, {effect.columns()[0]: 1e-3}, 1e-3, False) for effect in of_this_bench]
+        x = expand(block.target, block.modes.z[:1], trials)
+        wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
+        left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
+        of_which = f" ({WORD[control]})" if len(controls) > 1 else ""
+        out += [
+            f"{_of_sensor(effect.name, control)}{of_which}: {100 * (1 - rest / whole):.1f} % of it is absorbed by the "
+            "model's own parameters"
+            for effect, whole, rest in zip(of_this_bench, wholes, left, strict=True)
+            if rest < 0.1 * whole
+        ]
     return out + [
         f"{kind.name}: this protocol cannot show it ({kind.shows})" for kind in kinds if kind.name not in possible
     ]

@@ -74,7 +74,7 @@ def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array
         plain: Array | None = None
         for numbers in alike.values():
             effect = trials[numbers[0]].effect
-            if getattr(effect, "test", "") not in ("", sample.name):
+            if not effect.acts_on(sample.name, sample.protocol.control):
                 continue
             each = {name: np.repeat(value, len(numbers)) for name, value in own.items()}
             each |= {name: np.array([trials[k].own[name] for k in numbers]) for name in trials[numbers[0]].own}

@@ -9,6 +9,8 @@ from wirebayes.discovery.scans import Scan
 from wirebayes.json_files.discovery import Disagreement
 from wirebayes.model.problem import Problem, Sample
 from wirebayes.numeric.typing import Array
+from wirebayes.wire.control import READ_UNIT
+from wirebayes.wire.protocol import Control
 
 _PARAMETERS = {"k1": "the stiffness k1", "B": "the creep amount B", "k2": "the creep rate k2"}
 
@@ -17,13 +19,22 @@ def _warming(s: Sample) -> Array:
     return np.zeros(s.protocol.time_s.shape) if s.protocol.warming_K is None else s.protocol.warming_K
 
 
+def _of(what: Control) -> Callable[[Sample], Array]:
+    """Displacements or tensions: what is set in a test is noted once a hold, the other was read."""
+
+    def values(s: Sample) -> Array:
+        return s.protocol.setting[:, None] if s.protocol.control == what else s.readings[..., 0]
+
+    return values
+
+
 # What was varied, of a sample's readings: (H, R) or what broadcasts to it.
 COVARIATES: dict[str, Callable[[Sample], Array]] = {
     "hold": lambda s: s.protocol.number[:, None],
-    "displacement": lambda s: s.protocol.setting[:, None],
+    "displacement": _of("displacement"),
     "time in hold": lambda s: s.protocol.time_s,
     "elapsed time": lambda s: s.protocol.start_s[:, None] + s.protocol.time_s,
-    "tension": lambda s: s.readings[..., 0],
+    "tension": _of("force"),
     "direction": lambda s: np.sign(np.diff(s.protocol.setting, prepend=0.0))[:, None],
     "temperature": _warming,
     "length": lambda s: np.array(s.protocol.length_mm),
@@ -41,11 +52,16 @@ class Pattern:
         The hold it belongs to, where it is one.
     moves : str or None
         The parameter that would move with the covariate.
+    counts_as : float
+        How many `unit` the readings of the hold count as one.
+    unit : {"N", "mm"}
     """
 
     covariate: str
     hold: int | None = None
     moves: str | None = None
+    counts_as: float = 1.0
+    unit: str = "N"
 
 
 def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, Array, Array], Array]]:
@@ -54,11 +70,13 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
     Along each covariate: smooth functions of it as an added tension, and the model's own parameters moving with it.
     """
     covariates = _covariates(problem)
+    steps = any(s.protocol.control == "displacement" for s in problem.samples)
+    parameters_move_with = ("displacement" if steps else "tension", "elapsed time")
     moving = [n.split("[")[0] for n in problem.names if n.split("[")[0] not in ("sensor_sd", "setting_sd")]
     listed: list[Pattern] = []
     for name, _, degrees in covariates:
         listed += [Pattern(name)] * degrees
-    for name in ("displacement", "elapsed time"):
+    for name in parameters_move_with:
         if any(c[0] == name for c in covariates):
             listed += [Pattern(name, moves=p) for p in _PARAMETERS if p in moving]
     holds = [
@@ -67,7 +85,10 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
         for j, n in enumerate(s.protocol.number)
         if s.protocol.recorded[j]
     ]
-    listed += [Pattern("hold", hold=n) for _, n, _ in holds]
+    for at, n, _ in holds:
+        sample = problem.samples[at]
+        unit = READ_UNIT[sample.protocol.control]
+        listed.append(Pattern("hold", hold=n, counts_as=problem.read_unit(sample), unit=unit))
 
     def columns(problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
         n = tension.shape[2]
@@ -77,7 +98,7 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
             x = values[at]
             by_name[name] = x
             out += [np.broadcast_to((x**d)[..., None], tension.shape) for d in range(1, degrees + 1)]
-        for name in ("displacement", "elapsed time"):
+        for name in parameters_move_with:
             if name in by_name:
                 out += [slopes[..., moving.index(p)] * by_name[name][..., None] for p in _PARAMETERS if p in moving]
         for sample, _, j in holds:
@@ -148,7 +169,8 @@ def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
         return f"{names}: the residuals show no dependence on {pattern.covariate} ({chance})."
     if pattern.hold is not None:
         side = "above" if amplitude > 0 else "below"
-        return f"{names}: hold {pattern.hold} lies {abs(amplitude):.3g} N {side} what the others predict ({chance})."
+        size = f"{abs(amplitude) * pattern.counts_as:.3g} {pattern.unit}"
+        return f"{names}: hold {pattern.hold} lies {size} {side} what the others predict ({chance})."
     if pattern.moves is not None:
         way = "grows" if amplitude > 0 else "decreases"
         factor = np.exp(np.clip(2 * abs(amplitude), 0, 20))

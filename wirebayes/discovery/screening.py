@@ -101,11 +101,11 @@ def _variants(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protocol]) 
     """The forms of an effect that a block could show; what all tests share has the form that it has for all of them."""
     if kind.needs_saturation and block.history == "additive":
         return []
+    if kind.scope in FILE_WIDE:
+        return _of_the_bench(kind, block, tests)
     if not issubclass(kind, EventEffect):
         found_by_all = kind.variants([e.protocol() for e in block.experiments])
         learned = any(name.startswith(LENGTH_EXPONENT) for name in block.target.problem.names)
-        if kind.scope in FILE_WIDE:
-            found_by_all = [v.on(tests) for v in found_by_all]
         return [v for v in found_by_all if not (learned and v.key == _LEARNED_EXPONENT)]
     taken = {e.key for e in block.effects}
     if kind.name in {e.name for e in block.effects}:
@@ -113,6 +113,18 @@ def _variants(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protocol]) 
     found = [(e.name, v) for e in block.experiments for v in kind.variants([e.protocol()])]
     out = [replace(v, test=name) if len(tests) > 1 else v for name, v in found]  # type: ignore[type-var]
     return [v for v in out if v.key not in taken]
+
+
+def _of_the_bench(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protocol]) -> list[Effect]:
+    """The forms of what belongs to a bench; where a file has steps and weights, each kind of test has its own."""
+    controls = sorted({p.control for p in tests})
+    out: list[Effect] = []
+    for control in controls:
+        here = [e.protocol() for e in block.experiments if e.control == control]
+        alike = [p for p in tests if p.control == control]
+        forms_here = kind.variants(here) if here else []
+        out += [v.on(alike).under(control if len(controls) > 1 else None) for v in forms_here]
+    return out
 
 
 def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array, Array]:

@@ -132,10 +132,11 @@ def investigate(
     out: dict[str, ExperimentFindings] = {}
     for i, answer in enumerate(answers):
         report("held-out holds", i, len(answers))
-        common = _common(answers, i, gate.blocks, gate.test, where[i], alike)
         ahead = outlook(gate, i, settings, answer, alike)
-        for name, own in _own_reports(gate, i, answer, left_out, rng, parallel_map).items():
-            out[name] = {**common, **ahead, **own}
+        own = _own_reports(gate, i, answer, left_out, rng, parallel_map)
+        for e in gate.blocks[i].experiments:
+            common = _common(answers, i, e, gate.blocks, gate.test, where[i], alike)
+            out[e.name] = {**common, **ahead, **own[e.name]}
     report("held-out holds", len(answers), len(answers))
     return Investigation(
         {"version": 3, "experiments": out, "warnings": named(out)}, tuple(final), _undecided(past, answers, final)
@@ -238,10 +239,15 @@ def _inclusion(found: Evidence | None) -> dict[str, float]:
 
 
 def _common(
+<<<<<<< HEAD
     answers: Sequence[MaterialAnswer], i: int, plain: list[LaplaceFit], test: GlobalTest, where: list[Disagreement],
     alike: dict[tuple[str, str], float],
+=======
+    answers: Sequence[_Answer], i: int, e: Experiment, plain: list[LaplaceFit], test: GlobalTest,
+    where: list[Disagreement], alike: dict[tuple[str, str], float],
+>>>>>>> db79917 (Steps and weights of one wire are searched together: the fault of each kind's instruments apart; patterns under weights by their names and in the unit of what is read)
 ) -> Answer:  # fmt: skip
-    """What the experiments of one block share in the report."""
+    """What the experiments of one block share in the report; of amplitudes those of the effects that act on `e`."""
     answer = answers[i]
     names, members = [a.name for a in answer.accepted], answer.set
     named = [m for m in members if m != "unknown"]
@@ -253,7 +259,11 @@ def _common(
         "set": members,
         "group": (power.group_of(named, alike) if named else []) + (["unknown"] if "unknown" in members else []),
         "accepted": names,
-        "amplitudes": {a.name: _amplitude(answer.stages[-1], a.effects[i]) for a in answer.accepted},
+        "amplitudes": {
+            a.name: _amplitude(answer.stages[-1], a.effects[i])
+            for a in answer.accepted
+            if a.effects[i].acts_on(e.name, e.control)
+        },
         "probabilities": answer.shares,
         "probability_nothing": None if answer.found is None else answer.found.nothing,
         "inclusion": _inclusion(answer.found),

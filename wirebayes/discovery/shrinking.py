@@ -243,7 +243,8 @@ def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: np.random.G
 
 def alone(effects: Sequence[Effect], experiment: Experiment) -> tuple[Effect, ...]:
     """The effects that act on an experiment and need no other one to show."""
-    return tuple(e for e in effects if not e.compares_lengths and getattr(e, "test", "") in ("", experiment.name))
+    here = experiment.name, experiment.control
+    return tuple(e for e in effects if not e.compares_lengths and e.acts_on(*here))
 
 
 def discrepancy(experiment: Experiment, size_N: float) -> Discrepancy:

@@ -5,10 +5,14 @@ import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import get_args
 
 from wirebayes.effects import creep, elastic, event, instrument, unknown
 from wirebayes.errors import InputError
 from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.protocol import Control
+
+CONTROLS = get_args(Control)
 
 CATALOGUE: dict[str, type[Effect]] = {
     effect.name: effect
@@ -116,6 +120,8 @@ def named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
     for form in (creep.SteadyCreepCarried(), elastic.ToeOfStrain()):
         if key == form.key:
             return form
+    if variant in CONTROLS and kind.scope != "material":
+        return kind().under(variant)  # type: ignore[arg-type]
     if variant:
         raise InputError(f"effect {key}: {name} takes no '@'")
     return kind()

@@ -154,7 +154,7 @@ class ScrewError(Effect):
         longest = max((_half_range(p) for p in protocols), default=0.0)
         if self.of_several or longest < _LEAST * _SHORTEST:
             return self
-        return type(self)(longest, len(protocols) > 1)
+        return type(self)(longest, len(protocols) > 1).under(self.control)
 
     def shapes_tried(self) -> list[dict[str, float]]:
         """Periods so near that no other fits much better between two, and a phase every sixth of a turn."""

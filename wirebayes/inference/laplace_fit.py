@@ -110,7 +110,8 @@ class LaplaceFit:
 
     def _unit(self, effect: Effect, column: str) -> str:
         problem = self.target.problem
-        with_effect = [replace(s, model=replace(s.model, effects=(effect,))) for s in problem.samples]
+        here = [s for s in problem.samples if effect.acts_on(s.name, s.protocol.control)]
+        with_effect = [replace(s, model=replace(s.model, effects=(effect,))) for s in here]
         return unit_of_column(column, with_effect)
 
     def natural_amplitude(self, effect: Effect, amplitude: float) -> float:

@@ -20,7 +20,7 @@ from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Array
 from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
-from wirebayes.wire.effect import Amplitude, Effect, EventEffect
+from wirebayes.wire.effect import Amplitude, Effect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.model import Model, tension_reference
 from wirebayes.wire.protocol import Control, Protocol
@@ -316,7 +316,9 @@ def build(
         materials.setdefault(experiment.material, []).append(experiment)
     scales = scales or scales_of(experiments)
     several = len(experiments) > 1
-    effects = [effect.on([e.protocol() for e in experiments]) for effect in effects]
+    effects = [
+        effect.on([e.protocol() for e in experiments if effect.acts_on(e.name, e.control)]) for effect in effects
+    ]
     distributions: dict[str, Any] = {}
     samples: list[Sample] = []
     for material, members in materials.items():
@@ -330,7 +332,8 @@ def build(
         defaults = wire_defaults(experiment.length_mm, scales, experiment.control, zero_mm)
         wanted = SAMPLE if likelihood == "chain" else ("sensor_sd",)
         distributions |= {f"{name}{mark}": defaults[name] for name in wanted}
-        distributions |= {f"{c}{mark}": a.prior for c, a in _amplitudes(effects) if a.of_each_test}
+        own = [effect for effect in effects if effect.acts_on(experiment.name, experiment.control)]
+        distributions |= {f"{c}{mark}": a.prior for c, a in _amplitudes(own) if a.of_each_test}
     units = scales.units
     learned = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.in_natural_units}
     every = {
@@ -479,7 +482,7 @@ def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effe
     out: dict[str, Any] = {}
     for effect in (effect for effect in effects if effect.scope != "material"):
         apart = len(controls) > 1 and effect.scope != "event"
-        marks = [f"[{control}]" for control in controls] if apart else [""]
+        marks = [f"[{control}]" for control in controls if effect.control in (None, control)] if apart else [""]
         out |= {f"{c}{mark}": a.prior for mark in marks for c, a in _amplitudes([effect]) if not a.of_each_test}
     return out
 
@@ -497,7 +500,7 @@ def _samples(
     length = _reference_length(members) if len(members) > 1 else 0.0
     out = []
     for e in members:
-        present = tuple(x for x in effects if not isinstance(x, EventEffect) or x.test in ("", e.name))
+        present = tuple(x for x in effects if x.acts_on(e.name, e.control))
         model = Model(law, history, present, tension, length)
         finest = max(e.resolution, FINEST * _extent(e))
         out.append(Sample(e.name, e.material, e.protocol(), e.readings()[..., None], finest, model))

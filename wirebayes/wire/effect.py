@@ -4,8 +4,9 @@ The staircase calls effects by place and knows none by name; a user's own effect
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,6 +163,7 @@ class Effect:
     compares_lengths: ClassVar[bool] = False  # changes parameters by the sample's length over the common one
     nearly_linear: ClassVar[bool] = False  # of one sign, yet its signature has the same form at any size
     needs_saturation: ClassVar[bool] = False  # has no meaning where creep is added anew in every hold
+    control: Control | None = None  # of the tests that it acts on, where it does not act on all: see `under`
 
     def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
         """The quantity at the effect's place, changed by the effect.
@@ -189,8 +191,8 @@ class Effect:
 
     @property
     def key(self) -> str:
-        """The effect's name, with its hold where it has one."""
-        return self.name
+        """The effect's name, with its hold where it has one, or the only kind of tests that it acts on."""
+        return self.name if self.control is None else f"{self.name}@{self.control}"
 
     @property
     def formula_constant(self) -> float:
@@ -205,6 +207,24 @@ class Effect:
         """Columns of the shape constants that all tests have alike."""
         shapes = zip(self.columns(), self.amplitudes, strict=True)
         return tuple(column for column, a in shapes if a.is_shape and not a.of_each_test)
+
+    def under(self, control: Control | None) -> Self:
+        """The effect on tests of one control alone, as of an instrument that reads these; on all tests for None."""
+        own = copy(self)
+        object.__setattr__(own, "control", control)  # some effects are frozen
+        return own
+
+    def acts_on(self, test: str, control: Control) -> bool:
+        """Whether the effect is there in a test.
+
+        Parameters
+        ----------
+        test : str
+            The experiment's name.
+        control : {"displacement", "force"}
+            What is set in it.
+        """
+        return self.control in (None, control)
 
     def in_units(self, tension: float, time: float) -> "Effect":
         """The effect where tensions and times are multiplied by these numbers; itself unless it has such constants."""
@@ -354,6 +374,9 @@ class EventEffect(Effect):
     @property
     def formula_constant(self) -> float:
         return float(self.hold)
+
+    def acts_on(self, test: str, control: Control) -> bool:
+        return self.test in ("", test)
 
     @classmethod
     def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers import findings_in_a_sentence
+from wirebayes.answers import findings_in_a_sentence, in_other_tests
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.discovery import Amplitude, DiscoveryJson, ExperimentFindings
 from wirebayes.json_files.read_units import read, unit_read
@@ -80,7 +80,9 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     blocks += _parameters(folder / name, v)
     where = [w["sentence"] for w in v.get("where", []) if w["p"] <= _SPEAKS] or ["No pattern stands out."]
     beside = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
-    known = [*beside, _held_out(v), *(_amplitude(e, a) for e, a in v.get("amplitudes", {}).items())]
+    sizes = [_amplitude(e, a) for e, a in v.get("amplitudes", {}).items()]
+    elsewhere = [f"{spoken(sentence)}." for sentence in in_other_tests(v)]
+    known = [*beside, _held_out(v), *sizes, *elsewhere]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
     unknown = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
     known = [point for point in known if point] or ["Nothing had to be added to the plain model."]
