@@ -40,6 +40,13 @@ def read(folder, text, **choices):
     ("text", "message", "answers"),
     [
         (HEADER.replace(" [N]", "") + BODY, r"line 1, column 3 \(Kraft\): found no unit", "--map Kraft=tension [kgf]"),
+        (
+            HEADER.replace("Weg [mm]", "Strain") + BODY,
+            r"line 1, column 1 \(Strain\): found no unit",
+            "--map Strain=displacement [mm/mm]",
+        ),
+        (HEADER.replace("Weg [mm]", "ε (-)") + BODY, r"line 1, column 1 \(ε \(-\)\): found no unit",
+         "--map ε (-)=displacement [%]"),
         (HEADER.replace(" [s]", "") + BODY, r"line 1, column 2 \(Zeit\): found no unit", "--map Zeit=time [min]"),
         (
             HEADER.replace("\n", ",Kraft 2 [N]\n") + BODY.replace("\n", ",1\n"),
@@ -64,7 +71,7 @@ def read(folder, text, **choices):
         ),
         (POSITION, r"line 2, column 1 \(Weg \[mm\]\): found displacements from 521 to 525 mm", "--zero-mm 521"),
     ],
-    ids=["force unit", "time unit", "two forces", "comma", "point", "clock", "times run on", "machine position"],
+    ids=["force unit", "strain unit", "no unit in brackets", "time unit", "two forces", "comma", "point", "clock", "times run on", "machine position"],
 )
 def test_two_readings_are_refused_and_an_answer_settles_it(tmp_path, text, message, answers):
     with pytest.raises(Undecided, match=f"raw.csv, {message}.*, expected --") as refused:
@@ -404,3 +411,15 @@ def test_a_column_that_is_chosen_may_still_be_asked_for_its_unit(tmp_path):
     answers = ["--map Kraft 1=tension", "--map Kraft 1=tension [kN]"]
     imported = wb.import_bench(raw, length_mm=1000, ask=lambda question: answers.pop(0))
     assert imported.experiments[0].tension()[0, 0] == 2100.0
+
+
+@pytest.mark.parametrize(("unit", "first_mm"), [("mm/mm", 1000.0), ("%", 10.0), ("mm", 1.0)])
+def test_a_strain_without_a_unit_is_read_as_what_it_is_said_to_be(tmp_path, unit, first_mm):
+    text = HEADER.replace("Weg [mm]", "Strain") + BODY
+    made = read(tmp_path, text, mapping=(f"Strain=displacement [{unit}]",))
+    assert with_readings(made)[0][1] == first_mm
+
+
+def test_a_displacement_stands_before_a_strain_without_a_unit(tmp_path):
+    text = HEADER.replace("Weg [mm]", "Weg [mm],Strain") + BODY.replace("1,", "1,0.001,", 3).replace("2,", "2,0.002,")
+    assert with_readings(read(tmp_path, text))[0][1] == 1.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from wirebayes.errors import InputError, shown
 from wirebayes.io.bench.clock import UNDERSTOOD, has_moments, looks_like_a_moment
-from wirebayes.io.bench.quantities import COMMON, ROLES, UNITS, Role, Unit, is_foreign, unit_of
+from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, is_foreign, unit_of
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best, clock_of, parting
 from wirebayes.io.bench.undecided import Undecided
@@ -60,7 +60,8 @@ _LETTERS: dict[Role, tuple[str, ...]] = {  # mean something beside the right uni
 # What a strain or a stress is called; only beside a unit of one, for other quantities have these names too.
 _OF_SAMPLE: dict[Role, tuple[str, ...]] = {
     "displacement": (
-        "strain", "verformung", "deformation", "deformacion", "deformazione", "ε", "epsilon", "e", "应变", "ひずみ",
+        "strain", "dehnung", "verformung", "deformation", "deformacion", "deformazione", "ε", "epsilon", "e", "应变",
+        "ひずみ",
     ),
     "tension": (
         "stress", "spannung", "contrainte", "esfuerzo", "sforzo", "tensao", "spanning", "σ", "sigma", "s",
@@ -132,6 +133,7 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
     free = [i for i, name in enumerate(table.header) if name and i not in taken]
     for role in [role for role in ROLES if role not in roles and role not in open_questions]:
         likely = [i for i in free if _may_be(table, i, role)] or [i for i in free if _is_of_rig(table, i, role)]
+        likely = likely or [i for i in free if _is_called_of_sample(table, i, role)]
         try:
             if likely:
                 roles[role] = _one(table, likely, role)
@@ -270,7 +272,7 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
     unit = from_row or from_header
     if unit is None and not moments:
         bracket = _BRACKET.match(header)
-        if bracket and bracket[2] and not bracket[2].isdigit():
+        if bracket and bracket[2] not in _NO_UNIT and not bracket[2].isdigit():
             raise table.complain(
                 table.header_line, index, f"the unit {bracket[2]!r}", f"one of {role}{_units(role)}; or --map "
                 f'"{header}={role} [{UNITS[role]}]" if that is what it means'
@@ -281,9 +283,14 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
         raise Undecided(
             f"{table.sheet.path}, {table.place(table.header_line, index)}: found no unit",
             f"the unit of {role}",
-            {f"--map {header}={role} [{name}]": name for name in COMMON[role]},
+            {f"--map {header}={role} [{name}]": name for name in _usual(table, index, role)},
         )
     return Column(role, index, header, unit)
+
+
+def _usual(table: RawTable, index: int, role: Role) -> tuple[str, ...]:
+    """The units that a column without one is most likely in."""
+    return OF_SAMPLE[role] if _is_called_of_sample(table, index, role) else COMMON[role]
 
 
 def _units(role: Role) -> str:
@@ -337,6 +344,16 @@ def _is_of_rig(table: RawTable, index: int, role: Role) -> bool:
     name, unit = name_and_unit(table.header[index], role)
     unit = unit_of(table.units[index], role) or unit
     return unit is not None and bool(set(_words(name)) & set(_OF_RIG.get(role, ())))
+
+
+def _is_called_of_sample(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a column without a unit has the name, not the letter, of a strain or a stress."""
+    header = table.header[index]
+    bracket = _BRACKET.match(header)
+    if table.units[index] not in _NO_UNIT or (bracket and bracket[2] not in _NO_UNIT):
+        return False
+    names = {name for name in _OF_SAMPLE.get(role, ()) if len(name) > 1 or not name.isascii()}
+    return bool(_words(header) & names)
 
 
 def _has_foreign_unit(header: str, row_unit: str) -> bool:

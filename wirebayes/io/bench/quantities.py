@@ -15,6 +15,8 @@ COMMON: dict[Role, tuple[str, ...]] = {
     "displacement": ("mm", "cm", "m", "in"), "time": ("s", "min", "h", "ms"), "tension": ("N", "kN", "kgf", "lbf"),
     "temperature": ("°C", "°F", "K"),
 }  # fmt: skip
+# What strains and stresses may be in, where a column of that name says no unit; or it is a length or a force after all.
+OF_SAMPLE: dict[Role, tuple[str, ...]] = {"displacement": ("mm/mm", "%", "mm"), "tension": ("MPa", "N")}
 # seconds that the first number of a two-part clock counts; three parts leave no doubt
 CLOCKS = {"mm:ss": 60.0, "m:ss": 60.0, "min:s": 60.0, "hh:mm": 3600.0, "h:mm": 3600.0, "hh:mm:ss": 1.0, "h:mm:ss": 1.0}
 
