@@ -98,7 +98,7 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
 
 def in_other_tests(report: ExperimentFindings) -> list[str]:
     """Which accepted effects are those of other tests: an event there, or an instrument that reads only those."""
-    others = [effect for effect in report["accepted"] if effect not in report["amplitudes"]]
+    others = [effect for effect in report.get("accepted", []) if effect not in report["amplitudes"]]
     return [f"{effect}: in other tests of the same material, not in this one" for effect in others]
 
 

@@ -70,8 +70,7 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
     Along each covariate: smooth functions of it as an added tension, and the model's own parameters moving with it.
     """
     covariates = _covariates(problem)
-    steps = any(s.protocol.control == "displacement" for s in problem.samples)
-    parameters_move_with = ("displacement" if steps else "tension", "elapsed time")
+    parameters_move_with = (_set_in(problem), "elapsed time")
     moving = [n.split("[")[0] for n in problem.names if n.split("[")[0] not in ("sensor_sd", "setting_sd")]
     listed: list[Pattern] = []
     for name, _, degrees in covariates:
@@ -85,10 +84,7 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
         for j, n in enumerate(s.protocol.number)
         if s.protocol.recorded[j]
     ]
-    for at, n, _ in holds:
-        sample = problem.samples[at]
-        unit = READ_UNIT[sample.protocol.control]
-        listed.append(Pattern("hold", hold=n, counts_as=problem.read_unit(sample), unit=unit))
+    listed += [_of_hold(problem, problem.samples[at], number) for at, number, _ in holds]
 
     def columns(problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
         n = tension.shape[2]
@@ -109,6 +105,17 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
         return np.stack(out, axis=-1).reshape(*tension.shape[:2], n, -1)
 
     return listed, columns
+
+
+def _set_in(problem: Problem) -> str:
+    """The covariate that is set in the tests: the displacement, where any of them has steps."""
+    return "displacement" if any(s.protocol.control == "displacement" for s in problem.samples) else "tension"
+
+
+def _of_hold(problem: Problem, sample: Sample, number: int) -> Pattern:
+    """A hold that lies off by itself."""
+    unit = READ_UNIT[sample.protocol.control]
+    return Pattern("hold", hold=number, counts_as=problem.read_unit(sample), unit=unit)
 
 
 def _covariates(problem: Problem) -> list[tuple[str, list[Array], int]]:

@@ -80,9 +80,7 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     blocks += _parameters(folder / name, v)
     where = [w["sentence"] for w in v.get("where", []) if w["p"] <= _SPEAKS] or ["No pattern stands out."]
     beside = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
-    sizes = [_amplitude(e, a) for e, a in v.get("amplitudes", {}).items()]
-    elsewhere = [f"{spoken(sentence)}." for sentence in in_other_tests(v)]
-    known = [*beside, _held_out(v), *sizes, *elsewhere]
+    known = [*beside, _held_out(v), *_sizes(v)]
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
     unknown = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
     known = [point for point in known if point] or ["Nothing had to be added to the plain model."]
@@ -226,6 +224,12 @@ def _held_out(v: ExperimentFindings) -> str:
     if v.get("accepted") and (flexible := held.get("flexible")):
         text += f"; a smooth curve instead of a named effect reaches {number(read(flexible, 'rmse'), 2)}"
     return text + "."
+
+
+def _sizes(v: ExperimentFindings) -> list[str]:
+    """How large each effect is here, and which are those of other tests."""
+    here = [_amplitude(effect, a) for effect, a in v.get("amplitudes", {}).items()]
+    return here + [f"{spoken(sentence)}." for sentence in in_other_tests(v)]
 
 
 def _amplitude(effect: str, a: Amplitude) -> str:
