@@ -45,8 +45,11 @@ def read(folder, text, **choices):
             r"line 1, column 1 \(Strain\): found no unit",
             "--map Strain=displacement [mm/mm]",
         ),
-        (HEADER.replace("Weg [mm]", "ε (-)") + BODY, r"line 1, column 1 \(ε \(-\)\): found no unit",
-         "--map ε (-)=displacement [%]"),
+        (
+            HEADER.replace("Weg [mm]", "ε (-)") + BODY,
+            r"line 1, column 1 \(ε \(-\)\): found no unit",
+            "--map ε (-)=displacement [%]",
+        ),
         (HEADER.replace(" [s]", "") + BODY, r"line 1, column 2 \(Zeit\): found no unit", "--map Zeit=time [min]"),
         (
             HEADER.replace("\n", ",Kraft 2 [N]\n") + BODY.replace("\n", ",1\n"),
@@ -71,7 +74,18 @@ def read(folder, text, **choices):
         ),
         (POSITION, r"line 2, column 1 \(Weg \[mm\]\): found displacements from 521 to 525 mm", "--zero-mm 521"),
     ],
-    ids=["force unit", "strain unit", "no unit in brackets", "time unit", "two forces", "comma", "point", "clock", "times run on", "machine position"],
+    ids=[
+        "force unit",
+        "strain unit",
+        "no unit in brackets",
+        "time unit",
+        "two forces",
+        "comma",
+        "point",
+        "clock",
+        "times run on",
+        "machine position",
+    ],
 )
 def test_two_readings_are_refused_and_an_answer_settles_it(tmp_path, text, message, answers):
     with pytest.raises(Undecided, match=f"raw.csv, {message}.*, expected --") as refused:

@@ -239,13 +239,8 @@ def _inclusion(found: Evidence | None) -> dict[str, float]:
 
 
 def _common(
-<<<<<<< HEAD
-    answers: Sequence[MaterialAnswer], i: int, plain: list[LaplaceFit], test: GlobalTest, where: list[Disagreement],
-    alike: dict[tuple[str, str], float],
-=======
-    answers: Sequence[_Answer], i: int, e: Experiment, plain: list[LaplaceFit], test: GlobalTest,
+    answers: Sequence[MaterialAnswer], i: int, e: Experiment, plain: list[LaplaceFit], test: GlobalTest,
     where: list[Disagreement], alike: dict[tuple[str, str], float],
->>>>>>> db79917 (Steps and weights of one wire are searched together: the fault of each kind's instruments apart; patterns under weights by their names and in the unit of what is read)
 ) -> Answer:  # fmt: skip
     """What the experiments of one block share in the report; of amplitudes those of the effects that act on `e`."""
     answer = answers[i]
