@@ -171,11 +171,16 @@ def test_steps_are_the_typical_ones_of_those_that_move(simulated):
     assert posterior_checks.loose_steps({}, sample) == ""  # hold by hold there is no such error
 
 
-@pytest.mark.parametrize(("N", "named"), [(0.049, True), (0.051, False)])
-def test_a_time_exponent_at_its_wall_is_said_to_want_a_power_law(N, named):
-    """A prior between 0 and 1, whose 5 % point is .05."""
-    prior = {"N": np.linspace(0.0, 1.0, 1001)}
-    said = posterior_checks.endless({"N": np.full(100, N)}, prior)
+@pytest.mark.parametrize(("decades", "named"), [(4.01, True), (3.99, False)])
+def test_creep_over_more_decades_than_a_test_reads_is_said_to_want_a_power_law(decades, named):
+    """The tenth and nine tenths of 1 - exp(-k2 t^N), found here by trying times, lie so many decades apart."""
+    prior = {"N": np.linspace(0.1, 1.0, 11)}
+    k2, N = 0.4, np.log10(np.log(10.0) / np.log(10.0 / 9.0)) / decades
+    times = np.geomspace(1e-6, 1e6, 240001)
+    begins, ends = np.interp([0.1, 0.9], -np.expm1(-k2 * times**N), times)
+    assert np.log10(ends / begins) == pytest.approx(decades, abs=1e-3)
+    said = posterior_checks.endless({"N": np.full(100, N), "k2": np.full(100, k2)}, prior)
     assert ("as a power law or the logarithm of time" in said) == named
-    assert posterior_checks.endless({"N": np.full(100, 0.01)}, {"N": np.full(10, 0.01)}) == ""  # stated
+    assert (f"a tenth is reached after {begins:.1g} s and nine tenths after {ends:.1g} s" in said) == named
+    assert posterior_checks.endless({"N": np.full(9, 0.1), "k2": np.ones(9)}, {"N": np.full(9, 0.1)}) == ""  # stated
     assert posterior_checks.endless({}, prior) == ""

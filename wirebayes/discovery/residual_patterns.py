@@ -70,39 +70,30 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
     Along each covariate: smooth functions of it as an added tension, and the model's own parameters moving with it.
     """
     covariates = _covariates(problem)
-    parameters_move_with = (_set_in(problem), "elapsed time")
-    moving = [n.split("[")[0] for n in problem.names if n.split("[")[0] not in ("sensor_sd", "setting_sd")]
-    listed: list[Pattern] = []
-    for name, _, degrees in covariates:
-        listed += [Pattern(name)] * degrees
-    for name in parameters_move_with:
-        if any(c[0] == name for c in covariates):
-            listed += [Pattern(name, moves=p) for p in _PARAMETERS if p in moving]
+    moving = [name.split("[")[0] for name in problem.names]
+    moving = [name for name in moving if name not in ("sensor_sd", "setting_sd")]
+    along = [name for name in (_set_in(problem), "elapsed time") if any(c[0] == name for c in covariates)]
     holds = [
-        (at, int(n), j)
-        for at, s in enumerate(problem.samples)
-        for j, n in enumerate(s.protocol.number)
-        if s.protocol.recorded[j]
+        (at, int(sample.protocol.number[j]), j)
+        for at, sample in enumerate(problem.samples)
+        for j in np.flatnonzero(sample.protocol.recorded)
     ]
+    listed = [Pattern(name) for name, _, degrees in covariates for _ in range(degrees)]
+    listed += [Pattern(name, moves=p) for name in along for p in _PARAMETERS if p in moving]
     listed += [_of_hold(problem, problem.samples[at], number) for at, number, _ in holds]
 
     def columns(problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
-        n = tension.shape[2]
         out: list[Array] = []
-        by_name = {}
-        for name, values, degrees in covariates:
-            x = values[at]
-            by_name[name] = x
-            out += [np.broadcast_to((x**d)[..., None], tension.shape) for d in range(1, degrees + 1)]
-        for name in parameters_move_with:
-            if name in by_name:
-                out += [slopes[..., moving.index(p)] * by_name[name][..., None] for p in _PARAMETERS if p in moving]
-        for sample, _, j in holds:
-            one = np.zeros(tension.shape)
-            if sample == at:
-                one[j] = 1.0
-            out.append(one)
-        return np.stack(out, axis=-1).reshape(*tension.shape[:2], n, -1)
+        by_name = {name: values[at] for name, values, _ in covariates}
+        for name, _, degrees in covariates:
+            out += [np.broadcast_to((by_name[name] ** d)[..., None], tension.shape) for d in range(1, degrees + 1)]
+        for name in along:
+            out += [slopes[..., moving.index(p)] * by_name[name][..., None] for p in _PARAMETERS if p in moving]
+        for of_sample, _, j in holds:
+            out.append(np.zeros(tension.shape))
+            if of_sample == at:
+                out[-1][j] = 1.0
+        return np.stack(out, axis=-1).reshape(*tension.shape, -1)
 
     return listed, columns
 

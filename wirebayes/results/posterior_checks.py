@@ -20,7 +20,10 @@ LOOSE_STEPS = 0.35  # setting error over the typical step, which its prior ends 
 NOISY = 0.25  # sensor error over the range of the tensions: half their spread is noise
 QUIET = 2 * FINEST  # sensor and rounding error over the largest tension: finer than a load cell resolves
 FAR_OUT = 3.7  # standard deviations from the middle of k1's prior: one line in five thousand, a factor of 260 off
-ENDLESS = 0.05  # share of N's prior below its posterior's median: creep that goes on over decades of time, and no end
+# decades of time between a tenth of the creep and nine tenths: from a second to three hours, which no hold shows
+ENDLESS = 4.0
+_TENTH, _NINE_TENTHS = np.log(10.0 / 9.0), np.log(10.0)  # of the creep is reached at this hazard k2 t^N
+_DECADES_TIMES_N = float(np.log10(_NINE_TENTHS / _TENTH))
 LEAST_SHRINKAGE = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
 
 
@@ -135,16 +138,18 @@ def stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
 
 
 def endless(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
-    """A time exponent at the lower wall of its prior, as a power law or a logarithm of time drives it there."""
+    """Creep over more decades of time than a test can follow, as a power law or a logarithm of time asks for."""
     if "N" not in own or not np.ptp(prior["N"]):
         return ""
-    middle, wall = float(np.median(own["N"])), float(np.quantile(prior["N"], ENDLESS))
-    if middle >= wall:
+    exponent = float(np.median(own["N"]))
+    if _DECADES_TIMES_N / exponent <= ENDLESS:
         return ""
+    begins, ends = (float(np.median((left / own["k2"]) ** (1.0 / own["N"]))) for left in (_TENTH, _NINE_TENTHS))
     return (
-        f"the readings want creep without an end in sight, as a power law or the logarithm of time has it: N = "
-        f"{middle:.2g} is below {100 * (1.0 - ENDLESS):.0f} % of its prior; shown is the stretched exponential "
-        "nearest to it, good for the times that were read, while final creep and creep long after are the prior's"
+        "the readings want creep spread over many decades of time, as a power law or the logarithm of time has it: at "
+        f"N = {exponent:.2g} a tenth is reached after {begins:.1g} s and nine tenths after {ends:.1g} s; shown is the "
+        "stretched exponential nearest to it, good for the times that were read: the stiffness before the first "
+        "reading, creep long after the last and final creep are extrapolated"
     )
 
 

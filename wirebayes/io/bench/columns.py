@@ -23,13 +23,13 @@ _WORDS: dict[Role, tuple[str, ...]] = {
     "hold": (
         "hold", "step", "stage", "segment", "cycle", "stufe", "schritt", "haltestufe", "palier", "etape", "pas",
         "escalon", "paso", "passo", "gradino", "stap", "degrau", "krok",
-        "ступень", "шаг", "段階", "步骤", "步", "단계",
+        "ступень", "шаг", "段階", "步骤", "步", "级", "단계",
     ),
     "displacement": (
         "displacement", "extension", "elongation", "position", "pos", "stroke", "crosshead", "travel", "stretch", "weg",
         "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
         "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
-        "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp",
+        "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp", "ext",
         "forlangning", "forskjutning", "forskydning", "forskyvning", "forlengelse", "siirtyma", "venyma",
         "posunuti", "prodlouzeni", "uzama",
         "przemieszczenie", "wydłuzenie", "перемещение", "удлинение", "ход", "смещение",

@@ -84,7 +84,10 @@ class RawTable:
         for column, name in enumerate(self.header):
             if name and name in self.header[:column]:
                 where = f"line {self.header_line}, column {self.sheet.column_name(column)}"
-                raise InputError(f"{self.sheet.path}, {where}: found {name} a second time, expected it once")
+                raise InputError(
+                    f"{self.sheet.path}, {where}: found {name} a second time, expected it once"
+                    f"; of several specimens, number the columns: {name} 1, {name} 2"
+                )
 
 
 def find_table(sheet: Sheet) -> RawTable:
