@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wirebayes as wb
-from wirebayes.discovery.linear_scan import forms
+from wirebayes.discovery.probes import forms
 from wirebayes.discovery.screening import candidate_probes
 from wirebayes.discovery.search import discover
 from wirebayes.effects import CATALOGUE, named
