@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from wirebayes.discovery import ascent, continuation, linear_scan, path_weights, refit, screening
+from wirebayes.discovery import ascent, continuation, noise_integral, path_weights, refit, screening
 from wirebayes.discovery.ascent import PathEvidence, Start, lead, start
 from wirebayes.discovery.continuation import Continuation, strengths
 from wirebayes.discovery.ladders import AmplitudePath, ladders
-from wirebayes.discovery.linear_scan import RATIOS, expand, scan
+from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
+from wirebayes.discovery.noise_integral import RATIOS
 from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import GlobalTest, Scale
 from wirebayes.discovery.tangent import Tangent, moving_columns
@@ -176,9 +177,9 @@ def test_what_a_smooth_process_takes_is_its_determinant_and_its_part_of_the_squa
     rng = np.random.default_rng(0)
     root, along = rng.normal(size=(5, 7, 4)), rng.normal(size=(5, 4))
     square = np.swapaxes(root, 1, 2) @ root
-    log_volume, less = linear_scan._taken_by(square, along)
+    log_volume, less = noise_integral._taken_by(square, along)
     for i in range(5):
-        for j, size in enumerate(linear_scan.SIZES):
+        for j, size in enumerate(noise_integral.SIZES):
             share = size**2 / np.trace(square[i])
             whole = np.eye(4) + share * square[i]
             assert log_volume[i, j] == pytest.approx(0.5 * np.linalg.slogdet(whole)[1], rel=1e-10)

@@ -10,7 +10,8 @@ from scipy.special import logsumexp
 
 from analyses.hidden_effects.cases import Spec, seal
 from tests.simulated import simulated_tests
-from wirebayes.discovery.linear_scan import RATIOS, SIZES, evidences, expand, scan
+from wirebayes.discovery.linear_scan import expand, scan
+from wirebayes.discovery.noise_integral import RATIOS, SIZES, evidences
 from wirebayes.discovery.remainder_evidence import (
     Reference,
     _most_probable,

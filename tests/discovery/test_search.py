@@ -8,7 +8,7 @@ import pytest
 
 from analyses.hidden_effects.cases import Spec, seal
 from wirebayes import cli
-from wirebayes.discovery import held_out, linear_scan, next_measurement, power, screening
+from wirebayes.discovery import held_out, linear_scan, next_measurement, noise_integral, power, screening
 from wirebayes.discovery.investigation import final_models
 from wirebayes.discovery.probes import probes
 from wirebayes.discovery.search import discover, investigate
@@ -263,7 +263,7 @@ def test_the_linear_scan_sees_what_a_regression_on_the_dense_covariance_sees(tmp
     )
     trials = probes(named("strain_stiffening"))
     x = linear_scan.expand(block.target, block.modes.z[:1], trials)
-    whitened = linear_scan.projected(x, float(x.ratio[0]))[:, 0]
+    whitened = noise_integral.projected(x, float(x.ratio[0]))[:, 0]
     k = np.sqrt(float(x.ratio[0])) * x.left[0] * x.singular[0]
     inverse = np.linalg.inv(np.eye(len(k)) + k @ k.T)
     a, s = x.parameters[0], x.signatures[0][:, 0]

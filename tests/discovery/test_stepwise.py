@@ -52,7 +52,7 @@ def test_two_effects_have_one_evidence_in_either_order(truth: dict[str, float], 
 
 def test_the_credit_beside_a_smooth_remainder_is_a_ratio_of_two_regressions() -> None:
     """Against the dense covariance of readings that hold the remainder as noise, its size and the noise's known."""
-    from wirebayes.discovery import linear_scan, smooth_credit
+    from wirebayes.discovery import noise_integral, smooth_credit
 
     block = plain_fit(Bench(), {"toe.w": 1.0}, ("toe",))[0]
     trials, _ = screening.candidate_probes([block], {"toe": CATALOGUE["toe"]})
@@ -60,9 +60,8 @@ def test_the_credit_beside_a_smooth_remainder_is_a_ratio_of_two_regressions() ->
     ratio, size = 10.0, 8.0
     found = {}
     with pytest.MonkeyPatch.context() as patch:
-        for module in (linear_scan, smooth_credit):
-            patch.setattr(module, "RATIOS", np.array([ratio]))
-            patch.setattr(module, "SIZES", np.array([size]))
+        patch.setattr(noise_integral, "RATIOS", np.array([ratio]))
+        patch.setattr(smooth_credit, "SIZES", np.array([size]))
         found = beside_smooth(x)
     k = x.left[0] * x.singular[0]
     noise = np.eye(len(k)) + ratio * k @ k.T
@@ -87,6 +86,6 @@ def test_the_credit_beside_a_smooth_remainder_is_a_ratio_of_two_regressions() ->
         s = signature[:, m]
         b, c = s @ inverse @ residual, s @ inverse @ s
         b = max(b, 0.0) if x.one_sided[m] else b
-        absorbed = c <= linear_scan.ABSORBED * (x.signatures[0][:, m] ** 2).sum()
+        absorbed = c <= noise_integral.ABSORBED * (x.signatures[0][:, m] ** 2).sum()
         b = 0.0 if absorbed else b
         assert found[m] == pytest.approx(-0.5 * x.degrees * np.log((rss - b**2 / c) / rss), rel=1e-6, abs=1e-8)

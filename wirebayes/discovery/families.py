@@ -9,7 +9,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wirebayes.discovery.linear_scan import expand, projected
+from wirebayes.discovery.linear_scan import expand
+from wirebayes.discovery.noise_integral import projected
 from wirebayes.discovery.power import ALIKE, cosines
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import Refit

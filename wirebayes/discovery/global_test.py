@@ -14,7 +14,8 @@ from scipy.stats import binom
 
 from wirebayes.discovery import gross_errors, residual_patterns, screening
 from wirebayes.discovery.continuation import Continuation
-from wirebayes.discovery.linear_scan import Expansion, expand, scan
+from wirebayes.discovery.linear_scan import expand, scan
+from wirebayes.discovery.noise_integral import Expansion
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import Candidate, GlobalTest, Replicates

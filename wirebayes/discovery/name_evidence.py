@@ -7,7 +7,8 @@ from functools import partial
 import numpy as np
 from scipy.special import logsumexp
 
-from wirebayes.discovery.linear_scan import expand, projected
+from wirebayes.discovery.linear_scan import expand
+from wirebayes.discovery.noise_integral import projected
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import LARGEST, Refit, refit
 from wirebayes.discovery.scans import Scan

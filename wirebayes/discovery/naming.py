@@ -9,8 +9,8 @@ from wirebayes.discovery.families import Family, block_ratio, families_of, noise
 from wirebayes.discovery.fitted_sets import Explored, Fits
 from wirebayes.discovery.global_test import Gate
 from wirebayes.discovery.held_out import LeftOut
-from wirebayes.discovery.linear_scan import Expansion
 from wirebayes.discovery.name_evidence import NameEvidence, reaches, weigh_names
+from wirebayes.discovery.noise_integral import Expansion
 from wirebayes.discovery.settings import Settings
 from wirebayes.discovery.stepwise import explore
 from wirebayes.discovery.verdict import (

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.discovery.linear_scan import expand, projected
+from wirebayes.discovery.linear_scan import expand
+from wirebayes.discovery.noise_integral import projected
 from wirebayes.discovery.probes import Probe
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior

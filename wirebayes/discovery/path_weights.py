@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from wirebayes.discovery.linear_scan import ABSORBED, RATIOS
+from wirebayes.discovery.noise_integral import ABSORBED, RATIOS
 from wirebayes.discovery.tangent import Tangent, damp
 from wirebayes.numeric.linear_algebra import cholesky, solve
 from wirebayes.numeric.typing import Array

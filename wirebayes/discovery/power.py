@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from wirebayes.discovery.linear_scan import Expansion, expand, projected
+from wirebayes.discovery.linear_scan import expand
+from wirebayes.discovery.noise_integral import Expansion, projected
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import LARGEST, occam
 from wirebayes.discovery.scans import Scan

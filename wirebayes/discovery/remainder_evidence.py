@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.discovery import smooth_reference
-from wirebayes.discovery.linear_scan import RATIOS, SIZES, Expansion, evidences, expand
+from wirebayes.discovery.linear_scan import expand
+from wirebayes.discovery.noise_integral import RATIOS, SIZES, Expansion, evidences
 from wirebayes.discovery.tangent import moving_columns, residuals, whitened
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior

@@ -20,9 +20,9 @@ from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.investigation import Investigation
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence
-from wirebayes.discovery.linear_scan import Expansion
 from wirebayes.discovery.material_answer import MaterialAnswer, answer_material
 from wirebayes.discovery.naming import Named, name_effects
+from wirebayes.discovery.noise_integral import Expansion
 from wirebayes.discovery.outlook import outlook
 from wirebayes.discovery.screening import GlobalTest
 from wirebayes.discovery.settings import ALPHA, LEAST_HOLDS, Settings

@@ -17,9 +17,10 @@ from wirebayes.discovery import screening
 from wirebayes.discovery.families import Family
 from wirebayes.discovery.fitted_sets import Accepted, Explored, FittedSet, Key, added
 from wirebayes.discovery.frontier import Frontier
-from wirebayes.discovery.linear_scan import Expansion, expand, scan
+from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet, family_of, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence, weigh_names
+from wirebayes.discovery.noise_integral import Expansion
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import occam
 from wirebayes.discovery.remainder_evidence import Reference, reference_of, remainder_evidence

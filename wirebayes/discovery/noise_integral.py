@@ -1,0 +1,217 @@
+"""Inner products of a linearised model in the metric of its noise, whose ratio and scale are integrated out.
+
+The metric is ``V0(ρ) = I + ρ K Kᵀ`` of readings divided by their standard deviation: K is the derivative by the setting
+errors, ρ their unknown size relative to the sensor's error. The overall scale of the noise is integrated out and ρ is
+summed over a grid, so no test relies on the noise that a possibly wrong model has estimated.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.discovery.tangent import (
+    LARGEST_SLOPE,
+    Tangent,
+    damp,
+    whitened,
+)
+from wirebayes.numeric.linear_algebra import cholesky
+from wirebayes.numeric.typing import Array
+
+# of setting to sensor error, squared: from one that does not matter to one beside which the sensor's does not; steps of
+# half a decade, as the evidence is smooth in log ρ
+RATIOS = np.logspace(-2.0, 6.0, 13)
+# δ of the smooth remainder, doubling from about the least that the global test detects; a choice that hardly matters,
+# because neighbouring sizes explain nearly the same
+SIZES = np.array([4.0, 8.0, 16.0, 32.0])
+
+
+@dataclass(frozen=True)
+class Expansion(Tangent):
+    """A tangent with what each effect and the flexible reference would add.
+
+    Attributes
+    ----------
+    signatures : (n, N, m)
+        What each probe adds, per unit amplitude.
+    one_sided : (m,) bool
+    flexible : (n, N, q)
+        Functions of the flexible reference, one process after the other.
+    processes : tuple of int
+        How many functions each process has.
+    """
+
+    signatures: Array
+    one_sided: Array
+    flexible: Array
+    processes: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Projected:
+    """Inner products at n parameter sets and k ratios of the grid, free of what the parameters absorb.
+
+    Attributes
+    ----------
+    shared : (n, k)
+        Log volume of setting errors and parameters; -inf where the parameters cannot be distinguished.
+    rss : (n, k)
+        Of the residual with itself, the prior's square included.
+    along, square : (n, k, m)
+        Of each signature with the residual and with itself; infinite where the parameters take all of a signature.
+    smooth_along, smooth_square : (n, k, q) and (n, k, q, q) for each process
+        Of its smooth functions with the residual and with each other.
+    smooth_signatures : (n, k, q, m) for each process
+        Of its smooth functions with each signature; none where they are not asked for.
+    """
+
+    shared: Array
+    rss: Array
+    along: Array
+    square: Array
+    smooth_along: list[Array]
+    smooth_square: list[Array]
+    smooth_signatures: list[Array]
+
+
+def project(x: Expansion, *, with_signatures: bool = False) -> Projected:
+    """Project residual, signatures and smooth functions on what the parameters leave, in the metric of each ratio."""
+    p, m = x.parameters.shape[2], x.signatures.shape[2]
+    columns = np.concatenate([x.parameters, x.residual[..., None], x.signatures, x.flexible], axis=2)
+    levels = np.swapaxes(x.left, 1, 2) @ columns
+    shrink = damp(x.singular[:, None], RATIOS[:, None])
+    of_m, of_f = slice(p + 1, p + 1 + m), slice(p + 1 + m, None)
+    # Inner products of the parameters with everything, at each ratio.
+    shrunk = np.swapaxes(levels[..., :p], 1, 2)[:, None] * shrink[:, :, None]
+    gram = (np.swapaxes(x.parameters, 1, 2) @ columns)[:, None] - shrunk @ levels[:, None]
+    gram[..., :p] += x.prior_precision[:, None]
+    gram[..., p] += x.prior_gradient[:, None]
+    factor = cholesky(gram[..., :p])
+    # There may be a ratio at which the parameters cannot be distinguished: it is left out.
+    regular = np.isfinite(factor).all(axis=(2, 3))
+    factor[~regular] = np.eye(p)
+    # What the parameters take of each column, in coordinates in which it is a sum of squares.
+    taken = np.linalg.inv(factor) @ gram[..., p:]
+    taken[~regular] = 0.0
+    residual, signatures, flexible = taken[..., 0], taken[..., 1 : m + 1], taken[..., m + 1 :]
+
+    def whitened(plain: Array, one: Array, other: Array) -> Array:
+        """(n, k, c) products of columns, given those (n, c) without setting errors and the columns' levels."""
+        return np.asarray(plain[:, None] - shrink @ (one * other))
+
+    r, levels_m, levels_f = levels[..., p : p + 1], levels[..., of_m], levels[..., of_f]
+    square = np.einsum("nim,nim->nm", x.signatures, x.signatures)
+    rr = whitened((x.residual**2).sum(axis=1)[:, None], r, r)[..., 0]
+    mr = whitened((x.residual[:, None] @ x.signatures)[:, 0], levels_m, r)
+    mm = whitened(square, levels_m, levels_m)
+    c = mm - np.einsum("nkpm,nkpm->nkm", signatures, signatures)
+    fr = whitened((x.residual[:, None] @ x.flexible)[:, 0], levels_f, r) - (residual[:, :, None] @ flexible)[:, :, 0]
+    each = _slices(x.processes)
+    smooth = [_Functions(x.flexible[..., own], flexible[..., own], levels_f[..., own]) for own in each]
+    form = _Functions(x.signatures, signatures, levels_m)
+    shared = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
+    return Projected(
+        shared=np.where(regular, shared - np.log(np.einsum("nkpp->nkp", factor)).sum(axis=2), -np.inf),
+        rss=rr - (residual**2).sum(axis=2) + x.prior_square[:, None],
+        along=mr - (residual[:, :, None] @ signatures)[:, :, 0],
+        square=np.where(c > ABSORBED * square[:, None], c, np.inf),
+        smooth_along=[fr[..., own] for own in each],
+        smooth_square=[process.products(process, shrink) for process in smooth],
+        smooth_signatures=[process.products(form, shrink) for process in smooth] if with_signatures else [],
+    )
+
+
+def _slices(processes: Sequence[int]) -> list[slice]:
+    """Where the functions of each process stand."""
+    ends = np.cumsum(processes)
+    return [slice(last - count, last) for last, count in zip(ends, processes, strict=True)]
+
+
+class _Functions(NamedTuple):
+    """Functions (n, N, q), the parameters' part of them (n, k, p, q) and the setting errors' (n, H, q)."""
+
+    plain: Array
+    taken: Array
+    levels: Array
+
+    def products(self, other: "_Functions", shrink: Array) -> Array:
+        """(n, k, q, m) inner products with other functions, as `project` has them."""
+        plain = (np.swapaxes(self.plain, 1, 2) @ other.plain)[:, None]
+        whole_holds = (np.swapaxes(self.levels, 1, 2)[:, None] * shrink[:, :, None]) @ other.levels[:, None]
+        return np.asarray(plain - np.swapaxes(self.taken, 2, 3) @ other.taken - whole_holds)
+
+
+def evidences(x: Expansion) -> tuple[Array, Array]:
+    """(n, k) and (n, k, s) log evidence at each ratio, without a remainder and with one of each process and size.
+
+    Parameters and the scale of the noise are integrated out; the prior has its top at one. It is -inf for a row that
+    has no tangent.
+    """
+    seen = has_tangent(x)
+    x = without_tangent(x)
+    plain, beside = without_and_with(x, project(x))
+    return np.where(seen[:, None], plain, -np.inf), np.where(seen[:, None, None], beside, -np.inf)
+
+
+def without_and_with(x: Expansion, found: Projected) -> tuple[Array, Array]:
+    shared, rss, degrees, least = found.shared, found.rss, x.degrees, x.least[:, None]
+    plain = shared - 0.5 * degrees * np.log(np.maximum(rss, least))
+    loose = []
+    for square, along in zip(found.smooth_square, found.smooth_along, strict=True):
+        log_volume, less = _taken_by(square, along)
+        # The process is measured in units of the noise that is left beside it.
+        left_beside = np.maximum(rss[..., None] - less, least[..., None])
+        loose.append(shared[..., None] - log_volume - 0.5 * degrees * np.log(left_beside))
+    return plain, np.concatenate(loose, axis=2)
+
+
+def _taken_by(square: Array, along: Array) -> tuple[Array, Array]:
+    """What a process of each size takes: half a log determinant, and of the sum of squares, both (..., sizes).
+
+    `square` (..., q, q) and `along` (..., q) are the inner products of its functions with themselves and the residual.
+    """
+    q = along.shape[-1]
+    share = SIZES**2 / np.maximum(np.einsum("...ff->...", square), 1e-300)[..., None]
+    # One Cholesky factor of I + share square, bordered by the residual's products, holds both; the corner is not used.
+    bordered = np.zeros((*share.shape, q + 1, q + 1))
+    bordered[..., :q, :q] = share[..., None, None] * square[..., None, :, :]
+    bordered.reshape(-1, (q + 1) ** 2)[:, :: q + 2] += 1.0
+    bordered[..., q, :q] = np.sqrt(share)[..., None] * along[..., None, :]
+    bordered[..., q, q] = LARGEST_SLOPE
+    factor = cholesky(bordered)
+    with np.errstate(invalid="ignore"):
+        log_volume = np.log(np.einsum("...ff->...f", factor)[..., :q]).sum(axis=-1)
+        less = (factor[..., q, :q] ** 2).sum(axis=-1)
+    # Functions that the parameters take entirely leave rounding errors.
+    seen = np.isfinite(log_volume + less)
+    return np.where(seen, log_volume, 0.0), np.where(seen, less, 0.0)
+
+
+def has_tangent(x: Expansion) -> NDArray[np.bool_]:
+    """(n,) where the model neither overflows nor jumps."""
+    parts = (x.parameters, x.signatures, x.flexible, x.residual[..., None])
+    with np.errstate(invalid="ignore"):
+        return np.all([(np.abs(part) < LARGEST_SLOPE).all(axis=(1, 2)) for part in parts], axis=0)
+
+
+def without_tangent(x: Expansion) -> Expansion:
+    """Rows that have no tangent as rows in which nothing is seen."""
+    seen = has_tangent(x)
+    if seen.all():
+        return x
+    names = ("parameters", "signatures", "flexible")
+    parts: dict[str, Any] = {name: np.where(seen[:, None, None], getattr(x, name), 0.0) for name in names}
+    return replace(x, **parts, residual=np.where(seen[:, None], x.residual, 0.0))
+
+
+def projected(x: Expansion, ratio: float) -> Array:
+    """(N, m) signatures of the first row, whitened at a noise ratio, free of what the parameters absorb."""
+    basis, _ = np.linalg.qr(whitened(x, x.parameters[0], ratio))
+    signatures = whitened(x, x.signatures[0], ratio)
+    return np.asarray(signatures - basis @ (basis.T @ signatures))
+
+
+ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it
