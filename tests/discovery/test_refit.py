@@ -34,6 +34,11 @@ def ends_of(value: np.ndarray, z: np.ndarray, converged: np.ndarray) -> Optimum:
     return Optimum(z, value, np.full((len(z), 1, 1), 2.0 * np.pi), converged)
 
 
+def shared(blocks: list[Any], added: float) -> refit._Amplitude:
+    """An amplitude that blocks share, with a constant for its prior."""
+    return refit._Amplitude(blocks, 0.0, -np.inf, np.inf, 1.0, lambda amplitudes: np.full(len(amplitudes), added))
+
+
 def refitted(
     monkeypatch: pytest.MonkeyPatch,
     tops: list[float],
@@ -95,9 +100,9 @@ def test_where_climbs_from_afar_end_nowhere_nearer_ones_lead_on(monkeypatch: pyt
     assert found.amplitude / 1e-3 == pytest.approx(15.0, abs=0.3) and found.sd == pytest.approx(1e-3, rel=1e-6)
 
 
-def test_an_amplitude_out_of_reach_from_neutral_is_reached_from_the_next_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_amplitude_out_of_reach_from_neutral_is_reached_from_the_next_one() -> None:
     """From there the climbs of one sign end nowhere but at the least, and those of the other lead to a lesser top."""
-    profile = Profiles(monkeypatch, reached=[-0.5, 0.5, 1.0, 2.0, 3.0]).tried()
+    profile = Profiles(reached=[-0.5, 0.5, 1.0, 2.0, 3.0]).tried()
     assert profile.amplitude[np.isfinite(profile.value)].tolist() == [-3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0]
     assert profile.value[np.isfinite(profile.value)] == pytest.approx([9.0, 4.0, 1.0, 0.25, 0.5, 1.0, 2.0, 3.0])
 
@@ -105,12 +110,13 @@ def test_an_amplitude_out_of_reach_from_neutral_is_reached_from_the_next_one(mon
 class Profiles:
     """Climbs that reach one amplitude more each time, and from neutral some alone; a mode for each sign."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, reached: list[float]) -> None:
+    def __init__(self, reached: list[float]) -> None:
         self.reached = reached
-        monkeypatch.setattr(refit, "_climbed", self.climbed)
         self.rounds = 0
 
-    def climbed(self, pinned: Any, added: Any, amplitudes: np.ndarray, begin: Any) -> Any:
+    neutral = 0.0
+
+    def climbed(self, amplitudes: np.ndarray, begin: Any) -> Any:
         near = np.isin(amplitudes, self.reached) if self.rounds == 0 else np.ones(len(amplitudes), bool)
         self.rounds += 1
         value = np.where(amplitudes < 0, amplitudes**2, amplitudes)
@@ -119,8 +125,7 @@ class Profiles:
 
     def tried(self) -> Any:
         grid = np.array([-20.0, -10.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0])
-        first = refit._climbed([], lambda a: a, grid, [])
-        return refit._followed([], lambda a: a, first, 0.0)
+        return refit._followed(self, self.climbed(grid, []))  # type: ignore[arg-type]
 
 
 def test_blocks_that_share_an_amplitude_add_their_evidence(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -207,15 +212,15 @@ def test_climbs_begin_on_the_line_between_what_is_known() -> None:
 def tried(monkeypatch: pytest.MonkeyPatch, top: float, effect: Any = TWO_SIDED, guess: float = 3.0) -> list[Any]:
     """The amplitudes of each round of climbs, in units of δ."""
     rounds: list[Any] = []
-    climbed = refit._climbed
+    climbed = refit._Amplitude.climbed
 
-    def watched(pinned: Any, added: Any, amplitudes: np.ndarray, begin: Any) -> Any:
+    def watched(self: Any, amplitudes: np.ndarray, begin: Any) -> Any:
         rounds.append(amplitudes / 1e-3)
-        return climbed(pinned, added, amplitudes, begin)
+        return climbed(self, amplitudes, begin)
 
-    monkeypatch.setattr(refit, "_climbed", watched)
+    monkeypatch.setattr(refit._Amplitude, "climbed", watched)
     refitted(monkeypatch, [top], effect, guess)
-    monkeypatch.setattr(refit, "_climbed", climbed)
+    monkeypatch.setattr(refit._Amplitude, "climbed", climbed)
     return rounds
 
 
@@ -264,7 +269,7 @@ def test_curvatures_are_exact_where_they_count(monkeypatch: pytest.MonkeyPatch) 
             assert ends.z[:, 0].tolist() == amplitude.tolist()
             return replace(ends, curvature=np.exp(2.0) * ends.curvature)
 
-    found = refit._exact([Block()], lambda a: np.zeros(len(a)), refit._Profile(grid, value, [rough]))  # type: ignore[list-item]
+    found = refit._exact(shared([Block()], 0.0), refit._Profile(grid, value, [rough]))
     assert found.value == pytest.approx([-1.5, -1.0, -6.9, -6.1])
 
 
@@ -340,7 +345,7 @@ def test_a_climb_that_did_not_converge_has_no_evidence() -> None:
 
     blocks = [block([1.0, 9.0, 4.0, 3.0], [True, False, True, True]), block([10.0, 20.0], [True, False])]
     starts = [np.zeros((4, 1)), np.zeros((2, 1))]
-    found = refit._climbed(blocks, lambda a: np.full(len(a), -100.0), np.array([5.0, 6.0]), starts)
+    found = shared(blocks, -100.0).climbed(np.array([5.0, 6.0]), starts)
     assert found.value.tolist() == [1.0 + 10.0 - 100.0, -np.inf]
     assert [ends.z[:, 0].tolist() for ends in found.ends] == [[0.0, 2.0], [0.0, 1.0]]
 

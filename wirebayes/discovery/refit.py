@@ -22,7 +22,8 @@ from wirebayes.wire.effect import Effect
 
 # δ; end of an amplitude's prior. Hardly matters: twice as much takes ln 2 from every name alike
 LARGEST = 40.0
-_OUTWARD = 6  # times that the grid may grow outwards, by up to 2.3 each: 150-fold in all
+_FARTHER = np.array([1.3, 1.7, 2.3])  # times an end's distance from neutral, where the top lies at an end
+_OUTWARD = 6  # times that the grid may grow outwards so: 150-fold in all
 _ROUNDING = 1e-9  # of a reach, which a grid may end on
 _TOP = 1.0  # nats; neighbours alone may lie so close that their values' last digits decide
 _LEAST_INSIDE = 1e-3  # of a parabola; one farther outside the prior's ends is not the profile's
@@ -139,46 +140,114 @@ def refit(
     shapes : sequence of mappings of column to float
         Shape constants to begin with, a block each; their medians where left out.
     """
-    main = effect.amplitudes[0]
-    low, high = (float(v) for v in main.prior.support())
-    one_sided = low >= main.neutral
-    low, high = max(low, main.neutral - reach), min(high, main.neutral + reach)
-    pinned = [Pinned(blocks[b], effect) for b in which]
-    reference = sum(blocks[b].log_evidence for b in which)
-    log_prior = within(pinned[0].prior, main.neutral, reach)
+    amplitude = _Amplitude.of([blocks[b] for b in which], effect, per_delta, reach)
+    starts = [p.starts(own) for p, own in zip(amplitude.pinned, shapes or [{}] * len(which), strict=True)]
+    grid = amplitude.first(guess)
+    profile = amplitude.climbed(grid, [np.tile(start, (len(grid), 1)) for start in starts])
+    profile = _looked_closer(amplitude, _followed(amplitude, profile).known())
+    return _summary(effect, which, amplitude, _exact(amplitude, profile))
 
-    def added(amplitudes: Array) -> Array:
-        return log_prior(amplitudes) - reference
 
-    steps = np.concatenate([_DELTAS, [max(abs(guess) / per_delta, 0.3)]]) * per_delta
-    grid = main.neutral + (steps if one_sided else np.concatenate([steps, -steps]))
-    grid = np.unique(np.clip(grid, low, high))
-    starts = [p.starts(own) for p, own in zip(pinned, shapes or [{}] * len(pinned), strict=True)]
-    profile = _climbed(pinned, added, grid, [np.tile(start, (len(grid), 1)) for start in starts])
-    profile = _followed(pinned, added, profile, main.neutral).known()
+@dataclass(frozen=True)
+class _Amplitude:
+    """An amplitude that some blocks share.
+
+    Attributes
+    ----------
+    pinned : sequence of Pinned
+        The blocks with the effect, the amplitude of which is given.
+    neutral, low, high : float
+        Where it changes nothing, and its ends.
+    per_delta : float
+        What amounts to δ = 1.
+    added : function of (a,) amplitudes to (a,)
+        Log density of its prior, less the evidence without the effect.
+    """
+
+    pinned: Sequence[Pinned]
+    neutral: float
+    low: float
+    high: float
+    per_delta: float
+    added: Callable[[Array], Array]
+
+    @classmethod
+    def of(cls, blocks: Sequence[LaplaceFit], effect: Effect, per_delta: float, reach: float) -> "_Amplitude":
+        """That of an effect on some blocks.
+
+        Parameters
+        ----------
+        blocks : sequence of LaplaceFit
+        effect : Effect
+        per_delta : float
+        reach : float
+            How far from neutral it may lie.
+        """
+        main = effect.amplitudes[0]
+        least, most = (float(end) for end in main.prior.support())
+        low, high = max(least, main.neutral - reach), min(most, main.neutral + reach)
+        pinned = [Pinned(block, effect) for block in blocks]
+        log_prior = within(pinned[0].prior, main.neutral, reach)
+        without = sum(block.log_evidence for block in blocks)
+        return cls(pinned, main.neutral, low, high, per_delta, lambda amplitudes: log_prior(amplitudes) - without)
+
+    @property
+    def one_sided(self) -> bool:
+        return self.low >= self.neutral
+
+    def first(self, guess: float) -> Array:
+        """The amplitudes tried first, with one that is guessed."""
+        steps = np.append(_DELTAS, max(abs(guess) / self.per_delta, 0.3)) * self.per_delta
+        grid = self.neutral + (steps if self.one_sided else np.concatenate([steps, -steps]))
+        return np.unique(np.clip(grid, self.low, self.high))
+
+    def outwards(self, from_: float) -> Array:
+        """Three amplitudes that lie farther from neutral."""
+        return np.clip(self.neutral + (from_ - self.neutral) * _FARTHER, self.low, self.high)
+
+    def climbed(self, amplitudes: Array, begin: Sequence[Array]) -> _Profile:
+        """The profile at amplitudes (a,): blocks climb from k starts an amplitude, (a k, d); the best end stays."""
+        ends, rows = [], np.arange(len(amplitudes))
+        for block, start in zip(self.pinned, begin, strict=True):
+            k = len(start) // len(amplitudes)
+            found = block.climb(start, np.repeat(amplitudes, k))
+            value = np.where(found.converged, found.log_evidence, -np.inf).reshape(-1, k)
+            ends.append(found.rows(rows * k + np.argmax(value, axis=1)))
+        return self.profile(amplitudes, ends)
+
+    def profile(self, amplitudes: Array, ends: Sequence[Optimum]) -> _Profile:
+        """That of climbs that have ended, one an amplitude and block."""
+        total = np.sum([np.where(end.converged, end.log_evidence, -np.inf) for end in ends], axis=0)
+        if len(self.pinned) > 1 and self.pinned[0].common:
+            total = total + _one_value_each(self.pinned, ends, amplitudes)
+        return _Profile(amplitudes, total + self.added(amplitudes), ends)
+
+
+def _looked_closer(amplitude: _Amplitude, profile: _Profile) -> _Profile:
+    """The profile with amplitudes about its top, followed outwards where that lies at an end."""
     outward = closer = 0
     while closer < _CLOSER and not (closer and _is_close(profile)):
         at = float(profile.amplitude[profile.best])
         at_end = profile.best in (0, len(profile.amplitude) - 1)
-        if at_end and low < at < high and at != main.neutral and outward < _OUTWARD:
+        if at_end and amplitude.low < at < amplitude.high and at != amplitude.neutral and outward < _OUTWARD:
             # The scan's unit was too small, or climbs from afar ended nowhere: go on outwards before looking closer.
-            finer = np.clip(main.neutral + (at - main.neutral) * np.array([1.3, 1.7, 2.3]), low, high)
+            finer = amplitude.outwards(at)
             outward += 1
         else:
-            finer = _around(profile, main.neutral if one_sided else None, per_delta)
+            finer = _around(profile, amplitude.neutral if amplitude.one_sided else None, amplitude.per_delta)
             closer += 1
-        begin = [_between(profile.amplitude, e.z, profile.best, finer) for e in profile.ends]
-        profile = profile.joined(_climbed(pinned, added, finer, begin)).known()
-    return _summary(effect, which, pinned, _exact(pinned, added, profile), per_delta, (low, high))
+        begin = [_between(profile.amplitude, ends.z, profile.best, finer) for ends in profile.ends]
+        profile = profile.joined(amplitude.climbed(finer, begin)).known()
+    return profile
 
 
-def _followed(pinned: Sequence[Pinned], added: Callable[[Array], Array], profile: _Profile, neutral: float) -> _Profile:
+def _followed(amplitude: _Amplitude, profile: _Profile) -> _Profile:
     """The profile with climbs that begin where the next amplitude towards neutral has ended, where these are better.
 
     A climb from the fit without the effect may end nowhere, or in a lesser mode.
     """
     number = np.arange(len(profile.amplitude))
-    side = np.sign(profile.amplitude - neutral)
+    side = np.sign(profile.amplitude - amplitude.neutral)
     towards = np.clip(number - side.astype(np.int64), 0, len(number) - 1)
     inner = np.where(side[towards] == side, towards, number)
     news = np.isfinite(profile.value)
@@ -187,7 +256,7 @@ def _followed(pinned: Sequence[Pinned], added: Callable[[Array], Array], profile
         rows = np.flatnonzero(news[inner] & hopeful & (inner != number))
         if not len(rows):
             break
-        tried = _climbed(pinned, added, profile.amplitude[rows], [ends.z[inner[rows]] for ends in profile.ends])
+        tried = amplitude.climbed(profile.amplitude[rows], [ends.z[inner[rows]] for ends in profile.ends])
         better = tried.value > profile.value[rows] + _NEWS
         profile = profile.with_rows(rows[better], tried.rows(better))
         news = np.isin(number, rows[better])
@@ -212,43 +281,14 @@ def within(prior: Any, neutral: float, reach: float) -> Callable[[Array], Array]
     return log_density
 
 
-def _climbed(
-    pinned: Sequence[Pinned],
-    added: Callable[[Array], Array],
-    amplitudes: Array,
-    begin: Sequence[Array],
-) -> _Profile:
-    """The profile at amplitudes (a,): each block climbs from k starts an amplitude, (a k, d); the best end stays.
-
-    `added` is the prior's log density, less the evidence without the effect.
-    """
-    ends, rows = [], np.arange(len(amplitudes))
-    for block, start in zip(pinned, begin, strict=True):
-        k = len(start) // len(amplitudes)
-        found = block.climb(start, np.repeat(amplitudes, k))
-        value = np.where(found.converged, found.log_evidence, -np.inf).reshape(-1, k)
-        ends.append(found.rows(rows * k + np.argmax(value, axis=1)))
-    return _profile(pinned, added, amplitudes, ends)
-
-
-def _profile(
-    pinned: Sequence[Pinned], added: Callable[[Array], Array], amplitudes: Array, ends: Sequence[Optimum]
-) -> _Profile:
-    """The profile of climbs that have ended, one an amplitude and block."""
-    total = np.sum([np.where(end.converged, end.log_evidence, -np.inf) for end in ends], axis=0)
-    if len(pinned) > 1 and pinned[0].common:
-        total = total + _one_value_each(pinned, ends, amplitudes)
-    return _Profile(amplitudes, total + added(amplitudes), ends)
-
-
-def _exact(pinned: Sequence[Pinned], added: Callable[[Array], Array], profile: _Profile) -> _Profile:
+def _exact(amplitude: _Amplitude, profile: _Profile) -> _Profile:
     """The profile with exact curvatures where it counts; until then their expectation has shown where the top is."""
     rows = np.flatnonzero(profile.value > profile.value.max() - _COUNTS)
     if not len(rows):
         return profile
     near = profile.rows(rows)
-    ends = [block.curved(end, near.amplitude) for block, end in zip(pinned, near.ends, strict=True)]
-    return profile.with_rows(rows, _profile(pinned, added, near.amplitude, ends)).known()
+    ends = [block.curved(end, near.amplitude) for block, end in zip(amplitude.pinned, near.ends, strict=True)]
+    return profile.with_rows(rows, amplitude.profile(near.amplitude, ends)).known()
 
 
 def _one_value_each(pinned: Sequence[Pinned], ends: Sequence[Optimum], amplitudes: Array) -> Array:
@@ -288,23 +328,16 @@ def _around(profile: _Profile, end: float | None, per_delta: float) -> Array:
     return np.linspace(left, right, 8)[1:-1]
 
 
-def _summary(
-    effect: Effect,
-    which: Sequence[int],
-    pinned: Sequence[Pinned],
-    profile: _Profile,
-    per_delta: float,
-    ends: tuple[float, float] = (-np.inf, np.inf),
-) -> Refit:
-    """What a profile says, between the ends of the amplitude's prior."""
+def _summary(effect: Effect, which: Sequence[int], amplitude: _Amplitude, profile: _Profile) -> Refit:
     best = profile.best
     at = profile.amplitude[best : best + 1]
-    top = _top(profile.amplitude, profile.value, best, per_delta)
+    top = _top(profile.amplitude, profile.value, best, amplitude.per_delta)
     if top is None:
-        log_bayes, sd = _integrated(profile, effect.amplitudes[0].neutral, per_delta)
+        log_bayes, sd = _integrated(profile, amplitude.neutral, amplitude.per_delta)
     else:
-        log_bayes, sd = top.log_integral(*ends), top.sd
-    theta = tuple(p.natural(e.z[best : best + 1], at)[0] for p, e in zip(pinned, profile.ends, strict=True))
+        log_bayes, sd = top.log_integral(amplitude.low, amplitude.high), top.sd
+    ends = [end.z[best : best + 1] for end in profile.ends]
+    theta = tuple(p.natural(z, at)[0] for p, z in zip(amplitude.pinned, ends, strict=True))
     return Refit(effect, tuple(which), log_bayes, float(at[0]), sd, theta)
 
 
