@@ -57,7 +57,7 @@ def of_fit(summary: SummaryJson) -> list[str]:
     names = [n for n in summary["parameters"] if n.split("[")[0].split(".")[0] in (*_SHOWN, *_effects(summary))]
     parameters = ", ".join(f"{name} {_with_unit(summary['parameters'][name])}" for name in names)
     tension = f"{float(format(derived['tension_N'], '.4g')):g} N"
-    creep = f"creep after 2 min at {tension} {_band(derived['creep_2min_mm'])} mm"
+    creep = f"creep after 2 min at {tension}: {_band(derived['creep_2min_mm'])} mm"
     return [f"{summary['experiment']}: {state}, {checked}", f"  {parameters}", f"  {creep} (medians, 90 % intervals)"]
 
 

@@ -94,7 +94,10 @@ class Findings(Result[DiscoveryJson]):
         return [line for name, report in found.items() for line in answers.of_findings(name, report)]
 
     def next_step(self, given: Given = NOTHING) -> str:
-        return " ".join(f"{name}: {r['next_measurement']}" for name, r in self.report["experiments"].items())
+        proposals = {name: found["next_measurement"] for name, found in self.report["experiments"].items()}
+        if len(proposals) == 1:
+            return next(iter(proposals.values()))
+        return " ".join(f"{name}: {proposal}" for name, proposal in proposals.items())
 
     def _short_form(self) -> list[str]:
         return [
