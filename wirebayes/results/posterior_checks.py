@@ -144,13 +144,18 @@ def endless(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
     exponent = float(np.median(own["N"]))
     if _DECADES_TIMES_N / exponent <= ENDLESS:
         return ""
-    begins, ends = (float(np.median((left / own["k2"]) ** (1.0 / own["N"]))) for left in (_TENTH, _NINE_TENTHS))
+    begins, ends = (np.median((hazard / own["k2"]) ** (1.0 / own["N"])) for hazard in (_TENTH, _NINE_TENTHS))
     return (
         "the readings want creep spread over many decades of time, as a power law or the logarithm of time has it: at "
-        f"N = {exponent:.2g} a tenth is reached after {begins:.1g} s and nine tenths after {ends:.1g} s; shown is the "
-        "stretched exponential nearest to it, good for the times that were read: the stiffness before the first "
-        "reading, creep long after the last and final creep are extrapolated"
+        f"N = {exponent:.2g} a tenth is reached after {_rounded(begins)} s and nine tenths after {_rounded(ends)} s; "
+        "shown is the stretched exponential nearest to it, good for the times that were read: the stiffness before the "
+        "first reading, creep long after the last and final creep are extrapolated"
     )
+
+
+def _rounded(value: float) -> str:
+    """One digit, and no power of ten where that can be read."""
+    return f"{float(f'{value:.1g}'):g}"
 
 
 def unchanged_prior(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
