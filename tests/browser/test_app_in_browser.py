@@ -144,8 +144,8 @@ def test_a_robot_of_ones_own_moves_on_the_wire(tab, served, tmp_path):
     tab.wait_for("document.querySelector('[data-robot]')")
     tab.run("document.querySelector('[data-robot]').scrollIntoView({block: 'center'})")
     tab.drop([robot, way], "[data-robot]")
-    tab.wait_for("document.querySelector('iframe').getAttribute('src') == '/files/moved/pose-mine/report.html'")
-    tab.wait_for("document.querySelector('iframe').contentDocument.querySelector('.lead')")
+    tab.wait_for("document.querySelector('iframe[src=\"/files/moved/pose-mine/report.html\"]')")
+    tab.wait_for("document.querySelector('iframe')?.contentDocument?.querySelector('.lead')")
     assert "mm" in tab.run("document.querySelector('iframe').contentDocument.querySelector('.lead').innerText")
     assert tab.run("document.querySelector('iframe').contentDocument.querySelectorAll('img').length") >= 1
     tab.click("Drift")
