@@ -69,15 +69,21 @@ def next_poses(found: Whole, holds: Holds, count: int, rng: np.random.Generator)
     motion = _follows(_at(found, blind, x, R, tau), robot.degrees)
     information = _information(equations)
     root = np.moveaxis(motion[:, :3], 0, 1).reshape(-1, motion.shape[2])  # what counts: the position
-    known = inv(found.covariance)
-    sd, picked = [_rms(found.covariance, root, len(x))], []
-    for _ in range(min(count, len(x))):
-        left = [_rms(inv(known + one), root, len(x)) for one in information]
+    picked, sd = _one_after_another(found.covariance, information, root, min(count, len(x)))
+    return NextPoses(x[picked], sd)
+
+
+def _one_after_another(covariance: Floats, information: Floats, root: Floats, count: int) -> tuple[list[int], Floats]:
+    """Candidates that leave the smallest pose error, each beside those before it, and that error before and after."""
+    known, poses = inv(covariance), len(information)
+    sd, picked = [_rms(covariance, root, poses)], []
+    for _ in range(count):
+        left = [_rms(inv(known + one), root, poses) for one in information]
         choice = int(np.nanargmin(left))
         known = known + information[choice]
         picked.append(choice)
         sd.append(left[choice])
-    return NextPoses(x[picked], np.array(sd))
+    return picked, np.array(sd)
 
 
 def _rms(covariance: Floats, root: Floats, poses: int) -> float:

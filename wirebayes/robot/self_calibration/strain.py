@@ -74,59 +74,7 @@ def by_unknown(unknowns: Unknowns, values: Floats) -> Floats:
     return out
 
 
-@dataclass(frozen=True)
-class Course:
-    """How tensions changed on the way to the end of every hold, at the beginning of each share of its duration.
-
-    Attributes
-    ----------
-    response_N : (p, w, w) array
-        Change of the tensions when wires lengthen by a strain, at fixed joint values.
-    beyond_N : (p, s, w) array
-        What the tensions at the beginning of each share are beyond that straight line.
-    """
-
-    response_N: Floats
-    beyond_N: Floats
-
-
-def straight(response_N: Floats) -> Course:
-    """Tensions that follow the equilibrium's response at the end.
-
-    Parameters
-    ----------
-    response_N : (p, w, w) array
-    """
-    p, legs, _ = response_N.shape
-    return Course(response_N, np.zeros((p, len(_SHARES), legs)))
-
-
-def on_the_way(
-    unknowns: Unknowns, white: Floats, pull_N: Floats, course: Course, duration_s: Floats
-) -> tuple[Floats, Floats]:
-    """Creep strains at the end of every hold, and what those at the beginning of each of its shares are beyond them.
-
-    Parameters
-    ----------
-    unknowns : Unknowns
-    white : (m,) array
-    pull_N : (p, w) array
-        Tensions when the holds ended.
-    course : Course
-    duration_s : (p,) array
-
-    Returns
-    -------
-    end : (p, w) array
-    ahead : (p, s, w) array
-    """
-    mean, root = unknowns.moments
-    wires = unknowns.prior.wires(unknowns.robot, (mean + root @ white[unknowns.slices["wires"]])[None])[0]
-    end, ahead = _through(wires, pull_N, np.ones(1), course, duration_s)
-    return end[..., 0], ahead[..., 0]
-
-
-def grown(unknowns: Unknowns, white: Floats, pull_N: Floats, course: Course, duration_s: Floats) -> Grown:
+def grown(unknowns: Unknowns, white: Floats, pull_N: Floats, response_N: Floats, duration_s: Floats) -> Grown:
     """Creep of every hold under tensions that ended at known values.
 
     Parameters
@@ -135,7 +83,8 @@ def grown(unknowns: Unknowns, white: Floats, pull_N: Floats, course: Course, dur
     white : (m,) array
     pull_N : (p, w) array
         Tensions when the holds ended; negative ones are slack.
-    course : Course
+    response_N : (p, w, w) array
+        Change of the tensions when wires lengthen by a strain, at fixed joint values.
     duration_s : (p,) array
     """
     wires = differing_wires(unknowns, white)
@@ -147,7 +96,7 @@ def grown(unknowns: Unknowns, white: Floats, pull_N: Floats, course: Course, dur
     more = wires.part(np.concatenate([np.arange(columns), [0, 0]]))
     factor = np.ones(columns + 2)
     factor[-2:] = 1 + _LOAD, 1 - _LOAD
-    strain, _ = _through(more, pull_N, factor, course, duration_s)
+    strain = _through(more, pull_N, factor, response_N, duration_s)
     slope = (strain[..., -2] - strain[..., -1]) / (2 * _LOAD * np.maximum(pull_N, 1e-300))
     taut = pull_N > 0
     return Grown(strain[..., 0], by_unknown(unknowns, strain[..., :-2]), np.where(taut, slope, 0.0))
@@ -157,13 +106,10 @@ def _count(wires: Wires) -> int:
     return max(np.shape(v)[-1] for v in wires.theta.values())
 
 
-def _through(wires: Wires, pull_N: Floats, factor: Floats, course: Course, duration_s: Floats) -> tuple[Floats, Floats]:
-    """Creep strains ``(p, w, n)`` at the end of every hold, for n wires under tensions times a factor.
-
-    Also, ``(p, s, w, n)``, what the strains at the beginning of each share of a hold are beyond them.
-    """
+def _through(wires: Wires, pull_N: Floats, factor: Floats, response_N: Floats, duration_s: Floats) -> Floats:
+    """Creep strains ``(p, w, n)`` at the end of every hold, for n wires under tensions times a factor."""
     state = fresh(pull_N.shape[1], len(factor))
-    ends, begins = [], []
+    out = []
     for k, duration in enumerate(duration_s):
         end = np.maximum(pull_N[k, :, None] * factor, 0.0)
         times = duration * _SHARES
@@ -172,14 +118,12 @@ def _through(wires: Wires, pull_N: Floats, factor: Floats, course: Course, durat
             creep = HoldCreep(wires, state, path[0])
             states = [creep.advance(float(time), tension) for time, tension in zip(times, path, strict=True)]
             ahead = np.array([s.strain(wires) - states[-1].strain(wires) for s in [state, *states[:-1]]])
-            along = end + course.response_N[k] @ ahead + course.beyond_N[k, ..., None]
-            before, path = path, np.maximum(along, 0.0)
+            before, path = path, np.maximum(end + response_N[k] @ ahead, 0.0)
             if np.abs(path - before).max() < _SAME * end.max():
                 break
         state = states[-1]
-        ends.append(state.strain(wires))
-        begins.append(ahead)
-    return np.stack(ends), np.stack(begins)
+        out.append(state.strain(wires))
+    return np.stack(out)
 
 
 @dataclass(frozen=True)

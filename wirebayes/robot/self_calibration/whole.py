@@ -55,16 +55,12 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
     state : State
         A rough guess.
     """
-    robot, stated = unknowns.robot, unknowns.errors.joint_m
-    target = usual_joint(robot, holds)[0] if stated is None else max(stated, EXACT * robot.span_m)
-    low, high = robot.rule.lowest_N, robot.rule.highest_N
-    usual = 0.5 * (low + high) if robot.rule.choice == "middle" else low
-    finest = min(holds.session.tension_sd_N, low) if np.isfinite(holds.tension_N).any() else low
-    noise = Noise(target, FRICTIONLESS, _UNREAD * (high - low), usual, _SOFT * finest)
+    robot = unknowns.robot
+    noise = _before_reading(unknowns, holds)
     since, creep = state, creep_of(unknowns, holds, state)
 
     state = _from_rough(unknowns, holds, noise, state, creep)
-    if stated is None:
+    if unknowns.errors.joint_m is None:
         noise = replace(noise, balance=_shown(unknowns, holds, noise, state, creep, "balance"))
         if np.isfinite(holds.tension_N).any():
             noise = replace(noise, joint_m=_shown(unknowns, holds, noise, state, creep, "loop"))
@@ -85,6 +81,16 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
         joint, balance = np.exp(_ahead(rounds))
         noise = replace(noise, joint_m=float(joint), balance=float(balance))
     return replace(found, converged=False)
+
+
+def _before_reading(unknowns: Unknowns, holds: Holds) -> Noise:
+    """What is stated of every noise, or usual."""
+    robot, stated = unknowns.robot, unknowns.errors.joint_m
+    joint = usual_joint(robot, holds)[0] if stated is None else max(stated, EXACT * robot.span_m)
+    low, high = robot.rule.lowest_N, robot.rule.highest_N
+    usual = 0.5 * (low + high) if robot.rule.choice == "middle" else low
+    finest = min(holds.session.tension_sd_N, low) if np.isfinite(holds.tension_N).any() else low
+    return Noise(joint, FRICTIONLESS, _UNREAD * (high - low), usual, _SOFT * finest)
 
 
 def _between(before: State, after: State) -> State:
