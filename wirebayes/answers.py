@@ -28,6 +28,7 @@ from wirebayes.sentences import (
     p_in_words,
     quantity,
     said_beside,
+    short,
     span,
     undecided,
     unit_text,
@@ -56,8 +57,7 @@ def of_fit(summary: SummaryJson) -> list[str]:
     checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
     names = [n for n in summary["parameters"] if n.split("[")[0].split(".")[0] in (*_SHOWN, *_effects(summary))]
     parameters = ", ".join(f"{name} {_with_unit(summary['parameters'][name])}" for name in names)
-    tension = f"{float(format(derived['tension_N'], '.4g')):g} N"
-    creep = f"creep after 2 min at {tension}: {_band(derived['creep_2min_mm'])} mm"
+    creep = f"creep after 2 min at {short(derived['tension_N'])} N: {_band(derived['creep_2min_mm'])} mm"
     return [f"{summary['experiment']}: {state}, {checked}", f"  {parameters}", f"  {creep} (medians, 90 % intervals)"]
 
 
@@ -305,7 +305,7 @@ def fit_in_a_sentence(summary: SummaryJson) -> str:
         return f"{doubt}{summary['experiment']}: the readings do not say how much this wire creeps."
     stretched = quantity(creep["q50"], creep["q05"], creep["q95"], "mm")
     stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
-    tension = f"{number(derived['tension_N'])} N"
+    tension = f"{short(derived['tension_N'])} N"
     return (
         f"{doubt}{summary['experiment']} creeps by {stretched} within two minutes under {tension}, and its "
         f"stiffness is {stiff} per unit of strain; intervals hold 90 %."

@@ -121,6 +121,11 @@ def unit_text(unit: str) -> str:
     return "" if unit in ("1", "-") else unit.replace("^-U", "⁻ᵁ").replace("^-N", "⁻ᴺ")
 
 
+def short(value: float) -> str:
+    """A number with at most four digits and no zeros behind them: 6, 4.5, 1800."""
+    return f"{float(f'{value:.4g}'):g}"
+
+
 def number(value: Any, digits: int = 3) -> str:
     """A number for people: significant digits, no exponent where none is needed; a dash for nothing."""
     if value is None or value != value:

@@ -17,7 +17,7 @@ from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifia
 from wirebayes.model.distributions import fast_logpdf
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import contraction, source
-from wirebayes.sentences import number
+from wirebayes.sentences import short
 from wirebayes.wire.fresh import FreshSample
 
 SENSITIVE = 0.05  # the threshold that the authors of the method propose
@@ -141,7 +141,7 @@ class Extrapolation:
         if factor <= 1.0:
             return ""
         return (
-            f"{self.time_s[-1] / 3600.0:g} h is {number(factor)} times the longest hold ({self.longest_hold_s:g} s): "
+            f"{self.time_s[-1] / 3600.0:g} h is {short(factor)} times the longest hold ({self.longest_hold_s:g} s): "
             "this far out the answer rests on the model's form alone, and no reading checks it."
         )
 
