@@ -121,9 +121,9 @@ def unit_text(unit: str) -> str:
     return "" if unit in ("1", "-") else unit.replace("^-U", "⁻ᵁ").replace("^-N", "⁻ᴺ")
 
 
-def short(value: float) -> str:
-    """A number with at most four digits and no zeros behind them: 6, 4.5, 1800."""
-    return f"{float(f'{value:.4g}'):g}"
+def short(value: float, digits: int = 4) -> str:
+    """A number with at most so many digits and no zeros behind them: 6, 4.5, 1800."""
+    return f"{float(f'{value:.{digits}g}'):g}"
 
 
 def number(value: Any, digits: int = 3) -> str:

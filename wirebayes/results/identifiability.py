@@ -141,7 +141,7 @@ class Extrapolation:
         if factor <= 1.0:
             return ""
         return (
-            f"{self.time_s[-1] / 3600.0:g} h is {short(factor)} times the longest hold ({self.longest_hold_s:g} s): "
+            f"{self.time_s[-1] / 3600.0:g} h is {short(factor, 3)} times the longest hold ({self.longest_hold_s:g} s): "
             "this far out the answer rests on the model's form alone, and no reading checks it."
         )
 
