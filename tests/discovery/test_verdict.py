@@ -191,7 +191,7 @@ def test_the_gain_of_a_family_is_that_of_the_mixture_over_its_members(monkeypatc
     """Beside the others of the set; the weights forget each hold, and a member of less than a twentieth has none."""
     sets = [EffectSet(tuple(names), 0.0, {}, None) for names in ("ab", "ac", "ad", "b", "e")]
     weights = np.array([0.6, 0.3, 0.02, 0.05, 0.03])
-    found: Any = SimpleNamespace(sets=sets, without=weights, beside=np.zeros(5))
+    found: Any = SimpleNamespace(weights={s.key: w for s, w in zip(sets, weights, strict=True)})
     fits: Any = Scored({"a": [[1.0, 2.0]], "ac": [[3.0, 1.0]], "ad": [[90.0, 90.0]], "b": [[9.0, 9.0]]})
     accepted = (Accepted("a", (0,), {}), Accepted("b", (0,), {}))
     best: Any = SimpleNamespace(effects=sets[0], accepted=accepted, blocks=[[2.0, 4.0]])
@@ -256,7 +256,7 @@ def test_too_few_holds_establish_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
 def alternative_models(weights: dict[str, float]) -> tuple[Any, Any, Any]:
     """A decision between sets of one material, fits of them, and the fit of one as the final model."""
     sets = [EffectSet(tuple(n), 0.0, dict.fromkeys(n, ONE), None) for n in weights]
-    space = SimpleNamespace(sets=sets, without=np.array(list(weights.values())), beside=np.zeros(len(weights)))
+    space = SimpleNamespace(sets=sets, weights={s.key: w for s, w in zip(sets, weights.values(), strict=True)})
 
     def final(names: str) -> Any:
         return SimpleNamespace(effects=[SimpleNamespace(name=n, key=n) for n in names])

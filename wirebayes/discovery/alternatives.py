@@ -4,10 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wirebayes.discovery.fitted_sets import Fits, Key
-from wirebayes.discovery.settings import (
-    LEAST_ALTERNATIVE,
-    MOST_ALTERNATIVES,
-)
+from wirebayes.discovery.settings import LEAST_ALTERNATIVE, MOST_ALTERNATIVES
 from wirebayes.discovery.verdict import Decision
 from wirebayes.inference.laplace_fit import LaplaceFit
 
@@ -55,7 +52,7 @@ def alternatives(
     found = decision.posterior
     names = frozenset(effect.name for effect in final.effects)
     weights: dict[Key, float] = {}
-    for s, weight in zip(found.sets, (found.without + found.beside).tolist(), strict=True):
+    for s, weight in zip(found.sets, found.weights.values(), strict=True):
         acting = frozenset(name for name in s.names if s.presence[name][i] > 0.5)
         swaps = acting - names <= set(undecided) and names - acting <= set(undecided)
         if acting and acting != names and swaps and s.key == acting and fits.knows(s.key):

@@ -9,9 +9,7 @@ from wirebayes.discovery.name_evidence import NameEvidence
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import Refit
 from wirebayes.discovery.screening import Candidate
-from wirebayes.discovery.settings import (
-    Settings,
-)
+from wirebayes.discovery.settings import Settings
 from wirebayes.discovery.sharing import informed
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.wire.effect import Effect
@@ -141,11 +139,9 @@ class Fits:
         out = []
         for plain, block in zip(self._known[frozenset()], larger.blocks, strict=True):
             effects = [effect for effect in block.effects if effect.name in key]
-            base = block if effects else plain
-            if effects:
-                out.append(fitted(base.experiments, effects, plain.law, plain.history, self._rng, scales=plain.scales))
-            else:
-                out.append(plain)
+            laws = plain.law, plain.history
+            own = fitted(block.experiments, effects, *laws, self._rng, scales=plain.scales) if effects else plain
+            out.append(own)
         return out
 
 

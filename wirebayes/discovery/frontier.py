@@ -9,11 +9,7 @@ from wirebayes.discovery.families import Family
 from wirebayes.discovery.fitted_sets import FittedSet, Key
 from wirebayes.discovery.model_space import EffectSet, family_of, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence
-from wirebayes.discovery.settings import (
-    MORE,
-    REACH,
-    SAME_EVIDENCE,
-)
+from wirebayes.discovery.settings import MORE, REACH, SAME_EVIDENCE
 
 
 @dataclass

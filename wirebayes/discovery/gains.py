@@ -9,9 +9,7 @@ from wirebayes.discovery.families import Family
 from wirebayes.discovery.fitted_sets import Fits, FittedSet
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.model_space import ModelPosterior
-from wirebayes.discovery.settings import (
-    LEAST_ALTERNATIVE,
-)
+from wirebayes.discovery.settings import LEAST_ALTERNATIVE
 from wirebayes.numeric.typing import Array
 
 
@@ -73,8 +71,7 @@ def family_gain(candidate: FittedSet, family: Family, found: ModelPosterior, fit
     """
     rest = frozenset(name for name in candidate.effects.names if name not in family)
     on = _acting(candidate, family)
-    weights = {s.key: w for s, w in zip(found.sets, (found.without + found.beside).tolist(), strict=True)}
-    members = {k: w for k, w in weights.items() if k > rest and all(name in family for name in k - rest)}
+    members = {k: w for k, w in found.weights.items() if k > rest and all(name in family for name in k - rest)}
     least = LEAST_ALTERNATIVE * sum(members.values())
     kept = [k for k, w in members.items() if k == candidate.effects.key or (w >= least and fits.knows(k))]
     versions = [candidate.blocks if k == candidate.effects.key else fits.of(k) for k in kept]

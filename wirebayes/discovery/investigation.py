@@ -6,9 +6,7 @@ from wirebayes.discovery import shrinking
 from wirebayes.discovery.alternatives import Alternative
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
-from wirebayes.json_files.discovery import (
-    DiscoveryJson,
-)
+from wirebayes.json_files.discovery import DiscoveryJson
 from wirebayes.wire.effect import Effect
 
 

@@ -7,9 +7,7 @@ import numpy as np
 
 from wirebayes.discovery.probes import Probe, forms
 from wirebayes.discovery.scans import Scan
-from wirebayes.discovery.screening import (
-    Candidate,
-)
+from wirebayes.discovery.screening import Candidate
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.model import likelihoods
 from wirebayes.numeric.typing import Array

@@ -8,13 +8,7 @@ from wirebayes.discovery import smooth_reference
 from wirebayes.discovery.noise_integral import Expansion, project, without_and_with, without_tangent
 from wirebayes.discovery.probes import Probe, forms
 from wirebayes.discovery.scans import Pieces, Scan, joined
-from wirebayes.discovery.tangent import (
-    around_points,
-    block_diagonal,
-    moving_columns,
-    points_of,
-    tangent_of,
-)
+from wirebayes.discovery.tangent import around_points, block_diagonal, moving_columns, points_of, tangent_of
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.log_sum import log_sum

@@ -13,16 +13,9 @@ from wirebayes.discovery.judgement import Evidence, Judgement, judge
 from wirebayes.discovery.model_space import smallest_set
 from wirebayes.discovery.naming import Named
 from wirebayes.discovery.settings import REMAINS
-from wirebayes.discovery.verdict import (
-    accepted_effects,
-    evidence,
-)
+from wirebayes.discovery.verdict import accepted_effects, evidence
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
-from wirebayes.json_files.discovery import (
-    Disagreement,
-    Remainder,
-    Verdict,
-)
+from wirebayes.json_files.discovery import Disagreement, Remainder, Verdict
 from wirebayes.processes.workers import ParallelMap
 
 # of a material that the global test has cleared

@@ -87,6 +87,11 @@ class ModelPosterior:
         return family_of(name, self.families)
 
     @property
+    def weights(self) -> dict[frozenset[str], float]:
+        """Probability of each set by its names, without a remainder or with one."""
+        return {s.key: w for s, w in zip(self.sets, (self.without + self.beside).tolist(), strict=True)}
+
+    @property
     def best(self) -> EffectSet:
         """The most probable set of those that begin with the most probable first family, and in it the first name."""
         sets = list(zip((self.without + self.beside).tolist(), self.sets, strict=True))

@@ -13,10 +13,7 @@ from wirebayes.discovery.name_evidence import NameEvidence, reaches, weigh_names
 from wirebayes.discovery.noise_integral import Expansion
 from wirebayes.discovery.settings import Settings
 from wirebayes.discovery.stepwise import explore
-from wirebayes.discovery.verdict import (
-    Decision,
-    decide,
-)
+from wirebayes.discovery.verdict import Decision, decide
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.processes.workers import ParallelMap
 

@@ -12,12 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.discovery.tangent import (
-    LARGEST_SLOPE,
-    Tangent,
-    damp,
-    whitened,
-)
+from wirebayes.discovery.tangent import LARGEST_SLOPE, Tangent, damp, whitened
 from wirebayes.numeric.linear_algebra import cholesky
 from wirebayes.numeric.typing import Array
 

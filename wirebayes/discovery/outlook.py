@@ -10,10 +10,7 @@ from wirebayes.discovery.material_answer import MaterialAnswer
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.settings import Settings
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.json_files.discovery import (
-    DetectableAmplitude,
-    Outlook,
-)
+from wirebayes.json_files.discovery import DetectableAmplitude, Outlook
 from wirebayes.wire.effect import Effect
 
 

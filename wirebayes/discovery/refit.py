@@ -25,7 +25,7 @@ LARGEST = 40.0
 _FARTHER = np.array([1.3, 1.7, 2.3])  # times an end's distance from neutral, where the top lies at an end
 _OUTWARD = 6  # times that the grid may grow outwards so: 150-fold in all
 _ROUNDING = 1e-9  # of a reach, which a grid may end on
-_TOP = 1.0  # nats; neighbours alone may lie so close that their values' last digits decide
+_NEAR_TOP = 1.0  # nats below it that a parabola is fitted to; neighbours alone may differ in their last digits only
 _LEAST_INSIDE = 1e-3  # of a parabola; one farther outside the prior's ends is not the profile's
 # δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice. The scan's unit
 # may be too large where the parameters bend themselves to the effect, so that it begins below what could be seen.
@@ -370,7 +370,7 @@ def _top(grid: Array, value: Array, best: int, per_delta: float) -> _Top | None:
     None where there is no such parabola: the best lies at an end, as of an amplitude that cannot go further.
     """
     if 0 < best < len(grid) - 1:
-        near = (value > value[best] - _TOP) & np.isfinite(value)
+        near = (value > value[best] - _NEAR_TOP) & np.isfinite(value)
         near[best - 1 : best + 2] = True
         x, y = (grid[near] - grid[best]) / per_delta, value[near] - value[best]
         if np.isfinite(y).all():

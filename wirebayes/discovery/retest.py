@@ -11,12 +11,7 @@ from wirebayes.discovery.global_test import is_close, with_more
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import ModelPosterior
 from wirebayes.discovery.screening import Replicates
-from wirebayes.discovery.settings import (
-    ALPHA_AFTER,
-    GIVE_WAY,
-    MOST_RETESTS,
-    RETESTS,
-)
+from wirebayes.discovery.settings import ALPHA_AFTER, GIVE_WAY, MOST_RETESTS, RETESTS
 from wirebayes.json_files.discovery import Disagreement
 from wirebayes.processes.workers import ParallelMap
 
@@ -77,7 +72,7 @@ def complete(
     parallel_map : function
         The built-in `map`, or one over processes.
     """
-    weights = {s.key: float(w) for s, w in zip(found.sets, found.without + found.beside, strict=True)}
+    weights = found.weights
     least = weights[best.effects.key] * np.exp(-GIVE_WAY)
     near = [k for k, w in sorted(weights.items(), key=lambda item: -item[1]) if k in explored.fitted and w > least]
     failed: set[Key] = set()

@@ -14,13 +14,7 @@ from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence
 from wirebayes.discovery.model_space import EffectSet, ModelPosterior
 from wirebayes.discovery.retest import Retest, complete, fails, retested
-from wirebayes.discovery.settings import (
-    ALPHA_AFTER,
-    KEEP_ELPD,
-    LEAST_HOLDS,
-    P_SLOPE,
-    Settings,
-)
+from wirebayes.discovery.settings import ALPHA_AFTER, KEEP_ELPD, LEAST_HOLDS, P_SLOPE, Settings
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import ParallelMap
@@ -132,9 +126,8 @@ def _best_fitted(found: ModelPosterior, explored: Explored) -> FittedSet | None:
     """The most probable set, if effects are in it; where a chain of refits is all that is known of it, the next one."""
     if not found.best.names or found.best.key in explored.fitted:
         return explored.fitted.get(found.best.key)
-    weights = zip(found.without + found.beside, (explored.fitted.get(s.key) for s in found.sets), strict=True)
-    known = [(weight, s) for weight, s in weights if s is not None]
-    return max(known, key=lambda item: item[0])[1] if known else None
+    weights = {key: weight for key, weight in found.weights.items() if key in explored.fitted}
+    return explored.fitted[max(weights, key=lambda key: weights[key])] if weights else None
 
 
 def _more_beside(sets: Sequence[EffectSet], without: Array, beside: Array, alike: Sequence[int], odds: float) -> Array:
