@@ -1,9 +1,13 @@
 """Which tension sensor is at fault: tests at their thresholds, rates on drawn estimates, and a drawn robot."""
 
+import contextlib
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.sensors import named, to_json, weighed
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 
@@ -78,3 +82,22 @@ def test_several_bad_sensors_are_said_without_a_name():
     found = weighed(*_estimate(np.array([20.0, 20.0, 0, 0]), np.eye(4)), PRIOR_N)
     assert [notice.text[:24] for notice in named(found)] == ["several tension sensors "]
     assert to_json(found)["wires"] == []
+
+
+@pytest.mark.parametrize(("read", "looked_at"), [(1, 0), (2, 1)])
+def test_at_a_single_hold_no_sensor_is_looked_at(read, looked_at, monkeypatch):
+    """An error of a sensor and one of a length look the same there."""
+    began = []
+
+    def begun(*given, **changed):
+        began.append(changed)
+        raise StopIteration
+
+    monkeypatch.setattr(sensors, "replace", begun)  # the first step of a search
+    found = SimpleNamespace(
+        unknowns=SimpleNamespace(prior=SimpleNamespace(bias_sd_N=0.0), errors=None), noise=SimpleNamespace(joint_m=0.0)
+    )
+    tension = np.where(np.arange(3)[:, None] < read, 5.0, np.nan) * np.ones((3, 4))
+    with pytest.raises(StopIteration) if looked_at else contextlib.nullcontext():
+        sensors.suspects(found, SimpleNamespace(tension_N=tension))
+    assert len(began) == looked_at

@@ -171,13 +171,10 @@ def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: Cal
 
 
 def _at_fault(robot: Robot, prior: LengthPrior, session: Session, readings: Floats) -> sensors.Suspects | None:
-    """Which sensor would explain what contradicts; None where sensors have a bias already, or nothing converged.
-
-    At a single hold an error of a sensor and one of a length look the same.
-    """
+    """Which sensor would explain what contradicts; None where sensors have a bias already, or nothing converged."""
     holds = int(session.read.sum())
     widest = session.tension_sd_N * float(readings[: holds * robot.legs].max(initial=0.0))  # no more than it ever read
-    if holds < 2 or prior.bias_sd_N > 0 or not widest > 0:
+    if holds < sensors.LEAST_HOLDS or prior.bias_sd_N > 0 or not widest > 0:
         return None
     other = calibrate(robot, replace(prior, bias_sd_N=widest), session, readings[None])
     if not other.converged[0]:

@@ -19,6 +19,7 @@ from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.whole import estimate
 
+LEAST_HOLDS = 2  # read: at a single one an error of a sensor and one of a length look the same
 _TRIES, _STILL = 3, 0.5  # searches, and standard deviations: along a narrow valley the last steps change little
 _MOST = 0.8  # of what contradicts: two sensors as bad as each other explain half of it each
 
@@ -88,7 +89,7 @@ def suspects(found: Whole, holds: Holds) -> Suspects | None:
     """
     unknowns = found.unknowns
     read = np.isfinite(holds.tension_N)
-    if unknowns.prior.bias_sd_N > 0 or not read.all(1).any():
+    if unknowns.prior.bias_sd_N > 0 or read.all(1).sum() < LEAST_HOLDS:
         return None
     widest = float(holds.tension_N[read].max())  # no sensor is off by more than it ever read
     if not widest > 0:
