@@ -18,7 +18,7 @@ from wirebayes.json_files.pose import Drift, PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
-from wirebayes.json_files.values import UNITS, Quantiles
+from wirebayes.json_files.values import UNITS, Quantiles, Statistics
 from wirebayes.sentences import (
     counted,
     families_said,
@@ -403,20 +403,22 @@ def batch_in_sentences(found: BatchJson) -> list[str]:
 
 def _stiffnesses(rows: Sequence[Row]) -> str:
     """Of the materials with most specimens: k1, and how far specimens differ, or how well a single one is known."""
-    known = [row for row in rows if row["material"] and "k1" in row["parameters"]]
-    materials = [material for material, _ in Counter(row["material"] for row in known).most_common(_MOST_MATERIALS)]
-    said = []
-    for material in materials:
-        stiff = [row["parameters"]["k1"] for row in known if row["material"] == material]
-        medians = [each["q50"] for each in stiff]
-        if len(stiff) == 1:
-            of, among = f"k1 of {material}", "90 % interval"
-            shown = quantity(medians[0], stiff[0]["q05"], stiff[0]["q95"], "N")
-        else:
-            of, among = f"median k1 of {material}", "least to largest specimen"
-            shown = quantity(float(np.median(medians)), min(medians), max(medians), "N")
-        said.append(f"{of} {shown[:-1]}, {among})")
+    each: dict[str, list[Statistics]] = {}
+    for row in rows:
+        if row["material"] and "k1" in row["parameters"]:
+            each.setdefault(row["material"], []).append(row["parameters"]["k1"])
+    largest = sorted(each, key=lambda material: -len(each[material]))[:_MOST_MATERIALS]
+    said = [_stiffness(material, each[material]) for material in largest]
     return f"; {', '.join(said)}" if said else ""
+
+
+def _stiffness(material: str, each: Sequence[Statistics]) -> str:
+    """k1 of the specimens of one material."""
+    medians = [k1["q50"] for k1 in each]
+    if len(each) == 1:
+        return f"k1 of {material} {number(medians[0])} N ({span(each[0]['q05'], each[0]['q95'])}, 90 % interval)"
+    middle, among = number(float(np.median(medians))), "least to largest specimen"
+    return f"median k1 of {material} {middle} N ({span(min(medians), max(medians))}, {among})"
 
 
 _MOST_MATERIALS = 2  # whose stiffness a first sentence has room for

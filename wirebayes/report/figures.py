@@ -20,6 +20,7 @@ from wirebayes.wire.protocol import Control, Protocol
 CHAIN, HOLD, QUIET, INK = "#30506d", "#c8553d", "#b9bec4", "#1d2226"
 COLOURS = {"chain": CHAIN, "hold": HOLD}
 WORDS = {"chain": "holds as one chain", "hold": "hold by hold"}
+HALF_90 = 1.645  # standard deviations on either side of a mean that hold 90 %
 _SIZE = (4.7, 3.4)  # inches: two panels stand side by side on a page
 
 

@@ -14,6 +14,7 @@ from wirebayes.model.problem import FINEST, Sample
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.results.prior_influence import leaning
+from wirebayes.sentences import short
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 
 LOOSE_STEPS = 0.35  # setting error over the typical step, which its prior ends at a half of: it presses against that
@@ -147,15 +148,10 @@ def endless(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
     begins, ends = (np.median((hazard / own["k2"]) ** (1.0 / own["N"])) for hazard in (_TENTH, _NINE_TENTHS))
     return (
         "the readings want creep spread over many decades of time, as a power law or the logarithm of time has it: at "
-        f"N = {exponent:.2g} a tenth is reached after {_rounded(begins)} s and nine tenths after {_rounded(ends)} s; "
+        f"N = {exponent:.2g} a tenth is reached after {short(begins, 1)} s and nine tenths after {short(ends, 1)} s; "
         "shown is the stretched exponential nearest to it, good for the times that were read: the stiffness before the "
         "first reading, creep long after the last and final creep are extrapolated"
     )
-
-
-def _rounded(value: float) -> str:
-    """One digit, and no power of ten where that can be read."""
-    return f"{float(f'{value:.1g}'):g}"
 
 
 def unchanged_prior(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:

@@ -6,9 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wirebayes.json_files.calibrate import EstimatedLengths
-from wirebayes.report.figures import CHAIN, HOLD, QUIET, legend_below, panel
+from wirebayes.report.figures import CHAIN, HALF_90, HOLD, QUIET, legend_below, panel
 
-_HALF = 1.645  # standard deviations on either side of a mean that hold 90 %
 _APART = 0.16  # of a wire's place, by which the two models stand beside each other
 
 
@@ -23,7 +22,7 @@ def reference_errors(creep: EstimatedLengths, hooke: EstimatedLengths, prior_sd_
         Standard deviation of these errors before the session, mm.
     """
     figure, axes = panel("wire", "error of the reference length, mm", size=(7.0, 3.4))
-    half = _HALF * prior_sd_mm
+    half = HALF_90 * prior_sd_mm
     axes.axhspan(-half, half, color=QUIET, alpha=0.25, lw=0, label="before, 90 %")
     axes.axhline(0.0, color=QUIET, lw=0.8)
     for result, place, colour, label in (
@@ -33,7 +32,7 @@ def reference_errors(creep: EstimatedLengths, hooke: EstimatedLengths, prior_sd_
         error: Any = result["reference_error_mm"]
         mean, sd = (np.array(error[key], float) for key in ("mean", "sd"))
         wires = np.arange(1, len(mean) + 1)
-        axes.errorbar(wires + place, mean, _HALF * sd, fmt="o", ms=4, color=colour, label=label)
+        axes.errorbar(wires + place, mean, HALF_90 * sd, fmt="o", ms=4, color=colour, label=label)
     axes.set_xticks(wires, [str(wire) for wire in wires])
     legend_below(figure, axes, 3)
     return figure

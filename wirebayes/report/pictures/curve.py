@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest, chain_course
-from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET
+from wirebayes.report.figures import CHAIN, HALF_90, HOLD, INK, QUIET
 from wirebayes.results.read_back import Stored
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol
@@ -179,7 +179,7 @@ def draw_readings(axes: Any, stored: Stored, found: Curve) -> None:
 
 def _left_over(axes: Any, stored: Stored, found: Curve) -> None:
     x, (j, r) = _places(stored, found)
-    width = 1.645 * found.noise
+    width = HALF_90 * found.noise
     axes.axhspan(-width, width, color=CHAIN, alpha=0.15, lw=0, label="90 % of the readings' own error")
     axes.axhline(0.0, color=QUIET, lw=0.8)
     axes.plot(x, stored.sample.readings[j, r, 0] - found.at_readings[j, r], "o", color=HOLD, ms=3)
