@@ -1,5 +1,8 @@
+import re
+
 import numpy as np
 
+from wirebayes.report.blocks import svg
 from wirebayes.report.pictures.robot import platform_edges
 from wirebayes.report.pictures.robot_space import workspace_maps
 from wirebayes.robot.motion.claim import WorkspaceDrift
@@ -28,3 +31,15 @@ def test_a_flat_workspace_is_mapped_in_its_own_plane():
         (panel,) = [axes for axes in maps["drift"].axes if axes.get_label() != "<colorbar>"]
         assert (panel.get_xlabel(), panel.get_ylabel()) == (f"{across}, m", "z, m")
         np.testing.assert_allclose(panel.collections[0].get_array().ravel(), [0, 2, 4, 1, 3, 5])
+
+
+def test_the_labels_of_a_map_lie_inside_its_picture():
+    place = np.linspace(-0.24, 0.24, 7)
+    where = np.array([[x, y, z] for z in (0.4, 0.6, 0.8) for y in place for x in place])
+    drift = 1e-3 * (where[:, 2:] + where[:, :1] ** 2)
+    still = np.zeros_like(drift)
+    figure = workspace_maps(WorkspaceDrift(where, drift, still, np.ones((len(where), 2)), 1.0, 1.0))["drift"]
+    found = re.findall(r'font-size: (\d+)px[^>]* x="([\d.-]+)"[^>]*rotate\(-90[^>]*>y, m<', svg(figure).decode())
+    assert len(found) == 3
+    for size, right in found:  # letters turned by a quarter rise to the left of their line, by less than their size
+        assert float(right) >= 0.8 * float(size)

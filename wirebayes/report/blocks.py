@@ -241,6 +241,8 @@ def _lay_out(figure: Figure) -> None:
     dpi = figure.dpi
     figure.dpi = FigureCanvasSVG.fixed_dpi
     engine.execute(figure)
+    if any(axes.get_aspect() != "auto" for axes in figure.axes):
+        engine.execute(figure)  # axes of one scale both ways are not yet where they were measured
     figure.dpi = dpi
     figure.set_layout_engine(None)
 
