@@ -93,17 +93,17 @@ def project(x: Expansion, *, with_signatures: bool = False) -> Projected:
     taken[~regular] = 0.0
     residual, signatures, flexible = taken[..., 0], taken[..., 1 : m + 1], taken[..., m + 1 :]
 
-    def whitened(plain: Array, one: Array, other: Array) -> Array:
+    def in_metric(plain: Array, one: Array, other: Array) -> Array:
         """(n, k, c) products of columns, given those (n, c) without setting errors and the columns' levels."""
         return np.asarray(plain[:, None] - shrink @ (one * other))
 
     r, levels_m, levels_f = levels[..., p : p + 1], levels[..., of_m], levels[..., of_f]
     square = np.einsum("nim,nim->nm", x.signatures, x.signatures)
-    rr = whitened((x.residual**2).sum(axis=1)[:, None], r, r)[..., 0]
-    mr = whitened((x.residual[:, None] @ x.signatures)[:, 0], levels_m, r)
-    mm = whitened(square, levels_m, levels_m)
+    rr = in_metric((x.residual**2).sum(axis=1)[:, None], r, r)[..., 0]
+    mr = in_metric((x.residual[:, None] @ x.signatures)[:, 0], levels_m, r)
+    mm = in_metric(square, levels_m, levels_m)
     c = mm - np.einsum("nkpm,nkpm->nkm", signatures, signatures)
-    fr = whitened((x.residual[:, None] @ x.flexible)[:, 0], levels_f, r) - (residual[:, :, None] @ flexible)[:, :, 0]
+    fr = in_metric((x.residual[:, None] @ x.flexible)[:, 0], levels_f, r) - (residual[:, :, None] @ flexible)[:, :, 0]
     each = _slices(x.processes)
     smooth = [_Functions(x.flexible[..., own], flexible[..., own], levels_f[..., own]) for own in each]
     form = _Functions(x.signatures, signatures, levels_m)
@@ -152,6 +152,7 @@ def evidences(x: Expansion) -> tuple[Array, Array]:
 
 
 def without_and_with(x: Expansion, found: Projected) -> tuple[Array, Array]:
+    """(n, k) and (n, k, s) log evidence as `evidences` has them, of rows that all have a tangent."""
     shared, rss, degrees, least = found.shared, found.rss, x.degrees, x.least[:, None]
     plain = shared - 0.5 * degrees * np.log(np.maximum(rss, least))
     loose = []
