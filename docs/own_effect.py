@@ -5,7 +5,7 @@ from scipy import stats
 
 from wirebayes.inference.fit import fit
 from wirebayes.io import paper
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.wire.effect import Amplitude, Effect
 
 

@@ -9,7 +9,9 @@ from analyses.posterior.any_scale import REST, SHARES, Line, line, measured, und
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.problem import Likelihood, Problem, build
+from wirebayes.model.build import build
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import Likelihood
 from wirebayes.model.scales import NATURAL, Units
 from wirebayes.wire.effect import Effect
 

@@ -6,7 +6,7 @@ import pytest
 from analyses.benchmarks import measure, model
 from analyses.benchmarks.plain import ours
 from wirebayes.io import paper
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 
 
 def test_a_fit_is_timed_in_its_parts():

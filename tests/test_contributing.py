@@ -10,7 +10,8 @@ import typer
 from typer.testing import CliRunner
 
 from wirebayes.io.bench import labview
-from wirebayes.io.bench.convert import About, Choices, convert
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.convert import Choices, convert
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.paper import FOLDER
 from wirebayes.wire.model import Model

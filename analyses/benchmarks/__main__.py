@@ -15,7 +15,7 @@ import numpy as np
 from analyses.benchmarks import gradient, measure, model, parsed, plain
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 
 PEERS = {
     "NumPyro NUTS, natural": lambda p, s, t: gradient.numpyro_nuts(p, s, t, True),

@@ -25,7 +25,8 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
 from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import write_json
-from wirebayes.model.problem import Likelihood, build
+from wirebayes.model.build import build
+from wirebayes.model.sample import Likelihood
 from wirebayes.wire import compiled
 
 BATCH, REPEATS, SEEDS = 256, 7, 20

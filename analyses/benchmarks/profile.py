@@ -22,7 +22,7 @@ from wirebayes.discovery.search import discover
 from wirebayes.inference.fit import fit
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.paper import run
 
 HOME = str(Path(wirebayes.__file__).parent)

@@ -8,8 +8,10 @@ import numpy as np
 from analyses.calibration.simulation_based_calibration import one
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
-from wirebayes.model.problem import Likelihood, Problem, build, with_readings
+from wirebayes.model.build import build
+from wirebayes.model.problem import Problem, with_readings
 from wirebayes.model.replicate import readings
+from wirebayes.model.sample import Likelihood
 from wirebayes.model.scales import planned_scales
 from wirebayes.simulation.synthetic import PAPER_TIMES_S, Bench
 

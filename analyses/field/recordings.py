@@ -20,7 +20,8 @@ from scipy import stats
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.inference.rough_draws import draws
-from wirebayes.io.bench.convert import About, Converted, convert
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.convert import Converted, convert
 from wirebayes.io.bench.undecided import Choices
 from wirebayes.model.scales import NATURAL
 from wirebayes.numeric.typing import Floats

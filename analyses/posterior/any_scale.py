@@ -17,7 +17,7 @@ from analyses.resumable import study
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.numeric.frozen import frozen
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 

@@ -20,7 +20,8 @@ from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.likelihoods import chain, reading_variance
-from wirebayes.model.problem import MATERIAL, Problem
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import MATERIAL
 from wirebayes.simulation.synthetic import Bench, Simulated, Truth, draw
 from wirebayes.wire.staircase import linearise
 

@@ -16,8 +16,9 @@ from scipy import stats
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
+from wirebayes.model.build import build
 from wirebayes.model.prior import Prior
-from wirebayes.model.problem import Problem, build
+from wirebayes.model.problem import Problem
 from wirebayes.model.replicate import readings
 from wirebayes.prediction.held_out import LEVELS, held_out
 from wirebayes.processes.workers import workers

@@ -21,7 +21,8 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_json
 from wirebayes.json_files.plan import ExpectedWidth
-from wirebayes.model.problem import build, with_readings
+from wirebayes.model.build import build
+from wirebayes.model.problem import with_readings
 from wirebayes.model.replicate import readings
 from wirebayes.numeric.typing import Array
 from wirebayes.planning.widths import at_centre, expected_widths

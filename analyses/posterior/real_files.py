@@ -22,7 +22,7 @@ from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_json
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.typing import Array
 

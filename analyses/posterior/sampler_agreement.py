@@ -20,7 +20,8 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.inference.sampler import ensemble
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import Likelihood, build
+from wirebayes.model.build import build
+from wirebayes.model.sample import Likelihood
 from wirebayes.processes.workers import workers
 
 FIRST = 100

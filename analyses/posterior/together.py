@@ -13,7 +13,9 @@ from scipy import stats
 from wirebayes.effects import named
 from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import LENGTH_EXPONENT, MATERIAL, Problem, build
+from wirebayes.model.build import build
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL
 from wirebayes.prediction.leave_one_hold_out import LeftOut, smoothed_leave_one_hold_out
 from wirebayes.results.identifiability import identifiability
 

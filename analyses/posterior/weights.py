@@ -12,7 +12,7 @@ import numpy as np
 from analyses.posterior.any_scale import POLICY, SHARES, Line, line, measured, under_steps, under_weights
 from analyses.resumable import study
 from wirebayes.inference.fit import fit, seed_of
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.numeric.typing import Array
 
 KINDS = ("steps", "weights", "together")

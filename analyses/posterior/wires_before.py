@@ -26,7 +26,7 @@ def fits_here(seed: int) -> dict[str, Any]:
     """All fits by this process's package."""
     from wirebayes.inference.fit import fit
     from wirebayes.io.paper import experiments
-    from wirebayes.model.problem import build
+    from wirebayes.model.build import build
 
     out = {}
     for experiment in experiments():

@@ -17,7 +17,7 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import DEFAULT
 from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.state import Sampling, State
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.numeric.resampling import effective_number
 from wirebayes.processes.workers import workers
 

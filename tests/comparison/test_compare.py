@@ -15,7 +15,7 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import linearise, simulate
 

@@ -17,7 +17,7 @@ from wirebayes.comparison.compare import Task, judge, side_by_side, stacking
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.prediction.held_out import HeldOut, Scores
 
 PLAIN = Candidate(BASE, "", "")

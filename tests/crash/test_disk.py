@@ -15,7 +15,7 @@ from wirebayes.cli import main
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import Fit, fit
 from wirebayes.io.run_folder import open_run
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.results import store
 
 ROOT = Path(__file__).parents[2]

@@ -14,7 +14,7 @@ from tests.simulated import simulated_tests
 from wirebayes.discovery import held_out
 from wirebayes.effects import named
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.model.scales import Scales
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.model import Model

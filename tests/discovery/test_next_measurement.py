@@ -10,7 +10,7 @@ import pytest
 from wirebayes.discovery import next_measurement as module
 from wirebayes.discovery.next_measurement import alternatives
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.model.scales import NATURAL
 from wirebayes.wire.protocol import Protocol
 

@@ -5,7 +5,7 @@ import pytest
 
 from tests.rescaled import drawn
 from wirebayes.discovery.residual_patterns import COVARIATES, Pattern, _sentence
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 
 
 @pytest.mark.parametrize(

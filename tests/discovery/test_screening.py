@@ -13,7 +13,7 @@ from wirebayes.discovery.screening import Scale, candidate_probes
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 
 
 @pytest.mark.parametrize(("exponent", "missing"), [(1.0, set()), (stats.norm(1.0, 1.0), {"length_dependence@B"})])

@@ -12,7 +12,7 @@ from wirebayes.discovery.held_out import HeldOut, gap_closed, last_third
 from wirebayes.discovery.shrinking import _compared, _Gain
 from wirebayes.effects import named
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.wire.staircase import simulate
 
 

@@ -14,7 +14,7 @@ from wirebayes.discovery.power import amplitude_80
 from wirebayes.discovery.refit import LARGEST, occam
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.wire.staircase import simulate
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4, "sensor_sd": 0.01, "setting_sd": 1e-9}

@@ -10,11 +10,12 @@ import numpy as np
 from tests.conftest import CSV, TOML
 from wirebayes.commands.import_robot import import_robot
 from wirebayes.io import plan_file
-from wirebayes.io.bench.convert import About, convert
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.convert import convert
 from wirebayes.io.bench.undecided import Choices
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.readings import protocol_holds, protocol_table
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.self_calibration import session_file
 

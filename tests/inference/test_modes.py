@@ -13,8 +13,9 @@ from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import search
 from wirebayes.io.paper import experiments
+from wirebayes.model.build import build
 from wirebayes.model.linear_amplitudes import integrated
-from wirebayes.model.problem import build, with_readings
+from wirebayes.model.problem import with_readings
 from wirebayes.numeric.spread_rows import spread_rows
 from wirebayes.prediction.left_out_density import without_hold
 from wirebayes.simulation.synthetic import Bench, Truth, draw

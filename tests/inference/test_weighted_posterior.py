@@ -13,7 +13,7 @@ from wirebayes.inference import weighted_posterior as module
 from wirebayes.inference.climb import Optimum
 from wirebayes.inference.weighted_posterior import overlooked, weighted_posterior, witnessed
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 
 D = 4
 TENTH = np.log([0.9, 0.1])  # of the mass, each in units of which it is normal

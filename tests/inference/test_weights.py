@@ -10,7 +10,7 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.model.scales import NATURAL
 from wirebayes.simulation.synthetic import Bench, Truth
 

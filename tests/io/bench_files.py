@@ -7,7 +7,8 @@ from pathlib import Path
 
 import openpyxl
 
-from wirebayes.io.bench.convert import About, Converted
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.convert import Converted
 from wirebayes.io.bench.convert import convert as convert_all
 from wirebayes.io.bench.undecided import Choices
 

@@ -6,7 +6,7 @@ import pytest
 import wirebayes as wb
 from tests.io.bench_files import convert
 from wirebayes.io import data_checks
-from wirebayes.io.bench.convert import About
+from wirebayes.io.bench.about import About
 from wirebayes.io.bench.undecided import Choices, Undecided
 from wirebayes.io.experiment_file import read_experiments
 

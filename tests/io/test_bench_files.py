@@ -5,7 +5,7 @@ import pytest
 
 import wirebayes as wb
 from tests.io.bench_files import convert
-from wirebayes.io.bench.convert import About
+from wirebayes.io.bench.about import About
 from wirebayes.io.bench.undecided import Choices, Undecided
 
 ROWS = [(h, 30 * i, 2.0 * h - 0.1 * i) for h in (1, 2, 3) for i in range(4)]

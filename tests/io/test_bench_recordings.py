@@ -9,7 +9,7 @@ import wirebayes as wb
 from analyses.field.recordings import Drive, imported
 from analyses.field.recordings import record as recorded
 from tests.io.bench_files import convert
-from wirebayes.io.bench.convert import About
+from wirebayes.io.bench.about import About
 from wirebayes.io.bench.plateaus import plateaus
 from wirebayes.io.bench.thinning import KEPT, MOST, thinned
 from wirebayes.io.bench.undecided import Choices

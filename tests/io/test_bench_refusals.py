@@ -8,7 +8,7 @@ import pytest
 import wirebayes as wb
 from tests.io.bench_files import convert, convert_all
 from wirebayes.cli import main
-from wirebayes.io.bench.convert import About
+from wirebayes.io.bench.about import About
 from wirebayes.io.bench.undecided import Choices, Undecided
 
 ABOUT = About("wire", "line", 1000.0)

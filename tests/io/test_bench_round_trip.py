@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import wirebayes as wb
 from tests.io.bench_files import Dialect, convert, write_text, write_workbook
-from wirebayes.io.bench.convert import About
+from wirebayes.io.bench.about import About
 from wirebayes.io.bench.undecided import Choices
 
 ABOUT = About("wire", "line", 800.0)

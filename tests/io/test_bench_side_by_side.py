@@ -3,7 +3,8 @@
 import pytest
 
 import wirebayes as wb
-from wirebayes.io.bench.convert import About, convert
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.convert import convert
 from wirebayes.io.bench.undecided import Choices, Undecided
 
 ABOUT = About("bench", None, 1000.0)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from wirebayes.errors import InputError
 from wirebayes.io.experiment_file import read_experiments, select
 from wirebayes.io.readings import protocol_holds, protocol_table, readings_of, readings_table
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 
 PAPER = Path(__file__).parents[2] / "data" / "paper"
 

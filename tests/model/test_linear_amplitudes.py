@@ -11,8 +11,8 @@ from wirebayes.effects import named
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
+from wirebayes.model.build import build
 from wirebayes.model.linear_amplitudes import MarginalisedProblem, completed, integrated
-from wirebayes.model.problem import build
 
 WIRES = {e.name: e for e in paper.experiments()}
 UNNAMED = "discrepancy@13:0.08:120.0"

@@ -14,7 +14,8 @@ from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.arrays import from_arrays
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.problem import build, unit_of_column
+from wirebayes.model.build import build
+from wirebayes.model.column_units import unit_of_column
 
 TIMES = (0.0, 30.0, 60.0, 120.0)
 STEPS, WEIGHTS = (1.0, 2.0, 3.0, 4.0, 5.0), (1.0, 2.0, 3.0, 4.0)

@@ -14,8 +14,10 @@ from wirebayes.effects.event import GripSlip
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import single_holds
+from wirebayes.model.build import build
 from wirebayes.model.prior import Prior
-from wirebayes.model.problem import Likelihood, build, with_protocols, with_readings
+from wirebayes.model.problem import with_protocols, with_readings
+from wirebayes.model.sample import Likelihood
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.model import Model
 

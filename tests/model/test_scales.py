@@ -11,7 +11,7 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.io.arrays import from_arrays
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.model.scales import NATURAL, Units, scales_of
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.simulation.synthetic import Bench, Truth, draw

@@ -9,7 +9,8 @@ from wirebayes.inference.climb import climb
 from wirebayes.inference.fit import fit
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
-from wirebayes.model.problem import build, with_readings
+from wirebayes.model.build import build
+from wirebayes.model.problem import with_readings
 from wirebayes.model.replicate import readings
 from wirebayes.planning import widths
 from wirebayes.planning.widths import at_centre, expected_widths, typical_tension

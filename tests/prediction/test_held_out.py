@@ -11,7 +11,7 @@ from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.prediction.held_out import Scores, _log_mean, _scores, held_out, pit_band, two_thirds
 from wirebayes.wire.staircase import simulate
 

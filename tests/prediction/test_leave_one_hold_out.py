@@ -12,7 +12,8 @@ from scipy.special import expit
 
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import Problem, build
+from wirebayes.model.build import build
+from wirebayes.model.problem import Problem
 from wirebayes.prediction import leave_one_hold_out as module
 from wirebayes.prediction.leave_one_hold_out import (
     REFIT,

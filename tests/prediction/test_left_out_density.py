@@ -15,7 +15,8 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import ensemble
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import Problem, build
+from wirebayes.model.build import build
+from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL, Units
 from wirebayes.prediction import left_out_density as module
 from wirebayes.prediction.leave_one_hold_out import log_mean, smoothed_leave_one_hold_out

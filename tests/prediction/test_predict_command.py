@@ -15,7 +15,7 @@ from wirebayes.commands.wires import read_robot, wire_draws
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.results.read_back import load
 from wirebayes.results.store import save
 from wirebayes.robot.mechanics.draws import warnings

@@ -10,7 +10,7 @@ from wirebayes.effects import named
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
 from wirebayes.model import single_holds
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.prediction import predictive
 from wirebayes.prediction.predictive import PredictionRequest, _regressed, predict, settings_given_readings
 from wirebayes.wire.staircase import simulate

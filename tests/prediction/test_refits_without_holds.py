@@ -6,7 +6,7 @@ import pytest
 from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.prediction.leave_one_hold_out import LARGEST_K, smoothed_leave_one_hold_out
 from wirebayes.prediction.left_out_density import without_hold
 

@@ -9,7 +9,7 @@ from wirebayes.effects import named
 from wirebayes.errors import InputError
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.readings import protocol_table
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.prediction.request import request_of
 from wirebayes.results.read_back import Stored
 from wirebayes.strict.table import Table

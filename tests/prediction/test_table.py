@@ -9,7 +9,7 @@ from scipy import stats
 
 from tests.model.dense import normal
 from tests.simulated import simulated_tests
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.prediction import table as module
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.prediction.table import beyond_tested, dataset, header, mixture_table

@@ -1,6 +1,7 @@
 """What a page says first: grave warnings, then the answer with number, unit and interval."""
 
-from wirebayes import answers, sentences
+from wirebayes import sentences
+from wirebayes.answers import headline
 from wirebayes.notice import Notice
 from wirebayes.report.blocks import Notices, Page, Section, Text
 from wirebayes.report.page import render
@@ -22,13 +23,13 @@ def test_grave_warnings_stand_before_the_answer_and_once() -> None:
 
 
 def test_the_answer_of_a_fit_has_number_unit_and_interval() -> None:
-    said = answers.fit_in_a_sentence(SUMMARY)  # type: ignore[arg-type]
+    said = headline.fit_in_a_sentence(SUMMARY)  # type: ignore[arg-type]
     assert said == (
         "kite creeps by 1.23 mm (1.10 … 1.40) within two minutes under 4.5 N, and its stiffness is 882 N "
         "(850 … 910) per unit of strain; intervals hold 90 %."
     )
     failed = SUMMARY | {"model_check": {"passed": False}}
-    assert answers.fit_in_a_sentence(failed).startswith("If the model were right: ")  # type: ignore[arg-type]
+    assert headline.fit_in_a_sentence(failed).startswith("If the model were right: ")  # type: ignore[arg-type]
 
 
 def test_a_comparison_is_a_ranking_in_words() -> None:
@@ -38,12 +39,12 @@ def test_a_comparison_is_a_ranking_in_words() -> None:
         {"name": "ageing", "failed": "no fit", "difference": None},
     ]
     table = {"base": "plain", "models": rows}
-    assert answers.comparison_in_words("a", table) == (  # type: ignore[arg-type]
+    assert headline.comparison_in_words("a", table) == (  # type: ignore[arg-type]
         "a: toe predicts left-out holds best, by 12 ± 3.2 in elpd against plain; then comes plain."
     )
     for elpd, se, chance in ((4.0, 2.0, False), (3.99, 0.1, True), (12.3, 6.2, True)):
         rows[0]["difference"] = {"elpd": elpd, "se": se}
-        said = answers.comparison_in_words("a", table)  # type: ignore[arg-type]
+        said = headline.comparison_in_words("a", table)  # type: ignore[arg-type]
         assert ("against plain, which may be chance; then" in said) == chance
 
 
@@ -56,13 +57,13 @@ def test_a_batch_says_a_sentence_a_finding_and_no_plural_of_one() -> None:
         row | {"name": "b", "parameters": stiff[1], "verdict": "named", "effects": ["toe"]},
     ]
     found = {"experiments": rows, "outliers": []}
-    assert answers.batch_in_sentences(found) == [  # type: ignore[arg-type]
+    assert headline.batch_in_sentences(found) == [  # type: ignore[arg-type]
         "2 tests of one material, 2 converged; median k1 of m 915 N (900 … 930, least to largest specimen).",
         "Nothing is missing in one test.",
         "Toe: in one test (b).",
     ]
     rows.append(row | {"name": "c", "parameters": stiff[2], "material": "other"})
-    assert answers.batch_in_sentences(found)[0] == (  # type: ignore[arg-type]
+    assert headline.batch_in_sentences(found)[0] == (  # type: ignore[arg-type]
         "3 tests of 2 materials, 3 converged; median k1 of m 915 N (900 … 930, least to largest specimen), "
         "k1 of other 990 N (970 … 1\u202f010, 90 % interval)."
     )

@@ -18,7 +18,7 @@ from wirebayes.inference.fit import Fit, fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out
 from wirebayes.results import read_back, store
 

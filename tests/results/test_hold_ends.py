@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wirebayes.effects import named
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.results import hold_ends
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 from wirebayes.wire.effect import Effect

@@ -9,8 +9,8 @@ from scipy import stats
 
 from wirebayes.effects import named
 from wirebayes.io.paper import experiments
+from wirebayes.model.build import build
 from wirebayes.model.prior import Prior
-from wirebayes.model.problem import build
 from wirebayes.results import identifiability as module
 from wirebayes.results.identifiability import (
     SENSITIVE,

@@ -8,7 +8,8 @@ import pytest
 
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
-from wirebayes.model.problem import FINEST, build, with_readings
+from wirebayes.model.build import FINEST, build
+from wirebayes.model.problem import with_readings
 from wirebayes.report.pages.fit import _cautions
 from wirebayes.results import posterior_checks, store
 from wirebayes.simulation.synthetic import Bench, Truth, draw

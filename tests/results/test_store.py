@@ -10,7 +10,7 @@ from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment_file import read_experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.results import jobs, read_back, store
 from wirebayes.results.jobs import Job
 from wirebayes.results.summary import CREEP_TIMES_S

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from wirebayes.cli import main
-from wirebayes.model.problem import Sample
+from wirebayes.model.sample import Sample
 from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics import schema
 from wirebayes.wire.model import Model

@@ -11,7 +11,7 @@ from wirebayes.cli import main
 from wirebayes.effects import catalogue
 from wirebayes.inference.fit import fit
 from wirebayes.io import paper
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.results import read_back, store
 from wirebayes.robot.mechanics import rotation, schema
 

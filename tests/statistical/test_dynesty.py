@@ -6,7 +6,7 @@ import pytest
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 
 dynesty = pytest.importorskip("dynesty")
 

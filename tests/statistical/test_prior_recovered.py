@@ -8,7 +8,7 @@ from tests.statistical.targets import Silent
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.fit import fit, parameters_at
 from wirebayes.inference.policy import Policy
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 pytestmark = pytest.mark.statistical

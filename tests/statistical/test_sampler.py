@@ -17,7 +17,7 @@ from wirebayes.inference.sampler import burn_in, kept, moves, proposal, stop_rul
 from wirebayes.inference.sampler import state as sampler_state
 from wirebayes.inference.sampler.ensemble import sample
 from wirebayes.io import paper
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 
 pytestmark = pytest.mark.statistical
 SMALL = Policy(ensembles=4, walkers=48, ess=300.0, rounds=3, round_draws=2304, most_rounds=4, block=24, most_steps=240)

@@ -18,7 +18,7 @@ from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model import likelihoods, single_holds
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.wire import compiled
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.model import Model

@@ -22,7 +22,8 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes, write_csv, write_json, write_parquet
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
-from wirebayes.model.problem import MATERIAL, SAMPLE, build
+from wirebayes.model.build import build
+from wirebayes.model.sample import MATERIAL, SAMPLE
 from wirebayes.notice import Notice, from_json, named, to_json
 from wirebayes.processes.workers import as_finished, computing, executor
 from wirebayes.results.outliers import outliers

@@ -26,7 +26,7 @@ from wirebayes.io.data_checks import of_experiment
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
 from wirebayes.json_files.comparison import ComparisonJson, ModelJson
-from wirebayes.model.problem import Likelihood
+from wirebayes.model.sample import Likelihood
 from wirebayes.notice import Notice, named
 from wirebayes.processes.workers import computing
 from wirebayes.sentences import counted

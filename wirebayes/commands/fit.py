@@ -25,7 +25,8 @@ from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run
-from wirebayes.model.problem import Likelihood, build
+from wirebayes.model.build import build
+from wirebayes.model.sample import Likelihood
 from wirebayes.processes.workers import computing
 from wirebayes.results.jobs import Job, run
 from wirebayes.strict.files import PathLike

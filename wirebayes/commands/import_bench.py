@@ -10,7 +10,9 @@ from wirebayes._version import __version__
 from wirebayes.commands.options import above_zero, check_choice, without_breaks, words
 from wirebayes.errors import InputError
 from wirebayes.io import data_checks, gross_events
-from wirebayes.io.bench.convert import About, Converted, convert, default_name, toml_of
+from wirebayes.io.bench.about import About, default_name
+from wirebayes.io.bench.as_experiment import toml_of
+from wirebayes.io.bench.convert import Converted, convert
 from wirebayes.io.bench.undecided import Choices, Decimal, Specimens, TimeSince, Undecided
 from wirebayes.io.readings import READ
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text

@@ -25,7 +25,8 @@ from wirebayes.json_files.discovery import DiscoveryJson
 from wirebayes.json_files.plain import plain
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
 from wirebayes.json_files.values import Statistics
-from wirebayes.model.problem import MATERIAL, SAMPLE, Sample, build
+from wirebayes.model.build import build
+from wirebayes.model.sample import MATERIAL, SAMPLE, Sample
 from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.frozen import frozen
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables

@@ -11,7 +11,9 @@ from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import modes
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.problem import Likelihood, Problem, build
+from wirebayes.model.build import build
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import Likelihood
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
 
@@ -35,7 +37,7 @@ class Candidate:
     question, sentence : str
         What its comparison with the base answers, and what it says of the wire.
     law, history, likelihood
-        See `wirebayes.model.problem.build`.
+        See `wirebayes.model.build.build`.
     effects : tuple of str
         Keys; an event without its hold (``grip_slip``) stands for the hold with the most evidence in the training.
     fixed : dict

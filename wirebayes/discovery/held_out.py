@@ -11,8 +11,10 @@ from wirebayes.inference import rough_draws
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
+from wirebayes.model.build import build
 from wirebayes.model.linear_amplitudes import completed
-from wirebayes.model.problem import Problem, Sample, build
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect

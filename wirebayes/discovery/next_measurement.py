@@ -11,7 +11,8 @@ from wirebayes.discovery.noise_integral import projected
 from wirebayes.discovery.probes import Probe
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.model.problem import LENGTH_EXPONENT, Problem, with_protocols
+from wirebayes.model.problem import Problem, with_protocols
+from wirebayes.model.sample import LENGTH_EXPONENT
 from wirebayes.model.scales import NATURAL, Units
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.control import SET_UNIT

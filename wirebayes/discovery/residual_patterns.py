@@ -7,7 +7,8 @@ import numpy as np
 
 from wirebayes.discovery.scans import Scan
 from wirebayes.json_files.discovery import Disagreement
-from wirebayes.model.problem import Problem, Sample
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Control

@@ -20,8 +20,8 @@ from wirebayes.discovery.settings import ABOVE_COUNT, ONE_NAT, UPPER
 from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.climb import climb
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.model.problem import LENGTH_EXPONENT
 from wirebayes.model.replicate import readings as replicate
+from wirebayes.model.sample import LENGTH_EXPONENT
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.protocol import Protocol

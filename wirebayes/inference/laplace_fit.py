@@ -11,8 +11,10 @@ from wirebayes.inference.climb import Optimum, climb, curved
 from wirebayes.inference.log_posterior import Density, LogPosterior
 from wirebayes.inference.modes import modes
 from wirebayes.io.experiment import Experiment
+from wirebayes.model.build import build
+from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.linear_amplitudes import integrated
-from wirebayes.model.problem import Problem, build, unit_of_column
+from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL, Scales
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
@@ -153,7 +155,7 @@ def fitted(
     near : (d,) array, optional
         Parameters known to be good, in units of the scales: one more start.
     exponent : float or prior
-        That of the creep amount's growth with the sample's length (see `wirebayes.model.problem.build`).
+        That of the creep amount's growth with the sample's length (see `wirebayes.model.build.build`).
     scales : Scales, optional
         In whose units the fit is made; those of the experiments when left out.
 

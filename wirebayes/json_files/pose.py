@@ -321,3 +321,9 @@ class PoseJson(RobotOnWires):
     between_calibrations: NotRequired[list[BetweenCalibrations]]
     variance_shares: NotRequired[VarianceShares]
     workspace: NotRequired[Workspace | None]
+
+
+def known_at_the_end(drift: Drift) -> bool:
+    """Whether any draw holds the platform at the last time."""
+    middle = drift["distance_mm"]["q50"]
+    return middle is not None and middle[-1] is not None

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from wirebayes.model.problem import Problem, Sample
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import Sample
 from wirebayes.model.single_holds import hold_courses
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.staircase import simulate

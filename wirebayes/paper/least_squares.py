@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.problem import MATERIAL, Likelihood, default_prior
+from wirebayes.model.build import default_prior
+from wirebayes.model.sample import MATERIAL, Likelihood
 from wirebayes.model.scales import scales_of
 from wirebayes.model.single_holds import hold_courses
 from wirebayes.numeric.typing import Array

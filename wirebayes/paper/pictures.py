@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_bytes, write_json
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.numeric.typing import Array
 from wirebayes.paper import figures as paper_figures

@@ -13,7 +13,8 @@ from wirebayes.inference.policy import Policy, describe
 from wirebayes.io import paper
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, write_csv, write_json
-from wirebayes.model.problem import Likelihood, build
+from wirebayes.model.build import build
+from wirebayes.model.sample import Likelihood
 from wirebayes.numeric.typing import Array
 from wirebayes.paper import claim_steps, identification, pictures, section_4, verdicts
 from wirebayes.paper.held_out import HeldOut, held_out

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from wirebayes.model.problem import MATERIAL
+from wirebayes.model.sample import MATERIAL
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import MOST, contraction, interval
 from wirebayes.results.parameters import unit_of

@@ -10,8 +10,9 @@ import numpy as np
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.inference.rough_draws import draws as rough_draws
 from wirebayes.io.experiment import Experiment
+from wirebayes.model.build import default_prior
 from wirebayes.model.prior import from_table, possible
-from wirebayes.model.problem import MATERIAL, SAMPLE, default_prior
+from wirebayes.model.sample import MATERIAL, SAMPLE
 from wirebayes.model.scales import NATURAL, TYPICAL_K1_N, planned_scales
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array

@@ -16,7 +16,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import EffectPower
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.planning.widths import Guess, central
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History

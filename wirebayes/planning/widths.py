@@ -14,8 +14,10 @@ from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import Density, LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import ExpectedWidth
-from wirebayes.model.problem import MATERIAL, Problem, build
+from wirebayes.model.build import build
+from wirebayes.model.problem import Problem
 from wirebayes.model.replicate import readings
+from wirebayes.model.sample import MATERIAL
 from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.fresh import FreshSample

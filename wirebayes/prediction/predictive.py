@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.model import likelihoods, single_holds
-from wirebayes.model.problem import Problem, Sample
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.linear_algebra import eigh, solve
 from wirebayes.numeric.typing import Floats
 from wirebayes.wire.model import Model

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from wirebayes._version import __version__
 from wirebayes.inference.fit import Fit
 from wirebayes.io.readings import READ, SET, UNIT
-from wirebayes.model.problem import Problem, Sample
+from wirebayes.model.problem import Problem
 from wirebayes.model.replicate import readings as replicate
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.results.netcdf import Group, Variable
 from wirebayes.results.parameters import unit_of, variables

@@ -12,8 +12,10 @@ from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.json_files.hold_ends import HoldEnds, MovedByHoldEnds
 from wirebayes.json_files.values import UNITS
+from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.linear_amplitudes import integrated
-from wirebayes.model.problem import Problem, Sample, unit_of_column
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.sentences import listed, number, unit_text
 from wirebayes.wire.protocol import Protocol

@@ -10,7 +10,8 @@ from wirebayes.effects import catalogue, named
 from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
-from wirebayes.model.problem import Likelihood, build
+from wirebayes.model.build import build
+from wirebayes.model.sample import Likelihood
 from wirebayes.processes.workers import cores, workers
 from wirebayes.results.store import save, save_summary
 from wirebayes.wire.laws import ElasticLaw, History
@@ -30,7 +31,7 @@ class Job:
     own_effects : Path or None
         The user's Python file that some of them come from.
     law, history, likelihood, length_exponent
-        See `wirebayes.model.problem.build`.
+        See `wirebayes.model.build.build`.
     provenance : dict
     near : dict, optional
         Parameters known to be good (see `wirebayes.inference.fit.fit`).

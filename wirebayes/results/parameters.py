@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from wirebayes.json_files.values import UNITS
-from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import LENGTH_EXPONENT, Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Effect

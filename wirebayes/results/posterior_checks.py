@@ -10,7 +10,8 @@ import numpy as np
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.fit import Fit
 from wirebayes.io import data_checks
-from wirebayes.model.problem import FINEST, Sample
+from wirebayes.model.build import FINEST
+from wirebayes.model.sample import Sample
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.results.prior_influence import leaning

@@ -17,7 +17,8 @@ from wirebayes.errors import InputError
 from wirebayes.io.readings import READ, SET
 from wirebayes.io.run_folder import read_json, stored_results
 from wirebayes.model.prior import Prior
-from wirebayes.model.problem import LENGTH_EXPONENT, Problem, Sample, at_length
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import LENGTH_EXPONENT, Sample, at_length
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
 from wirebayes.results import netcdf

@@ -9,7 +9,7 @@ import numpy as np
 from wirebayes.inference.fit import Fit
 from wirebayes.io.run_folder import write_bytes, write_json
 from wirebayes.json_files.summary import SummaryJson
-from wirebayes.model.problem import Sample
+from wirebayes.model.sample import Sample
 from wirebayes.results import netcdf
 from wirebayes.results.content import groups_of
 from wirebayes.results.summary import summary_of

@@ -6,7 +6,7 @@ from typing import Any, get_args
 import numpy as np
 
 from wirebayes.model.prior import ABOVE_ZERO, NOT_BELOW_ZERO
-from wirebayes.model.problem import Likelihood, Sample
+from wirebayes.model.sample import Likelihood, Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.laws import ElasticLaw, History
 

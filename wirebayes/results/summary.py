@@ -7,7 +7,7 @@ from wirebayes.inference.fit import Fit
 from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.summary import Derived, Mixed, Parameter, SummaryJson
 from wirebayes.json_files.values import Statistics
-from wirebayes.model.problem import Sample
+from wirebayes.model.sample import Sample
 from wirebayes.notice import Notice, NoticeJson, to_json
 from wirebayes.numeric.typing import Array
 from wirebayes.results import hold_ends, posterior_checks

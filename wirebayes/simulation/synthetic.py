@@ -17,8 +17,10 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import READ, SET, Hold
 from wirebayes.io.run_folder import write_csv, write_json, write_text
 from wirebayes.json_files.truth import TrueWire, TruthJson
-from wirebayes.model.problem import Problem, Sample, build, with_readings
+from wirebayes.model.build import build
+from wirebayes.model.problem import Problem, with_readings
 from wirebayes.model.replicate import rounded
+from wirebayes.model.sample import Sample
 from wirebayes.model.scales import TYPICAL_K1_N, planned_scales
 from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.means import geometric_mean

@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from wirebayes import answers
+from wirebayes.answers import terminal
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.results import read_back
 
@@ -75,7 +75,7 @@ class Batch(Result[BatchJson]):
         }
 
     def lines(self) -> list[str]:
-        return answers.of_batch(self.summary())
+        return terminal.of_batch(self.summary())
 
     def next_step(self, given: Given = NOTHING) -> str:
         predicted = f"wirebayes predict {self.place.path} PROTOCOL.csv --experiment NAME"

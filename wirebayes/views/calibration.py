@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from wirebayes import answers
+from wirebayes.answers import terminal
 from wirebayes.json_files.calibrate import CalibrateJson
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ class Calibration(Result[CalibrateJson]):
     _content: ClassVar[str] = "calibration.json"
 
     def lines(self) -> list[str]:
-        return answers.of_calibration(self.summary())
+        return terminal.of_calibration(self.summary())
 
     def next_step(self, given: Given = NOTHING) -> str:
         robot, lengths = self.place.path / "robot.toml", self.place.path / "calibration.json"

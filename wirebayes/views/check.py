@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from wirebayes import answers
+from wirebayes.answers import terminal
 from wirebayes.json_files.check import CheckJson
 from wirebayes.sentences import counted, unit_text
 
@@ -29,7 +29,7 @@ class Check(Result[CheckJson]):
 
     def lines(self) -> list[str]:
         found = self.summary()["experiments"]
-        return [line for name, test in found.items() for line in answers.of_check(name, test)]
+        return [line for name, test in found.items() for line in terminal.of_check(name, test)]
 
     def next_step(self, given: Given = NOTHING) -> str:
         then = "once the warnings are settled" if self.warnings else f"then wirebayes discover {given.file}"

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from wirebayes import answers
+from wirebayes.answers import terminal
 from wirebayes.json_files.comparison import ComparisonJson
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class Comparison(Result[ComparisonJson]):
 
     def lines(self) -> list[str]:
         found = self.summary()["experiments"]
-        return [answers.of_comparison(name, table) for name, table in found.items()]
+        return [terminal.of_comparison(name, table) for name, table in found.items()]
 
     def next_step(self, given: Given = NOTHING) -> str:
         return f"wirebayes fit {given.file} with the options of the best model, or wirebayes discover {given.file}"

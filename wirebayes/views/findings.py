@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from wirebayes import answers
+from wirebayes.answers import terminal
 from wirebayes.errors import InputError
 from wirebayes.json_files.discovery import DiscoveryJson
 from wirebayes.results import read_back
@@ -91,7 +91,7 @@ class Findings(Result[DiscoveryJson]):
 
     def lines(self) -> list[str]:
         found = self.summary()["experiments"]
-        return [line for name, report in found.items() for line in answers.of_findings(name, report)]
+        return [line for name, report in found.items() for line in terminal.of_findings(name, report)]
 
     def next_step(self, given: Given = NOTHING) -> str:
         proposals = {name: found["next_measurement"] for name, found in self.report["experiments"].items()}

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
-from wirebayes import answers
+from wirebayes.answers import terminal
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.json_files.imported import ImportJson
@@ -38,7 +38,7 @@ class ImportedTests(Result[ImportJson]):
 
     def lines(self) -> list[str]:
         found = self.summary()["experiments"]
-        return [line for name, test in found.items() for line in answers.of_import(name, test)]
+        return [line for name, test in found.items() for line in terminal.of_import(name, test)]
 
     def next_step(self, given: Given = NOTHING) -> str:
         names = list(self.summary()["experiments"])

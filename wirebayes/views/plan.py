@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
-from wirebayes import answers
+from wirebayes.answers import terminal
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Plan(Result[PlanJson]):
         return self.protocols[0]
 
     def lines(self) -> list[str]:
-        return [line for row in self.protocols for line in answers.of_plan(row)]
+        return [line for row in self.protocols for line in terminal.of_plan(row)]
 
     def next_step(self, given: Given = NOTHING) -> str:
         best = self.best["words"] or f"the test {self.best['name']}"

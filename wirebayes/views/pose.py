@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from wirebayes import answers
+from wirebayes.answers import terminal
 from wirebayes.json_files.pose import PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.robot.mechanics.draws import specimens_in_words
@@ -13,7 +13,7 @@ from wirebayes.robot.mechanics.draws import specimens_in_words
 if TYPE_CHECKING:
     pass
 
-from wirebayes.answers import known_at_the_end
+from wirebayes.json_files.pose import known_at_the_end
 from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
 
 
@@ -35,7 +35,7 @@ class Pose(Result[PoseJson | PoseHistoryJson]):
         return (*specimens_in_words(self.summary()["wires"]), *super().messages)
 
     def lines(self) -> list[str]:
-        return answers.of_pose(self.summary())
+        return terminal.of_pose(self.summary())
 
     def next_step(self, given: Given = NOTHING) -> str:
         return _after_pose(self.summary(), self.place.path, given)

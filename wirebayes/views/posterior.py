@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from wirebayes import answers
+from wirebayes.answers import terminal
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, stored_results
 from wirebayes.json_files.summary import SummaryJson
@@ -152,7 +152,7 @@ class Posterior(Result[SummaryJson]):
             return tuple(notice.of(name) for notice in from_json(self.summary()["warnings"]))
 
     def lines(self) -> list[str]:
-        return answers.of_fit(self.summary())
+        return terminal.of_fit(self.summary())
 
     def next_step(self, given: Given = NOTHING) -> str:
         return _after_fit(self.kinds, self.place, self.folder, given)

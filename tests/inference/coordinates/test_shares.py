@@ -11,7 +11,8 @@ from wirebayes.inference.coordinates import shares
 from wirebayes.inference.coordinates.transform import Transformation
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.paper import experiments
-from wirebayes.model.problem import Problem, build
+from wirebayes.model.build import build
+from wirebayes.model.problem import Problem
 from wirebayes.wire.staircase import simulate
 
 

@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 from wirebayes.inference.coordinates.steps import Level
 from wirebayes.inference.coordinates.transform import Transformation
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 ONE_HOLD = draw([Bench(displacements_mm=(3.0,))], Truth({"k1": 800.0, "preload": 0.0}), seed=8).problem

@@ -10,7 +10,7 @@ from wirebayes.effects import named
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.coordinates.transform import Transformation
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate

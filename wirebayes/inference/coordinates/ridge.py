@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from wirebayes.inference.coordinates.columns import ONE_SD, Columns
 from wirebayes.inference.coordinates.power_of_tension import suiting_powers
 from wirebayes.inference.coordinates.shares import Elongation
-from wirebayes.model.problem import MATERIAL, Problem, Sample
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import MATERIAL, Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.wire import compiled
 from wirebayes.wire.effect import Effect, HoldContext, Placed

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.model.problem import Problem, Sample
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 
 

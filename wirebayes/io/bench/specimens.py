@@ -12,11 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.io.bench.columns import IGNORE, is_of, name_and_unit, speaks_of_a_quantity
+from wirebayes.io.bench.columns import IGNORE
+from wirebayes.io.bench.header import is_of, name_and_unit
 from wirebayes.io.bench.quantities import ROLES, Role
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Specimens, Undecided
 from wirebayes.io.bench.unread import speaks_of_specimens
+from wirebayes.io.bench.words import speaks_of_a_quantity
 from wirebayes.numeric.typing import Floats
 
 SAME_WIRE = 0.005  # of the range: two sensors of one wire agree so well, and two specimens hardly

@@ -7,7 +7,7 @@ three columns or more then are numbers with one unit, and one other column is wh
 import re
 from dataclasses import dataclass, replace
 
-from wirebayes.io.bench.columns import is_of, name_and_unit
+from wirebayes.io.bench.header import is_of, name_and_unit
 from wirebayes.io.bench.quantities import Role, unit_of
 from wirebayes.io.bench.sheet import Row, is_number
 from wirebayes.io.bench.table import RawTable

@@ -6,9 +6,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from wirebayes.errors import shown
-from wirebayes.io.bench.columns import Column, ignored, is_copy, plain
+from wirebayes.io.bench.columns import Column, ignored
+from wirebayes.io.bench.header import is_copy
 from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.words import plain
 from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import listed
 

@@ -4,7 +4,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers import batch_in_sentences
+from wirebayes.answers.headline import batch_in_sentences
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row

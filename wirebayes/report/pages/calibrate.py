@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.answers import calibration_in_a_sentence
+from wirebayes.answers.headline import calibration_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.calibrate import CalibrateJson, EstimatedLengths
 from wirebayes.report.blocks import (

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers import check_in_a_sentence, of_import
+from wirebayes.answers.headline import check_in_a_sentence
+from wirebayes.answers.terminal import of_import
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson
 from wirebayes.json_files.imported import ImportedExperiment, ImportJson

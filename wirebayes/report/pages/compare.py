@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers import comparison_in_words
+from wirebayes.answers.headline import comparison_in_words
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.comparison import ComparedModels, ComparisonJson
 from wirebayes.json_files.read_units import read, unit_read

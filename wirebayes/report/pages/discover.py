@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers import findings_in_a_sentence, in_other_tests
+from wirebayes.answers.headline import findings_in_a_sentence
+from wirebayes.answers.terminal import in_other_tests
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.discovery import Amplitude, DiscoveryJson, ExperimentFindings
 from wirebayes.json_files.read_units import read, unit_read

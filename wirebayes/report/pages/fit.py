@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from wirebayes.answers import fit_in_a_sentence
+from wirebayes.answers.headline import fit_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.summary import SummaryJson
-from wirebayes.model.problem import Sample
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.prediction.predictive import PredictionRequest, predict
 from wirebayes.report import figures

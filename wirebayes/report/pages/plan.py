@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers import plan_in_a_sentence
+from wirebayes.answers.headline import plan_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson
 from wirebayes.json_files.values import UNITS

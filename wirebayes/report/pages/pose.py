@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers import pose_in_a_sentence
+from wirebayes.answers.headline import pose_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.pose import PoseJson, TimeWithin, Tolerances
 from wirebayes.json_files.values import INTERVAL

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers import of_pose
+from wirebayes.answers.terminal import of_pose
 from wirebayes.json_files.pose_history import HistoryOfRobot, PoseHistoryJson
 from wirebayes.json_files.values import INTERVAL, Band, Numbers
 from wirebayes.report.blocks import (

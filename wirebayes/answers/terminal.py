@@ -1,52 +1,34 @@
 """The answer of every result in a few lines, with units: on a terminal, and in Python with `print`."""
 
 from collections import Counter
-from collections.abc import Sequence
 from textwrap import wrap
 from typing import cast
 
 import numpy as np
 
-from wirebayes.json_files.batch import BatchJson, Row
+from wirebayes.answers.verdict import verdict_in_words
+from wirebayes.json_files.batch import BatchJson
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckedExperiment, EffectSize, ParameterRange
 from wirebayes.json_files.comparison import ComparedModels
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.imported import ImportedExperiment
-from wirebayes.json_files.plan import JudgedProtocol, PlanJson
-from wirebayes.json_files.pose import Drift, PoseJson
+from wirebayes.json_files.plan import JudgedProtocol
+from wirebayes.json_files.pose import PoseJson, known_at_the_end
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
-from wirebayes.json_files.values import UNITS, Quantiles, Statistics
+from wirebayes.json_files.values import UNITS, Quantiles
 from wirebayes.sentences import (
     counted,
     families_said,
     likely,
-    listed,
-    number,
     p_in_words,
-    quantity,
     said_beside,
     short,
-    span,
     undecided,
     unit_text,
 )
-
-_NAMED = {
-    "nothing-missing": "nothing is missing",
-    "unknown": "something is missing that no effect in the catalogue explains",
-}
-
-# with fewer than three holds, where no effect of the catalogue can be established or ruled out
-_FEW_HOLDS = {"nothing-missing": "nothing stands out", "unknown": "something is missing; so few holds do not say what"}
-
-
-def _verdict_in_words(report: ExperimentFindings) -> str | None:
-    """Of a verdict without names; None for the others."""
-    few = any(warning["kind"] == "few-holds" for warning in report.get("warnings", []))
-    return (_FEW_HOLDS if few else _NAMED).get(report["verdict"])
 
 
 def of_fit(summary: SummaryJson) -> list[str]:
@@ -71,7 +53,7 @@ def _effects(summary: SummaryJson) -> list[str]:
 def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     """Of one experiment that something may be missing in: what, how large, and what it is worth."""
     verdict, effects = report["verdict"], ", ".join(report["effects"])
-    finding = _verdict_in_words(report) or f"{verdict}: {effects}"
+    finding = verdict_in_words(report) or f"{verdict}: {effects}"
     if verdict == "ambiguous":
         finding = f"ambiguous: {undecided(report) if families_said(report) else likely(report)}"
     if verdict == "partial":
@@ -120,8 +102,8 @@ def of_batch(found: BatchJson) -> list[str]:
     verdicts = Counter(row["verdict"] for row in rows if row["verdict"])
     if verdicts:
         lines.append("  " + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()))
-    lines += [f"  apart: {outlier['sentence']}" for outlier in far[:_MOST_LINES]]
-    return lines + ([f"  and {len(far) - _MOST_LINES} more outliers"] if len(far) > _MOST_LINES else [])
+    lines += [f"  apart: {outlier['sentence']}" for outlier in far[:MOST_OUTLIERS]]
+    return lines + ([f"  and {len(far) - MOST_OUTLIERS} more outliers"] if len(far) > MOST_OUTLIERS else [])
 
 
 def of_plan(row: JudgedProtocol) -> list[str]:
@@ -141,7 +123,7 @@ def of_plan(row: JudgedProtocol) -> list[str]:
     return lines
 
 
-_MOST_LINES = 10  # of outliers, on a terminal
+MOST_OUTLIERS = 10  # of outliers, on a terminal
 
 
 def of_check(name: str, test: CheckedExperiment) -> list[str]:
@@ -185,26 +167,6 @@ _SHOWS = {
     "if unusually large": "effects that would be detected if unusually large",
     "no": "effects that it cannot show",
 }
-
-
-def check_in_a_sentence(name: str, test: CheckedExperiment) -> str:
-    """The stiffness as a quick look has it, what only the prior says, and how many effects the test would show.
-
-    Parameters
-    ----------
-    name : str
-        Of the experiment.
-    test : dict
-    """
-    alone = [parameter for parameter, p in test["parameters"].items() if p["determined_by"] == "prior"]
-    known = "k1" not in alone
-    k1 = test["parameters"].get("k1")
-    said = [f"k1 is about {quantity(k1['q50'], k1['q05'], k1['q95'], k1['unit'])}"] if k1 and known else []
-    said += [f"it does not determine {listed(alone)}"] if alone else ["every parameter is determined by the readings"]
-    shown = sum(effect["shows"] == "yes" for effect in test["effects"].values())
-    said.append(f"it would show {shown} of {counted(len(test['effects']), 'effect')}")
-    many = f"{counted(test['recorded_holds'], 'hold')} with {counted(test['readings'], 'reading')}"
-    return f"{name}, {many}: {', '.join(said)}; intervals hold 90 %."
 
 
 def _size(effect: str, found: EffectSize) -> str:
@@ -282,210 +244,3 @@ def _with_unit(quantity: Parameter | ParameterRange) -> str:
 
 def _band(quantity: Quantiles | ParameterRange | None) -> str:
     return "-" if quantity is None else f"{quantity['q50']:.4g} [{quantity['q05']:.4g}, {quantity['q95']:.4g}]"
-
-
-def known_at_the_end(drift: Drift) -> bool:
-    """Whether any draw holds the platform at the last time."""
-    middle = drift["distance_mm"]["q50"]
-    return middle is not None and middle[-1] is not None
-
-
-def fit_in_a_sentence(summary: SummaryJson) -> str:
-    """How much the wire creeps and how stiff it is, with intervals.
-
-    Parameters
-    ----------
-    summary : dict
-    """
-    derived, k1 = summary["derived"], summary["parameters"].get("k1")
-    trusted = summary["converged"] and summary.get("model_check", {}).get("passed") is not False
-    doubt = "" if trusted else "If the model were right: "
-    creep = derived["creep_2min_mm"]
-    if creep is None or k1 is None:
-        return f"{doubt}{summary['experiment']}: the readings do not say how much this wire creeps."
-    stretched = quantity(creep["q50"], creep["q05"], creep["q95"], "mm")
-    stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
-    tension = f"{short(derived['tension_N'])} N"
-    return (
-        f"{doubt}{summary['experiment']} creeps by {stretched} within two minutes under {tension}, and its "
-        f"stiffness is {stiff} per unit of strain; intervals hold 90 %."
-    )
-
-
-def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
-    """What is missing, how large it is, and what it takes away of the error on holds that were not used.
-
-    Parameters
-    ----------
-    name : str
-        Of the experiment.
-    report : dict
-        Its part of ``discovery.json``.
-    """
-    effects = [effect.replace("_", " ") for effect in report["effects"]]
-    are = "are" if effects[1:] else "is"
-    candidates = likely(report, lambda effect: effect.replace("_", " "))
-    what = {
-        "nothing-missing": f"{_verdict_in_words(report)}: the plain model and its noise explain these readings",
-        "unknown": f"{_verdict_in_words(report)}"
-        + (f"; beside it most likely {candidates}, none of them established" if candidates else ""),
-        "ambiguous": undecided(report, lambda effect: effect.replace("_", " ")),
-        "named": f"{listed(effects)} {are} missing",
-        "partial": f"{listed(effects)} {are} missing, and something else that no effect in the catalogue explains",
-    }[report["verdict"]]
-    sizes = [quantity(a["mean"], a["q05"], a["q95"], a["unit"]) for a in report["amplitudes"].values()]
-    size = f", of size {listed(sizes)}" if sizes else ""
-    held = report["held_out"]
-    before, after = (read(held[model], "rmse") for model in ("plain", "final"))
-    gain = ""
-    if report["effects"] and before is not None and after is not None:
-        gain = f"; with {'them' if effects[1:] else 'it'} the error on unused holds goes from {number(before)} to "
-        gain += f"{number(after)} {unit_read(held['plain'])}"
-    sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
-    return f"{name}: {what}{size}{gain}{sure}."
-
-
-def comparison_in_words(name: str, table: ComparedModels) -> str:
-    """The ranking of the models.
-
-    Parameters
-    ----------
-    name : str
-        Of the experiment.
-    table : dict
-        Its part of ``comparison.json``.
-    """
-    good = [row for row in table["models"] if row["failed"] is None]
-    if not good:
-        return f"{name}: no model could be judged."
-    best, *others = good
-    gain = best["difference"]
-    against = ""
-    if gain is not None and best["name"] != table["base"]:
-        from wirebayes.comparison.compare import meaningful  # loaded by now, and by no other command
-
-        against = f", by {number(gain['elpd'], 2)} ± {number(gain['se'], 2)} in elpd against {table['base']}"
-        against += "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
-    come = "come" if others[1:] else "comes"
-    then = f"; then {come} {listed([row['name'] for row in others[:3]])}" if others else ""
-    rest = f" and {len(others) - 3} more" if len(others) > 3 else ""
-    return f"{name}: {best['name']} predicts left-out holds best{against}{then}{rest}."
-
-
-def batch_in_sentences(found: BatchJson) -> list[str]:
-    """A sentence a finding: how many were fitted, what is missing in which, which stand apart.
-
-    Parameters
-    ----------
-    found : dict
-    """
-    rows = found["experiments"]
-    materials = {row["material"] for row in rows if row["material"]}
-    kinds = f"{len(materials)} materials" if len(materials) > 1 else "one material"
-    failed = [row["name"] for row in rows if row["error"]]
-    many = _count(len(rows), "test")
-    converged = sum(bool(row["converged"]) for row in rows)
-    out = [f"{many[:1].upper()}{many[1:]} of {kinds}, {converged} converged{_stiffnesses(rows)}."]
-    out += [f"Not fitted: {_some(failed)}."] if failed else []
-    clean = [row["name"] for row in rows if row["verdict"] == "nothing-missing"]
-    out += [f"Nothing is missing in {_count(len(clean), 'test')}."] if clean else []
-    effects = Counter(effect for row in rows for effect in row["effects"])
-    for effect, count in effects.most_common():
-        where = [row["name"] for row in rows if effect in row["effects"]]
-        out.append(f"{effect.replace('_', ' ').capitalize()}: in {_count(count, 'test')} ({_some(where)}).")
-    unknown = [row["name"] for row in rows if row["verdict"] in ("unknown", "partial")]
-    out += [f"Something without a name: in {_some(unknown)}."] if unknown else []
-    refused = [row["name"] for row in rows if row["check"] == "failed" and row["verdict"] is None]
-    out += [f"The model does not describe the readings of {_some(refused)}."] if refused else []
-    out += [outlier["sentence"].rstrip(".") + "." for outlier in found["outliers"][:_MOST_LINES]]
-    return out
-
-
-def _stiffnesses(rows: Sequence[Row]) -> str:
-    """Of the materials with most specimens: k1, and how far specimens differ, or how well a single one is known."""
-    each: dict[str, list[Statistics]] = {}
-    for row in rows:
-        if row["material"] and "k1" in row["parameters"]:
-            each.setdefault(row["material"], []).append(row["parameters"]["k1"])
-    largest = sorted(each, key=lambda material: -len(each[material]))[:_MOST_MATERIALS]
-    said = [_stiffness(material, each[material]) for material in largest]
-    return f"; {', '.join(said)}" if said else ""
-
-
-def _stiffness(material: str, each: Sequence[Statistics]) -> str:
-    """k1 of the specimens of one material."""
-    medians = [k1["q50"] for k1 in each]
-    if len(each) == 1:
-        return f"k1 of {material} {number(medians[0])} N ({span(each[0]['q05'], each[0]['q95'])}, 90 % interval)"
-    middle, among = number(float(np.median(medians))), "least to largest specimen"
-    return f"median k1 of {material} {middle} N ({span(min(medians), max(medians))}, {among})"
-
-
-_MOST_MATERIALS = 2  # whose stiffness a first sentence has room for
-
-
-def _count(number_of: int, what: str) -> str:
-    return f"one {what}" if number_of == 1 else f"{number_of} {what}s"
-
-
-def _some(names: list[str], most: int = 6) -> str:
-    """Names as a sentence lists them, the first of many."""
-    more = [f"{len(names) - most} more"] if len(names) > most else []
-    return listed([*names[:most], *more])
-
-
-def pose_in_a_sentence(found: PoseJson) -> str:
-    """How far the platform moves, with the conditions behind it.
-
-    Parameters
-    ----------
-    found : dict
-    """
-    if not found["feasible"]:
-        return found["sentence"]
-    known = [drift for drift in found["drift"] if known_at_the_end(drift)]
-    if not known:
-        return f"No draw of the wires holds {found['robot']} to the end."
-    drift = known[-1]
-    far, tilt, time = drift["distance_mm"], drift["tilt_deg"], drift["times_s"][-1]
-    moved, turned = (quantity(q["q50"][-1], q["q05"][-1], q["q95"][-1], unit) for q, unit in ((far, "mm"), (tilt, "")))
-    spread = drift["specimen_spread"]
-    alike = f"if wires cut from one line differ by {100 * spread:g} %" if spread else "if all wires are alike"
-    return (
-        f"The platform of {found['robot']} moves by {moved} and tilts by {turned} degrees within {number(time)} s of "
-        f"standing still, {alike}; intervals hold 90 %."
-    )
-
-
-def plan_in_a_sentence(found: PlanJson) -> str:
-    """The test to do, and what would be known after it.
-
-    Parameters
-    ----------
-    found : dict
-    """
-    best = found["protocols"][0]
-    creep = best["creep"]["creep_1h_mm"]
-    what = f" ({best['words']})" if best["words"] else ""
-    return (
-        f"Do {best['name']}{what}: within {number(best['duration_min'])} min it would make known the creep after an "
-        f"hour at {number(best['creep']['tension_N'])} N to ± {number(creep['sd'], 2)} mm (now ± "
-        f"{number(creep['guess_sd'], 2)} mm, standard deviations)."
-    )
-
-
-def calibration_in_a_sentence(found: CalibrateJson) -> str:
-    """How well the lengths are known.
-
-    Parameters
-    ----------
-    found : dict
-    """
-    known = found["with_creep_model"]
-    if not known["converged"]:
-        return "Not converged: there are no lengths to use."
-    sd = [1e3 * value for value in known["length_m"]["sd"]]
-    return (
-        f"The zero-tension lengths of {found['robot']}'s {len(sd)} wires are known to {span(min(sd), max(sd), 2)} mm "
-        f"(standard errors), from {found['read']} of {counted(found['holds'], 'hold')}."
-    )

@@ -1,0 +1,132 @@
+"""The experiment out of a raw file, checked as one of an experiment file is, and that file."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.columns import Column
+from wirebayes.io.bench.quantities import UNITS, Role
+from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.table_numbers import COLUMN_ROLES
+from wirebayes.io.data_checks import falls
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import experiment_of
+from wirebayes.strict.table import Table
+from wirebayes.strict.toml_keys import Keys
+from wirebayes.wire.protocol import Control
+
+RESOLUTION: dict[Control, str] = {"displacement": "resolution_N", "force": "resolution_mm"}
+
+
+def check_direction(table: RawTable, column: Column, experiment: Experiment) -> None:
+    """Refuse a displacement counted downwards: the wire pulls the more, the further it is below zero.
+
+    Parameters
+    ----------
+    table : RawTable
+        Whose place the error names.
+    column : Column
+        Of the displacement.
+    experiment : Experiment
+        Read with it.
+    """
+    holds = experiment.recorded_holds
+    place, pull = (
+        np.array(v) for v in zip(*((np.mean(h.displacement_mm), np.mean(h.tension_N)) for h in holds), strict=True)
+    )
+    if place.max() > 0 or not falls(place, pull):
+        return
+    found = f"displacements down to {place.min():g} mm, the further down the more tension"
+    expected = f"what lengthens the wire counted up; change the sign with {_turned(column)}"
+    raise table.complain(table.rows[0].line, column.index, found, expected)
+
+
+def _turned(column: Column) -> str:
+    """The option that turns the sign of a column."""
+    unit = column.unit.text if column.unit else UNITS[column.role]
+    return f'--map "{column.header}={column.role} [{unit[1:] if unit[0] in "-−" else f"-{unit}"}]"'
+
+
+def as_experiment(
+    table: RawTable, columns: dict[Role, Column], header: tuple[str, ...], rows: list[list[Any]], origin: list[int],
+    about: About, resolution: float | None, control: Control,
+) -> Experiment:  # fmt: skip
+    """The experiment checked as the reader of files checks its own, blaming the raw file's lines.
+
+    Parameters
+    ----------
+    table : RawTable
+    columns : dict of Role to Column
+        Of the table, which errors name.
+    header : tuple of str
+        Columns of the readings' CSV.
+    rows : list of list
+        Its rows.
+    origin : list of int
+        The row of the table that each comes from.
+    about : About
+    resolution : float or None
+        Step of what is read, N or mm.
+    control : {"displacement", "force"}
+    """
+    keys = {"name": about.name, "material": about.material or about.name, "length_mm": about.length_mm}
+    extra: dict[str, Any] = {"control": control} if control != "displacement" else {}
+    extra |= {RESOLUTION[control]: resolution} if resolution else {}
+
+    def readings() -> Table:
+        texts = [["" if value is None else repr(value) for value in row] for row in rows]
+        return _RawReadings(table.sheet.path, list(header), texts, table, columns, origin)
+
+    return experiment_of(_Options(table.sheet.path, "", None, keys | extra), readings)
+
+
+@dataclass(frozen=True)
+class _RawReadings(Table):
+    """Readings whose complaints name the line and column of the raw file."""
+
+    raw: RawTable
+    columns: dict[Role, Column]
+    origin: list[int]
+
+    def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
+        tension, displacement = (_turned(self.columns[role]) for role in ("tension", "displacement"))
+        both = f"the signs with {displacement} {tension}"
+        expected = expected.replace("the signs of displacement_mm and of tension_N", both)
+        expected = expected.replace("the sign of tension_N", f"the sign with {tension}")
+        return super().complain(row, column, found, expected)
+
+    def place(self, row: int, column: str) -> str:
+        role = COLUMN_ROLES[column]
+        known = self.columns.get(role) or self.columns["displacement"]
+        return self.raw.place(self.raw.rows[self.origin[row]].line, known.index)
+
+
+class _Options(Keys):
+    """Options of a command in place of the keys of a file."""
+
+    def complain(self, key: str, found: str, expected: str) -> InputError:
+        if key == "readings":
+            return InputError(f"{self.source}: found {found.partition(' in ')[0]}, expected {expected}")
+        return InputError(f"--{key.replace('_', '-')}: found {found}, expected {expected}")
+
+
+def toml_of(experiment: Experiment, comments: Sequence[str] = ()) -> str:
+    """The experiment file of a test whose readings stand in ``NAME.csv`` beside it."""
+    lines = [f"# {comment}" for comment in comments]
+    lines += ["[[experiment]]", f"name = {_string(experiment.name)}", f"material = {_string(experiment.material)}"]
+    lines.append(f"length_mm = {experiment.length_mm!r}")
+    if experiment.control != "displacement":
+        lines.append(f"control = {_string(experiment.control)}")
+    if experiment.resolution:
+        lines.append(f"{RESOLUTION[experiment.control]} = {experiment.resolution!r}")
+    lines.append(f"readings = {_string(experiment.name + '.csv')}")
+    return "\n".join(lines) + "\n"
+
+
+def _string(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

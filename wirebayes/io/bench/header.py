@@ -1,0 +1,144 @@
+"""What a column's header and unit say of the quantity in it."""
+
+import re
+
+from wirebayes.io.bench.quantities import ROLES, Role, Unit, is_foreign, unit_of
+from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.words import LETTERS, RIG_WORDS, SAMPLE_WORDS, last_named, plain, speaks_of, words_in
+
+NO_UNIT = ("", "-", "–", "1")  # what stands in a row of units where there is none
+UNIT_IN_BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
+_UNIT_FIRST = re.compile(r"(seconds|minutes|hours|sekunden|minuten|stunden|secondes|heures|segundos|minutos)\b", re.I)
+_TAILS = (r"(.+?)\s*/\s*(\S+)$", r"(.+),\s*(\S+)$", r"(.+?)\s+in\s+(\S+)$", r"(.+)[_\s]+(\S+)$")
+
+
+def is_of_sample(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a column's unit is one of a strain or a stress.
+
+    Parameters
+    ----------
+    table : RawTable
+    index : int
+        Of the column.
+    role : str
+        The quantity.
+    """
+    unit = unit_of(table.units[index], role) or name_and_unit(table.header[index], role)[1]
+    return unit is not None and unit.of_sample
+
+
+def is_copy(table: RawTable, column: int, other: int) -> bool:
+    """Whether two columns hold the same cells under the same unit.
+
+    Parameters
+    ----------
+    table : RawTable
+    column, other : int
+    """
+    units = [
+        table.units[i] or next(iter(UNIT_IN_BRACKETS.findall(table.header[i])), ("", ""))[1] for i in (column, other)
+    ]
+    return units[0] == units[1] and table.column(column) == table.column(other)
+
+
+def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
+    """A header without its unit, and the unit: in brackets, after a slash, a comma, ``in``, ``_`` or a space.
+
+    A time may begin with its unit in full: hours at load.
+    """
+    bracket = UNIT_IN_BRACKETS.match(header)
+    if bracket and unit_of(bracket[2], role):
+        return bracket[1], unit_of(bracket[2], role)
+    for pattern in _TAILS:
+        tail = re.match(pattern, header)
+        if tail and unit_of(tail[2], role):
+            return tail[1], unit_of(tail[2], role)
+    first = _UNIT_FIRST.match(header) if role == "time" else None
+    return header, unit_of(first[1], role) if first else None
+
+
+def is_of(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a column seems to be of a quantity, by its name and its unit.
+
+    Parameters
+    ----------
+    table : RawTable
+    index : int
+    role : str
+    """
+    return may_be(table, index, role) or is_of_rig(table, index, role)
+
+
+def may_be(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a header's words and unit fit a quantity.
+
+    Parameters
+    ----------
+    table : RawTable
+    index : int
+        Of the column.
+    role : str
+        The quantity.
+    """
+    header = table.header[index]
+    row_unit = table.units[index]
+    units: dict[Role, Unit] = {}
+    for other in ROLES:
+        found = (unit_of(row_unit, other) if row_unit else None) or name_and_unit(header, other)[1]
+        if found:
+            units[other] = found
+    if not units and _has_foreign_unit(header, row_unit):
+        return False
+    if role == "hold":
+        return not units and speaks_of(header, role)
+    name = name_and_unit(header, role)[0] if role in units else header
+    if units and role not in units:
+        return False
+    if not units and any(speaks_of(header, other) for other in ROLES if other != role) and role != "time":
+        return last_named(header) == role
+    if role in units and units[role].of_sample and words_in(name) & set(SAMPLE_WORDS[role]):
+        return True
+    return speaks_of(name, role) or (role in units and plain(name) in LETTERS.get(role, ()))
+
+
+def is_of_rig(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a column with a unit of the quantity has a name of `RIG_WORDS`.
+
+    Parameters
+    ----------
+    table : RawTable
+    index : int
+        Of the column.
+    role : str
+        The quantity.
+    """
+    name, unit = name_and_unit(table.header[index], role)
+    unit = unit_of(table.units[index], role) or unit
+    return unit is not None and bool(set(words_in(name)) & set(RIG_WORDS.get(role, ())))
+
+
+def is_called_of_sample(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a column without a unit has the name, not the letter, of a strain or a stress.
+
+    Parameters
+    ----------
+    table : RawTable
+    index : int
+        Of the column.
+    role : str
+        The quantity.
+    """
+    header = table.header[index]
+    bracket = UNIT_IN_BRACKETS.match(header)
+    if table.units[index] not in NO_UNIT or (bracket and bracket[2] not in NO_UNIT):
+        return False
+    names = {name for name in SAMPLE_WORDS.get(role, ()) if len(name) > 1 or not name.isascii()}
+    return bool(words_in(header) & names)
+
+
+def _has_foreign_unit(header: str, row_unit: str) -> bool:
+    """Whether a column is said to be in a unit that no quantity of a test has."""
+    if row_unit not in NO_UNIT:
+        return True
+    bracket = UNIT_IN_BRACKETS.match(header)
+    return bracket is not None and is_foreign(bracket[2])

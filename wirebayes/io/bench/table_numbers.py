@@ -1,0 +1,231 @@
+"""The numbers of a table: holds, settings, times and readings, converted to mm, N and s."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError, shown
+from wirebayes.io.bench import clock
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.columns import Column, understand
+from wirebayes.io.bench.complete_rows import WHERE_MISSING, complete
+from wirebayes.io.bench.numerals import decimal_sign, plain_number
+from wirebayes.io.bench.quantities import UNITS, Role
+from wirebayes.io.bench.recorded import Readings
+from wirebayes.io.bench.resolution import evident_step
+from wirebayes.io.bench.sheet import is_number
+from wirebayes.io.bench.stamps import is_coarse, spread
+from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
+from wirebayes.io.bench.unread import unread
+from wirebayes.numeric.typing import Floats
+from wirebayes.sentences import listed
+from wirebayes.strict.table import LARGEST
+from wirebayes.wire.protocol import Control
+
+COLUMN_ROLES: dict[str, Role] = {
+    "hold": "hold", "displacement_mm": "displacement", "time_s": "time", "tension_N": "tension",
+    "temperature_C": "temperature",
+}  # fmt: skip
+_SIZE: dict[Role, str] = {"displacement": "length", "tension": "area"}  # what a strain and a stress are times of
+READS: dict[Control, Role] = {"displacement": "tension", "force": "displacement"}  # by what is set
+FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
+FAR_STEPS = 2.0  # and this many times the range of the test
+MOST_HOLDS = 1e9  # numbers of holds stay below, as in the files that are written
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """What a file records, before it is known what was set.
+
+    Attributes
+    ----------
+    table : RawTable
+    columns : dict of Role to Column
+    texts : dict of Role to list of str
+        Numbers as they were written.
+    values : dict of Role to (r,) array
+    hold : (r,) array of int or None
+    of_day : bool
+        Whether times are moments of a day.
+    numbering : list of str
+        How holds that have names were numbered, in a sentence.
+    not_read : int or None
+        The first line without a displacement, which has that of the line above.
+    """
+
+    table: RawTable
+    columns: dict[Role, Column]
+    texts: dict[Role, list[str]]
+    values: dict[Role, Floats]
+    hold: NDArray[np.int64] | None
+    of_day: bool
+    numbering: list[str]
+    not_read: int | None
+
+    def complain(self, row: int, role: str, found: str, expected: str) -> InputError:
+        """The error of a cell.
+
+        Parameters
+        ----------
+        row : int
+            Of the table, from 0.
+        role : str
+            Of the column.
+        found, expected : str
+            As the message shows them.
+        """
+        return self.table.complain(self.table.rows[row].line, self.columns[role].index, found, expected)  # type: ignore[index]
+
+    def readings(self, control: Control) -> Readings:
+        """The same, by what was set."""
+        role: Literal["displacement", "tension"] = "displacement" if control == "displacement" else "tension"
+        unit = self.columns[role].unit
+        step = (evident_step(self.texts[role]) or 0.0) * abs(unit.factor if unit else 1.0)
+        return Readings(
+            role, self.values[role], self.values[READS[control]], self.values["time"], self.hold, self.of_day, step,
+            self.columns["time"].header, self.complain,
+        )  # fmt: skip
+
+
+def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Recorded, list[str]]:
+    """The numbers of a table, with what was understood on the way.
+
+    Parameters
+    ----------
+    table : RawTable
+    about : About
+        The sample, whose length and area strains and stresses are multiplied by.
+    choices : Choices
+        What the user decided.
+    """
+    columns = _of_sample(table, understand(table, choices.mapping), about)
+    not_read = next((row.line for row in table.rows if not row.cell(columns["displacement"].index)), None)
+    table, notes = complete(table, columns)
+    not_read = not_read if not_read in {row.line for row in table.rows} else None  # below the readings
+    decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
+    notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes]
+    texts: dict[Role, list[str]] = {
+        role: _numbers(table, column, decimal) for role, column in columns.items() if role != "hold"
+        and not (role == "time" and clock.has_moments(table, column.index))
+    }  # fmt: skip
+    values: dict[Role, Floats] = {role: _converted(columns[role], text) for role, text in texts.items()}
+    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes)
+    _check_sizes(table, columns, values)
+    values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
+    notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
+    hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
+    return Recorded(table, columns, texts, values, hold, of_day, numbering, not_read), notes
+
+
+def _of_sample(table: RawTable, columns: dict[Role, Column], about: About) -> dict[Role, Column]:
+    """Columns whose units are those of this sample: strains times its length, stresses times its area."""
+    size = {"displacement": about.length_mm, "tension": about.area_mm2}
+    out = dict(columns)
+    for role, column in columns.items():
+        if column.unit is None or not column.unit.of_sample:
+            continue
+        times = size[role]
+        if times is None:
+            found = f"a stress in {column.unit.text}"
+            expected = "--area-mm2 A, the sample's cross-section, or a column of forces"
+            raise table.complain(table.header_line, column.index, found, expected)
+        out[role] = replace(column, unit=replace(column.unit, factor=column.unit.factor * times))
+    return out
+
+
+def _whose(table: RawTable, columns: dict[Role, Column]) -> list[str]:
+    """Of which specimen these columns are, where several stand side by side."""
+    if not table.specimen:
+        return []
+    places = [table.sheet.column_name(i) for i in sorted(column.index for column in columns.values())]
+    return [f"specimens side by side: {table.whose} in columns {listed(places)}"]
+
+
+def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> str:
+    parts = []
+    for role, column in columns.items():
+        if table.turned and role == "hold":
+            continue  # the table's own
+        stated = column.unit is None or column.unit.text in (UNITS[role], *re.split(r"[\s()\[\]/_,]+", column.header))
+        unit = "" if stated or column.unit is None else f" in {column.unit.text}"
+        how = " (sign turned)" if column.unit and column.unit.factor < 0 else ""
+        how += " (its weight)" if column.unit and column.unit.is_mass else ""
+        how += f" (times the {_SIZE[role]})" if column.unit and column.unit.of_sample else ""
+        parts.append(f"{role} from {column.header!r}{unit}{how}")
+    comma = ", decimal comma" if decimal == "comma" else ""
+    return f"{table.sheet.described}{comma}; {listed(parts)}"
+
+
+def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
+    out = []
+    for row in table.rows:
+        number = plain_number(row.cell(column.index), decimal)
+        if number is None:
+            sign = "comma" if decimal == "comma" else "point"
+            expected = f"a number (decimal {sign}, as elsewhere in the file)"
+            if not any(c.isdigit() for c in row.cell(column.index)):  # NaN, n/a, #N/A, a dash
+                expected += WHERE_MISSING
+            if column.role == "time" and clock.looks_like_a_moment(row.cell(column.index)):
+                expected = clock.UNDERSTOOD
+            raise table.complain(row.line, column.index, shown(row.cell(column.index)), expected)
+        out.append(number)
+    return out
+
+
+def _converted(column: Column, texts: list[str]) -> Floats:
+    assert column.unit is not None
+    return column.unit.convert(np.array([float(text) for text in texts]))
+
+
+def _times(table: RawTable, column: Column, numbers: Floats | None, notes: list[str]) -> tuple[Floats, bool]:
+    """Times in s, of numbers or of clocks, and whether they are moments of a day; what was done joins the notes."""
+    time, of_day = (numbers, False) if numbers is not None else clock.seconds(table, column.index, column.unit)
+    if is_coarse(table, column.index):
+        time, spreading = spread(time)
+        notes += spreading
+    return time, of_day
+
+
+def _check_sizes(table: RawTable, columns: dict[Role, Column], values: Mapping[Any, Floats]) -> None:
+    """Refuse numbers that no bench can mean, before anything is computed with them."""
+    for name, role in COLUMN_ROLES.items():
+        for row in np.flatnonzero(~(np.abs(values[role]) <= LARGEST[name]))[:1] if role in values else ():
+            line, index = table.rows[row].line, columns[role].index
+            expected = f"at most {LARGEST[name]:.0e} {UNITS[role]} in size"
+            raise table.complain(line, index, shown(table.rows[row].cell(index)), expected)
+
+
+def _from_zero(table: RawTable, column: Column, x: Floats, about: About, zero_mm: float | None) -> Floats:
+    """Displacements counted from the zero-tension length, refused where they are a machine's position."""
+    if zero_mm is not None:
+        return np.array([float(f"{value:.12g}") for value in x - zero_mm])
+    nearest = float(np.abs(x).min())
+    if nearest > FAR * about.length_mm and nearest > FAR_STEPS * float(np.ptp(x)):
+        found = f"displacements from {x.min():g} to {x.max():g} mm of a wire of {about.length_mm:g} mm"
+        answers = {f"--zero-mm {x[0]:g}": "counted from the first reading", "--zero-mm 0": "as they stand"}
+        place = f"{table.sheet.path}, {table.place(table.rows[0].line, column.index)}"
+        raise Undecided(f"{place}: found {found}", "where the wire begins to pull", answers)
+    return x
+
+
+def _hold_numbers(
+    table: RawTable, column: Column | None, decimal: Decimal
+) -> tuple[NDArray[np.int64] | None, list[str]]:
+    if column is None:
+        return None, []
+    cells = table.column(column.index)
+    plain = [plain_number(cell, decimal) for cell in cells]
+    if all(number is not None and float(number).is_integer() and 0 <= float(number) < MOST_HOLDS for number in plain):
+        return np.array([int(float(number or 0)) for number in plain], dtype=np.int64), []
+    odd = next((row for row in table.rows if is_number(row.cell(column.index))), None)
+    if odd is not None:
+        raise table.complain(odd.line, column.index, shown(odd.cell(column.index)), "a whole number for each hold")
+    names = list(dict.fromkeys(cells))
+    number_of = {name: i + 1 for i, name in enumerate(names)}
+    numbers = np.array([number_of[cell] for cell in cells], dtype=np.int64)
+    return numbers, [f"holds numbered in order, {names[0]} to {names[-1]}"]

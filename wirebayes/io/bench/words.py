@@ -1,0 +1,114 @@
+"""What quantities are called on benches, in the words of several languages."""
+
+import re
+import unicodedata
+
+from wirebayes.io.bench.quantities import ROLES, Role
+
+# Words of English, German, French, Spanish, Italian, Portuguese, Dutch, Swedish, Danish, Norwegian, Finnish, Polish,
+# Czech, Turkish, Russian, Japanese, Chinese and Korean, without accents.
+WORDS: dict[Role, tuple[str, ...]] = {
+    "hold": (
+        "hold", "step", "stage", "segment", "cycle", "stufe", "schritt", "haltestufe", "palier", "etape", "pas",
+        "escalon", "paso", "passo", "gradino", "stap", "degrau", "krok",
+        "ступень", "шаг", "段階", "步骤", "步", "级", "단계",
+    ),
+    "displacement": (
+        "displacement", "extension", "elongation", "position", "pos", "stroke", "crosshead", "travel", "stretch", "weg",
+        "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
+        "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
+        "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp", "ext",
+        "forlangning", "forskjutning", "forskydning", "forskyvning", "forlengelse", "siirtyma", "venyma",
+        "posunuti", "prodlouzeni", "uzama",
+        "przemieszczenie", "wydłuzenie", "перемещение", "удлинение", "ход", "смещение",
+        "変位", "伸び", "ストローク", "位移", "伸长", "伸長", "變形", "变形", "행정", "변위", "신율",
+    ),
+    "time": (
+        "time", "elapsed", "seconds", "minutes", "hours", "timestamp", "clock", "stopwatch", "zeit", "uhrzeit",
+        "zeitpunkt", "sekunden", "minuten", "stunden", "temps", "duree", "heure",
+        "tiempo", "tempo", "hora", "tijd", "czas", "tid", "aika", "cas", "zaman",
+        "время", "時間", "时间", "時刻", "시간",
+    ),
+    "tension": (
+        "tension", "force", "load", "loadcell", "pull", "kraft", "last", "zugkraft", "spannkraft", "effort", "charge",
+        "fuerza", "carga", "forza", "carico", "tensione", "tracao", "forca", "kracht", "trekkracht",
+        "voima", "sila", "zatizeni", "kuvvet",
+        "siła", "obciazenie", "сила", "нагрузка", "усилие", "натяжение",
+        "荷重", "試験力", "張力", "力", "拉力", "载荷", "负荷", "张力", "荷載", "하중", "장력",
+    ),
+    "temperature": (
+        "temperature", "temp", "temperatur", "temperatura", "temperatuur", "raumtemperatur", "температура",
+        "温度", "溫度", "온도",
+    ),
+}  # fmt: skip
+LETTERS: dict[Role, tuple[str, ...]] = {  # mean something beside the right unit only
+    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t", "x_value"), "tension": ("f", "t"),
+    "temperature": ("t", "ϑ"),
+}  # fmt: skip
+# What a strain or a stress is called; only beside a unit of one, for other quantities have these names too.
+SAMPLE_WORDS: dict[Role, tuple[str, ...]] = {
+    "displacement": (
+        "strain", "dehnung", "verformung", "deformation", "deformacion", "deformazione", "ε", "epsilon", "e", "应变",
+        "ひずみ",
+    ),
+    "tension": (
+        "stress", "spannung", "contrainte", "esfuerzo", "sforzo", "tensao", "spanning", "σ", "sigma", "s",
+        "应力", "応力",
+    ),
+}  # fmt: skip
+# What a rig calls its weights, and the gauge that reads the wire: only where no column speaks of the quantity itself.
+RIG_WORDS: dict[Role, tuple[str, ...]] = {
+    "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok"),
+    "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
+}  # fmt: skip
+_COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg or Prüfzeit
+
+
+def speaks_of_a_quantity(word: str) -> bool:
+    """Whether a word, or a letter, is the name of a quantity."""
+    letters = {letter for known in LETTERS.values() for letter in known}
+    of_rig = {name for names in RIG_WORDS.values() for name in names}
+    return plain(word) in letters | of_rig or any(speaks_of(word, role) for role in ROLES)
+
+
+def known_words(text: str) -> int:
+    """How many different words of a text name a quantity."""
+    return sum(any(_is_word(word, role) for role in ROLES) for word in words_in(text))
+
+
+def words_in(text: str) -> set[str]:
+    """The words of a text, in small letters without accents."""
+    return set(re.findall(r"[^\W\d_]+", plain(text)))
+
+
+def last_named(header: str) -> Role | None:
+    """Of a header that speaks of several quantities the one named last, as languages put it: step time, load time."""
+    words = re.findall(r"[^\W\d_]+", plain(header))
+    for word in reversed(words):
+        for role in ROLES:
+            if _is_word(word, role):
+                return role
+    return None
+
+
+def speaks_of(text: str, role: Role) -> bool:
+    """Whether a word of a text names a quantity."""
+    return any(_is_word(word, role) for word in words_in(text))
+
+
+def _is_word(word: str, role: Role) -> bool:
+    known = WORDS[role]
+    if word in known or (word.endswith("s") and word[:-1] in known):
+        return True
+    if any(word in words for words in WORDS.values()):
+        return False
+    return any(len(w) >= _COMPOUND and word.endswith(w) for w in known) or any(
+        len(w) > _COMPOUND + 1 and word.startswith(w) for w in known
+    )
+
+
+def plain(text: str) -> str:
+    """Small letters without accents."""
+    apart = unicodedata.normalize("NFKD", text.casefold().replace("ß", "ss"))
+    joined = "".join(c for c in apart if not unicodedata.combining(c) or c == "\u3099")
+    return unicodedata.normalize("NFC", joined).strip(" .:_#")

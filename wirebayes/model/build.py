@@ -1,0 +1,220 @@
+"""From experiments to a posterior: samples, and the prior of every parameter, a default or the user's."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.io.experiment import Experiment
+from wirebayes.model.column_units import unit_of_column
+from wirebayes.model.distributions import scaled
+from wirebayes.model.prior import Power, Prior, from_table, possible, wire_defaults
+from wirebayes.model.problem import Problem
+from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL, SAMPLE, Likelihood, Sample
+from wirebayes.model.scales import Scales, Units, scales_of
+from wirebayes.numeric.means import geometric_mean
+from wirebayes.strict.hint import hint
+from wirebayes.wire.control import READ_UNIT, SET_UNIT
+from wirebayes.wire.effect import Amplitude, Effect
+from wirebayes.wire.laws import ElasticLaw, History
+from wirebayes.wire.model import Model, tension_reference
+from wirebayes.wire.protocol import Control
+
+FINEST = 1e-5  # of the largest tension: no load cell resolves less, and data without any noise need a floor
+_POSITIVE = {"k1", "B", "U", "k2", "N", "sensor_sd", "setting_sd"}
+
+
+def build(
+    experiments: Sequence[Experiment],
+    effects: Sequence[Effect] = (),
+    *,
+    law: ElasticLaw = "hooke",
+    history: History = "saturating",
+    likelihood: Likelihood = "chain",
+    length_exponent: Any = 1.0,
+    scales: Scales | None = None,
+) -> Problem:
+    """The posterior of some experiments, in mm, N and s; those of one material share its parameters.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    effects : sequence of Effect
+        Each acts on every sample; its amplitudes are shared as its scope says (an event acts where its hold is).
+    law, history, likelihood
+        See `wirebayes.wire.laws` and `wirebayes.model.likelihoods`.
+    length_exponent : float or scipy frozen distribution
+        p of B ∝ L0^p among samples of one material: a value, or a prior to learn it.
+    scales : Scales, optional
+        What default priors refer to; those of the experiments when left out. Part of a test, or a replicate of it, is
+        given those of the whole.
+
+    Raises
+    ------
+    InputError
+        If a prior in the file names no parameter, or is malformed.
+    """
+    materials: dict[str, list[Experiment]] = {}
+    for experiment in experiments:
+        materials.setdefault(experiment.material, []).append(experiment)
+    scales = scales or scales_of(experiments)
+    several = len(experiments) > 1
+    effects = [
+        effect.on([e.protocol() for e in experiments if effect.acts_on(e.name, e.control)]) for effect in effects
+    ]
+    distributions: dict[str, Any] = {}
+    samples: list[Sample] = []
+    for material, members in materials.items():
+        mark = f"[{material}]" if len(materials) > 1 else ""
+        distributions |= _material_priors(members, effects, mark, length_exponent, scales, likelihood)
+        samples += _samples(members, [effect.referred(scales.hold_s) for effect in effects], law, history)
+    distributions |= _instrument_priors(experiments, effects)
+    for experiment in experiments:
+        mark = f"[{experiment.name}]" if several else ""
+        zero_mm = scales.zeros_mm.get(experiment.name, 0.0)
+        defaults = wire_defaults(experiment.length_mm, scales, experiment.control, zero_mm)
+        wanted = SAMPLE if likelihood == "chain" else ("sensor_sd",)
+        distributions |= {f"{name}{mark}": defaults[name] for name in wanted}
+        own = [effect for effect in effects if effect.acts_on(experiment.name, experiment.control)]
+        distributions |= {f"{c}{mark}": a.prior for c, a in _amplitudes(own) if a.of_each_test}
+    units = scales.units
+    learned = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.in_natural_units}
+    every = {
+        name: d if name in learned or not hasattr(d, "dist") else scaled(d, units.of(unit_of_column(name, samples)))
+        for name, d in distributions.items()
+    }
+    stated = _apply_tables(every, experiments, several)
+    fixed = {name: float(d) for name, d in every.items() if isinstance(d, int | float)}
+    shapes = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_shape}
+    free = {name: d for name, d in every.items() if name not in fixed}
+    logarithmic = frozenset(n for n, d in free.items() if n.split("[")[0] in _POSITIVE | shapes and d.support()[0] >= 0)
+    powers = _default_powers([name for name in free if name not in stated], fixed, units)
+    return Problem(
+        tuple(samples), Prior(free, fixed, logarithmic, powers), likelihood, scales=scales, stated=frozenset(stated)
+    )
+
+
+def default_prior(
+    length_mm: float, scales: Scales, instead: Mapping[str, Any], control: Control = "displacement"
+) -> Prior:
+    """The plain model's prior for a wire of this length, in mm, N and s.
+
+    Parameters
+    ----------
+    length_mm : float
+    scales : Scales
+        Of the test, which defaults refer to.
+    instead : mapping of name to float or scipy frozen distribution
+        What is stated in place of defaults, in natural units.
+    control : {"displacement", "force"}
+        What is set in the test.
+    """
+    units = scales.units
+    defaults = wire_defaults(length_mm, scales, control)
+    own = {name: unit_of_column(name, ()) for name in defaults} | {
+        "sensor_sd": READ_UNIT[control],
+        "setting_sd": SET_UNIT[control],
+    }
+    every = {name: scaled(d, units.of(own[name])) for name, d in defaults.items()} | dict(instead)
+    fixed = {name: d for name, d in every.items() if isinstance(d, float)}
+    free = {name: d for name, d in every.items() if name not in fixed}
+    powers = _default_powers([name for name in free if name not in instead], fixed, units)
+    return Prior(free, fixed, frozenset(_POSITIVE & free.keys()), powers)
+
+
+def _default_powers(names: Sequence[str], fixed: Mapping[str, float], units: Units) -> dict[str, Power]:
+    """Of the defaults of B and k2, which speak of the creep at the typical tension and of the hazard after a hold."""
+    logs = {"B": ("U", float(np.log(units.tension_N))), "k2": ("N", float(np.log(units.time_s)))}
+    out = {}
+    for name in names:
+        base, bracket, mark = name.partition("[")
+        if base in logs:
+            exponent, log_base = logs[base]
+            column = f"{exponent}{bracket}{mark}"
+            out[name] = Power(fixed.get(column, column), log_base)
+    return out
+
+
+def _reference_length(members: Sequence[Experiment]) -> float:
+    """Geometric mean of the lengths, mm: B belongs to it."""
+    return geometric_mean(e.length_mm for e in members)
+
+
+def _material_priors(
+    members: Sequence[Experiment],
+    effects: Sequence[Effect],
+    mark: str,
+    length_exponent: Any,
+    scales: Scales,
+    likelihood: Likelihood,
+) -> dict[str, Any]:
+    """Default priors of what the samples of one material share; `mark` distinguishes materials in the names."""
+    defaults = wire_defaults(_reference_length(members), scales)
+    stiff = likelihood == "chain" or any(e.control == "displacement" for e in members)
+    wanted = MATERIAL if stiff else tuple(name for name in MATERIAL if name != "k1")
+    out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in wanted}
+    if len({e.length_mm for e in members}) > 1:
+        out[f"{LENGTH_EXPONENT}{mark}"] = length_exponent
+    of_wire = [effect for effect in effects if effect.scope == "material"]
+    return out | {f"{c}{mark}": a.prior for c, a in _amplitudes(of_wire) if not a.of_each_test}
+
+
+def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effect]) -> dict[str, Any]:
+    """Priors of what does not belong to the wire: steps and weights are read by different instruments, each its own."""
+    controls = dict.fromkeys(e.control for e in experiments)
+    out: dict[str, Any] = {}
+    for effect in (effect for effect in effects if effect.scope != "material"):
+        apart = len(controls) > 1 and effect.scope != "event"
+        marks = [f"[{control}]" for control in controls if effect.control in (None, control)] if apart else [""]
+        out |= {f"{c}{mark}": a.prior for mark in marks for c, a in _amplitudes([effect]) if not a.of_each_test}
+    return out
+
+
+def _amplitudes(effects: Sequence[Effect]) -> list[tuple[str, Amplitude]]:
+    """The amplitudes of effects with the names of their columns."""
+    return [pair for effect in effects for pair in zip(effect.columns(), effect.amplitudes, strict=True)]
+
+
+def _samples(
+    members: Sequence[Experiment], effects: Sequence[Effect], law: ElasticLaw, history: History
+) -> list[Sample]:
+    """The experiments of one material as the likelihood sees them."""
+    tension = tension_reference(np.concatenate([e.tension()[e.protocol().mask] for e in members]))
+    length = _reference_length(members) if len(members) > 1 else 0.0
+    out = []
+    for e in members:
+        present = tuple(x for x in effects if x.acts_on(e.name, e.control))
+        model = Model(law, history, present, tension, length)
+        finest = max(e.resolution, FINEST * _extent(e))
+        out.append(Sample(e.name, e.material, e.protocol(), e.readings()[..., None], finest, model))
+    return out
+
+
+def _extent(experiment: Experiment) -> float:
+    """The largest tension that was read, or the range of displacements, whose zero means nothing."""
+    read = [hold.readings for hold in experiment.recorded_holds]
+    if not read:
+        return 0.0
+    values = np.concatenate(read)
+    return float(np.ptp(values) if experiment.control == "force" else np.abs(values).max())
+
+
+def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment], several: bool) -> set[str]:
+    """Put the priors of the files in place of the defaults, and return the columns that have one."""
+    stated = set()
+    everything = set(MATERIAL) | set(SAMPLE) | {LENGTH_EXPONENT}
+    for experiment in experiments:
+        for name, table in experiment.priors.items():
+            line = experiment.prior_lines.get(name)
+            key = f"{experiment.source}{f', line {line}' if line else ''}: prior.{name}"
+            wanted = possible(key, name, from_table(key, table))
+            marks = experiment.name, experiment.material, experiment.control
+            hits = [c for c in (*(f"{name}[{mark}]" for mark in marks), name) if c in distributions]
+            if hits:
+                distributions[hits[0]] = wanted
+                stated.add(hits[0])
+            elif name not in everything and "." not in name:
+                known = f"one of {', '.join(sorted(everything))}, or effect.parameter"
+                raise InputError(f"{key}: found no such parameter{hint(name, sorted(everything))}, expected {known}")
+    return stated

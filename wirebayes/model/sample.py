@@ -1,0 +1,77 @@
+"""One experiment as the likelihood sees it, and the names of the plain model's parameters."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from wirebayes.numeric.typing import Array
+from wirebayes.wire.effect import Effect
+from wirebayes.wire.model import Model
+from wirebayes.wire.protocol import Protocol
+
+Likelihood = Literal["chain", "hold"]
+MATERIAL = ("k1", "B", "U", "k2", "N")
+SAMPLE = ("preload", "sensor_sd", "setting_sd")
+LENGTH_EXPONENT = "creep_length_exponent"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One experiment made ready for the likelihood.
+
+    Attributes
+    ----------
+    name, material : str
+    protocol : Protocol
+    readings : (H, R, 1) array
+        N, or mm where the tension is set.
+    resolution : float
+        Step to which they were rounded, no finer than any instrument resolves.
+    model : Model
+        With the effects that act on this sample.
+    """
+
+    name: str
+    material: str
+    protocol: Protocol
+    readings: Array
+    resolution: float
+    model: Model
+
+    def parameters(self, likelihood: Likelihood) -> tuple[str, ...]:
+        """The plain parameters that its readings depend on: hold by hold no preload, and under weights no k1."""
+        if likelihood == "chain":
+            return MATERIAL + SAMPLE
+        wire = MATERIAL if self.protocol.control == "displacement" else MATERIAL[1:]
+        return (*wire, "sensor_sd")
+
+    @property
+    def typical_hold_s(self) -> float:
+        """Median duration of the recorded holds (a second where all readings are at time zero)."""
+        return float(np.median(self.protocol.duration_s[self.protocol.recorded])) or 1.0
+
+
+def at_length(own: Mapping[str, Array], effects: Sequence[Effect], ratio: float, exponent: Any) -> dict[str, Array]:
+    """Parameters of a sample of another length than the reference: whatever is an elongation of the wire has grown.
+
+    The creep amount `B` grows as the ratio to the power `exponent`, an effect's elongation as the ratio itself.
+
+    Parameters
+    ----------
+    own : mapping of name to (n,) array
+        Parameters at the reference length.
+    effects : sequence of Effect
+        Those of the model; they say which of their amplitudes are elongations.
+    ratio : float
+        Length of the sample over the reference length.
+    exponent : float or (n,) array
+        1 where creep is a strain of the whole wire, 0 where it does not depend on the length.
+
+    Returns
+    -------
+    dict of name to array
+    """
+    grown = [c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_elongation]
+    return {**own, "B": own["B"] * ratio**exponent, **{name: own[name] * ratio for name in grown}}
