@@ -20,7 +20,7 @@ from analyses.mutants.tree import copy_of_the_checkout, preload, run
 
 # What decides, by package.
 MODULES = {
-    "model": ["likelihoods", "problem"],
+    "model": ["likelihoods", "problem", "build"],
     "inference": ["convergence", "importance", "sampler/burn_in", "sampler/ensemble", "sampler/kept", "sampler/moves",
                   "sampler/stop_rule"],
     "results": ["contraction", "identifiability", "outliers", "posterior_checks"],
