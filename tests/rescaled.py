@@ -13,6 +13,7 @@ from wirebayes.model.build import build
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Likelihood
 from wirebayes.model.scales import NATURAL, Units
+from wirebayes.model.spec import ModelSpec
 from wirebayes.wire.effect import Effect
 
 KINDS = ("steps", "weights", "two lengths", "two under weights", "steps and weights")
@@ -31,7 +32,7 @@ class Drawn:
 
     def problem(self, by: Units = NATURAL) -> Problem:
         """The problem of these tests, written in other units."""
-        return build(self.rewritten(by), list(self.effects), likelihood=self.likelihood)
+        return build(self.rewritten(by), list(self.effects), spec=ModelSpec(likelihood=self.likelihood))
 
     def rewritten(self, by: Units) -> list[Experiment]:
         """These tests in other units."""

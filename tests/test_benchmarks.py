@@ -7,6 +7,7 @@ from analyses.benchmarks import measure, model
 from analyses.benchmarks.plain import ours
 from wirebayes.io import paper
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 
 
 def test_a_fit_is_timed_in_its_parts():
@@ -19,7 +20,7 @@ def test_a_fit_is_timed_in_its_parts():
 @pytest.mark.parametrize("likelihood", ["chain", "hold"])
 @pytest.mark.parametrize("wire", range(4))
 def test_peers_sample_the_same_posterior(wire, likelihood):
-    problem = build([paper.experiments()[wire]], likelihood=likelihood)
+    problem = build([paper.experiments()[wire]], spec=ModelSpec(likelihood=likelihood))
     assert model.difference(np, problem, 0) < 1e-8
 
 

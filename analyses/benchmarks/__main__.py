@@ -16,6 +16,7 @@ from analyses.benchmarks import gradient, measure, model, parsed, plain
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 
 PEERS = {
     "NumPyro NUTS, natural": lambda p, s, t: gradient.numpyro_nuts(p, s, t, True),
@@ -48,7 +49,13 @@ def main():
         if options.wires and experiment.name not in options.wires:
             continue
         for likelihood in options.likelihoods:
-            cases.append(run(build([experiment], likelihood=likelihood), f"{experiment.name}, {likelihood}", options))
+            cases.append(
+                run(
+                    build([experiment], spec=ModelSpec(likelihood=likelihood)),
+                    f"{experiment.name}, {likelihood}",
+                    options,
+                )
+            )
             write_json(options.output / "samplers.json", {"wanted_ess": measure.WANTED, "minutes": options.minutes,
                                                           "cases": cases})  # fmt: skip
     print("\nratio of effective draws per second of processor time, all costs counted: median over cases, worst case")

@@ -27,6 +27,7 @@ from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
+from wirebayes.model.spec import ModelSpec
 from wirebayes.wire import compiled
 
 BATCH, REPEATS, SEEDS = 256, 7, 20
@@ -166,14 +167,16 @@ def main():
     print("\nshare of a fit")
     out["share"] = {}
     for likelihood in LIKELIHOODS:
-        out["share"][likelihood] = share = share_in_likelihood(build([wire], likelihood=likelihood), 0)
+        out["share"][likelihood] = share = share_in_likelihood(build([wire], spec=ModelSpec(likelihood=likelihood)), 0)
         print(f"  {wire.name}, {likelihood}: " + ", ".join(f"{k} {v:.2f}" for k, v in share.items()), flush=True)
     print("\neffective draws per evaluation: after burn-in, and all counted; the same of means alone")
     print("(least, median, largest of the seeds)")
     out["draws"] = {}
     for experiment in experiments():
         for likelihood in LIKELIHOODS:
-            found = out["draws"][f"{experiment.name}, {likelihood}"] = draws(build([experiment], likelihood=likelihood))
+            found = out["draws"][f"{experiment.name}, {likelihood}"] = draws(
+                build([experiment], spec=ModelSpec(likelihood=likelihood))
+            )
             cells = [" ".join(f"{v:.3f}" for v in (min(x), np.median(x), max(x))) for x in found.values()]
             print(f"  {experiment.name + ', ' + likelihood:24s}", "    ".join(cells), flush=True)
     out["with_effects"] = with_effects(singles)

@@ -13,6 +13,7 @@ from wirebayes.model.problem import Problem, with_readings
 from wirebayes.model.replicate import readings
 from wirebayes.model.sample import Likelihood
 from wirebayes.model.scales import planned_scales
+from wirebayes.model.spec import ModelSpec
 from wirebayes.simulation.synthetic import PAPER_TIMES_S, Bench
 
 POLICY = Policy(walkers=64, round_draws=2048, ess=400.0)
@@ -48,7 +49,7 @@ class Study:
         """Simulate and fit the data set of a number; the same whatever else is run."""
         own = seed_of(seed, "calibration", self.protocol, self.likelihood, str(index))
         test = BENCHES[self.protocol].experiment()
-        problem = build([test], likelihood=self.likelihood, scales=planned_scales([test]))
+        problem = build([test], spec=ModelSpec(likelihood=self.likelihood), scales=planned_scales([test]))
         if self.likelihood == "hold":
             problem = _with_first_readings(problem, self.protocol, own)
         fitted = _without_setting_error if self.broken else _as_it_is

@@ -17,6 +17,7 @@ from wirebayes.discovery.settings import Settings
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io import paper
+from wirebayes.model.spec import PLAIN_SPEC
 
 TRAIN = {"roc-line-1m": 8, "roc-line-1.71m": 8, "nylon-1.5m": 8, "kite-1.5m": 5}
 
@@ -28,7 +29,7 @@ def unseen(experiment, seed=0):
     verdict = findings.report["experiments"][experiment.name]
     effects = final_models(findings)[0].effects
     rng = np.random.default_rng(seed)
-    block = fitted([trained], (), "hooke", "saturating", rng)
+    block = fitted([trained], (), PLAIN_SPEC, rng)
     plain, final = (
         held_out.predicted([experiment], [TRAIN[experiment.name]], chosen, block, rng)[0] for chosen in ((), effects)
     )

@@ -24,6 +24,7 @@ from wirebayes.io.bench.about import About
 from wirebayes.io.bench.convert import Converted, convert
 from wirebayes.io.bench.undecided import Choices
 from wirebayes.model.scales import NATURAL
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import workers
 from wirebayes.wire.laws import LAWS, creep_fraction, creep_target
@@ -117,7 +118,7 @@ def one(job: tuple[int, int]) -> dict[str, tuple[float, float]] | None:
         experiment = imported(Path(folder), record(wire, length_mm, levels, drive, rng), length_mm).experiment
     if len(experiment.holds) != len(levels):
         return None
-    found = fitted([experiment], (), "hooke", "saturating", rng)
+    found = fitted([experiment], (), PLAIN_SPEC, rng)
     problem = found.target.problem
     theta = problem.theta_in(NATURAL, draws(found.target, found.modes, rng, 2000))
     columns = dict(zip(problem.names, theta.T, strict=True))

@@ -26,6 +26,7 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.model.spec import ModelSpec
 from wirebayes.results.jobs import Job
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect, EventEffect
@@ -92,7 +93,7 @@ def case(kind: str, index: int, simulations: int) -> dict[str, Any]:
             break
     exponent = stats.norm(1.0, 1.0) if kind == "together" else 1.0
     keys = tuple(e.key for e in effects)
-    job = Job("", experiments, keys, history=history, length_exponent=exponent)
+    job = Job("", experiments, keys, spec=ModelSpec(history=history, length_exponent=exponent))
     check = check_model(job, index, simulations=simulations)
     about = {"kind": kind, "index": index, "protocol": protocol, "effects": keys, "reason": check.reason}
     return about | {"p": check.p, "simulations": check.simulations, "gross_errors": len(check.gross_errors)}

@@ -24,6 +24,7 @@ from wirebayes.json_files.plan import ExpectedWidth
 from wirebayes.model.build import build
 from wirebayes.model.problem import with_readings
 from wirebayes.model.replicate import readings
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.numeric.typing import Array
 from wirebayes.planning.widths import at_centre, expected_widths
 from wirebayes.processes.workers import as_finished, processes
@@ -69,7 +70,7 @@ def planned(name: str, seed: int, n: int) -> tuple[Any, dict[str, Any]]:
     """The test at the centre of the guess, and draws of the guess."""
     bench = PROTOCOLS[name]
     centre = guess(4000, bench.length_mm, np.random.default_rng(0))
-    test = at_centre(bench.experiment(), centre, "hooke", "saturating")
+    test = at_centre(bench.experiment(), centre, PLAIN_SPEC)
     return replace(test, source=Path("plan")), guess(n, bench.length_mm, np.random.default_rng(seed))
 
 

@@ -22,6 +22,7 @@ from wirebayes.inference.sampler import ensemble
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
+from wirebayes.model.spec import ModelSpec
 from wirebayes.processes.workers import workers
 
 FIRST = 100
@@ -30,7 +31,7 @@ TAILS = (0.05, 0.95)
 
 def run(seed: int, wire: int, effect: str | None, likelihood: Likelihood, ess: float):
     """Whether one run converged, its draws (n, d), positive parameters as logarithms, and effective draws (d,)."""
-    problem = build([experiments()[wire]], [named(effect)] if effect else [], likelihood=likelihood)
+    problem = build([experiments()[wire]], [named(effect)] if effect else [], spec=ModelSpec(likelihood=likelihood))
     target = LogPosterior(problem)
     chains = ensemble.sample(target, seed, Policy(ess=ess))
     theta = target.coordinates.to_natural(chains.z.reshape(-1, chains.z.shape[-1]))

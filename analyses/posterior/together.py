@@ -16,6 +16,7 @@ from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL
+from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction.leave_one_hold_out import LeftOut, smoothed_leave_one_hold_out
 from wirebayes.results.identifiability import identifiability
 
@@ -47,7 +48,7 @@ def main() -> None:
     wires = [e for e in experiments() if e.material.startswith("Roc Line")]
     free = stats.norm(1.0, 1.0)
     separate = [fitted(build([e]), e.name) for e in wires]
-    together = fitted(build(wires, length_exponent=free), "together, B as L0^p")
+    together = fitted(build(wires, spec=ModelSpec(length_exponent=free)), "together, B as L0^p")
     models = {
         "separate": joined([smoothed_leave_one_hold_out(f) for f in separate]),
         "together, B as L0^p": smoothed_leave_one_hold_out(together),
@@ -55,7 +56,7 @@ def main() -> None:
     }
     for which in ("k1", "U", "N"):
         name = f"together, B as L0^p, {which} by length"
-        result = fitted(build(wires, [named(f"length_dependence@{which}")], length_exponent=free), name)
+        result = fitted(build(wires, [named(f"length_dependence@{which}")], spec=ModelSpec(length_exponent=free)), name)
         models[name] = smoothed_leave_one_hold_out(result)
         print(f"  {which} as L0^p, p {interval(result.flat[:, result.problem.names.index('length_dependence.p')])}")
 

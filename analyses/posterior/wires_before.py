@@ -16,6 +16,8 @@ from typing import Any, Literal
 import numpy as np
 from scipy import stats
 
+from wirebayes.model.spec import ModelSpec
+
 LIKELIHOODS: tuple[Literal["chain", "hold"], ...] = ("chain", "hold")
 HOLDS = {"all holds": None, "first 5": 5}
 MOVED, WIDER = 0.5, 1.5
@@ -33,7 +35,7 @@ def fits_here(seed: int) -> dict[str, Any]:
         for likelihood in LIKELIHOODS:
             for words, holds in HOLDS.items():
                 trained = experiment if holds is None else experiment.train(holds)
-                done = fit(build([trained], likelihood=likelihood), seed)
+                done = fit(build([trained], spec=ModelSpec(likelihood=likelihood)), seed)
                 out[f"{experiment.name}, {likelihood}, {words}"] = kept(done)
     return out
 

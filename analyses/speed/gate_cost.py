@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from wirebayes.model.spec import PLAIN_SPEC
+
 PAPER = tuple(f"paper:{i}" for i in range(4))
 
 
@@ -39,7 +41,7 @@ def plain_fits(experiments: Any, seed: int) -> tuple[list[Any], np.random.Genera
     for e in experiments:
         groups.setdefault(e.material, []).append(e)
     streams = rng.spawn(len(groups))
-    return [fitted(g, (), "hooke", "saturating", r) for g, r in zip(groups.values(), streams, strict=True)], rng
+    return [fitted(g, (), PLAIN_SPEC, r) for g, r in zip(groups.values(), streams, strict=True)], rng
 
 
 def cost_of(case: str, seed: int, simulations: int) -> dict[str, Any]:

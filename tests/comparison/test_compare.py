@@ -16,6 +16,7 @@ from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import linearise, simulate
 
@@ -142,9 +143,9 @@ def test_every_candidate_differs_from_the_base_in_its_one_thing() -> None:
     for c in everything[1:]:
         again = replace(c, name=PLAIN.name, question="", sentence="")
         assert again != PLAIN, c.name
-    with_law = candidates(experiments()[0], replace(PLAIN, law="modified", history="additive"), CATALOGUE)
-    assert {c.law for c in with_law} == {"hooke", "modified"}
-    assert next(c for c in with_law if c.name == "toe").history == "additive"
+    with_law = candidates(experiments()[0], replace(PLAIN, spec=ModelSpec("modified", "additive")), CATALOGUE)
+    assert {c.spec.law for c in with_law} == {"hooke", "modified"}
+    assert next(c for c in with_law if c.name == "toe").spec.history == "additive"
 
 
 def test_an_event_is_put_where_the_readings_say() -> None:

@@ -18,6 +18,7 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction.held_out import HeldOut, Scores
 
 PLAIN = Candidate(BASE, "", "")
@@ -98,7 +99,7 @@ def test_without_a_reference_nothing_is_compared() -> None:
 @pytest.mark.parametrize(("likelihood", "scored"), [("chain", "all readings"), ("hold", "later readings")])
 def test_a_judgement_says_what_was_scored(likelihood: str, scored: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compare, "_scores", lambda task, seed, policy: {"parameters": 8, "converged": True})
-    found = judge(Task(experiments()[0], replace(PLAIN, likelihood=likelihood)), 0)  # type: ignore[arg-type]
+    found = judge(Task(experiments()[0], replace(PLAIN, spec=ModelSpec(likelihood=likelihood))), 0)  # type: ignore[arg-type]
     assert found["scored"].startswith(scored) and found["failed"] is None and found["parameters"] == 8
 
 
@@ -199,12 +200,16 @@ def test_candidates_differ_from_the_base_as_their_sentences_say() -> None:
         BASE, "hooke_without_creep", "creep_at_once", "exponential", "logarithmic", "power_law", "two_modes",
         "modified_hooke", "additive", "hold_by_hold", "independent_errors", "unrecorded_skipped",
     ]  # fmt: skip
-    laws = {"modified_hooke": {"law": "modified"}, "additive": {"history": "additive"},
-            "hold_by_hold": {"likelihood": "hold"}, "unrecorded_skipped": {"unrecorded": False}}  # fmt: skip
+    laws = {
+        "modified_hooke": ModelSpec(law="modified"),
+        "additive": ModelSpec(history="additive"),
+        "hold_by_hold": ModelSpec(likelihood="hold"),
+    }
     for c in chosen:
         assert set(c.fixed) == fixed.get(c.name, set()) and c.effects == acting.get(c.name, ())
         same = replace(c, name=BASE, question="", sentence="", fixed={}, effects=())
-        assert same == replace(PLAIN, **laws.get(c.name, {}))  # type: ignore[arg-type]
+        unrecorded = c.name != "unrecorded_skipped"
+        assert same == replace(PLAIN, spec=laws.get(c.name, PLAIN.spec), unrecorded=unrecorded)
         assert c is chosen[0] or (c.question and c.sentence)
     values = {c.name: c.fixed for c in chosen}
     assert values["hooke_without_creep"]["B"] == 0.0 == values["independent_errors"]["setting_sd"]
@@ -212,14 +217,14 @@ def test_candidates_differ_from_the_base_as_their_sentences_say() -> None:
 
 
 def test_of_another_base_the_laws_of_the_plain_model_are_candidates() -> None:
-    base = replace(PLAIN, law="modified", history="additive", likelihood="hold")
+    base = replace(PLAIN, spec=ModelSpec("modified", "additive", "hold"))
     chosen = {c.name: c for c in module.candidates(experiments()[1], base, {})}
     assert {"hooke", "saturating", "chain"} <= set(chosen) and len(chosen) == 10
     assert not {"modified_hooke", "additive", "hold_by_hold", "independent_errors", "unrecorded_skipped"} & set(chosen)
-    assert chosen["hooke"] == replace(base, name="hooke", law="hooke", question=module.LAW,
+    assert chosen["hooke"] == replace(base, name="hooke", spec=replace(base.spec, law="hooke"), question=module.LAW,
                                       sentence=chosen["hooke"].sentence)  # fmt: skip
-    assert (chosen["saturating"].history, chosen["chain"].likelihood) == ("saturating", "chain")
-    assert all(c.law == "modified" for name, c in chosen.items() if name != "hooke")
+    assert (chosen["saturating"].spec.history, chosen["chain"].spec.likelihood) == ("saturating", "chain")
+    assert all(c.spec.law == "modified" for name, c in chosen.items() if name != "hooke")
 
 
 def test_effects_that_the_test_could_show_are_candidates_and_only_those_asked_for() -> None:
@@ -243,7 +248,7 @@ def test_what_a_candidate_fixes_leaves_the_posterior() -> None:
     assert found.fixed == {"N": 1.0, "setting_sd": 0.0}
     assert list(found.distributions) == [name for name in plain.names if name not in ("N", "setting_sd")]
     assert found.logarithmic == plain.prior.logarithmic - {"N", "setting_sd"}
-    by_hold = module.problem_of(replace(fixed, likelihood="hold", law="modified"), experiment, [])
+    by_hold = module.problem_of(replace(fixed, spec=ModelSpec("modified", likelihood="hold")), experiment, [])
     assert by_hold.prior.fixed == {"N": 1.0} and by_hold.samples[0].model.law == "modified"
 
 

@@ -23,6 +23,7 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.likelihoods import reading_variance
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import simulate
@@ -35,7 +36,7 @@ STIFF = {"k1": 3000.0, "B": 0.02, "U": 0.8, "k2": 0.02, "N": 0.7, "preload": 0.1
 def block_of(folder: Path, truth: dict[str, float], effects: list[Effect], seed: int) -> LaplaceFit:
     write(folder, [Bench()], Truth(STIFF | truth, effects), seed)
     experiments = read_experiments(folder / "experiments.toml")
-    return fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    return fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
 
 
 def scanned(block: LaplaceFit, kinds: dict[str, type[Effect]]) -> tuple[list, list, Scan]:
@@ -66,7 +67,7 @@ def test_a_ladder_finds_what_refits_of_the_whole_density_find(tmp_path: Path, na
 def test_a_wire_that_goes_slack_in_every_hold_is_climbed_past() -> None:
     """No setting error moves a reading there, so that what setting errors do has no size to be measured in."""
     experiments = read_experiments(Path(__file__).parents[1] / "data" / "all-slack.toml")
-    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
     trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
     (way,) = ladders([block], trials, candidates, [data])
     found = lead(block, way, start(block, block.modes.z[:1]))
@@ -289,7 +290,7 @@ def test_no_setting_error_of_several_steps_explains_a_clamp_transient(tmp_path: 
     effect = named("clamp_transient")
     write(tmp_path, [bench], Truth(wire | {"clamp_transient.a": -0.05, "clamp_transient.T": 31.0}, [effect]), 0)
     experiments = read_experiments(tmp_path / "experiments.toml")
-    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
     assert block.parameters("simulated")["setting_sd"] < 0.5
     kinds = {name: CATALOGUE[name] for name in ("clamp_transient", "strain_stiffening")}
     trials, candidates, data = scanned(block, kinds)

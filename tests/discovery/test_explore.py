@@ -228,11 +228,11 @@ class Fits:
         self.parent: Any = stepwise.FittedSet(
             EffectSet(("a",), 7.0, {}, None), self.blocks, ("first",), further, ([], [], [])  # type: ignore[arg-type]
         )  # fmt: skip
-        self.settings: Any = SimpleNamespace(law="modified", history="additive", kinds={})
+        self.settings: Any = SimpleNamespace(spec="spec", kinds={})
 
-        def fitted(experiments: str, effects: Any, law: str, history: str, rng: Any, near: Any, scales: Any) -> Any:
+        def fitted(experiments: str, effects: Any, spec: str, rng: Any, near: Any, scales: Any) -> Any:
             assert scales == "scales"
-            self.did.append(("fitted", experiments, effects, law, history, near.tolist()))
+            self.did.append(("fitted", experiments, effects, spec, near.tolist()))
             return SimpleNamespace(target=experiments, modes=SimpleNamespace(z=np.ones((2, 1))))
 
         def informed(blocks: Any, effects: Any, rng: Any) -> Any:
@@ -261,7 +261,7 @@ class Fits:
 def test_one_more_effect_is_fitted_from_where_its_refit_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     fits = Fits(monkeypatch, on=(1,))
     found = fits.fit()
-    assert fits.did[0] == ("fitted", "e1", ("old1", "new"), "modified", "additive", [10.0])
+    assert fits.did[0] == ("fitted", "e1", ("old1", "new"), "spec", [10.0])
     assert found.blocks[0] is fits.blocks[0] and found.blocks[1].target == "e1"
     assert found.effects.names == ("a", "b") and found.effects.remainder.tolist() == [5.0, 4.0]  # type: ignore[union-attr]
     assert found.accepted == ("first", stepwise.Accepted("b", (1,), {1: "new"}))  # type: ignore[comparison-overlap, dict-item]

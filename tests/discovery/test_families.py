@@ -12,6 +12,7 @@ from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import fitted
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.sentences import families_said, said_beside, undecided
 from wirebayes.simulation.synthetic import Bench, Truth
 
@@ -70,7 +71,7 @@ def test_a_bent_line_and_a_bent_sensor_are_one_family_and_a_delay_is_another() -
     """Refitted on the paper's protocol, where the two differ by a few degrees."""
     effect = named("strain_stiffening")
     experiments = simulated_tests([Bench()], Truth(WIRE | {"strain_stiffening.c": 12.0}, [effect]), seed=3)
-    plain = [fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))]
+    plain = [fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))]
     kinds = {name: CATALOGUE[name] for name in ("strain_stiffening", "sensor_nonlinearity", "reading_delay")}
     trials, candidates = screening.candidate_probes(plain, kinds)
     data = [scan(expand(plain[0].target, plain[0].modes.z[:1], trials))]

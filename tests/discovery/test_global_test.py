@@ -14,6 +14,7 @@ from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.errors import InputError
 from wirebayes.io.paper import experiments
+from wirebayes.model.spec import PLAIN_SPEC
 
 SIMULATIONS = 199
 
@@ -115,7 +116,7 @@ def test_readings_are_struck_out_one_by_one_of_their_own_experiment(
         return SimpleNamespace(**(vars(block) | {"experiments": tuple(members)}))
 
     block: Any = SimpleNamespace(experiments=pair, target=None, modes=SimpleNamespace(z=np.zeros((1, 1))), effects=(),
-                                 law="", history="", exponent=None, scales=None)  # fmt: skip
+                                 spec=None, scales=None)  # fmt: skip
     # the best effect of this block explains 7, one of another block 50, a smooth curve 4
     effects = SimpleNamespace(effects=np.array([[7.0, 50.0]]), flexible=np.array([4.0]))
     monkeypatch.setattr(gross_errors, "suspect", suspect)
@@ -176,7 +177,7 @@ def test_of_few_readings_one_may_be_struck_out(monkeypatch: pytest.MonkeyPatch) 
         global_test, "scan", lambda x: SimpleNamespace(effects=np.array([[-7.0]]), flexible=np.array([4.0]))
     )
     block: Any = SimpleNamespace(experiments=(one,), target=None, modes=SimpleNamespace(z=np.zeros((1, 1))), effects=(),
-                                 law="hooke", history="saturating", exponent=None, scales=None)  # fmt: skip
+                                 spec=PLAIN_SPEC, scales=None)  # fmt: skip
     monkeypatch.setattr(global_test, "fitted", lambda members, *given, **known: SimpleNamespace(experiments=members))
     candidates = [Candidate(0, "a", (0,), True)]
     found, gone = global_test._strike_gross_errors(block, [], candidates, 0, np.random.default_rng(0))

@@ -16,6 +16,7 @@ from wirebayes.effects import named
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.scales import Scales
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.model import Model
 
@@ -46,7 +47,7 @@ def test_readings_are_inside_up_to_1_645_predictive_standard_deviations(
     theta = np.tile([WIRE[name] for name in problem.names], (4000, 1))  # a posterior that is one point
     monkeypatch.setattr(held_out, "fitted", lambda *_, **__: None)
     monkeypatch.setattr(held_out, "_draws", lambda *_: (problem, theta))
-    block = SimpleNamespace(effects=None, law="hooke", history="saturating", scales=None)
+    block = SimpleNamespace(effects=None, spec=PLAIN_SPEC, scales=None)
     # a quantile of 4000 normal draws has a standard error of 0.033 standard deviations
     for deviations, share in ((1.5, 1.0), (1.8, 0.0)):
         measured = moved(experiment, side * deviations)
@@ -142,7 +143,7 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
     """On the first holds of each experiment, with the laws of the block and five hundred draws."""
     pair = simulated_tests([Bench("a"), Bench("b", displacements_mm=(1, 2, 3, 4))], Truth(WIRE), seed=2)
     effects = (named("superposition"),)
-    problem = build([e.train(k) for e, k in zip(pair, (7, 3), strict=True)], effects, law="modified")
+    problem = build([e.train(k) for e, k in zip(pair, (7, 3), strict=True)], effects, spec=ModelSpec(law="modified"))
     given: list[tuple[object, ...]] = []
 
     def fitted(experiments: list[Experiment], *rest: object, scales: object) -> str:
@@ -158,11 +159,11 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
     monkeypatch.setattr(held_out, "fitted", fitted)
     monkeypatch.setattr(held_out, "_draws", draws)
     target = SimpleNamespace(coordinates=SimpleNamespace(to_natural=lambda z: z))
-    block = SimpleNamespace(effects=effects if same else (), law="modified", history="saturating", target=target,
+    block = SimpleNamespace(effects=effects if same else (), spec=ModelSpec(law="modified"), target=target,
                             scales=SCALES, modes=SimpleNamespace(z=np.array([[1.0, 2.0], [3.0, 4.0]])))  # fmt: skip
     found = held_out.predicted(pair, [7, 3], effects, block, np.random.default_rng(0))  # type: ignore[arg-type]
-    ((counts, extra, law, history, _, start),) = given
-    assert (counts, extra, law, history) == ([7, 3], effects, "modified", "saturating")
+    ((counts, extra, spec, _, start),) = given
+    assert (counts, extra, spec) == ([7, 3], effects, ModelSpec(law="modified"))
     assert start is None if near is None else start.tolist() == near  # type: ignore[attr-defined]
     assert [one.holds for one in found] == [[8, 9, 10, 11, 12], [4]]
 

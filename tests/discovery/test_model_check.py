@@ -19,6 +19,7 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.results.jobs import Job
 from wirebayes.simulation.synthetic import Bench, Truth, write
 
@@ -45,7 +46,7 @@ def test_a_p_near_the_level_is_distinguished_from_one_that_is_not() -> None:
 
 def test_a_p_too_close_to_the_level_gets_more_simulations(tmp_path: Path) -> None:
     small = simulated(tmp_path, {"strain_stiffening.c": 6.0}, ("strain_stiffening",))
-    block = fitted([small], (), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted([small], (), PLAIN_SPEC, np.random.default_rng(0))
     kinds = {name: CATALOGUE[name] for name in ("strain_stiffening", "sensor_drift")}
 
     def tested(alpha: float) -> tuple[float, int, int]:
@@ -96,7 +97,10 @@ def test_a_gross_error_is_set_aside_and_reported(tmp_path: Path) -> None:
 
 def test_what_cannot_be_checked_says_so(tmp_path: Path) -> None:
     experiment = simulated(tmp_path)
-    for job in (Job("", (experiment,), likelihood="hold"), Job("", (experiment,), ("discrepancy@7:0.1:120.0",))):
+    for job in (
+        Job("", (experiment,), spec=ModelSpec(likelihood="hold")),
+        Job("", (experiment,), ("discrepancy@7:0.1:120.0",)),
+    ):
         check = check_model(job)
         assert check.passed is None and check.p is None and check.to_dict()["passed"] is None
         assert check.sentence.startswith("The model was not checked")

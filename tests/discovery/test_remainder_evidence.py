@@ -23,6 +23,7 @@ from wirebayes.discovery.tangent import moving_columns, residuals
 from wirebayes.effects import named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.simulation.synthetic import Bench, Truth
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
@@ -89,7 +90,7 @@ def weighed(fit: LaplaceFit) -> tuple[float, float, float]:
 def test_a_remainder_has_the_evidence_of_an_integral(hidden: dict[str, float]) -> None:
     effects = [named(name.split(".")[0]) for name in hidden]
     experiments = simulated_tests([Bench()], Truth(WIRE | hidden, effects), seed=3)
-    _, found, exact = weighed(fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0)))
+    _, found, exact = weighed(fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0)))
     assert found == pytest.approx(exact, abs=1.0)
 
 
@@ -98,7 +99,7 @@ def test_what_bends_the_parameters_is_weighed_beside_others(tmp_path: Path) -> N
     spec = Spec("single", "paper", ("sensor_drift",), 10.0, 0, 777)
     assert seal(spec, tmp_path / "cases", tmp_path / "sealed")
     experiments = read_experiments(tmp_path / "cases" / spec.key / "experiment.toml")
-    by_fit, found, exact = weighed(fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0)))
+    by_fit, found, exact = weighed(fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0)))
     assert found == pytest.approx(exact, rel=0.06)
     assert by_fit < 0.7 * exact
 
@@ -106,7 +107,7 @@ def test_what_bends_the_parameters_is_weighed_beside_others(tmp_path: Path) -> N
 def test_a_mode_at_the_edge_of_a_prior_lends_a_remainder_nothing() -> None:
     """There the prior falls without a bend; as a parabola it would have its top anywhere, and any height."""
     experiments = simulated_tests([Bench(displacements_mm=(*range(1, 8), *range(6, 0, -1)))], Truth(WIRE), seed=3)
-    block = fitted(experiments, (named("superposition"),), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted(experiments, (named("superposition"),), PLAIN_SPEC, np.random.default_rng(0))
     edge = block.modes.z[:1].copy()
     edge[0, block.target.problem.names.index("superposition.omega")] = 6.0
     assert float(expand(block.target, edge, []).prior_square[0]) < 20.0
@@ -117,7 +118,7 @@ def test_a_mode_at_the_edge_of_a_prior_lends_a_remainder_nothing() -> None:
 
 def test_what_has_no_tangent_has_no_evidence() -> None:
     experiments = simulated_tests([Bench()], Truth(WIRE), seed=3)
-    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
     x = expand(block.target, block.modes.z[:1], [], reference=reference_of(block))
     plain, beside = evidences(replace(x, residual=np.full_like(x.residual, np.nan)))
     assert (plain == -np.inf).all() and (beside == -np.inf).all()

@@ -14,13 +14,14 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 
 
 @pytest.mark.parametrize(("exponent", "missing"), [(1.0, set()), (stats.norm(1.0, 1.0), {"length_dependence@B"})])
 def test_what_a_learned_exponent_says_is_no_candidate(exponent: object, missing: set[str]) -> None:
     """Creep that grows as L0^p: with p learned, an effect that changes B with length would be the same once more."""
     members = experiments()[:2]
-    problem = build(members, length_exponent=exponent)
+    problem = build(members, spec=ModelSpec(length_exponent=exponent))
     block = SimpleNamespace(experiments=members, effects=(), target=SimpleNamespace(problem=problem))
     trials, candidates = candidate_probes([block], {"length_dependence": CATALOGUE["length_dependence"]})  # type: ignore[list-item]
     every = {f"length_dependence@{which}" for which in ("k1", "B", "U", "N")}
@@ -71,7 +72,7 @@ def test_p_depends_less_on_the_simulations_drawn_than_by_counting(monkeypatch: p
 
 def test_what_has_many_signatures_is_scanned_in_smaller_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """As many simulations at once as fit, one at least, to the same log Bayes factors."""
-    block = fitted(experiments()[1:2], (), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted(experiments()[1:2], (), PLAIN_SPEC, np.random.default_rng(0))
     trials, _ = candidate_probes([block], CATALOGUE)
     numbers = len(trials) * block.target.problem.samples[0].protocol.mask.size
     rows: list[int] = []

@@ -19,6 +19,7 @@ from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io import paper
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.processes import workers
 from wirebayes.simulation.synthetic import Bench, Truth, write
 from wirebayes.wire.effect import Effect
@@ -67,7 +68,7 @@ def test_false_alarms_are_as_rare_as_said(tmp_path: Path) -> None:
     for seed in range(24):
         (folder := tmp_path / str(seed)).mkdir()
         rng = np.random.default_rng(seed)
-        block = fitted(made(folder, [Bench(resolution_N=0.01)], {}, [], seed), (), "hooke", "saturating", rng)
+        block = fitted(made(folder, [Bench(resolution_N=0.01)], {}, [], seed), (), PLAIN_SPEC, rng)
         trials, candidates = screening.candidate_probes([block], CATALOGUE)
         data = linear_scan.scan(linear_scan.expand(block.target, block.modes.z[:1], trials))
         values.append(screening.global_test(candidates, [data], [screening.replicated(block, trials, 99, rng).scan]).p)
@@ -192,7 +193,7 @@ def test_what_two_lengths_leave_open_a_third_one_tells(tmp_path: Path) -> None:
         Bench(name="long", length_mm=1800.0, displacements_mm=tuple(range(2, 22, 2))),
     ]
     experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3)
-    block = fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
     probes = {p.effect.name: p for p in screening.candidate_probes([block], CATALOGUE)[0]}
     proposal = next_measurement.next_measurement(
         block, (probes["fixture_compliance"], probes["length_dependence"]), None
@@ -258,9 +259,7 @@ def test_an_unknown_name_is_refused() -> None:
 
 def test_the_linear_scan_sees_what_a_regression_on_the_dense_covariance_sees(tmp_path: Path) -> None:
     """Projected length at the fitted noise, against generalised least squares written out."""
-    block = fitted(
-        made(tmp_path, [Bench()], {"toe.w": 1.0}, [named("toe")]), (), "hooke", "saturating", np.random.default_rng(0)
-    )
+    block = fitted(made(tmp_path, [Bench()], {"toe.w": 1.0}, [named("toe")]), (), PLAIN_SPEC, np.random.default_rng(0))
     trials = probes(named("strain_stiffening"))
     x = linear_scan.expand(block.target, block.modes.z[:1], trials)
     whitened = noise_integral.projected(x, float(x.ratio[0]))[:, 0]

@@ -15,13 +15,14 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.scales import scales_of
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.simulation.synthetic import Bench, Truth, write
 
 WIRE = {"U": 0.6, "B": 0.08, "k2": 0.02, "N": 0.7, "preload": 0.5, "sensor_sd": 0.01, "setting_sd": 0.01}
 
 
 def fit(experiments: list[Experiment], effect: str) -> LaplaceFit:
-    return fitted(experiments, [named(effect)], "hooke", "saturating", np.random.default_rng(0))
+    return fitted(experiments, [named(effect)], PLAIN_SPEC, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(
@@ -76,11 +77,11 @@ def weighed_by_both(folder: Path, periods: tuple[float, float]) -> tuple[float, 
         write(folder / material, [bench], truth, at)
         experiments += read_experiments(folder / material / "experiments.toml")
     scales = scales_of(experiments)
-    plain = [fitted([e], [], "hooke", "saturating", np.random.default_rng(0), scales=scales) for e in experiments]
+    plain = [fitted([e], [], PLAIN_SPEC, np.random.default_rng(0), scales=scales) for e in experiments]
     trials, candidates = candidate_probes(plain, {"screw_error": ScrewError})
     scans = [scan(expand(block.target, block.modes.z[:1], trials)) for block in plain]
     found = weigh_names(plain, trials, candidates, scans).winners["screw_error"][0]
-    both = fitted(experiments, [found.effect], "hooke", "saturating", np.random.default_rng(0), scales=scales)
+    both = fitted(experiments, [found.effect], PLAIN_SPEC, np.random.default_rng(0), scales=scales)
     by_both = both.log_evidence - sum(block.log_evidence for block in plain)
     return found.log_bayes, by_both, plain[0].natural_amplitude(found.effect, found.amplitude)
 

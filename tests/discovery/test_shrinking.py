@@ -13,6 +13,7 @@ from wirebayes.discovery.shrinking import _compared, _Gain
 from wirebayes.effects import named
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.wire.staircase import simulate
 
 
@@ -112,9 +113,7 @@ def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, ho
     """Reports of two experiments where a model's squared error says which one it is, and on what."""
     error = {"plain": 50.0, "a": 40.0, "ab": 30.0, "abc": 25.0, "plain~": 20.0, "a~": 15.0, "ab~": 10.0, "abc~": 5.0}
     pair = tuple(replace(e, holds=e.recorded_holds[:holds]) for e in experiments()[1:3])
-    models = [
-        Model(name=name, experiments=pair, effects=(), law="", history="", scales=None) for name in ("plain", *stages)
-    ]
+    models = [Model(name=name, experiments=pair, effects=(), spec=None, scales=None) for name in ("plain", *stages)]
 
     def predicted(trained: Any, rng: Any) -> list[HeldOut]:
         smooth = "~" if trained.effects == ("discrepancy",) else ""
@@ -168,7 +167,7 @@ def test_every_model_is_scored_under_its_own_name(
 
 def test_one_experiment_with_too_few_holds_is_enough_to_hold_none_out(monkeypatch: pytest.MonkeyPatch) -> None:
     pair = experiments()[1], experiments()[2].train(2)
-    block: Any = Model(name="plain", experiments=pair, effects=(), law="", history="")
+    block: Any = Model(name="plain", experiments=pair, effects=(), spec=None)
     monkeypatch.setattr(shrinking, "_predicted", lambda *given: pytest.fail("predicted"))
     rng = np.random.default_rng(0)
     found = shrinking.shrinking(block, [], [], True, held_out.LeftOut(rng, map), rng, map)
@@ -223,21 +222,21 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
     monkeypatch.setattr(shrinking, "fitted", fitted)
     slip = replace(named("grip_slip@4"), test="another")  # type: ignore[type-var]
     whole: Any = SimpleNamespace(
-        effects=(slip, named("superposition")), law="hooke", history="additive", names=(one.name, other.name),
+        effects=(slip, named("superposition")), spec=ModelSpec(history="additive"), names=(one.name, other.name),
         experiments=(one, other), scales="scales",
     )  # fmt: skip
     memory, smooth = shrinking.with_discrepancy(whole, other, "rng")  # type: ignore[arg-type]
-    assert memory is whole.effects[1] and asked == [([other], (memory,), "hooke", "additive", "rng", "scales")]
+    assert memory is whole.effects[1] and asked == [([other], (memory,), whole.spec, "rng", "scales")]
     assert smooth == shrinking.discrepancy(other, shrinking.left_over(block, other.name))
     # a block that is this experiment alone has been fitted, its first holds have not
     block.effects, block.experiments, block.names = (memory,), (other,), (other.name,)
-    block.law, block.history, block.scales = "hooke", "additive", "scales"
+    block.spec, block.scales = ModelSpec(history="additive"), "scales"
     first = other.train(3)
     monkeypatch.setattr(shrinking, "left_over", lambda fit, name: 0.5 if fit is block else np.nan)
     _, smooth = shrinking.with_discrepancy(block, other, "rng")  # type: ignore[arg-type]
     assert smooth == shrinking.discrepancy(other, 0.5) and len(asked) == 1
     shrinking.with_discrepancy(block, first, "rng")  # type: ignore[arg-type]
-    assert asked[1:] == [([first], (memory,), "hooke", "additive", "rng", "scales")]
+    assert asked[1:] == [([first], (memory,), whole.spec, "rng", "scales")]
 
 
 def test_a_gain_is_reported_by_its_three_numbers() -> None:

@@ -13,6 +13,7 @@ from wirebayes.discovery.remainder_evidence import reference_of, remainder_evide
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io import paper
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.simulation.synthetic import Bench, Truth, write
 
 WIRE = paper.experiments()[2]
@@ -76,7 +77,7 @@ def test_of_many_readings_the_covariance_of_some_gives_nearly_the_best_functions
 
 
 def test_the_evidence_of_several_processes_is_the_mean_of_theirs() -> None:
-    block = fitted([WIRE], (), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted([WIRE], (), PLAIN_SPEC, np.random.default_rng(0))
     z, family = block.modes.z[:1], smooth_reference.family(WIRE.protocol())
     each = [scan(expand(block.target, z, [], reference=[[f]])).flexible[0] for f in family]
     together = scan(expand(block.target, z, [], reference=[family])).flexible[0]
@@ -93,7 +94,7 @@ def disturbed(folder: Path, size_N: float) -> LaplaceFit:
     for j, share in ((5, 0.6), (6, 1.0), (7, 0.6)):
         off = size_N * share * np.exp(-np.asarray(holds[j].time_s) / 40.0)
         holds[j] = replace(holds[j], readings=np.asarray(holds[j].tension_N) + off)
-    return fitted([replace(clean, holds=tuple(holds))], (), "hooke", "saturating", np.random.default_rng(0))
+    return fitted([replace(clean, holds=tuple(holds))], (), PLAIN_SPEC, np.random.default_rng(0))
 
 
 def test_a_local_deviation_is_a_remainder_that_one_global_process_does_not_see(tmp_path: Path) -> None:

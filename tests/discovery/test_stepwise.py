@@ -13,6 +13,7 @@ from wirebayes.discovery.settings import SAME_EVIDENCE, Settings
 from wirebayes.discovery.smooth_credit import beside_smooth
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.simulation.synthetic import Bench, Truth
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
@@ -21,7 +22,7 @@ UP_AND_DOWN = (*range(1, 11), *range(9, 0, -1))
 
 def plain_fit(bench: Bench, truth: dict[str, float], names: tuple[str, ...]) -> list[LaplaceFit]:
     experiments = simulated_tests([bench], Truth(WIRE | truth, [named(n) for n in names]), seed=3)
-    return [fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))]
+    return [fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))]
 
 
 @pytest.mark.parametrize(

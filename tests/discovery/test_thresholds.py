@@ -15,6 +15,7 @@ from wirebayes.discovery.refit import LARGEST, occam
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.wire.staircase import simulate
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4, "sensor_sd": 0.01, "setting_sd": 1e-9}
@@ -82,7 +83,7 @@ def test_bands_of_held_out_readings_hold_nine_in_ten(
     theta = np.tile([WIRE[name] for name in problem.names], (500, 1))
     monkeypatch.setattr(held_out, "fitted", lambda *given, **_: None)
     monkeypatch.setattr(held_out, "_draws", lambda block, rng, n: (problem, theta))
-    block = SimpleNamespace(effects=("none",), law="hooke", history="saturating", scales=None)
+    block = SimpleNamespace(effects=("none",), spec=PLAIN_SPEC, scales=None)
     (found,) = held_out.predicted([one], [3], (), block, Even())  # type: ignore[arg-type]
     assert found.inside == covered
     assert found.squares == pytest.approx((away * WIRE["sensor_sd"]) ** 2, rel=1e-6)

@@ -16,6 +16,7 @@ from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import with_readings
+from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.spread_rows import spread_rows
 from wirebayes.prediction.left_out_density import without_hold
 from wirebayes.simulation.synthetic import Bench, Truth, draw
@@ -30,7 +31,7 @@ def test_rows_are_spread_and_never_repeated():
 
 def simulated(*effects, likelihood="chain"):
     made = draw([Bench()], Truth({"k1": 900.0, "B": 0.4, "U": 0.7, "k2": 0.03, "N": 0.6}), seed=4)
-    problem = build([Bench().experiment()], [named(e) for e in effects], likelihood=likelihood)
+    problem = build([Bench().experiment()], [named(e) for e in effects], spec=ModelSpec(likelihood=likelihood))
     return LogPosterior(integrated(with_readings(problem, [s.readings for s in made.problem.samples])))
 
 
@@ -268,7 +269,9 @@ def test_a_search_finds_a_narrow_mode_that_matters_where_a_hold_is_left_out(wire
     prior draws reach; nylon's additive creep, without its second, one that climbs with the noises free often miss.
     A climb from near that mode tells how high it is."""
     whole = experiments()[wire]
-    problem = build([whole.train(len(whole.recorded_holds))], [named(key) for key in effects], history=history)
+    problem = build(
+        [whole.train(len(whole.recorded_holds))], [named(key) for key in effects], spec=ModelSpec(history=history)
+    )
     [sample] = problem.samples
     target = LogPosterior(integrated(without_hold(problem, 0, int(np.flatnonzero(sample.protocol.recorded)[hold]))))
     there = climb(target.rowwise()[0], target.coordinates.to_sampled(np.array([place])), target.rowwise()[1])

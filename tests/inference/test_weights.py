@@ -12,6 +12,7 @@ from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.scales import NATURAL
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.simulation.synthetic import Bench, Truth
 
 TIMES = (0.0, 15.0, 30.0, 60.0, 120.0, 300.0)
@@ -33,7 +34,7 @@ def both() -> dict[str, Experiment]:
 def draws(experiments: list[Experiment]) -> dict[str, np.ndarray]:
     """Of the first experiment's parameters, by the normal approximation weighted by the posterior."""
     rng = np.random.default_rng(0)
-    block = fitted(experiments, (), "hooke", "saturating", rng)
+    block = fitted(experiments, (), PLAIN_SPEC, rng)
     own, natural = block.target.problem, block.target.problem.in_units(NATURAL)
     theta = own.theta_in(NATURAL, rough_draws.draws(block.target, block.modes, rng))
     return natural.parameters(theta, natural.samples[0])
@@ -52,15 +53,15 @@ def test_a_pair_of_tests_agrees_with_the_wire_and_is_sharper_together(both: dict
 
 
 def test_hold_by_hold_a_test_under_weights_has_neither_stiffness_nor_preload(both: dict[str, Experiment]) -> None:
-    problem = build([both["weights"]], likelihood="hold")
+    problem = build([both["weights"]], spec=ModelSpec(likelihood="hold"))
     assert problem.names == ("B", "U", "k2", "N", "sensor_sd")
     theta = np.array([[WIRE["B"], WIRE["U"], WIRE["k2"], WIRE["N"], 0.006]])
     assert np.isfinite(problem.log_likelihood(theta)).all()
-    assert build([both["steps"]], likelihood="hold").names[0] == "k1"
+    assert build([both["steps"]], spec=ModelSpec(likelihood="hold")).names[0] == "k1"
 
 
 def test_a_law_whose_wire_cannot_carry_the_weights_has_no_likelihood(both: dict[str, Experiment]) -> None:
-    problem = build([both["weights"]], law="modified")
+    problem = build([both["weights"]], spec=ModelSpec(law="modified"))
     theta = np.array([[k1, 0.2, 0.8, 0.03, 0.8, -3.0, 0.006, 0.02] for k1 in (4.9, 900.0)])
     assert np.isfinite(problem.log_likelihood(theta)).tolist() == [False, True]
 

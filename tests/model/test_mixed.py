@@ -16,6 +16,7 @@ from wirebayes.io.arrays import from_arrays
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.column_units import unit_of_column
+from wirebayes.model.spec import PLAIN_SPEC
 
 TIMES = (0.0, 30.0, 60.0, 120.0)
 STEPS, WEIGHTS = (1.0, 2.0, 3.0, 4.0, 5.0), (1.0, 2.0, 3.0, 4.0)
@@ -91,7 +92,7 @@ def test_an_effect_of_one_kind_of_test_is_in_no_other(pair):
 
 
 def test_a_search_looks_for_the_fault_of_each_instrument_apart(pair):
-    block = fitted(pair, (), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted(pair, (), PLAIN_SPEC, np.random.default_rng(0))
     kinds = {name: CATALOGUE[name] for name in ("sensor_drift", "toe")}
     trials, candidates = candidate_probes([block], kinds)
     assert all(c.blocks == (0,) and c.shared for c in candidates)
@@ -105,7 +106,7 @@ def test_a_search_looks_for_the_fault_of_each_instrument_apart(pair):
 
 
 def test_tests_of_one_kind_are_searched_as_one(pair):
-    block = fitted(pair[:1], (), "hooke", "saturating", np.random.default_rng(0))
+    block = fitted(pair[:1], (), PLAIN_SPEC, np.random.default_rng(0))
     trials, _ = candidate_probes([block], {"sensor_drift": CATALOGUE["sensor_drift"]})
     assert [t.effect.key for t in trials] == ["sensor_drift"]
 

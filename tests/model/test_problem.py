@@ -18,6 +18,7 @@ from wirebayes.model.build import build
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import with_protocols, with_readings
 from wirebayes.model.sample import Likelihood
+from wirebayes.model.spec import ModelSpec
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.model import Model
 
@@ -33,7 +34,7 @@ def test_rounding_is_part_of_the_error_of_every_reading():
     """A display that shows tenths of a newton hides more than the sensor: Var = sensor² + resolution²/12."""
     bench = Bench(resolution_N=0.1)
     experiment = simulated_tests([bench], Truth(WIRE), seed=1)[0]
-    problem = build([experiment], likelihood="hold")
+    problem = build([experiment], spec=ModelSpec(likelihood="hold"))
     sample = problem.samples[0]
     courses = single_holds.hold_courses(sample.protocol, columns(WIRE), Model(), sample.readings[:, 0])
     expected = 0.0
@@ -57,7 +58,7 @@ def test_creep_grows_with_length_to_the_fitted_power(exponent):
     benches = [Bench("short", "line", 500.0), Bench("long", "line", 2000.0)]
     experiments = simulated_tests(benches, Truth(values, effects), seed=3)
     for length_exponent in (exponent, stats.norm(1.0, 0.5)):  # known, and learned
-        problem = build(experiments, effects, length_exponent=length_exponent)
+        problem = build(experiments, effects, spec=ModelSpec(length_exponent=length_exponent))
         assert ("creep_length_exponent" in problem.names) == (length_exponent is not exponent)
         expected = 0.0
         for e, own in zip(experiments, problem.samples, strict=True):
@@ -100,10 +101,12 @@ def test_parameters_are_named_by_what_shares_them(likelihood: Likelihood) -> Non
     """Of one test plainly; of several by sample and by material, where there are several; amplitudes by their scope."""
     own = ["preload", "sensor_sd", "setting_sd"] if likelihood == "chain" else ["sensor_sd"]
     wire, effects = ["k1", "B", "U", "k2", "N"], (named("superposition"), named("sensor_drift"))
-    assert build([short()], likelihood=likelihood).names == (*wire, *own)
-    two = build([short("a"), short("b")], effects, likelihood=likelihood)
+    assert build([short()], spec=ModelSpec(likelihood=likelihood)).names == (*wire, *own)
+    two = build([short("a"), short("b")], effects, spec=ModelSpec(likelihood=likelihood))
     assert two.names == (*wire, "superposition.omega", "sensor_drift.a", *(f"{n}[{s}]" for s in "ab" for n in own))
-    lots = build([short("a"), short("b", "other"), short("c", length_mm=500.0)], effects, likelihood=likelihood)
+    lots = build(
+        [short("a"), short("b", "other"), short("c", length_mm=500.0)], effects, spec=ModelSpec(likelihood=likelihood)
+    )
     shared = [f"{n}[{m}]" for m in ("line", "other") for n in (*wire, "superposition.omega")]
     assert set(lots.names) == {*shared, "sensor_drift.a", *(f"{n}[{s}]" for s in "abc" for n in own)}
     assert lots.prior.fixed == {"creep_length_exponent[line]": 1.0}  # the two of one material differ in length
@@ -191,7 +194,7 @@ def test_a_typical_hold_lasts_the_median_of_the_recorded_ones() -> None:
 @pytest.mark.parametrize("likelihood", ["chain", "hold"])
 def test_every_hold_s_part_and_all_readings_but_its_own(likelihood: Likelihood) -> None:
     """Of two samples, against problems that never saw the hold; what is left out of one stays in the other."""
-    problem = build([short("a"), short("b", length_mm=1500.0)], likelihood=likelihood)
+    problem = build([short("a"), short("b", length_mm=1500.0)], spec=ModelSpec(likelihood=likelihood))
     values = WIRE | {"preload[b]": 0.1}
     theta = np.vstack([at(problem, values), at(problem, values | {"k1": 800.0})])
     whole, without = problem.without_each_hold(theta)

@@ -10,9 +10,10 @@ import pytest
 from tests import light
 from wirebayes.cli import main
 from wirebayes.io import paper
+from wirebayes.model.spec import ModelSpec
 from wirebayes.paper import verdicts
 from wirebayes.paper.held_out import HeldOut, published_course
-from wirebayes.paper.least_squares import Variant, at, residuals
+from wirebayes.paper.least_squares import at, residuals
 from wirebayes.paper.pictures import stiffest_step
 from wirebayes.processes import workers
 from wirebayes.results import jobs
@@ -63,7 +64,7 @@ def test_the_papers_curve_passes_where_its_residuals_say(name):
     wire = WIRES[name]
     hold = wire.recorded_holds[-1]
     curve = published_course(TABLE_4[name], wire, hold.time_s)
-    left = residuals(wire, at(TABLE_4[name]), Variant("hold"))[-1, 1:, 0]
+    left = residuals(wire, at(TABLE_4[name]), ModelSpec(likelihood="hold"))[-1, 1:, 0]
     assert curve[0] == pytest.approx(hold.tension_N[0], abs=1e-9)
     np.testing.assert_allclose(hold.tension_N[1:] - curve[1:], left, atol=1e-9)
 

@@ -11,6 +11,7 @@ from wirebayes.discovery.settings import ALPHA
 from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.model.scales import scales_of
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.numeric.frozen import frozen
 from wirebayes.planning.sensitivity import sensitivity
 from wirebayes.planning.widths import at_centre, central
@@ -22,7 +23,7 @@ KINDS = {name: CATALOGUE[name] for name in ("toe", "strain_stiffening", "lost_mo
 
 
 def seen(bench, kinds=KINDS, simulations=80):
-    test = at_centre(bench.experiment(), guess(20), "hooke", "saturating")
+    test = at_centre(bench.experiment(), guess(20), PLAIN_SPEC)
     return sensitivity(test, guess(20), kinds, np.random.default_rng(0), simulations=simulations)
 
 
@@ -48,7 +49,7 @@ def test_what_looks_alike_is_said_and_lies_close(up):
 
 def test_delta_is_amplitude_in_units_of_what_is_seen(up):
     effect = up.effects["steady_creep"]
-    units = scales_of([at_centre(UP.experiment(), central(guess(20)), "hooke", "saturating")]).units
+    units = scales_of([at_centre(UP.experiment(), central(guess(20)), PLAIN_SPEC)]).units
     amplitude = CATALOGUE["steady_creep"]().amplitudes[0]
     ratio = units.of(amplitude.unit) * amplitude.prior.std() / effect["amplitude_80"]
     assert effect["delta_prior"] == pytest.approx(ratio * effect["delta_80"])
@@ -74,6 +75,6 @@ def test_an_amplitude_said_to_be_seen_in_four_of_five_tests_is():
         rows = zip(test.holds, sample.readings[..., 0], strict=True)
         test = replace(test, holds=tuple(replace(h, readings=frozen(y.tolist())) for h, y in rows))
         rng = np.random.default_rng(i)
-        gate = examine([fitted([test], (), "hooke", "saturating", rng)], KINDS, 199, rng)
+        gate = examine([fitted([test], (), PLAIN_SPEC, rng)], KINDS, 199, rng)
         found += gate.test.p <= ALPHA
     assert 26 <= found <= 39  # 32 expected; the amplitude itself is known to some 5 %

@@ -12,6 +12,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.model.build import build
 from wirebayes.model.problem import with_readings
 from wirebayes.model.replicate import readings
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.planning import widths
 from wirebayes.planning.widths import at_centre, expected_widths, typical_tension
 from wirebayes.simulation.synthetic import Bench
@@ -35,13 +36,13 @@ def guess(n, spread=0.05):
 
 
 def planned(bench, n=16, **options):
-    test = at_centre(bench.experiment(), guess(n), "hooke", "saturating")
+    test = at_centre(bench.experiment(), guess(n), PLAIN_SPEC)
     return expected_widths(test, guess(n), np.random.default_rng(1), **options)
 
 
 def planned_over_sampled(bench):
     """Lengths of 90 % intervals of one simulated test's posterior: as a plan finds them, and by the sampler."""
-    test = at_centre(bench.experiment(), guess(5), "hooke", "saturating")
+    test = at_centre(bench.experiment(), guess(5), PLAIN_SPEC)
     problem = build([test])
     theta = np.array([[CENTRE[name] for name in problem.names]])
     y = readings(problem, theta, problem.samples[0], np.random.default_rng(3))
@@ -85,7 +86,7 @@ def test_more_readings_and_longer_holds_teach_more():
 
 def test_creep_is_stated_for_one_tension_and_length():
     bench = Bench("a", displacements_mm=(1, 2, 3, 4))
-    test = at_centre(bench.experiment(), guess(5), "hooke", "saturating")
+    test = at_centre(bench.experiment(), guess(5), PLAIN_SPEC)
     assert typical_tension(test) == pytest.approx(np.median([h.tension_N[0] for h in test.recorded_holds]))
     own, twice = planned(bench), planned(bench, length_mm=2000.0)
     ratio = twice.widths["creep_1h_mm"]["sd"] / own.widths["creep_1h_mm"]["sd"]
@@ -94,7 +95,7 @@ def test_creep_is_stated_for_one_tension_and_length():
 
 
 def test_a_fixed_parameter_has_no_width_and_priors_of_the_fit_count():
-    test = at_centre(RIDGE.experiment(), guess(20), "hooke", "saturating")
+    test = at_centre(RIDGE.experiment(), guess(20), PLAIN_SPEC)
     loose = expected_widths(test, guess(20), np.random.default_rng(1))
     fixed = replace(
         test, priors={"N": {"fixed": 0.7}, "k2": {"distribution": "log-normal", "median": 0.03, "sd_log": 0.01}}
@@ -112,7 +113,7 @@ def test_the_same_seed_gives_the_same_widths_and_draws_are_kept():
 
 
 def test_truths_that_the_priors_exclude_are_left_out():
-    test = at_centre(RIDGE.experiment(), guess(20), "hooke", "saturating")
+    test = at_centre(RIDGE.experiment(), guess(20), PLAIN_SPEC)
     never = replace(test, priors={"k1": {"distribution": "uniform", "low": 1.0, "high": 2.0}})
     with pytest.raises(ValueError, match="no simulated test could be fitted"):
         expected_widths(never, guess(20), np.random.default_rng(1))

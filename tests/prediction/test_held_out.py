@@ -12,6 +12,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction.held_out import Scores, _log_mean, _scores, held_out, pit_band, two_thirds
 from wirebayes.wire.staircase import simulate
 
@@ -89,7 +90,7 @@ def test_central_intervals_hold_the_share_they_name() -> None:
 
 def test_hold_by_hold_has_no_free_prediction() -> None:
     experiment = experiments()[1]
-    fitted = fit(build([experiment.train(8)], likelihood="hold"), 1, policy=QUICK)
+    fitted = fit(build([experiment.train(8)], spec=ModelSpec(likelihood="hold")), 1, policy=QUICK)
     result = held_out(fitted, experiment, np.random.default_rng(0))
     assert result.free is None
     assert result.given.rmse_N < 0.05
@@ -174,13 +175,13 @@ def test_the_band_by_counting(probability: float | None) -> None:
 def test_hold_by_hold_later_readings_are_scored_given_the_first() -> None:
     """At two points in turn: the logarithm of the mean of two densities, for each hold to come."""
     experiment = experiments()[1]
-    problem = build([experiment.train(8)], likelihood="hold")
+    problem = build([experiment.train(8)], spec=ModelSpec(likelihood="hold"))
     at = {"k1": 700.0, "B": 0.21, "U": 0.6, "k2": 0.03, "N": 0.7, "sensor_sd": 0.006}
     theta = np.array([[at[name] for name in problem.names]] * 2)
     theta[1, 0] = 650.0
     stub = SimpleNamespace(problem=problem, flat=np.tile(theta, (600, 1)))
     result = held_out(stub, experiment, np.random.default_rng(0))  # type: ignore[arg-type]
-    each = build([experiment], likelihood="hold").hold_log_likelihood(theta)[0][8:]
+    each = build([experiment], spec=ModelSpec(likelihood="hold")).hold_log_likelihood(theta)[0][8:]
     assert result.given.elpd == pytest.approx(np.log(np.exp(each).mean(axis=1)), rel=1e-9)
     assert result.experiment == "roc-line-1.71m" and result.trained == 8 and np.isnan(result.given.elpd_together)
     assert len(result.given.observed_N) == 16 and (result.given.time_s > 0).all()

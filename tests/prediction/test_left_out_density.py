@@ -18,6 +18,7 @@ from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL, Units
+from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction import left_out_density as module
 from wirebayes.prediction.leave_one_hold_out import log_mean, smoothed_leave_one_hold_out
 from wirebayes.prediction.left_out_density import joined, log_densities, without_hold
@@ -26,7 +27,7 @@ from wirebayes.prediction.left_out_density import joined, log_densities, without
 @pytest.mark.parametrize("likelihood", ["chain", "hold"])
 def test_the_densities_are_those_of_problems_without_a_hold(likelihood: str) -> None:
     """Two wires jointly, one with a hold that was not recorded; every member computed by a problem of its own."""
-    problem = build([experiments()[0].train(6), experiments()[2].train(4)], likelihood=likelihood)
+    problem = build([experiments()[0].train(6), experiments()[2].train(4)], spec=ModelSpec(likelihood=likelihood))
     target = LogPosterior(problem)
     theta = problem.prior.rvs(200, np.random.default_rng(0))
     holds = [(0, 0), (0, 5), (1, 3)]
@@ -244,7 +245,7 @@ def test_a_hold_that_is_apart_agrees_with_thermodynamic_integration(effects: tup
 @pytest.mark.parametrize("likelihood", ["chain", "hold"])
 def test_searches_see_all_holds_but_one(likelihood: Literal["chain", "hold"]) -> None:
     """The density that each climbs is that of the problem without the readings of its hold, and so are residuals."""
-    problem, holds = build(experiments()[:2], likelihood=likelihood), [(0, 3), (1, 0), (1, 9)]
+    problem, holds = build(experiments()[:2], spec=ModelSpec(likelihood=likelihood)), [(0, 3), (1, 0), (1, 9)]
     target = LogPosterior(problem)
     density, residuals = target.rowwise(module.without_holds(problem, holds))
     z = target.coordinates.to_sampled(problem.prior.rvs(5, np.random.default_rng(0)))

@@ -16,6 +16,7 @@ from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.results.read_back import load
 from wirebayes.results.store import save
 from wirebayes.robot.mechanics.draws import warnings
@@ -30,7 +31,7 @@ def fits(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("fits")
     for likelihood in ("chain", "hold"):
         for experiment in experiments()[1:3]:
-            result = fit(build([experiment.train(TRAINED)], likelihood=likelihood), 1, policy=QUICK)
+            result = fit(build([experiment.train(TRAINED)], spec=ModelSpec(likelihood=likelihood)), 1, policy=QUICK)
             place = folder / likelihood / experiment.name
             place.mkdir(parents=True)
             save(result, place, {})

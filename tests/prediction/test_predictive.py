@@ -11,6 +11,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
 from wirebayes.model import single_holds
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction import predictive
 from wirebayes.prediction.predictive import PredictionRequest, _regressed, predict, settings_given_readings
 from wirebayes.wire.staircase import simulate
@@ -149,7 +150,7 @@ def test_what_effects_carry_goes_on_from_the_training(key: str) -> None:
 @pytest.mark.statistical
 def test_hold_by_hold_spreads_the_first_readings_own_error() -> None:
     experiment = wire("roc-line-1.71m")
-    problem = build([experiment], likelihood="hold")
+    problem = build([experiment], spec=ModelSpec(likelihood="hold"))
     theta = rows(TRUTH, problem.names, 20000)
     protocol = experiment.protocol()
     question = PredictionRequest(protocol, len(protocol.number), protocol.recorded, experiment.tension()[:, 0])
@@ -290,7 +291,7 @@ def test_given_first_readings_are_regressed_on_within_their_own_history() -> Non
 def test_hold_by_hold_each_hold_follows_from_its_own_first_reading() -> None:
     """Without noise it is the course through that reading; where that is not above zero, there is none."""
     experiment = wire()
-    problem = build([experiment], likelihood="hold")
+    problem = build([experiment], spec=ModelSpec(likelihood="hold"))
     protocol = experiment.protocol()
     sample = replace(problem.samples[0], resolution=1e-12)
     requested = protocol.recorded & (protocol.number != 2)

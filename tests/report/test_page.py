@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from wirebayes.cli import main
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
+from wirebayes.model.spec import ModelSpec
 from wirebayes.report.blocks import (
     Page,
     Picture,
@@ -175,7 +176,7 @@ def fitted(tmp_path_factory) -> Path:
     directory = folder_of(tmp_path_factory.mktemp("fit") / "out", "fit")
     kite = next(e for e in paper.experiments() if e.name == "kite-1.5m")
     for likelihood in ("chain", "hold"):
-        run([Job(likelihood, (kite,), likelihood=likelihood)], directory, 0, policy=_FAST)
+        run([Job(likelihood, (kite,), spec=ModelSpec(likelihood=likelihood))], directory, 0, policy=_FAST)
     return directory
 
 

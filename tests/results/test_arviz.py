@@ -19,6 +19,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out
 from wirebayes.results import read_back, store
 
@@ -91,7 +92,7 @@ def stored(experiments: list[Experiment], tmp_path_factory: pytest.TempPathFacto
     joint = fit(build(both), 1, policy=HASTY)
     fits = {
         "chain": fit(build(short), 1, policy=HASTY),
-        "hold": fit(build(short, likelihood="hold"), 1, policy=HASTY),
+        "hold": fit(build(short, spec=ModelSpec(likelihood="hold")), 1, policy=HASTY),
         "together": joint,
         "apart": joint,
         "effects": fit(build(short, [named("thermal_expansion"), named("grip_slip@4")]), 1, policy=LESS_HASTY),

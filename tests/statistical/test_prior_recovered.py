@@ -9,6 +9,7 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.fit import fit, parameters_at
 from wirebayes.inference.policy import Policy
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 pytestmark = pytest.mark.statistical
@@ -17,7 +18,7 @@ POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0)
 
 def silent(effects=(), likelihood="chain"):
     made = draw([Bench()], Truth({"k1": 900.0}, effects), seed=3).problem
-    rebuilt = build([Bench().experiment()], effects, likelihood=likelihood)
+    rebuilt = build([Bench().experiment()], effects, spec=ModelSpec(likelihood=likelihood))
     return Silent(made.samples, rebuilt.prior, likelihood)
 
 

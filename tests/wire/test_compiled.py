@@ -19,6 +19,7 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.wire import compiled
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.model import Model
@@ -225,7 +226,7 @@ def test_the_coordinates_follow_the_same_creep(history: Any, known: tuple[str, .
     first, *rest = experiments()[0].holds
     longer = replace(first, duration_s=2.0 * first.duration_s)
     priors = {name: {"fixed": 0.7} for name in known}
-    problem = build([replace(experiments()[0], holds=(longer, *rest), priors=priors)], history=history)
+    problem = build([replace(experiments()[0], holds=(longer, *rest), priors=priors)], spec=ModelSpec(history=history))
     theta, coordinates = problem.prior.rvs(50, np.random.default_rng(0)), LogPosterior(problem).coordinates
     z = coordinates.to_sampled(theta)
     np.testing.assert_allclose(z, by_numpy(lambda: coordinates.to_sampled(theta)), rtol=1e-12, atol=1e-12)

@@ -8,11 +8,11 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from wirebayes._version import __version__
 from wirebayes.commands.one_experiment import QUANTITIES, Done, Task, do, first_columns, packed
-from wirebayes.commands.options import Progress, check_choice, check_seed, check_train_holds, path_of, silent, words
+from wirebayes.commands.options import Progress, check_seed, check_train_holds, model_spec, path_of, silent, words
 from wirebayes.discovery.search import catalogue_without
 from wirebayes.discovery.settings import SIMULATIONS
 from wirebayes.effects import catalogue, source_of
@@ -115,14 +115,13 @@ def batch(
     >>> [row["name"] for row in many.rows]
     ['wire-1', 'wire-2']
     """
-    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
-    check_choice("history", history, get_args(History))
+    spec = model_spec(elastic_law, history)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, left_out = path_of(own_effects), words(without)
     catalogue_without(left_out, catalogue(own))
     read, unreadable = _read(sources, train_holds, keep_going)
     task = Task(
-        discover, check, elastic_law, history, seed, policy or DEFAULT, left_out, own, simulations or SIMULATIONS,
+        discover, check, spec, seed, policy or DEFAULT, left_out, own, simulations or SIMULATIONS,
         posteriors,
     )  # fmt: skip
     configuration = {

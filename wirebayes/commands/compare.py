@@ -3,16 +3,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
     Progress,
     Source,
-    check_choice,
     check_seed,
     check_train_holds,
     experiments_of,
+    model_spec,
     path_of,
     silent,
     words,
@@ -159,16 +159,11 @@ def plan(
     InputError
         If an option, an experiment, its priors or the name of a model is not usable.
     """
-    for option, value, choices in (
-        ("elastic_law", elastic_law, get_args(ElasticLaw)),
-        ("history", history, get_args(History)),
-        ("likelihood", likelihood, get_args(Likelihood)),
-    ):
-        check_choice(option, value, choices)
+    spec = model_spec(elastic_law, history, likelihood)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, names = path_of(own_effects), words(only)
     experiments = experiments_of(source, experiment)
-    base = Candidate(BASE, "", "The plain model.", elastic_law, history, likelihood)
+    base = Candidate(BASE, "", "The plain model.", spec)
     tasks = []
     for one in experiments:
         _check_holds(one, train_holds)

@@ -3,16 +3,15 @@
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import get_args
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
     Progress,
     Source,
-    check_choice,
     check_seed,
     check_train_holds,
     experiments_of,
+    model_spec,
     path_of,
     silent,
     words,
@@ -25,6 +24,7 @@ from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.json_files.discovery import Interval
 from wirebayes.json_files.summary import Parameter, SummaryJson
+from wirebayes.model.spec import ModelSpec
 from wirebayes.notice import from_json, named, to_json
 from wirebayes.processes.workers import computing, workers
 from wirebayes.results.jobs import Job, run
@@ -99,8 +99,7 @@ def discover(
     >>> findings.report["experiments"]["wire"]["verdict"]
     'nothing-missing'
     """
-    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
-    check_choice("history", history, get_args(History))
+    spec = model_spec(elastic_law, history)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, left_out = path_of(own_effects), words(without)
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
@@ -119,11 +118,11 @@ def discover(
     with open_run(place.path, configuration) as opened:
         if opened.state == "done":
             return Findings(place, own, computed=False)
-        settings = Settings(elastic_law, history, kinds, simulations or SIMULATIONS)
+        settings = Settings(spec, kinds, simulations or SIMULATIONS)
         with computing():
             with workers(prepare=partial(catalogue, own)) as parallel_map:
                 found = investigate(experiments, settings, seed, progress or silent, parallel_map)
-            jobs = jobs_of(found, elastic_law, history, own)
+            jobs = jobs_of(found, spec, own)
             run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
         write_findings(found, place.path, own)
         opened.finish()
@@ -150,15 +149,15 @@ def write_findings(found: Investigation, output: Path, own_effects: Path | None)
     write_json(output / "discovery.json", found.report)
 
 
-def jobs_of(found: Investigation, law: ElasticLaw, history: History, own_effects: Path | None) -> list[Job]:
+def jobs_of(found: Investigation, spec: ModelSpec, own_effects: Path | None) -> list[Job]:
     """Plain fit of every experiment, and the final ones.
 
     Parameters
     ----------
     found : Findings
         Of the search.
-    law : {"hooke", "modified"}
-    history : {"saturating", "additive"}
+    spec : ModelSpec
+        The plain model.
     own_effects : Path or None
         File of a user's own effects, which the workers load again.
 
@@ -175,8 +174,7 @@ def jobs_of(found: Investigation, law: ElasticLaw, history: History, own_effects
         folders = tuple(f"{e.name}/{kind}" for e in model.experiments)
         keys = tuple(f.key for f in model.effects)
         provenance = {"data_sha256": {e.name: e.data_hash for e in model.experiments}}
-        out.append(Job(folders[0], model.experiments, keys, own_effects, law, history, "chain", 1.0, provenance,
-                       model.near, folders))  # fmt: skip
+        out.append(Job(folders[0], model.experiments, keys, own_effects, spec, provenance, model.near, folders))
     return out
 
 

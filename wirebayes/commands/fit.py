@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
-from typing import get_args
 
 from scipy import stats
 
@@ -11,10 +11,10 @@ from wirebayes._version import __version__
 from wirebayes.commands.options import (
     Progress,
     Source,
-    check_choice,
     check_seed,
     check_train_holds,
     experiments_of,
+    model_spec,
     path_of,
     silent,
     words,
@@ -111,12 +111,7 @@ def fit(
     >>> posterior.draws()["k1"].ndim
     1
     """
-    for option, value, known in (
-        ("elastic_law", elastic_law, get_args(ElasticLaw)),
-        ("history", history, get_args(History)),
-        ("likelihood", likelihood, get_args(Likelihood)),
-    ):
-        check_choice(option, value, known)
+    spec = model_spec(elastic_law, history, likelihood)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, keys = path_of(own_effects), words(effects)
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
@@ -128,16 +123,16 @@ def fit(
     if len({e.name for e in added}) < len(added):
         raise InputError(f"--effect: found {', '.join(keys)}, expected each effect once")
     groups = _groups(experiments, together, file)
-    exponent = stats.norm(1.0, 1.0) if together is not None else 1.0
+    if together is not None:
+        spec = replace(spec, length_exponent=stats.norm(1.0, 1.0))
     jobs = []
     for folder, members in groups.items():
         for effect in added:
             _check_possible(effect, members, file, known_effects, history)
-        # checks priors
-        build(members, added, law=elastic_law, history=history, likelihood=likelihood, length_exponent=exponent)
+        build(members, added, spec)  # checks priors
         hashes = {e.name: e.data_hash for e in members}
         provenance = {"data_file": file.name, "version": __version__, "data_sha256": hashes}
-        jobs.append(Job(folder, members, keys, own, elastic_law, history, likelihood, exponent, provenance))
+        jobs.append(Job(folder, members, keys, own, spec, provenance))
     configuration = {
         "command": "fit", "version": __version__, "seed": seed, "likelihood": likelihood, "elastic_law": elastic_law,
         "history": history, "effects": list(keys), "own_effects": source_of(own),

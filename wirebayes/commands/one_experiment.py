@@ -22,10 +22,10 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.batch import DiscoveryColumns, FitColumns, Row
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Statistics
+from wirebayes.model.spec import ModelSpec
 from wirebayes.processes.workers import one_thread_each
 from wirebayes.results.jobs import Job, fitted, store
 from wirebayes.views.posterior import POSTERIOR, SUMMARY
-from wirebayes.wire.laws import ElasticLaw, History
 
 QUANTITIES = ("mean", "sd", "q05", "q50", "q95")
 _ALONE = Lock()  # a worker with several threads still draws one picture at a time
@@ -41,7 +41,7 @@ class Task:
         Look for what the model is missing; otherwise fit.
     check : bool
         Check the fit's model, where nothing is looked for.
-    law, history, seed, policy
+    spec, seed, policy
         As for a fit.
     without : tuple of str
         Effects left out of the catalogue.
@@ -57,8 +57,7 @@ class Task:
 
     discover: bool
     check: bool
-    law: ElasticLaw
-    history: History
+    spec: ModelSpec
     seed: int
     policy: Policy
     without: tuple[str, ...]
@@ -128,7 +127,7 @@ def first_columns(experiment: Experiment, file: str) -> Row:
 
 def _fitted(experiment: Experiment, task: Task, folder: Path) -> FitColumns:
     about = {"data_file": experiment.source.name, "version": __version__, "data_sha256": _hash(experiment)}
-    job = Job(experiment.name, (experiment,), (), task.own_effects, task.law, task.history, provenance=about)
+    job = Job(experiment.name, (experiment,), (), task.own_effects, task.spec, about)
     _fit_and_store(job, folder, task, draws=task.posteriors)
     if task.check:
         write_checks([job], folder, task.seed, lambda name, done, total: None, map, task.simulations)
@@ -146,8 +145,8 @@ def _fit_and_store(job: Job, folder: Path, task: Task, *, draws: bool) -> None:
 
 def _discovered(experiment: Experiment, task: Task, folder: Path) -> DiscoveryColumns:
     kinds = catalogue_without(task.without, catalogue(task.own_effects))
-    found = investigate([experiment], Settings(task.law, task.history, kinds, task.simulations), task.seed)
-    for job in jobs_of(found, task.law, task.history, task.own_effects):
+    found = investigate([experiment], Settings(task.spec, kinds, task.simulations), task.seed)
+    for job in jobs_of(found, task.spec, task.own_effects):
         _fit_and_store(job, folder, task, draws=True)  # pictures show them
     write_findings(found, folder, task.own_effects)
     report = found.report["experiments"][experiment.name]

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -11,8 +11,11 @@ from wirebayes.errors import InputError
 from wirebayes.io import gross_events
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings
 from wirebayes.io.experiment_file import read_experiments, select
+from wirebayes.model.sample import Likelihood
+from wirebayes.model.spec import ModelSpec
 from wirebayes.strict.files import PathLike
 from wirebayes.strict.hint import hint
+from wirebayes.wire.laws import ElasticLaw, History
 
 Source = PathLike | Experiment | Sequence[Experiment]
 Progress = Callable[[str, float, float], None]
@@ -137,6 +140,25 @@ def check_choice(option: str, value: str, known: Sequence[str]) -> None:
     if value not in known:
         meant = hint(value, known) if isinstance(value, str) else ""
         raise InputError(f"{option}: found {value!r}{meant}, expected {' or '.join(known)}")
+
+
+def model_spec(elastic_law: ElasticLaw, history: History, likelihood: Likelihood = "chain") -> ModelSpec:
+    """The model that is asked for.
+
+    Parameters
+    ----------
+    elastic_law, history, likelihood : str
+        As the user spells them.
+
+    Raises
+    ------
+    InputError
+        One is not among the values that it may have.
+    """
+    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
+    check_choice("history", history, get_args(History))
+    check_choice("likelihood", likelihood, get_args(Likelihood))
+    return ModelSpec(elastic_law, history, likelihood)
 
 
 def text_of(values: Numbers) -> str:

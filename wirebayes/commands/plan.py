@@ -4,12 +4,12 @@ import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import Progress, above_zero, check_choice, check_seed, path_of, silent
+from wirebayes.commands.options import Progress, above_zero, check_seed, model_spec, path_of, silent
 from wirebayes.commands.predict import find_posterior
 from wirebayes.commands.wires import RobotLike, content, hash_of, robot_of
 from wirebayes.discovery.next_measurement import alternatives
@@ -27,6 +27,7 @@ from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.build import build
 from wirebayes.model.sample import MATERIAL, SAMPLE, Sample
+from wirebayes.model.spec import ModelSpec
 from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.frozen import frozen
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
@@ -126,8 +127,7 @@ def plan(
     >>> planned.best["parameters"]["k1"]["sd"] < planned.summary()["guess"]["parameters"]["k1"]["sd"]
     True
     """
-    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
-    check_choice("history", history, get_args(History))
+    spec = model_spec(elastic_law, history)
     seed, own = check_seed(seed), path_of(own_effects)
     if isinstance(tests, bool) or not isinstance(tests, int) or tests < 2:
         raise InputError(f"tests: found {tests!r}, expected a whole number, 2 or more")
@@ -135,7 +135,7 @@ def plan(
         above_zero(("--budget-min", budget_min))
     kinds = catalogue(own)
     rng = np.random.default_rng(seed_of(seed, "guess"))
-    request = _request(source, experiment, tests, list(kinds), elastic_law, history, own, rng)
+    request = _request(source, experiment, tests, list(kinds), spec, own, rng)
     request = replace(
         request,
         aim=request.aim if aim is None else _checked_aim(aim, list(kinds)),
@@ -159,21 +159,21 @@ def plan(
             for done, (test, words) in enumerate(request.tests):
                 report("protocols", done, len(request.tests))
                 guess = request.guess.at(test.length_mm)
-                test = at_centre(test, guess, elastic_law, history)
+                test = at_centre(test, guess, spec)
                 tension = typical_tension(test) if tension is None else tension
                 one = np.random.default_rng(seed_of(seed, "plan", test.name))
                 try:
                     expected = expected_widths(
-                        test, guess, one, law=elastic_law, history=history, tension_N=tension,
+                        test, guess, one, spec, tension_N=tension,
                         length_mm=request.guess.length_mm, kept_draws=0 if machine is None else _ROBOT_TESTS,
                     )  # fmt: skip
                 except ValueError as error:
                     raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
-                seen = sensitivity(test, guess, kinds, one, law=elastic_law, history=history, simulations=SIMULATIONS)
+                seen = sensitivity(test, guess, kinds, one, spec, simulations=SIMULATIONS)
                 judged.append(Judged(test, words, expected, seen))
         report("protocols", len(request.tests), len(request.tests))
         order = ranked(judged, request.aim, request.budget_min)
-        rows = [_row(j, request, place_in, machine, elastic_law, history) for place_in, j in enumerate(order, 1)]
+        rows = [_row(j, request, place_in, machine, spec) for place_in, j in enumerate(order, 1)]
         summary = _summary(rows, request, machine)
         write_json(opened.directory / "plan.json", summary)
         from wirebayes.report.pictures.plan import widths_and_effects  # matplotlib only where it is needed
@@ -191,7 +191,7 @@ def _identity(robot: RobotLike | None) -> str | None:
 
 
 def _request(
-    source: PathLike | Experiment, name: str | None, n: int, effects: list[str], law: ElasticLaw, history: History,
+    source: PathLike | Experiment, name: str | None, n: int, effects: list[str], spec: ModelSpec,
     own: Path | None, rng: np.random.Generator,
 ) -> _Request:  # fmt: skip
     """Tests and guess of whatever was given."""
@@ -206,8 +206,8 @@ def _request(
         names = ", ".join(e.name for e in experiments)
         raise InputError(f"{source}: found the experiments {names}, expected one of them as --experiment")
     (measured,) = experiments
-    build([measured], law=law, history=history)  # checks priors
-    guess = from_readings(measured, n, rng, law, history)
+    build([measured], (), spec)  # checks priors
+    guess = from_readings(measured, n, rng, spec)
     about = {"data_sha256": measured.data_hash, "priors": measured.priors}
     return _Request(_like(measured), guess, ("parameters",), None, None, about)
 
@@ -301,9 +301,7 @@ def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:
     raise InputError(f"--aim: found {', '.join(map(str, words))}, expected {expected}")
 
 
-def _row(
-    judged: Judged, request: _Request, rank: int, machine: Robot | None, law: ElasticLaw, history: History
-) -> JudgedProtocol:
+def _row(judged: Judged, request: _Request, rank: int, machine: Robot | None, spec: ModelSpec) -> JudgedProtocol:
     """A protocol as it stands in ``plan.json``."""
     test, expected, seen = judged.test, judged.expected, judged.sensitivity
     widths = expected.widths
@@ -321,7 +319,7 @@ def _row(
             "creep_1h_mm": widths["creep_1h_mm"],
         },
         "effects": seen.effects, "cosines": cosines, "not_identifiable": list(seen.hidden),
-        "robot": None if machine is None else _drift(judged, request.guess, machine, law, history),
+        "robot": None if machine is None else _drift(judged, request.guess, machine, spec),
     }  # fmt: skip
 
 
@@ -351,12 +349,12 @@ def _over_budget(best: JudgedProtocol, budget_min: float | None) -> list[Notice]
     return [Notice("budget", f"no test is done within {budget_min:g} min")]
 
 
-def _drift(judged: Judged, guess: GuessedWire, machine: Robot, law: ElasticLaw, history: History) -> RobotDrift:
+def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) -> RobotDrift:
     """How well the drift of a robot within an hour would be known, and how well it is at the guess."""
 
     def sd(parameters: dict[str, Any], length_mm: float) -> tuple[float, float]:
         few = {n: parameters[n][:_ROBOT_DRAWS] for n in MATERIAL}
-        wires = robot_draws.for_robot(machine, WireDraws(few, length_mm, law, history))
+        wires = robot_draws.for_robot(machine, WireDraws(few, length_mm, spec.law, spec.history))
         course = drift.from_command(
             machine, wires, machine.home_m, matrix(machine.home_rotation_rad), np.array([0.0, HOUR_S])
         )

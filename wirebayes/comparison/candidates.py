@@ -13,9 +13,8 @@ from wirebayes.inference.modes import modes
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.problem import Problem
-from wirebayes.model.sample import Likelihood
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.wire.effect import Effect, EventEffect
-from wirebayes.wire.laws import ElasticLaw, History
 
 HOOKE, TIME = "Is Hooke's law enough?", "Which time law?"
 LAW, HISTORY, LIKELIHOOD = "Which elastic law?", "Which history?", "One history, or every hold by itself?"
@@ -36,8 +35,7 @@ class Candidate:
         ``plain`` for the base.
     question, sentence : str
         What its comparison with the base answers, and what it says of the wire.
-    law, history, likelihood
-        See `wirebayes.model.build.build`.
+    spec : ModelSpec
     effects : tuple of str
         Keys; an event without its hold (``grip_slip``) stands for the hold with the most evidence in the training.
     fixed : dict
@@ -49,9 +47,7 @@ class Candidate:
     name: str
     question: str
     sentence: str
-    law: ElasticLaw = "hooke"
-    history: History = "saturating"
-    likelihood: Likelihood = "chain"
+    spec: ModelSpec = PLAIN_SPEC
     effects: tuple[str, ...] = ()
     fixed: Mapping[str, float] = field(default_factory=dict)
     unrecorded: bool = True
@@ -104,24 +100,36 @@ def _other_creep(base: Candidate) -> list[Candidate]:
 def _other_model(base: Candidate) -> list[Candidate]:
     """The other elastic law, history and likelihood."""
     out = []
-    if base.law == "hooke":
+    if base.spec.law == "hooke":
         sentence = "Strain is taken over the stretched length, eq (3)."
-        out.append(_beside(base, "modified_hooke", LAW, sentence, law="modified"))
+        out.append(_beside(base, "modified_hooke", LAW, sentence, spec=replace(base.spec, law="modified")))
     else:
-        out.append(_beside(base, "hooke", LAW, "Strain is taken over the zero-tension length, eq (1).", law="hooke"))
-    if base.history == "saturating":
+        out.append(
+            _beside(
+                base,
+                "hooke",
+                LAW,
+                "Strain is taken over the zero-tension length, eq (1).",
+                spec=replace(base.spec, law="hooke"),
+            )
+        )
+    if base.spec.history == "saturating":
         sentence = "Every hold adds the creep of eq (4) again."
-        out.append(_beside(base, "additive", HISTORY, sentence, history="additive"))
+        out.append(_beside(base, "additive", HISTORY, sentence, spec=replace(base.spec, history="additive")))
     else:
         sentence = "Creep saturates towards the amount of eq (4)."
-        out.append(_beside(base, "saturating", HISTORY, sentence, history="saturating"))
-    if base.likelihood == "chain":
+        out.append(_beside(base, "saturating", HISTORY, sentence, spec=replace(base.spec, history="saturating")))
+    if base.spec.likelihood == "chain":
         sentence = "Every hold is a separate experiment."
-        out.append(_beside(base, "hold_by_hold", LIKELIHOOD, sentence, likelihood="hold"))
+        out.append(_beside(base, "hold_by_hold", LIKELIHOOD, sentence, spec=replace(base.spec, likelihood="hold")))
         sentence = "Positions are exact; each reading has an independent error."
         out.append(_beside(base, "independent_errors", SETTING, sentence, fixed={"setting_sd": 0.0}))
     else:
-        out.append(_beside(base, "chain", LIKELIHOOD, "The holds form one history.", likelihood="chain"))
+        out.append(
+            _beside(
+                base, "chain", LIKELIHOOD, "The holds form one history.", spec=replace(base.spec, likelihood="chain")
+            )
+        )
     return out
 
 
@@ -130,7 +138,7 @@ def _with_effects(experiment: Experiment, base: Candidate, known: Mapping[str, t
     protocol = experiment.protocol()
     out = []
     for name, kind in known.items():
-        if kind.needs_saturation and base.history == "additive":
+        if kind.needs_saturation and base.spec.history == "additive":
             continue
         keys = [name] if issubclass(kind, EventEffect) else [each.key for each in kind.variants([protocol])]
         out += [_beside(base, key, EFFECT, kind.sentence, effects=(key,)) for key in keys]
@@ -193,7 +201,7 @@ def problem_of(candidate: Candidate, training: Experiment, effects: Sequence[Eff
     -------
     Problem
     """
-    problem = build([training], effects, law=candidate.law, history=candidate.history, likelihood=candidate.likelihood)
+    problem = build([training], effects, candidate.spec)
     prior = problem.prior
     here = {name: value for name, value in candidate.fixed.items() if name in prior.names}
     free = {name: d for name, d in prior.distributions.items() if name not in here}

@@ -85,8 +85,9 @@ def judge(task: Task, seed: int, policy: Policy = POLICY) -> ModelJson:
     candidate = task.candidate
     content: ModelJson = {
         "name": candidate.name, "question": candidate.question, "sentence": candidate.sentence,
-        "elastic_law": candidate.law, "history": candidate.history, "likelihood": candidate.likelihood,
-        "scored": "all readings" if candidate.likelihood == "chain" else "later readings given each hold's first",
+        "elastic_law": candidate.spec.law, "history": candidate.spec.history,
+        "likelihood": candidate.spec.likelihood,
+        "scored": "all readings" if candidate.spec.likelihood == "chain" else "later readings given each hold's first",
         "failed": None, "warnings": [],
     }  # fmt: skip
     try:

@@ -139,8 +139,7 @@ class Fits:
         out = []
         for plain, block in zip(self._known[frozenset()], larger.blocks, strict=True):
             effects = [effect for effect in block.effects if effect.name in key]
-            laws = plain.law, plain.history
-            own = fitted(block.experiments, effects, *laws, self._rng, scales=plain.scales) if effects else plain
+            own = fitted(block.experiments, effects, plain.spec, self._rng, scales=plain.scales) if effects else plain
             out.append(own)
         return out
 
@@ -166,7 +165,7 @@ def added(
         near = r.theta[r.blocks.index(b)]
         every = (*blocks[b].effects, r.effect)
         scales = blocks[b].scales
-        blocks[b] = fitted(blocks[b].experiments, every, settings.law, settings.history, rng, near, scales=scales)
+        blocks[b] = fitted(blocks[b].experiments, every, settings.spec, rng, near, scales=scales)
     if any(len(r.blocks) > 1 for r in refits.values()):
         blocks = informed(blocks, effects, rng)
     return blocks, effects

@@ -241,8 +241,6 @@ def _strike_gross_errors(
             break
         name, hold, reading, value = found
         members = [gross_errors.without(e, hold, reading) if e.name == name else e for e in block.experiments]
-        block = fitted(
-            members, block.effects, block.law, block.history, rng, exponent=block.exponent, scales=block.scales
-        )
+        block = fitted(members, block.effects, block.spec, rng, scales=block.scales)
         struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
     return block, struck

@@ -90,9 +90,9 @@ def predicted(
     """
     first = [e.train(k) for e, k in zip(experiments, train, strict=True)]
     near = block.target.coordinates.to_natural(block.modes.z[:1])[0] if block.effects == tuple(effects) else None
-    trained = fitted(first, effects, block.law, block.history, rng, near, scales=block.scales)
+    trained = fitted(first, effects, block.spec, rng, near, scales=block.scales)
     problem, theta = _draws(trained, rng, 500)
-    whole = build(experiments, effects, law=block.law, history=block.history, scales=block.scales)
+    whole = build(experiments, effects, block.spec, scales=block.scales)
     ahead = whole.in_units(problem.units).samples
     # The training readings' reference tension belongs to the parameters.
     return [

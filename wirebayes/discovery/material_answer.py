@@ -131,8 +131,6 @@ def _stages(
         effects = tuple(a.effects[i] for a in accepted[: k + 1])
         ready = [s.blocks[i] for s in explored.fitted.values() if s.blocks[i].effects == effects]
         base = stages[-1] if stages else plain
-        own = (
-            ready[0] if ready else fitted(base.experiments, effects, plain.law, plain.history, rng, scales=plain.scales)
-        )
+        own = ready[0] if ready else fitted(base.experiments, effects, plain.spec, rng, scales=plain.scales)
         stages.append(own)
     return stages

@@ -142,13 +142,13 @@ def check_model(
     kinds = catalogue(job.own_effects)
     effects = [named(key, kinds) for key in job.effects]
     unchecked = partial(ModelCheck, None, alpha, with_effects=bool(effects))
-    if job.likelihood == "hold":
+    if job.spec.likelihood == "hold":
         return unchecked(reason="the hold-by-hold likelihood says nothing of how one hold follows from another")
     if any(e.name not in kinds for e in effects):
         return unchecked(reason="a smooth discrepancy stands in for whatever is missing")
     rng = np.random.default_rng(seed_of(seed, "discover"))
     first = rng.spawn(1)[0]
-    block = fitted(job.experiments, effects, job.law, job.history, first, exponent=job.length_exponent)
+    block = fitted(job.experiments, effects, job.spec, first)
     try:
         gate = examine([block], kinds, simulations or SIMULATIONS, rng, alpha=alpha, parallel_map=parallel_map)
     except InputError:

@@ -17,6 +17,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.check import EffectSize, ParameterRange
 from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.model.scales import NATURAL
+from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
 from wirebayes.results import hold_ends
@@ -63,7 +64,7 @@ def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.r
     kinds : mapping of name to effect class
     rng : Generator
     """
-    block = fitted((experiment,), (), "hooke", "saturating", rng)
+    block = fitted((experiment,), (), PLAIN_SPEC, rng)
     problem = block.target.problem
     theta = problem.theta_in(NATURAL, rough_draws.draws(block.target, block.modes, rng))
     before = problem.theta_in(NATURAL, problem.prior.rvs(4000, rng))

@@ -99,7 +99,7 @@ def _but_for_each_test(effect: Effect, numbered: Mapping[int, Probe]) -> list[li
 
 def _variants(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protocol]) -> list[Effect]:
     """The forms of an effect that a block could show; what all tests share has the form that it has for all of them."""
-    if kind.needs_saturation and block.history == "additive":
+    if kind.needs_saturation and block.spec.history == "additive":
         return []
     if kind.scope in FILE_WIDE:
         return _of_the_bench(kind, block, tests)

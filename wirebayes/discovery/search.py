@@ -151,8 +151,8 @@ def _plain_fits(
     for e in experiments:
         materials.setdefault(e.material, []).append(e)
     one_scale = partial(fitted, scales=scales_of(experiments))
-    laws = repeat(settings.law), repeat(settings.history)
-    return list(parallel_map(one_scale, materials.values(), repeat(()), *laws, rng.spawn(len(materials))))
+    spec = repeat(settings.spec)
+    return list(parallel_map(one_scale, materials.values(), repeat(()), spec, rng.spawn(len(materials))))
 
 
 def _disagreements(gate: Gate) -> list[list[Disagreement]]:

@@ -6,8 +6,8 @@ docs/thresholds.rst says how each number was set.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.wire.effect import Effect
-from wirebayes.wire.laws import ElasticLaw, History
 
 ALPHA = 0.04  # level of the global test: one clean file in twenty-five is called incomplete
 BY_LARGER = 0.02  # p up to which what only larger effects show counts
@@ -61,15 +61,14 @@ class Settings:
 
     Attributes
     ----------
-    law, history
-        Of the plain model.
+    spec : ModelSpec
+        The plain model.
     kinds : mapping of name to effect class
         The catalogue searched.
     simulations : int
         Refitted data sets behind the p-value: half of them where these decide, more where it is too close to the level.
     """
 
-    law: ElasticLaw = "hooke"
-    history: History = "saturating"
+    spec: ModelSpec = PLAIN_SPEC
     kinds: Mapping[str, type[Effect]] = None  # type: ignore[assignment]
     simulations: int = SIMULATIONS

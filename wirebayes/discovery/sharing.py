@@ -37,7 +37,7 @@ def informed(blocks: Sequence[LaplaceFit], effects: Mapping[int, Effect], rng: n
             with_prior = [replace(e, priors=e.priors | priors) for e in blocks[b].experiments]
             near = blocks[b].target.coordinates.to_natural(blocks[b].modes.z[:1])[0]
             block = blocks[b]
-            out[b] = fitted(with_prior, block.effects, block.law, block.history, rng, near, scales=block.scales)
+            out[b] = fitted(with_prior, block.effects, block.spec, rng, near, scales=block.scales)
     return out
 
 

@@ -133,7 +133,7 @@ def _beside_discrepancy(
     for base, added, own in handed_over:
         effects, alone_ = list(added), [(e,) for e in base.experiments]
         one_scale = partial(fitted, scales=base.scales)
-        fits = parallel_map(one_scale, alone_, effects[:n], repeat(base.law), repeat(base.history), own)
+        fits = parallel_map(one_scale, alone_, effects[:n], repeat(base.spec), own)
         trained = zip(alone_, train, effects[n:], strict=True)
         fitting.append((fits, [_Trained(e, (k,), extra, base) for e, k, extra in trained]))
     return [_Smooth(list(fits), trained) for fits, trained in fitting]
@@ -192,8 +192,8 @@ def discrepancy_gain(
         return None
     n = len(base.experiments)
     added = parallel_map(with_discrepancy, repeat(base), base.experiments, rng.spawn(n))
-    alone_, laws = [(e,) for e in base.experiments], (repeat(base.law), repeat(base.history))
-    beside = list(parallel_map(fitted, alone_, list(added), *laws, rng.spawn(n)))
+    alone_ = [(e,) for e in base.experiments]
+    beside = list(parallel_map(fitted, alone_, list(added), repeat(base.spec), rng.spawn(n)))
     before, *after = (float(v.sum()) for v in left_out.of([base, *beside]))
     return sum(after) - before
 
@@ -233,11 +233,7 @@ def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: np.random.G
     own = alone(block.effects, experiment)
     # two experiments of one name differ in how many of its holds they have
     same = block.names == (experiment.name,) and len(block.experiments[0].holds) == len(experiment.holds)
-    fit = (
-        block
-        if same and own == block.effects
-        else fitted([experiment], own, block.law, block.history, rng, scales=block.scales)
-    )
+    fit = block if same and own == block.effects else fitted([experiment], own, block.spec, rng, scales=block.scales)
     return (*own, discrepancy(experiment, left_over(fit, experiment.name)))
 
 

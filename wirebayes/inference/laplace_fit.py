@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -16,9 +15,9 @@ from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL, Scales
+from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
-from wirebayes.wire.laws import ElasticLaw, History
 
 _FLAT = stats.norm(0.0, 1e9)  # a prior that no amplitude feels; in standard deviations of its own, of density
 # its log density in those units, taken out again: the amplitude's own prior is not in the evidence
@@ -35,22 +34,17 @@ class LaplaceFit:
         All of one material.
     effects : tuple of Effect
         Accepted so far.
-    law, history
-        See `wirebayes.wire.laws`.
+    spec : ModelSpec
     target : LogPosterior
     modes : Optimum
         Distinct modes, best first.
-    exponent : float or scipy frozen distribution
-        See `fitted`.
     """
 
     experiments: tuple[Experiment, ...]
     effects: tuple[Effect, ...]
-    law: ElasticLaw
-    history: History
+    spec: ModelSpec
     target: LogPosterior
     modes: Optimum
-    exponent: Any = 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -96,14 +90,7 @@ class LaplaceFit:
     def problem_with(self, effect: Effect) -> Problem:
         """The same samples with one more effect, nothing integrated out."""
         effects = (*self.effects, effect)
-        problem = build(
-            self.experiments,
-            effects,
-            law=self.law,
-            history=self.history,
-            length_exponent=self.exponent,
-            scales=self.scales,
-        )
+        problem = build(self.experiments, effects, self.spec, scales=self.scales)
         return problem.in_units(problem.own_units)
 
     def unit(self, effect: Effect) -> str:
@@ -133,11 +120,9 @@ class LaplaceFit:
 def fitted(
     experiments: Sequence[Experiment],
     effects: Sequence[Effect],
-    law: ElasticLaw,
-    history: History,
+    spec: ModelSpec,
     rng: np.random.Generator,
     near: Array | None = None,
-    exponent: Any = 1.0,
     scales: Scales | None = None,
 ) -> LaplaceFit:
     """Find the modes of the posterior of some experiments with some effects, from many starts.
@@ -149,13 +134,10 @@ def fitted(
     experiments : sequence of Experiment
         Samples of one material, fitted jointly.
     effects : sequence of Effect
-    law : {"hooke", "modified"}
-    history : {"saturating", "additive"}
+    spec : ModelSpec
     rng : numpy.random.Generator
     near : (d,) array, optional
         Parameters known to be good, in units of the scales: one more start.
-    exponent : float or prior
-        That of the creep amount's growth with the sample's length (see `wirebayes.model.build.build`).
     scales : Scales, optional
         In whose units the fit is made; those of the experiments when left out.
 
@@ -163,11 +145,11 @@ def fitted(
     -------
     LaplaceFit
     """
-    problem = build(experiments, effects, law=law, history=history, length_exponent=exponent, scales=scales)
+    problem = build(experiments, effects, spec, scales=scales)
     target = LogPosterior(integrated(problem.in_units(problem.own_units)), for_draws=False)
     extra = None if near is None else target.coordinates.to_sampled(near[None])
     found = modes(target, rng, extra)
-    return LaplaceFit(tuple(experiments), tuple(effects), law, history, target, found, exponent)
+    return LaplaceFit(tuple(experiments), tuple(effects), spec, target, found)
 
 
 _HOPELESS = 12.0  # nats below the best amplitude, which no curvature makes up for

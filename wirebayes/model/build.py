@@ -11,13 +11,13 @@ from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.distributions import scaled
 from wirebayes.model.prior import Power, Prior, from_table, possible, wire_defaults
 from wirebayes.model.problem import Problem
-from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL, SAMPLE, Likelihood, Sample
+from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL, SAMPLE, Sample
 from wirebayes.model.scales import Scales, Units, scales_of
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.effect import Amplitude, Effect
-from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.model import Model, tension_reference
 from wirebayes.wire.protocol import Control
 
@@ -28,11 +28,8 @@ _POSITIVE = {"k1", "B", "U", "k2", "N", "sensor_sd", "setting_sd"}
 def build(
     experiments: Sequence[Experiment],
     effects: Sequence[Effect] = (),
+    spec: ModelSpec = PLAIN_SPEC,
     *,
-    law: ElasticLaw = "hooke",
-    history: History = "saturating",
-    likelihood: Likelihood = "chain",
-    length_exponent: Any = 1.0,
     scales: Scales | None = None,
 ) -> Problem:
     """The posterior of some experiments, in mm, N and s; those of one material share its parameters.
@@ -42,10 +39,8 @@ def build(
     experiments : sequence of Experiment
     effects : sequence of Effect
         Each acts on every sample; its amplitudes are shared as its scope says (an event acts where its hold is).
-    law, history, likelihood
-        See `wirebayes.wire.laws` and `wirebayes.model.likelihoods`.
-    length_exponent : float or scipy frozen distribution
-        p of B ∝ L0^p among samples of one material: a value, or a prior to learn it.
+    spec : ModelSpec
+        Laws, likelihood, and how creep grows with the length.
     scales : Scales, optional
         What default priors refer to; those of the experiments when left out. Part of a test, or a replicate of it, is
         given those of the whole.
@@ -67,14 +62,14 @@ def build(
     samples: list[Sample] = []
     for material, members in materials.items():
         mark = f"[{material}]" if len(materials) > 1 else ""
-        distributions |= _material_priors(members, effects, mark, length_exponent, scales, likelihood)
-        samples += _samples(members, [effect.referred(scales.hold_s) for effect in effects], law, history)
+        distributions |= _material_priors(members, effects, mark, spec, scales)
+        samples += _samples(members, [effect.referred(scales.hold_s) for effect in effects], spec)
     distributions |= _instrument_priors(experiments, effects)
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""
         zero_mm = scales.zeros_mm.get(experiment.name, 0.0)
         defaults = wire_defaults(experiment.length_mm, scales, experiment.control, zero_mm)
-        wanted = SAMPLE if likelihood == "chain" else ("sensor_sd",)
+        wanted = SAMPLE if spec.likelihood == "chain" else ("sensor_sd",)
         distributions |= {f"{name}{mark}": defaults[name] for name in wanted}
         own = [effect for effect in effects if effect.acts_on(experiment.name, experiment.control)]
         distributions |= {f"{c}{mark}": a.prior for c, a in _amplitudes(own) if a.of_each_test}
@@ -91,7 +86,11 @@ def build(
     logarithmic = frozenset(n for n, d in free.items() if n.split("[")[0] in _POSITIVE | shapes and d.support()[0] >= 0)
     powers = _default_powers([name for name in free if name not in stated], fixed, units)
     return Problem(
-        tuple(samples), Prior(free, fixed, logarithmic, powers), likelihood, scales=scales, stated=frozenset(stated)
+        tuple(samples),
+        Prior(free, fixed, logarithmic, powers),
+        spec.likelihood,
+        scales=scales,
+        stated=frozenset(stated),
     )
 
 
@@ -145,17 +144,16 @@ def _material_priors(
     members: Sequence[Experiment],
     effects: Sequence[Effect],
     mark: str,
-    length_exponent: Any,
+    spec: ModelSpec,
     scales: Scales,
-    likelihood: Likelihood,
 ) -> dict[str, Any]:
     """Default priors of what the samples of one material share; `mark` distinguishes materials in the names."""
     defaults = wire_defaults(_reference_length(members), scales)
-    stiff = likelihood == "chain" or any(e.control == "displacement" for e in members)
+    stiff = spec.likelihood == "chain" or any(e.control == "displacement" for e in members)
     wanted = MATERIAL if stiff else tuple(name for name in MATERIAL if name != "k1")
     out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in wanted}
     if len({e.length_mm for e in members}) > 1:
-        out[f"{LENGTH_EXPONENT}{mark}"] = length_exponent
+        out[f"{LENGTH_EXPONENT}{mark}"] = spec.length_exponent
     of_wire = [effect for effect in effects if effect.scope == "material"]
     return out | {f"{c}{mark}": a.prior for c, a in _amplitudes(of_wire) if not a.of_each_test}
 
@@ -176,16 +174,14 @@ def _amplitudes(effects: Sequence[Effect]) -> list[tuple[str, Amplitude]]:
     return [pair for effect in effects for pair in zip(effect.columns(), effect.amplitudes, strict=True)]
 
 
-def _samples(
-    members: Sequence[Experiment], effects: Sequence[Effect], law: ElasticLaw, history: History
-) -> list[Sample]:
+def _samples(members: Sequence[Experiment], effects: Sequence[Effect], spec: ModelSpec) -> list[Sample]:
     """The experiments of one material as the likelihood sees them."""
     tension = tension_reference(np.concatenate([e.tension()[e.protocol().mask] for e in members]))
     length = _reference_length(members) if len(members) > 1 else 0.0
     out = []
     for e in members:
         present = tuple(x for x in effects if x.acts_on(e.name, e.control))
-        model = Model(law, history, present, tension, length)
+        model = Model(spec.law, spec.history, present, tension, length)
         finest = max(e.resolution, FINEST * _extent(e))
         out.append(Sample(e.name, e.material, e.protocol(), e.readings()[..., None], finest, model))
     return out

@@ -7,7 +7,8 @@ import numpy as np
 
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.experiment import Experiment
-from wirebayes.paper.least_squares import VARIANTS, Identified, Variant, at, identify, leading, residuals, rms
+from wirebayes.model.spec import ModelSpec
+from wirebayes.paper.least_squares import VARIANTS, Identified, at, identify, leading, residuals, rms
 from wirebayes.processes.workers import ParallelMap
 
 Row = dict[str, Any]
@@ -53,7 +54,7 @@ def _wire(task: tuple[Experiment, dict[str, float], int, int]) -> list[Row]:
     return out
 
 
-def _row(experiment: Experiment, variant: Variant, source: str, found: Identified, cut: int) -> Row:
+def _row(experiment: Experiment, variant: ModelSpec, source: str, found: Identified, cut: int) -> Row:
     left = residuals(experiment, at(found.parameters), variant)
     return {
         "experiment": experiment.name,

@@ -14,11 +14,11 @@ from scipy.optimize import least_squares
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import default_prior
-from wirebayes.model.sample import MATERIAL, Likelihood
+from wirebayes.model.sample import MATERIAL
 from wirebayes.model.scales import scales_of
 from wirebayes.model.single_holds import hold_courses
+from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
 
@@ -28,38 +28,19 @@ _DRAWS, _STARTS = 2000, 6
 _STEP = 1e-5  # of coordinates of order one: central differences are then exact to some 1e-10
 
 
-@dataclass(frozen=True)
-class Variant:
-    """One reading of the paper's model.
-
-    Attributes
-    ----------
-    likelihood : {"hold", "chain"}
-        Hold by hold, the first reading fixes the stretched length and the later ones are predicted; as a chain, the
-        displacements and one preload predict all readings.
-    history : {"saturating", "additive"}
-        Of a chain; hold by hold there is none.
-    law : {"hooke", "modified"}
-    """
-
-    likelihood: Likelihood
-    history: History = "saturating"
-    law: ElasticLaw = "hooke"
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of what is adjusted."""
-        return MATERIAL if self.likelihood == "hold" else (*MATERIAL, "preload")
-
-
 VARIANTS = (
-    Variant("hold"),
-    Variant("hold", law="modified"),
-    Variant("chain"),
-    Variant("chain", law="modified"),
-    Variant("chain", "additive"),
-    Variant("chain", "additive", "modified"),
-)
+    ModelSpec(likelihood="hold"),
+    ModelSpec(likelihood="hold", law="modified"),
+    ModelSpec(),
+    ModelSpec(law="modified"),
+    ModelSpec(history="additive"),
+    ModelSpec(history="additive", law="modified"),
+)  # readings of the paper's model
+
+
+def adjusted(variant: ModelSpec) -> tuple[str, ...]:
+    """Names of what is adjusted: hold by hold the first reading fixes the stretched length, a chain has a preload."""
+    return MATERIAL if variant.likelihood == "hold" else (*MATERIAL, "preload")
 
 
 @dataclass(frozen=True)
@@ -81,7 +62,7 @@ class Identified:
     not_held_back: tuple[str, ...] = ()
 
 
-def residuals(experiment: Experiment, theta: Mapping[str, Array], variant: Variant) -> Array:
+def residuals(experiment: Experiment, theta: Mapping[str, Array], variant: ModelSpec) -> Array:
     """Measured minus predicted tension.
 
     Parameters
@@ -89,7 +70,7 @@ def residuals(experiment: Experiment, theta: Mapping[str, Array], variant: Varia
     experiment : Experiment
     theta : mapping of name to (n,) array
         Without ``preload`` hold by hold.
-    variant : Variant
+    variant : ModelSpec
 
     Returns
     -------
@@ -121,14 +102,14 @@ def at(parameters: Mapping[str, float]) -> dict[str, Array]:
 
 
 def identify(
-    experiment: Experiment, variant: Variant, rng: np.random.Generator, known: Mapping[str, float] | None = None
+    experiment: Experiment, variant: ModelSpec, rng: np.random.Generator, known: Mapping[str, float] | None = None
 ) -> Identified:
     """Least squares over all readings of an experiment.
 
     Parameters
     ----------
     experiment : Experiment
-    variant : Variant
+    variant : ModelSpec
     rng : numpy Generator
         For the starts: the best of many draws of the prior.
     known : mapping of name to float, optional
@@ -139,7 +120,7 @@ def identify(
     Identified
     """
     known = dict(known or {})
-    names = [name for name in variant.parameters if name not in known]
+    names = [name for name in adjusted(variant) if name not in known]
     if not names:
         only = residuals(experiment, at(known), variant)
         return Identified(known, rms(only))
@@ -175,7 +156,7 @@ def identify(
     costs = np.array([np.sqrt(np.mean(misfit(z[None]) ** 2)) for z in ends])
     end = ends[int(np.argmin(costs))]
     found = {name: float(value[0]) for name, value in natural(end[None]).items()}
-    ordered = {name: found[name] for name in variant.parameters}
+    ordered = {name: found[name] for name in adjusted(variant)}
     loose = np.maximum(0.01 * (high - low), costs.min() * _per_unit_misfit(misfit, end))
     edge = np.minimum(end - low, high - end) < loose
     return Identified(ordered, float(costs.min()), tuple(name for name, on in zip(names, edge, strict=True) if on))

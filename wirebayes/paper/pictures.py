@@ -11,10 +11,11 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_bytes, write_json
 from wirebayes.model.build import build
 from wirebayes.model.replicate import readings as replicate
+from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.typing import Array
 from wirebayes.paper import figures as paper_figures
 from wirebayes.paper.held_out import HeldOut, last_hold_course, published_course, some
-from wirebayes.paper.least_squares import Variant, at, residuals
+from wirebayes.paper.least_squares import at, residuals
 from wirebayes.report import figures
 from wirebayes.report.blocks import number, svg
 from wirebayes.results.read_back import Stored
@@ -156,7 +157,7 @@ class Gallery:
 
 def _published_at(e: Experiment, published: Mapping[str, float], out: HeldOut) -> Array:
     """The paper's prediction of the unused readings, hold by hold."""
-    left = residuals(e, at(published), Variant("hold"))[..., 0]
+    left = residuals(e, at(published), ModelSpec(likelihood="hold"))[..., 0]
     wanted = np.isfinite(left) & np.isin(e.protocol().number, out.hold)[:, None]
     return np.asarray((e.tension() - left)[wanted])
 

@@ -15,6 +15,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
+from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.typing import Array
 from wirebayes.paper import claim_steps, identification, pictures, section_4, verdicts
 from wirebayes.paper.held_out import HeldOut, held_out
@@ -104,7 +105,7 @@ def fits(experiments: Sequence[Experiment], training: int) -> list[Job]:
             for likelihood in LIKELIHOODS:
                 provenance = {"version": __version__, "data_sha256": {e.name: e.data_hash}, "train_holds": holds}
                 folder = f"{e.name}/{likelihood}{suffix}"
-                jobs.append(Job(folder, (shown,), likelihood=likelihood, provenance=provenance))
+                jobs.append(Job(folder, (shown,), spec=ModelSpec(likelihood=likelihood), provenance=provenance))
     return jobs
 
 
@@ -184,7 +185,7 @@ def _draw(
 
 
 def _prior_draws(experiment: Experiment, likelihood: Likelihood, seed: int) -> dict[str, Array]:
-    prior = build([experiment], likelihood=likelihood).prior
+    prior = build([experiment], (), ModelSpec(likelihood=likelihood)).prior
     draws = prior.rvs(_PRIOR_DRAWS, np.random.default_rng(seed_of(seed, "prior", experiment.name, likelihood)))
     return dict(zip(prior.names, draws.T, strict=True)) | {k: np.full(len(draws), v) for k, v in prior.fixed.items()}
 

@@ -14,9 +14,9 @@ from wirebayes.model.build import default_prior
 from wirebayes.model.prior import from_table, possible
 from wirebayes.model.sample import MATERIAL, SAMPLE
 from wirebayes.model.scales import NATURAL, TYPICAL_K1_N, planned_scales
+from wirebayes.model.spec import ModelSpec
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.laws import ElasticLaw, History
 
 
 @dataclass(frozen=True)
@@ -117,9 +117,7 @@ def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n:
     return GuessedWire({name: draws[name][pick] for name in (*MATERIAL, *SAMPLE)}, length_mm, source)
 
 
-def from_readings(
-    experiment: Experiment, n: int, rng: np.random.Generator, law: ElasticLaw, history: History
-) -> GuessedWire:
+def from_readings(experiment: Experiment, n: int, rng: np.random.Generator, spec: ModelSpec) -> GuessedWire:
     """The posterior of what was measured, by a short run of the sampler.
 
     Parameters
@@ -128,14 +126,13 @@ def from_readings(
     n : int
         Number of draws.
     rng : numpy.random.Generator
-    law : {"hooke", "modified"}
-    history : {"saturating", "additive"}
+    spec : ModelSpec
 
     Returns
     -------
     GuessedWire
     """
-    block = fitted([experiment], (), law, history, rng)
+    block = fitted([experiment], (), spec, rng)
     theta = rough_draws(block.target, block.modes, rng, n)
     problem = block.target.problem.in_units(NATURAL)
     own = problem.parameters(block.target.problem.theta_in(NATURAL, theta), problem.samples[0])

@@ -17,9 +17,9 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import EffectPower
 from wirebayes.model.build import build
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.planning.widths import Guess, central
 from wirebayes.wire.effect import Effect
-from wirebayes.wire.laws import ElasticLaw, History
 
 SIMULATIONS = 300  # an amplitude seen in 80 % of tests is then known to some 5 %
 
@@ -54,9 +54,8 @@ def sensitivity(
     guess: Guess,
     kinds: Mapping[str, type[Effect]],
     rng: np.random.Generator,
+    spec: ModelSpec = PLAIN_SPEC,
     *,
-    law: ElasticLaw = "hooke",
-    history: History = "saturating",
     simulations: int = SIMULATIONS,
 ) -> Sensitivity:
     """Find what a planned test would show of missing effects.
@@ -68,8 +67,8 @@ def sensitivity(
     guess : mapping of name to (n,) array
     kinds : mapping of name to effect class
     rng : numpy Generator
-    law, history
-        Of the plain model.
+    spec : ModelSpec
+        The plain model.
     simulations : int
         Refitted tests behind the level of chance.
 
@@ -77,7 +76,7 @@ def sensitivity(
     -------
     Sensitivity
     """
-    block = _fit_at(test, central(guess), law, history)
+    block = _fit_at(test, central(guess), spec)
     trials, candidates = screening.candidate_probes([block], kinds)
     hidden = power.not_identifiable(block, list(kinds.values()), [c.name for c in candidates])
     if not candidates:
@@ -100,12 +99,12 @@ def sensitivity(
     return Sensitivity(effects, alike, tuple(hidden))
 
 
-def _fit_at(test: Experiment, centre: Mapping[str, float], law: ElasticLaw, history: History) -> LaplaceFit:
+def _fit_at(test: Experiment, centre: Mapping[str, float], spec: ModelSpec) -> LaplaceFit:
     """The fit whose best parameters are the guess's centre."""
-    natural = build([test], law=law, history=history)
+    natural = build([test], (), spec)
     target = LogPosterior(natural.in_units(natural.own_units))
     theta = np.array([[centre[name] for name in natural.names]])
     z = target.coordinates.to_sampled(natural.theta_in(target.problem.units, theta))
     d = z.shape[1]
     there = Optimum(z, target(z), np.eye(d)[None], np.array([True]))
-    return LaplaceFit((test,), (), law, history, target, there)
+    return LaplaceFit((test,), (), spec, target, there)

@@ -18,10 +18,10 @@ from wirebayes.model.build import build
 from wirebayes.model.problem import Problem
 from wirebayes.model.replicate import readings
 from wirebayes.model.sample import MATERIAL
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.fresh import FreshSample
-from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.staircase import simulate
 
 Guess = Mapping[str, Array]
@@ -69,7 +69,7 @@ def central(guess: Guess) -> dict[str, float]:
     return {name: float(np.median(values)) for name, values in guess.items()}
 
 
-def at_centre(test: Experiment, guess: Guess, law: ElasticLaw, history: History) -> Experiment:
+def at_centre(test: Experiment, guess: Guess, spec: ModelSpec) -> Experiment:
     """The test with the readings, tensions or displacements, that the guess's centre gives without errors.
 
     Parameters
@@ -77,14 +77,13 @@ def at_centre(test: Experiment, guess: Guess, law: ElasticLaw, history: History)
     test : Experiment
         The planned test; the readings that it holds are replaced.
     guess : Guess
-    law : {"hooke", "modified"}
-    history : {"saturating", "additive"}
+    spec : ModelSpec
 
     Returns
     -------
     Experiment
     """
-    problem = build([test], law=law, history=history)
+    problem = build([test], (), spec)
     (sample,) = problem.samples
     read = simulate(sample.protocol, {n: np.array([v]) for n, v in central(guess).items()}, sample.model)[..., 0]
     holds = [
@@ -103,9 +102,8 @@ def expected_widths(
     test: Experiment,
     guess: Guess,
     rng: np.random.Generator,
+    spec: ModelSpec = PLAIN_SPEC,
     *,
-    law: ElasticLaw = "hooke",
-    history: History = "saturating",
     tension_N: float | None = None,
     length_mm: float | None = None,
     kept_draws: int = 0,
@@ -119,8 +117,7 @@ def expected_widths(
     guess : mapping of name to (n,) array
         Draws of the plain model's parameters; ``n`` tests are simulated.
     rng : numpy Generator
-    law, history
-        Of the model.
+    spec : ModelSpec
     tension_N, length_mm : float, optional
         For which creep is stated, so that tests of several lengths can be compared (creep is a strain of the whole
         wire); this test's `typical_tension` and length when left out.
@@ -136,7 +133,7 @@ def expected_widths(
     ValueError
         If no simulated test has a posterior that can be climbed.
     """
-    problem = build([test], law=law, history=history)
+    problem = build([test], (), spec)
     (sample,) = problem.samples
     target = LogPosterior(problem)
     truth = np.column_stack([guess[name] for name in problem.names])

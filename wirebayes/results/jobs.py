@@ -11,10 +11,9 @@ from wirebayes.inference.fit import Fit, fit, seed_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
-from wirebayes.model.sample import Likelihood
+from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.processes.workers import cores, workers
 from wirebayes.results.store import save, save_summary
-from wirebayes.wire.laws import ElasticLaw, History
 
 
 @dataclass(frozen=True)
@@ -30,8 +29,7 @@ class Job:
         Keys of effects.
     own_effects : Path or None
         The user's Python file that some of them come from.
-    law, history, likelihood, length_exponent
-        See `wirebayes.model.build.build`.
+    spec : ModelSpec
     provenance : dict
     near : dict, optional
         Parameters known to be good (see `wirebayes.inference.fit.fit`).
@@ -43,10 +41,7 @@ class Job:
     experiments: tuple[Experiment, ...]
     effects: tuple[str, ...] = ()
     own_effects: Path | None = None
-    law: ElasticLaw = "hooke"
-    history: History = "saturating"
-    likelihood: Likelihood = "chain"
-    length_exponent: Any = 1.0
+    spec: ModelSpec = PLAIN_SPEC
     provenance: dict[str, Any] = field(default_factory=dict)
     near: dict[str, float] | None = None
     apart: tuple[str, ...] = ()
@@ -143,8 +138,8 @@ def fitted(
     Fit
     """
     known = catalogue(job.own_effects)
-    problem = build(job.experiments, [named(key, known) for key in job.effects], law=job.law, history=job.history,
-                    likelihood=job.likelihood, length_exponent=job.length_exponent)  # fmt: skip
+    effects = [named(key, known) for key in job.effects]
+    problem = build(job.experiments, effects, job.spec)
     own_seed = seed_of(seed, job.folder)
     return fit(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress, near=job.near)
 

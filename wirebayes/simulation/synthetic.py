@@ -22,6 +22,7 @@ from wirebayes.model.problem import Problem, with_readings
 from wirebayes.model.replicate import rounded
 from wirebayes.model.sample import Sample
 from wirebayes.model.scales import TYPICAL_K1_N, planned_scales
+from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Array
@@ -185,7 +186,7 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     stated = [value for name, value in truth.parameters.items() if name.split("[")[0] == "k1" and value > 0]
     tests = [bench.experiment() for bench in benches]
     scales = planned_scales(tests, geometric_mean(stated) if stated else TYPICAL_K1_N)
-    problem = build(tests, truth.effects, law=truth.law, history=truth.history, scales=scales)
+    problem = build(tests, truth.effects, ModelSpec(truth.law, truth.history), scales=scales)
     theta = problem.prior.rvs(1, rng)
     for name, value in truth.parameters.items():
         theta[0, _columns(problem, name, value)] = value
