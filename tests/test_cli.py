@@ -48,11 +48,12 @@ def test_reading_a_bench_file_loads_no_library_of_posteriors(tmp_path):
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_what_fits_load_holds_no_library_of_posteriors():
-    """Pandas and xarray would take a third of a fit's time, in the process of the command and in those of its check."""
+def test_what_fits_load_holds_no_library_of_posteriors_and_statistics():
+    """They would take a third of a fit's time, in the process of the command and in those of its check."""
+    heavy = ("pandas", "xarray", "arviz_base", "arviz_stats", "scipy.stats", "scipy.optimize", "scipy.ndimage")
     code = (
         "import sys; import wirebayes.commands.fit, wirebayes.preloaded, wirebayes.report.pages.fit\n"
-        "print([m for m in ('pandas', 'xarray', 'arviz_base', 'arviz_stats') if m in sys.modules])"
+        f"print([m for m in {heavy} if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"

@@ -13,6 +13,7 @@ from wirebayes.inference.coordinates.slack_edge import DECADES
 from wirebayes.inference.coordinates.steps import Preload
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import modes
+from wirebayes.numeric.distributions import LogitNormal, LogNormal
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 
@@ -127,11 +128,10 @@ def prior_terms(problem):
     """
     out: list[tuple[str, str | float, float, float]] = []
     for name, dist in problem.prior.distributions.items():
-        if dist.dist.name == "lognorm":
-            out.append((name, "log", float(np.log(dist.kwds["scale"])), float(dist.args[0])))
-        elif dist.dist.name == "logitnorm":
-            middle, spread = dist.args
-            out.append((name, float(dist.kwds["scale"]), float(middle + np.log(dist.kwds["scale"])), float(spread)))
+        if isinstance(dist, LogNormal):
+            out.append((name, "log", float(np.log(dist.middle)), dist.sd_log))
+        elif isinstance(dist, LogitNormal):
+            out.append((name, dist.most, dist.middle + float(np.log(dist.most)), dist.sd))
         else:
             out.append((name, "itself", float(dist.mean()), float(dist.std())))
     return out

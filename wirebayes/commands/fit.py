@@ -5,8 +5,6 @@ from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-from scipy import stats
-
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
     Progress,
@@ -27,6 +25,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run
 from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
+from wirebayes.numeric.distributions import Normal
 from wirebayes.processes.workers import computing
 from wirebayes.results.jobs import Job, run
 from wirebayes.strict.files import PathLike
@@ -124,7 +123,7 @@ def fit(
         raise InputError(f"--effect: found {', '.join(keys)}, expected each effect once")
     groups = _groups(experiments, together, file)
     if together is not None:
-        spec = replace(spec, length_exponent=stats.norm(1.0, 1.0))
+        spec = replace(spec, length_exponent=Normal(1.0, 1.0))
     jobs = []
     for folder, members in groups.items():
         for effect in added:

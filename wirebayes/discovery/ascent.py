@@ -5,7 +5,6 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from wirebayes.discovery.ladders import FIRST, LAST, AmplitudePath
 from wirebayes.discovery.path_weights import Weighed, weigh, without_last
@@ -13,6 +12,7 @@ from wirebayes.discovery.tangent import Tangent, damp, moving_columns, residuals
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
+from wirebayes.numeric.distributions import Normal
 from wirebayes.numeric.typing import Array
 
 _STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
@@ -291,7 +291,7 @@ def _with_effect(block: LaplaceFit, ladder: AmplitudePath, places: Sequence[Arra
     problem = block.problem_with(effect)
     column = column_of(problem, effect)
     # A prior that is not felt, in whose standard deviations the column counts.
-    wide = stats.norm(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))
+    wide = Normal(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))
     free = problem.prior.distributions | {problem.names[column]: wide}
     target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
     theta = []

@@ -10,7 +10,7 @@ from itertools import repeat
 from typing import Any
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtr, bdtrc
 
 from wirebayes.discovery import gross_errors, residual_patterns, screening
 from wirebayes.discovery.continuation import Continuation
@@ -175,7 +175,9 @@ def is_close(p: float, alpha: float, simulations: int) -> bool:
     simulations : int
     """
     larger = round(p * (1 + simulations)) - 1
-    return bool(min(binom.cdf(larger, simulations, alpha), binom.sf(larger - 1, simulations, alpha)) > CLOSE)
+    at_most = bdtr(larger, simulations, alpha)
+    at_least = bdtrc(larger - 1, simulations, alpha) if larger > 0 else 1.0
+    return bool(min(at_most, at_least) > CLOSE)
 
 
 def simulated_with_patterns(block: LaplaceFit, trials: Sequence[Probe], n: int, rng: np.random.Generator) -> Replicates:

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
 
 from wirebayes.discovery.linear_scan import expand
 from wirebayes.discovery.noise_integral import Expansion, projected
@@ -13,6 +12,7 @@ from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import Candidate, GlobalTest
 from wirebayes.discovery.settings import ALPHA
 from wirebayes.inference.laplace_fit import LaplaceFit
+from wirebayes.numeric.distributions import Normal
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Control
@@ -141,7 +141,7 @@ def group_of(members: Sequence[str], alike: dict[tuple[str, str], float]) -> lis
     return list(names)
 
 
-_ANY = stats.norm(0.0, 0.1)  # the prior of a probe, of which only the signature is used
+_ANY = Normal(0.0, 0.1)  # the prior of a probe, of which only the signature is used
 
 
 class _SensorGain(Effect):

@@ -268,7 +268,7 @@ def within(prior: Any, neutral: float, reach: float) -> Callable[[Array], Array]
 
     Parameters
     ----------
-    prior : scipy frozen distribution
+    prior : Distribution
     neutral, reach : float
     """
     inside = float(prior.cdf(neutral + reach) - prior.cdf(neutral - reach))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import betaincinv
 
 from wirebayes.discovery.linear_scan import expand, plain_reference, scan
 from wirebayes.discovery.probes import Probe, forms, probes
@@ -331,7 +331,9 @@ class GlobalTest:
     @property
     def p_interval(self) -> tuple[float, float]:
         """Clopper and Pearson's 95 % interval of the share of simulations at least as surprising."""
-        low, high = stats.binomtest(self._as_surprising, len(self.null)).proportion_ci()
+        above, all_of_them = self._as_surprising, len(self.null)
+        low = betaincinv(above, all_of_them - above + 1, 0.025) if above > 0 else 0.0
+        high = betaincinv(above + 1, all_of_them - above, 0.975) if above < all_of_them else 1.0
         return float(low), float(high)
 
     def threshold(self, name: str, alpha: float) -> float:

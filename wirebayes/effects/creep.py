@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
+from wirebayes.numeric.distributions import HalfNormal, LogNormal, Normal, Uniform
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.laws import creep_fraction
 from wirebayes.wire.protocol import Protocol
@@ -21,7 +21,7 @@ class PermanentCreep(Effect):
     place = "amount"
     formula = "permanent"
     scope = "material"
-    amplitudes = (Amplitude("psi", "-", 0.0, stats.uniform(0.0, 1.0)),)
+    amplitudes = (Amplitude("psi", "-", 0.0, Uniform(0.0, 1.0)),)
     sentence = "A part of the creep is permanent: later holds creep as if it had not occurred."
     shows = "between holds, unloading"
 
@@ -43,7 +43,7 @@ class Superposition(Effect):
     scope = "material"
     needs_saturation = True
     # a share: nothing is known of it but that
-    amplitudes = (Amplitude("omega", "-", 0.0, stats.uniform(0.0, 1.0)),)
+    amplitudes = (Amplitude("omega", "-", 0.0, Uniform(0.0, 1.0)),)
     sentence = "The creep of earlier holds continues on its own time scale after the next hold has begun."
     shows = "grows with hold number, slow inside holds"
 
@@ -65,8 +65,8 @@ class SecondRelaxation(Effect):
     formula = "second_mode"
     scope = "material"
     amplitudes = (
-        Amplitude("A", "mm/N", 0.0, stats.halfnorm(0.0, 0.4), is_elongation=True),
-        Amplitude("T2", "s", 0.25, stats.lognorm(1.2, scale=0.25), is_shape=True),
+        Amplitude("A", "mm/N", 0.0, HalfNormal(0.4), is_elongation=True),
+        Amplitude("T2", "s", 0.25, LogNormal(1.2, 0.25), is_shape=True),
     )
     sentence = "The wire creeps in two modes, one with a time constant of its own."
     shows = "shape within the hold"
@@ -82,7 +82,7 @@ class SteadyCreep(Effect):
     place = "elongation"
     formula = "flow"
     scope = "material"
-    amplitudes = (Amplitude("a", "mm/(N s)", 0.0, stats.halfnorm(0.0, 0.5), is_elongation=True),)
+    amplitudes = (Amplitude("a", "mm/(N s)", 0.0, HalfNormal(0.5), is_elongation=True),)
     sentence = "The wire also flows steadily under tension and never settles."
     shows = "tail of the hold"
 
@@ -120,7 +120,7 @@ class TensionDependentRate(Effect):
     place = "rate"
     formula = "rate_power"
     scope = "material"
-    amplitudes = (Amplitude("m", "-", 0.0, stats.norm(0.0, 0.5)),)
+    amplitudes = (Amplitude("m", "-", 0.0, Normal(0.0, 0.5)),)
     sentence = "The creep runs faster or slower at higher tension."
     shows = "hold shape changes with tension"
 
@@ -136,7 +136,7 @@ class Ageing(Effect):
     place = "amount"
     formula = "ageing"
     scope = "material"
-    amplitudes = (Amplitude("a", "-", 0.0, stats.norm(0.0, 0.5)),)
+    amplitudes = (Amplitude("a", "-", 0.0, Normal(0.0, 0.5)),)
     sentence = "Each hold relaxes less than the one before, whatever its tension."
     shows = "relaxation amplitude by order, not displacement"
 
@@ -152,7 +152,7 @@ class CreepThreshold(Effect):
     formula = "threshold"
     no_creep_below = "creep_threshold.tau_c"
     scope = "material"
-    amplitudes = (Amplitude("tau_c", "N", 0.0, stats.halfnorm(0.0, 0.5)),)
+    amplitudes = (Amplitude("tau_c", "N", 0.0, HalfNormal(0.5)),)
     sentence = "Below a threshold tension the wire does not creep."
     shows = "no relaxation in the first holds"
 
@@ -172,7 +172,7 @@ class PriorCreep(Effect):
     scope = "event"
     needs_saturation = True
     # from the minutes of adjusting a sample to an hour or so under its preload, in holds of some minutes
-    amplitudes = (Amplitude("T_0", "s", 0.0, stats.halfnorm(0.0, 20.0), of_each_test=True),)
+    amplitudes = (Amplitude("T_0", "s", 0.0, HalfNormal(20.0), of_each_test=True),)
     sentence = "The wire had been under its preload for some time before the first hold."
     shows = "first holds relax less"
 

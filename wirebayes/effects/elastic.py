@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
+from wirebayes.numeric.distributions import HalfNormal, Normal, TruncatedNormal
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Protocol
 
@@ -22,7 +22,7 @@ class StrainStiffening(Effect):
     place = "strain"
     formula = "stiffening"
     scope = "material"
-    amplitudes = (Amplitude("c", "-", 0.0, stats.norm(0.0, 20.0)),)
+    amplitudes = (Amplitude("c", "-", 0.0, Normal(0.0, 20.0)),)
     sentence = "The wire becomes stiffer (or softer) the more it is strained."
     shows = "curved in displacement, constant within a hold"
 
@@ -42,7 +42,7 @@ class Toe(Effect):
     formula = "toe"
     scope = "material"
     # a few steps of a test are enough to straighten ends and knots; as much as that is seen on short samples of rope
-    amplitudes = (Amplitude("w", "mm", 0.0, stats.halfnorm(0.0, 2.0)),)
+    amplitudes = (Amplitude("w", "mm", 0.0, HalfNormal(2.0)),)
     sentence = "At low tension the ends are still straightening out and the line pulls less than its stiffness implies."
     shows = "deficit at low tension only"
 
@@ -95,7 +95,7 @@ class PowerStrain(Effect):
     scope = "material"
     # tendons and braids follow powers of 1.2 to 2, plastics below their yield nearly 1, rubber less; at p = -1 the
     # tension would not depend on the strain
-    amplitudes = (Amplitude("p", "-", 0.0, stats.truncnorm(-3.0, np.inf, loc=0.0, scale=0.3)),)
+    amplitudes = (Amplitude("p", "-", 0.0, TruncatedNormal(-3.0, 0.0, 0.3)),)
     sentence = "The tension follows a power of the strain."
     shows = "curved in displacement, most at low tension; constant within a hold"
 
@@ -113,7 +113,7 @@ class FixtureCompliance(Effect):
     formula = "series"
     scope = "instrument"
     in_series = True
-    amplitudes = (Amplitude("c", "mm/N", 0.0, stats.halfnorm(0.0, 0.8)),)
+    amplitudes = (Amplitude("c", "mm/N", 0.0, HalfNormal(0.8)),)
     sentence = "The test bench itself deforms under the tension."
     shows = "k1 differs by length; needs two lengths of one line"
 
@@ -133,7 +133,7 @@ class ThermalExpansion(Effect):
     place = "zero_length"
     formula = "thermal"
     scope = "material"
-    amplitudes = (Amplitude("alpha", "1/K", 0.0, stats.norm(0.0, 1e-4)),)
+    amplitudes = (Amplitude("alpha", "1/K", 0.0, Normal(0.0, 1e-4)),)
     sentence = "The wire grows or shrinks with the logged temperature."
     shows = "follows the logged temperature"
 
@@ -156,7 +156,7 @@ class LengthDependence(Effect):
     formula = "length_power"
     scope = "material"
     compares_lengths = True
-    amplitudes = (Amplitude("p", "-", 0.0, stats.norm(0.0, 1.0)),)
+    amplitudes = (Amplitude("p", "-", 0.0, Normal(0.0, 1.0)),)
     sentence = "A parameter changes with the length of the sample more than the plain model assumes."
     shows = "differs between lengths only"
 

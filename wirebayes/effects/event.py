@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
-from scipy import stats
 
+from wirebayes.numeric.distributions import HalfNormal, Normal
 from wirebayes.wire.effect import Amplitude, EventEffect, HoldContext
 
 Own = dict[str, NDArray[Any]]
@@ -18,7 +18,7 @@ class GripSlip(EventEffect):
     name = "grip_slip"
     place = "zero_length"
     formula = "slip"
-    amplitudes = (Amplitude("w", "mm", 0.0, stats.norm(0.0, 0.3)),)
+    amplitudes = (Amplitude("w", "mm", 0.0, Normal(0.0, 0.3)),)
     sentence = "The wire slipped in its grip once."
     shows = "one step in level; names the hold"
 
@@ -33,7 +33,7 @@ class UnrecordedHold(EventEffect):
     name = "unrecorded_hold"
     place = "wait"
     formula = "wait"
-    amplitudes = (Amplitude("T", "s", 0.0, stats.halfnorm(0.0, 2.5)),)
+    amplitudes = (Amplitude("T", "s", 0.0, HalfNormal(2.5)),)
     sentence = "Time passed at a displacement before its first reading."
     shows = "step in level; names the hold"
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
+from wirebayes.numeric.distributions import HalfNormal, LogNormal, LogUniform, Normal, Uniform
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Protocol
 
@@ -21,7 +21,7 @@ class ReadingDelay(Effect):
     place = "clock"
     formula = "delay"
     scope = "instrument"
-    amplitudes = (Amplitude("t_d", "s", 0.0, stats.halfnorm(0.0, 0.04)),)
+    amplitudes = (Amplitude("t_d", "s", 0.0, HalfNormal(0.04)),)
     sentence = "The first reading of each hold was taken later than recorded."
     shows = "first reading low, most where creep is fastest"
 
@@ -39,7 +39,7 @@ class LateClock(Effect):
     formula = "late"
     scope = "instrument"
     # the seconds between the end of a move and the start of a clock by hand, in holds of minutes
-    amplitudes = (Amplitude("t_d", "s", 0.0, stats.halfnorm(0.0, 0.05)),)
+    amplitudes = (Amplitude("t_d", "s", 0.0, HalfNormal(0.05)),)
     sentence = "The clock of each hold was started some time after the move."
     shows = "first readings of all holds low"
 
@@ -54,7 +54,7 @@ class SensorDrift(Effect):
     place = "reading"
     formula = "drift"
     scope = "instrument"
-    amplitudes = (Amplitude("a", "N/s", 0.0, stats.norm(0.0, 0.1)),)
+    amplitudes = (Amplitude("a", "N/s", 0.0, Normal(0.0, 0.1)),)
     sentence = "The force sensor drifts with time."
     shows = "grows with elapsed time, also within holds"
 
@@ -69,7 +69,7 @@ class SensorNonlinearity(Effect):
     place = "reading"
     formula = "square"
     scope = "instrument"
-    amplitudes = (Amplitude("a", "1/N", 0.0, stats.norm(0.0, 0.08)),)
+    amplitudes = (Amplitude("a", "1/N", 0.0, Normal(0.0, 0.08)),)
     sentence = "The force sensor is nonlinear at higher tension."
     shows = "like stiffening; distinguishable with several wires"
 
@@ -85,8 +85,8 @@ class ClampTransient(Effect):
     formula = "transient"
     scope = "instrument"
     amplitudes = (
-        Amplitude("a", "-", 0.0, stats.norm(0.0, 0.05)),
-        Amplitude("T", "s", 0.08, stats.lognorm(1.0, scale=0.08), is_shape=True),
+        Amplitude("a", "-", 0.0, Normal(0.0, 0.05)),
+        Amplitude("T", "s", 0.08, LogNormal(1.0, 0.08), is_shape=True),
     )
     sentence = "After each move the clamp or sensor settles, in proportion to the tension."
     shows = "decays inside the hold, scales with tension"
@@ -134,17 +134,17 @@ class ScrewError(Effect):
     nearly_linear = True
     # a few per cent of a step; with either sign half a turn of phase is enough
     amplitudes = (
-        Amplitude("a", "mm", 0.0, stats.norm(0.0, _OFF)),
-        Amplitude("P", "mm", 4.0, stats.loguniform(_SHORTEST, 6.0), is_shape=True),
-        Amplitude("phi", "-", 0.0, stats.uniform(-0.5 * np.pi, np.pi), is_shape=True, of_each_test=True),
+        Amplitude("a", "mm", 0.0, Normal(0.0, _OFF)),
+        Amplitude("P", "mm", 4.0, LogUniform(_SHORTEST, 6.0), is_shape=True),
+        Amplitude("phi", "-", 0.0, Uniform(-0.5 * np.pi, np.pi), is_shape=True, of_each_test=True),
     )
 
     def __post_init__(self) -> None:
         size, period, phase = type(self).amplitudes
-        period = replace(period, prior=stats.loguniform(_SHORTEST, self.longest))
+        period = replace(period, prior=LogUniform(_SHORTEST, self.longest))
         if self.of_several:  # one sign for all of them, so each test needs the whole turn
-            size = replace(size, prior=stats.halfnorm(0.0, _OFF))
-            phase = replace(phase, prior=stats.uniform(-np.pi, 2.0 * np.pi))
+            size = replace(size, prior=HalfNormal(_OFF))
+            phase = replace(phase, prior=Uniform(-np.pi, 2.0 * np.pi))
         object.__setattr__(self, "amplitudes", (size, period, phase))
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
@@ -192,7 +192,7 @@ class LostMotion(_NeedsReversal):
     place = "position"
     formula = "lost_motion"
     scope = "instrument"
-    amplitudes = (Amplitude("w", "mm", 0.0, stats.halfnorm(0.0, 0.1)),)
+    amplitudes = (Amplitude("w", "mm", 0.0, HalfNormal(0.1)),)
     sentence = "The screw has play: after a reversal the true position lags behind."
     shows = "unloading branch"
 
@@ -207,7 +207,7 @@ class GuideFriction(_NeedsReversal):
     place = "guide"
     formula = "friction"
     scope = "instrument"
-    amplitudes = (Amplitude("mu", "-", 0.0, stats.norm(0.0, 0.05)),)
+    amplitudes = (Amplitude("mu", "-", 0.0, Normal(0.0, 0.05)),)
     sentence = "Friction in the guide raises the reading while loading and lowers it while unloading."
     shows = "unloading branch"
 

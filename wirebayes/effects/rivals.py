@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
+from wirebayes.numeric.distributions import LogNormal, Uniform
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 
 Own = dict[str, NDArray[Any]]
@@ -86,7 +86,7 @@ class Logarithmic(_WithoutPlateau):
     place = "fraction"
     formula = "logarithmic"
     scope = "material"
-    amplitudes = (Amplitude("t0", "s", np.nan, stats.lognorm(1.5, scale=0.08), is_shape=True),)
+    amplitudes = (Amplitude("t0", "s", np.nan, LogNormal(1.5, 0.08), is_shape=True),)
     sentence = "Creep grows with the logarithm of time."
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
@@ -101,7 +101,7 @@ class PowerLaw(_WithoutPlateau):
     place = "fraction"
     formula = "power_of_time"
     scope = "material"
-    amplitudes = (Amplitude("n", "-", np.nan, stats.lognorm(0.7, scale=0.25), is_shape=True),)
+    amplitudes = (Amplitude("n", "-", np.nan, LogNormal(0.7, 0.25), is_shape=True),)
     sentence = "Creep grows with a power of time."
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
@@ -116,8 +116,8 @@ class TwoModes(Effect):
     formula = "two_modes"
     scope = "material"
     amplitudes = (
-        Amplitude("slow_share", "-", np.nan, stats.uniform(0.0, 1.0)),
-        Amplitude("slower", "-", np.nan, stats.lognorm(1.0, scale=10.0), is_shape=True),
+        Amplitude("slow_share", "-", np.nan, Uniform(0.0, 1.0)),
+        Amplitude("slower", "-", np.nan, LogNormal(1.0, 10.0), is_shape=True),
     )
     sentence = "The creep has two exponential modes."
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from wirebayes.errors import InputError
+from wirebayes.numeric.distributions import Normal
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 
 KNOTS = 3  # in the training holds, and as many behind them
@@ -47,7 +47,7 @@ class Discrepancy(Effect):
 
     @property
     def amplitudes(self) -> tuple[Amplitude, ...]:  # type: ignore[override]
-        step = stats.norm(0.0, self.size_N / KNOTS**0.5)
+        step = Normal(0.0, self.size_N / KNOTS**0.5)
         names = [f"{walk}{k}" for walk in ("level", "course") for k in range(2 * KNOTS)]
         return tuple(Amplitude(name, "N", 0.0, step, in_natural_units=True) for name in names)
 

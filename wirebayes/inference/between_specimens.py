@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import optimize
 
+from wirebayes.numeric.distributions import LogNormal
 from wirebayes.numeric.resampling import systematic_rows
 from wirebayes.numeric.typing import Floats
 
-SPREAD = stats.lognorm(1.0, scale=0.05)  # specimens of one line mostly agree within one to twenty-five per cent
+SPREAD = LogNormal(1.0, 0.05)  # specimens of one line mostly agree within one to twenty-five per cent
 _PROPOSALS = 4000  # importance draws: a thousand effective ones and more with five parameters
 _REACH = 4.0  # prior sd of log s in which the mode is sought
 _FREEDOM = 5.0  # of the proposal's t distribution: tails beyond those of a normal prior of log s

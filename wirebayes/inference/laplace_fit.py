@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
 
 from wirebayes.inference.climb import Optimum, climb, curved
 from wirebayes.inference.log_posterior import Density, LogPosterior
@@ -16,12 +15,13 @@ from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL, Scales
 from wirebayes.model.spec import ModelSpec
+from wirebayes.numeric.distributions import Normal
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 
-_FLAT = stats.norm(0.0, 1e9)  # a prior that no amplitude feels; in standard deviations of its own, of density
+_FLAT = Normal(0.0, 1e9)  # a prior that no amplitude feels; in standard deviations of its own, of density
 # its log density in those units, taken out again: the amplitude's own prior is not in the evidence
-_LOG_FLAT = float(stats.norm.logpdf(0.0))
+_LOG_FLAT = float(Normal().logpdf(0.0))
 
 
 @dataclass(frozen=True)

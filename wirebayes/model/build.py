@@ -8,12 +8,12 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.column_units import unit_of_column
-from wirebayes.model.distributions import scaled
 from wirebayes.model.prior import Power, Prior, from_table, possible, wire_defaults
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL, SAMPLE, Sample
 from wirebayes.model.scales import Scales, Units, scales_of
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
+from wirebayes.numeric.distributions import scaled
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
@@ -76,7 +76,7 @@ def build(
     units = scales.units
     learned = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.in_natural_units}
     every = {
-        name: d if name in learned or not hasattr(d, "dist") else scaled(d, units.of(unit_of_column(name, samples)))
+        name: d if name in learned or isinstance(d, int | float) else scaled(d, units.of(unit_of_column(name, samples)))
         for name, d in distributions.items()
     }
     stated = _apply_tables(every, experiments, several)
@@ -104,7 +104,7 @@ def default_prior(
     length_mm : float
     scales : Scales
         Of the test, which defaults refer to.
-    instead : mapping of name to float or scipy frozen distribution
+    instead : mapping of name to float or Distribution
         What is stated in place of defaults, in natural units.
     control : {"displacement", "force"}
         What is set in the test.

@@ -14,6 +14,7 @@ import numpy as np
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
 from wirebayes.numeric import linear_algebra
+from wirebayes.numeric.distributions import Normal, ours
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.staircase import Linearised, simulate
 
@@ -138,8 +139,8 @@ def integrated(problem: Problem) -> Problem:
     """
     last = {e.key: e for s in problem.samples for e in s.model.at("reading")[-1:] if e.adds}
     gone = [c for e in last.values() for c in e.columns() if c in problem.names]
-    priors = [problem.prior.distributions[c] for c in gone]
-    if not gone or problem.likelihood != "chain" or any(p.dist.name != "norm" for p in priors):
+    priors = [ours(problem.prior.distributions[c]) for c in gone]
+    if not gone or problem.likelihood != "chain" or not all(isinstance(p, Normal) for p in priors):
         return problem
     shapes = [_shapes(problem, i, gone) for i in range(len(problem.samples))]
     shows = np.any([(s != 0).any(axis=(0, 1)) for s in shapes], axis=0)

@@ -33,12 +33,21 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import stats
 from scipy.special import logit
 
 from wirebayes.errors import InputError, shown
-from wirebayes.model.distributions import fast_logpdf, logit_normal, lognormal, parsed
 from wirebayes.model.scales import Scales
+from wirebayes.numeric.distributions import (
+    HalfNormal,
+    LogitNormal,
+    LogNormal,
+    Normal,
+    TruncatedNormal,
+    Uniform,
+    log_density_of,
+    log_normal,
+    ours,
+)
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.protocol import Control
 
@@ -62,7 +71,7 @@ class Prior:
 
     Attributes
     ----------
-    distributions : dict of name to scipy frozen distribution
+    distributions : dict of name to Distribution
         In the order of the columns of every ``(n, d)`` array of parameters.
     fixed : dict of name to float
         Parameters that are known and not sampled.
@@ -118,12 +127,11 @@ class Prior:
 
     def log_density(self) -> Callable[[Array], Array]:
         """A function of (n, d) parameters that returns the (n,) log density."""
-        forms = [parsed(d) for d in self.distributions.values()]
+        forms = [ours(d) for d in self.distributions.values()]
         # most columns are of this form, and a call for each would take longer than the arithmetic
-        is_positive = np.array([d.name == "lognorm" and d.loc == 0.0 for d in forms])
-        positive = np.flatnonzero(is_positive)
-        together = lognormal(*(np.array([getattr(forms[i], k) for i in positive]) for k in ("shape", "scale")))
-        others = [(i, fast_logpdf(d)) for i, d in enumerate(self.distributions.values()) if not is_positive[i]]
+        positive = [i for i, d in enumerate(forms) if isinstance(d, LogNormal)]
+        together = log_normal(*(np.array([getattr(forms[i], k) for i in positive]) for k in ("sd_log", "middle")))
+        others = [(i, log_density_of(d)) for i, d in enumerate(forms) if i not in positive]
         powers = [name for name in self.distributions if name in self.powers]
 
         def evaluate(theta: Array) -> Array:
@@ -163,30 +171,30 @@ def wire_defaults(
 
     Returns
     -------
-    dict of name to scipy frozen distribution
+    dict of name to Distribution
         ``B`` is the creep at the typical tension in steps, ``k2`` the hazard after a typical hold.
     """
     lengths, steps = length_mm / scales.range_mm, scales.range_mm / scales.step_mm
     if control == "displacement":
         return dict(_wire_defaults(lengths, steps))
-    preload = stats.norm(-zero_mm / scales.step_mm, steps)
+    preload = Normal(-zero_mm / scales.step_mm, steps)
     return (
         _wire_defaults(lengths, steps) | _under_weights(steps, scales.step_N / scales.tension_N) | {"preload": preload}
     )
 
 
-@cache  # scipy takes as long to make eight distributions as a hundred points take to be evaluated
+@cache  # a search asks for them thousands of times
 def _wire_defaults(lengths: float, steps: float) -> dict[str, Any]:
     """`lengths` is the sample's length in ranges of displacement, `steps` the range in steps."""
     return {
-        "k1": stats.lognorm(K1_SD, scale=K1_TENSIONS * lengths),
-        "B": stats.lognorm(CREEP_SD, scale=CREEP_SHARE * 0.5 * steps),
-        "U": stats.lognorm(0.7, scale=0.5),
-        "k2": stats.lognorm(HAZARD_SD, scale=HAZARD),
-        "N": stats.lognorm(0.45, scale=0.65),
-        "preload": stats.norm(PRELOAD_MEAN * steps, PRELOAD_SD * steps),
-        "sensor_sd": stats.lognorm(SENSOR_SD, scale=SENSOR),
-        "setting_sd": logit_normal(float(logit(SETTING / SETTING_MOST)), SETTING_LOG_SD, loc=0.0, scale=SETTING_MOST),
+        "k1": LogNormal(K1_SD, K1_TENSIONS * lengths),
+        "B": LogNormal(CREEP_SD, CREEP_SHARE * 0.5 * steps),
+        "U": LogNormal(0.7, 0.5),
+        "k2": LogNormal(HAZARD_SD, HAZARD),
+        "N": LogNormal(0.45, 0.65),
+        "preload": Normal(PRELOAD_MEAN * steps, PRELOAD_SD * steps),
+        "sensor_sd": LogNormal(SENSOR_SD, SENSOR),
+        "setting_sd": LogitNormal(float(logit(SETTING / SETTING_MOST)), SETTING_LOG_SD, SETTING_MOST),
     }
 
 
@@ -203,17 +211,17 @@ def _under_weights(steps: float, weight_step: float) -> dict[str, Any]:
     """
     most = SETTING_MOST * weight_step
     return {
-        "sensor_sd": stats.lognorm(SENSOR_SD, scale=SENSOR * steps),
-        "setting_sd": logit_normal(float(logit(SETTING / SETTING_MOST)), SETTING_LOG_SD, loc=0.0, scale=most),
+        "sensor_sd": LogNormal(SENSOR_SD, SENSOR * steps),
+        "setting_sd": LogitNormal(float(logit(SETTING / SETTING_MOST)), SETTING_LOG_SD, most),
     }
 
 
-# for each form its keys in a TOML table, and how scipy makes it of them
+# for each form its keys in a TOML table, and how it is made of them
 _FORMS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
-    "normal": (("mean", "sd"), lambda mean, sd: stats.norm(mean, sd)),
-    "half-normal": (("sd",), lambda sd: stats.halfnorm(0.0, sd)),
-    "log-normal": (("median", "sd_log"), lambda median, sd_log: stats.lognorm(sd_log, scale=median)),
-    "uniform": (("low", "high"), lambda low, high: stats.uniform(low, high - low)),
+    "normal": (("mean", "sd"), Normal),
+    "half-normal": (("sd",), HalfNormal),
+    "log-normal": (("median", "sd_log"), lambda median, sd_log: LogNormal(sd_log, median)),
+    "uniform": (("low", "high"), lambda low, high: Uniform(low, high - low)),
 }
 
 
@@ -251,7 +259,7 @@ def from_table(key: str, table: Any) -> Any:
             raise InputError(f"{key}.{name}: found {values[name]}, expected a number above zero")
     if form == "uniform" and values["high"] <= values["low"]:
         raise InputError(f"{key}.high: found {values['high']}, expected a number above low = {values['low']}")
-    return build(**values)
+    return build(*(values[name] for name in wanted))
 
 
 def possible(key: str, name: str, wanted: Any) -> Any:
@@ -263,12 +271,12 @@ def possible(key: str, name: str, wanted: Any) -> Any:
         Where it was written, for messages.
     name : str
         Of the parameter.
-    wanted : float or scipy frozen distribution
+    wanted : float or Distribution
         As `from_table` returned it.
 
     Returns
     -------
-    float or scipy frozen distribution
+    float or Distribution
 
     Raises
     ------
@@ -291,7 +299,7 @@ def possible(key: str, name: str, wanted: Any) -> Any:
     mean, sd = float(wanted.mean()), float(wanted.std())
     if mean < 0:
         raise InputError(f"{key}.mean: found {mean:g}, expected 0 or more: {name} is never negative")
-    return wanted if mean > _NEVER_BELOW * sd else stats.truncnorm(-mean / sd, np.inf, loc=mean, scale=sd)
+    return wanted if mean > _NEVER_BELOW * sd else TruncatedNormal(-mean / sd, mean, sd)
 
 
 def _number(key: str, value: Any) -> float:

@@ -12,10 +12,10 @@ import numpy as np
 
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.column_units import sample_in, unit_of_column, units_ratio
-from wirebayes.model.distributions import scaled
 from wirebayes.model.prior import Power, Prior
 from wirebayes.model.sample import LENGTH_EXPONENT, Likelihood, Sample, at_length
 from wirebayes.model.scales import NATURAL, Scales, Units
+from wirebayes.numeric.distributions import scaled
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol

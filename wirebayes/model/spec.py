@@ -19,7 +19,7 @@ class ModelSpec:
         Whether eq (4) is the total creep a tension leads to, or is added again in every hold.
     likelihood : {"chain", "hold"}
         Whether the holds are one history, or each an experiment of its own (`wirebayes.model.likelihoods`).
-    length_exponent : float or scipy frozen distribution
+    length_exponent : float or Distribution
         p of B ∝ L0^p among samples of one material: a value, or a prior to learn it.
     """
 

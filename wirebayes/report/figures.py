@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
-from scipy.ndimage import gaussian_filter
 
 from wirebayes.json_files.summary import ExtrapolatedCreep
 from wirebayes.numeric.typing import Array
@@ -269,7 +268,7 @@ def _ticks(axes: Any, places: Sequence[tuple[float, float]], step: tuple[float, 
 def _regions(axes: Any, x: Array, y: Array, corner: tuple[float, float]) -> None:
     """Shade the densest places that hold 50 and 90 % of the draws, smoothed over neighbours, in a cell."""
     counts, xs, ys = np.histogram2d(x, y, bins=_CELLS, range=[(0.0, 1.0), (0.0, 1.0)])
-    density = gaussian_filter(counts, 1.0)
+    density = _SMOOTHING @ counts @ _SMOOTHING.T
     ranked = np.sort(density.ravel())[::-1]
     held = np.cumsum(ranked) / ranked.sum()
     half, most = (float(ranked[np.searchsorted(held, share)]) for share in (0.5, 0.9))
@@ -283,6 +282,21 @@ _MOST_TICKS = 4  # so that labels do not touch
 _SIDE, _GAP, _TICK = 0.92, 0.08, 0.035  # of a cell, between cells and of a tick, in units of both together
 _LONGEST = 17  # letters of a name that fit into a cell
 _CELLS = 22  # of a region's grid along each axis: fine enough to look smooth
+
+
+def _smoothing(cells: int) -> Array:
+    """(cells, cells) weights of the neighbours of each cell along one axis: normal, and reflected at the ends."""
+    reach = np.arange(-_REACH, _REACH + 1)
+    weights = np.exp(-0.5 * (reach / _BLUR) ** 2)
+    neighbour = np.arange(cells)[:, None] + reach
+    inside = np.where(neighbour < 0, -1 - neighbour, np.minimum(neighbour, 2 * cells - 1 - neighbour))
+    matrix = np.zeros((cells, cells))
+    np.add.at(matrix, (np.arange(cells)[:, None], inside), weights / weights.sum())
+    return matrix
+
+
+_BLUR, _REACH = 1.0, 4  # cells: standard deviation, and where its tail is cut off
+_SMOOTHING = _smoothing(_CELLS)
 
 
 def residuals(

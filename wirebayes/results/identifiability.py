@@ -14,7 +14,7 @@ import numpy as np
 from wirebayes.inference.chain_statistics import pareto_smoothed, power_scaled, power_sensitivity
 from wirebayes.inference.fit import Fit
 from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability, IdentifiabilityFigures
-from wirebayes.model.distributions import fast_logpdf
+from wirebayes.numeric.distributions import log_density_of
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import contraction, source
 from wirebayes.sentences import short
@@ -105,7 +105,7 @@ def log_priors(fitted: Fit, theta: Array) -> Array:
     known = prior.known(theta)
     columns = []
     for i, (name, distribution) in enumerate(prior.distributions.items()):
-        value = fast_logpdf(distribution)(known[:, i])
+        value = log_density_of(distribution)(known[:, i])
         columns.append(value + np.log(known[:, i]) if name in prior.logarithmic else value)
     return np.stack(columns, axis=1)
 

@@ -8,7 +8,7 @@ this specimen's posterior. Neither a few outliers nor one badly determined speci
 from collections.abc import Iterable
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from wirebayes.json_files.batch import OutlierRow, Row
 from wirebayes.json_files.values import INTERVAL
@@ -92,4 +92,4 @@ def threshold(specimens: int, parameters: int) -> float:
     simulations of the tests show to keep the level for 6 to 200 specimens.
     """
     tests = 2 * specimens * parameters
-    return float(stats.t.ppf(1.0 - FALSE_ALARMS / tests, 1.0 + MAD_EFFICIENCY * specimens))
+    return float(stdtrit(1.0 + MAD_EFFICIENCY * specimens, 1.0 - FALSE_ALARMS / tests))

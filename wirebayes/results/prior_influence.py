@@ -1,14 +1,14 @@
 """Where a posterior leans on a prior: intervals that would move if the prior were twice as wide."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
-from wirebayes.model.distributions import fast_logpdf, logit_normal
 from wirebayes.model.prior import Prior
 from wirebayes.notice import Notice
+from wirebayes.numeric.distributions import HalfNormal, LogitNormal, LogNormal, Normal, log_density_of, ours
 from wirebayes.numeric.typing import Array
 from wirebayes.sentences import listed
 
@@ -40,7 +40,7 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
         wide = _wider(prior.distributions[name])
         if wide is None:
             continue
-        log_weight = fast_logpdf(wide)(known[:, i]) - fast_logpdf(prior.distributions[name])(known[:, i])
+        log_weight = log_density_of(wide)(known[:, i]) - log_density_of(prior.distributions[name])(known[:, i])
         weight = np.exp(log_weight - log_weight.max())
         after = np.stack([_weighted_ends(theta[order[:, j], j], weight[order[:, j]]) for j in range(theta.shape[1])], 1)
         moved = np.abs(after - before).max(axis=0) > MOVED * spread
@@ -61,16 +61,11 @@ def _weighted_ends(ordered: Array, weight: Array) -> Array:
 
 def _wider(distribution: Any) -> Any:
     """The same distribution twice as wide; None where its ends say what is possible, as uniform ones do."""
-    name = distribution.dist.name
-    shapes, loc, scale = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
-    if name == "lognorm":
-        return stats.lognorm(WIDER * shapes[0], loc=loc, scale=scale)
-    if name == "logitnorm":
-        return logit_normal(shapes[0], WIDER * shapes[1], loc=loc, scale=scale)
-    if name == "norm":
-        return stats.norm(loc, WIDER * scale)
-    if name == "halfnorm":
-        return stats.halfnorm(loc, WIDER * scale)
+    match ours(distribution):
+        case LogNormal() as known:
+            return replace(known, sd_log=WIDER * known.sd_log)
+        case Normal() | HalfNormal() | LogitNormal() as known:
+            return replace(known, sd=WIDER * known.sd)
     return None
 
 

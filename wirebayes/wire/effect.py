@@ -52,7 +52,7 @@ class Amplitude:
     name, unit : str
     neutral : float
         The value at which the effect returns the plain model to the last bit.
-    prior : scipy frozen distribution
+    prior : Distribution, or a frozen distribution of scipy
         In the test's own units: displacement steps for mm, typical tensions for N, typical holds for s.
     is_shape : bool
         True for a positive constant of the form (a time constant), sampled as a logarithm; it means nothing while

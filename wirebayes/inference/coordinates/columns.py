@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wirebayes.inference.coordinates.edges import Edge, edge
 from wirebayes.model.problem import Problem
+from wirebayes.numeric.distributions import LogitNormal
 from wirebayes.numeric.typing import Array
 
 ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
@@ -96,7 +97,7 @@ def columns_of(problem: Problem) -> Columns:
     positive = np.array([name in problem.prior.logarithmic for name in problem.names], dtype=bool)
     edges = {i: at for i, d in enumerate(distributions) if not positive[i] and (at := edge(d)) is not None}
     linear = [not positive[i] and i not in edges for i in range(len(distributions))]
-    most = [float(d.support()[1]) if d.dist.name == "logitnorm" else np.inf for d in distributions]
+    most = [d.most if isinstance(d, LogitNormal) else np.inf for d in distributions]
     scale = [_spread(d) if own else 1.0 for d, own in zip(distributions, linear, strict=True)]
     spread = [_log_spread(d, m) if p else 1.0 for d, m, p in zip(distributions, most, positive, strict=True)]
     return Columns(positive, np.array(most), edges, np.array(scale), np.array(spread))

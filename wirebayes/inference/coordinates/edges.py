@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
 from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
 
-from wirebayes.model.distributions import fast_logpdf
+from wirebayes.numeric.distributions import HalfNormal, Normal, TruncatedNormal, Uniform, ours
 from wirebayes.numeric.typing import Array
 
 _NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite
-_log_normal = fast_logpdf(stats.norm())
+_log_normal = Normal().log_density()
 
 
 @dataclass(frozen=True)
@@ -38,13 +37,14 @@ class Edge:
 
 def edge(distribution: Any) -> Edge | None:
     """The map for a half-normal at zero, a normal one cut off below or a uniform distribution; none for others."""
-    kind = distribution.dist.name
-    shapes, loc, scale = distribution.dist._parse_args(*distribution.args, **distribution.kwds)
-    if kind == "halfnorm" and loc == 0.0:
-        return _half_normal(float(scale), fast_logpdf(distribution))
-    if kind == "truncnorm" and shapes[1] == np.inf:
-        return _cut_off(float(shapes[0]), float(loc), float(scale), distribution)
-    return _uniform(float(loc), float(scale), fast_logpdf(distribution)) if kind == "uniform" else None
+    match ours(distribution):
+        case HalfNormal(sd, 0.0) as known:
+            return _half_normal(sd, known.log_density())
+        case TruncatedNormal() as known:
+            return _cut_off(known)
+        case Uniform(low, width) as known:
+            return _uniform(low, width, known.log_density())
+    return None
 
 
 def _half_normal(sd: float, log_prior: Callable[[Array], Array]) -> Edge:
@@ -62,9 +62,10 @@ def _half_normal(sd: float, log_prior: Callable[[Array], Array]) -> Edge:
     return Edge(score, value, log_prior, False)
 
 
-def _cut_off(least: float, middle: float, sd: float, distribution: Any) -> Edge:
-    """Of a normal distribution what lies above `least` standard deviations; each half from its own tail."""
-    below, above, end = ndtr(least), ndtr(-least), float(distribution.support()[0])
+def _cut_off(known: TruncatedNormal) -> Edge:
+    """Each half from its own tail."""
+    least, middle, sd = known.least_sd, known.centre, known.sd
+    below, above, end = ndtr(least), ndtr(-least), known.support()[0]
     end = 0.0 if abs(end) < 1e-12 * sd else end  # where it was cut off, but for rounding
 
     def score(value: Array) -> Array:
@@ -77,7 +78,7 @@ def _cut_off(least: float, middle: float, sd: float, distribution: Any) -> Edge:
         found = middle + sd * np.where(score < 0.0, low, -ndtri(ndtr(-np.maximum(score, 0.0)) * above))
         return np.asarray(np.maximum(found, end))  # rounding may lead beyond
 
-    return Edge(score, value, fast_logpdf(distribution), False)
+    return Edge(score, value, known.log_density(), False)
 
 
 def _uniform(low: float, width: float, log_prior: Callable[[Array], Array]) -> Edge:

@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from emcee import State
-from emcee.moves import RedBlueMove
-from emcee.moves.move import Move
 from numpy.typing import NDArray
 
 from wirebayes.inference.sampler import net
+from wirebayes.inference.sampler.emcee_core import EmceeState, Move, RedBlueMove
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal, components
 from wirebayes.inference.sampler.transport_map import Straight
@@ -55,11 +53,11 @@ class PoolMove(Move):  # type: ignore[misc]
         self.components = components(proposal)
         self.coming: list[tuple[Array, Array, NDArray[np.bool_]]] = []
 
-    def propose(self, model: Any, state: State) -> tuple[State, NDArray[np.bool_]]:
+    def propose(self, model: Any, state: EmceeState) -> tuple[EmceeState, NDArray[np.bool_]]:
         """The next place of every walker, and which ones are new."""
         if self.coming:
             x, value, new = self.coming.pop()
-            return State(x, log_prob=value, random_state=state.random_state), new
+            return EmceeState(x, log_prob=value, random_state=state.random_state), new
         size = 1 << (min(self.steps, self.most).bit_length() - 1)
         self.steps -= size
         state, accepted = self.between.propose(model, state)
@@ -67,7 +65,7 @@ class PoolMove(Move):  # type: ignore[misc]
             self.coming = self._pooled(model, state, size - 1)[::-1]
         return state, accepted
 
-    def _pooled(self, model: Any, state: State, k: int) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
+    def _pooled(self, model: Any, state: EmceeState, k: int) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
         """The next k places of all walkers: (n, d), their log densities (n,), and whether they changed (n,)."""
         (n, d), random = state.coords.shape, model.random
         points = net.around(self.components.to_cube(state.coords, random), k + 1, random)

@@ -10,13 +10,11 @@ A. B. Owen, Randomly permuted (t, m, s)-nets and (t, s)-sequences, Monte Carlo a
 Scientific Computing, Springer 1995.
 """
 
-from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import qmc
 
+from wirebayes.numeric import sobol
 from wirebayes.numeric.typing import Array
 
 
@@ -36,7 +34,7 @@ def around(given: Array, size: int, random: Any) -> Array:
     (n, size, m) array
         The given points first, the others in the order of Sobol's sequence, which goes to and fro.
     """
-    (n, m), net = given.shape, _sobol(given.shape[1], size)
+    (n, m), net = given.shape, sobol.strata(given.shape[1], size)
     # Each binary digit is flipped by a coin of its own for all digits before it. Those of the given point, the origin
     # of the net, are not tossed: it is known where that point has to go, and all others follow it.
     flips = np.zeros((n, m, 1), net.dtype)
@@ -67,9 +65,3 @@ def even(n: int, m: int, random: Any) -> Array:
     (n, m) array
     """
     return around(random.uniform(size=(1, m)), 1 << (n - 1).bit_length(), random)[0, random.permutation(n)]
-
-
-@cache
-def _sobol(m: int, size: int) -> NDArray[np.uint32]:
-    """(size, m) strata of Sobol' points, the origin first."""
-    return np.asarray(qmc.Sobol(m, scramble=False).random(size) * size, np.uint32)

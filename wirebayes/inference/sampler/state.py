@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import emcee
 import numpy as np
-from emcee.moves.move import Move
 
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
+from wirebayes.inference.sampler.emcee_core import EmceeState, EnsembleSampler, Move
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
 from wirebayes.inference.sampler.points import Points
@@ -207,7 +206,7 @@ class Stretch:
     """What walkers did: where they are now, emcee's record of the way, and the evaluations it took."""
 
     walkers: Walkers
-    sampler: emcee.EnsembleSampler
+    sampler: EnsembleSampler
     evaluations: int
 
 
@@ -233,10 +232,10 @@ def advance(target: LogPosterior, walkers: Walkers, move: Move, steps: int, powe
     def density(z: Array) -> Array:
         return power * target(z)
 
-    sampler = emcee.EnsembleSampler(*walkers.positions.shape, density, moves=move, vectorize=True)
+    sampler = EnsembleSampler(*walkers.positions.shape, density, moves=move, vectorize=True)
     sampler.log_prob_fn = density  # without emcee's wrapper, which prints all points when an exception passes through
     before = target.evaluations
-    start = emcee.State(walkers.positions, log_prob=power * walkers.values, random_state=walkers.random)
+    start = EmceeState(walkers.positions, log_prob=power * walkers.values, random_state=walkers.random)
     end = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
     now = Walkers(end.coords, end.log_prob / power, sampler.random_state)
     return Stretch(now, sampler, target.evaluations - before)

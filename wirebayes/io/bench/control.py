@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import fdtrc, stdtr
 
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.numeric.typing import Floats
@@ -92,8 +92,8 @@ def trend_by_chance(groups: Sequence[Rows], values: Floats) -> float:
     if not explained.any():
         return 1.0
     variance = max(left, ROUNDING * float(explained.sum())) / free
-    one_way = 2.0 * float(stats.t.sf(abs(sum(along)) / np.sqrt(sum(squares) * variance), free))
-    either = float(stats.f.sf(explained.mean() / variance, len(groups), free))
+    one_way = 2.0 * float(stdtr(free, -abs(sum(along)) / np.sqrt(sum(squares) * variance)))
+    either = float(fdtrc(len(groups), free, explained.mean() / variance))
     return min(1.0, 2.0 * min(one_way, either))
 
 
