@@ -1,7 +1,7 @@
 """Pieces of the sentences that people read on a terminal, on a page and in a message."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from wirebayes.json_files.discovery import Answer
@@ -28,15 +28,20 @@ def lasting(seconds: float) -> str:
 _TIMES = (("h", 3600.0), ("min", 60.0), ("s", 1.0))  # s, the longest first
 
 
-def likely(found: Answer, spoken: Callable[[str], str] = str) -> str:
+def spoken(effect: str) -> str:
+    """An effect's name as people say it; files and options keep the name itself."""
+    name, _, hold = effect.partition("@")
+    at = f" at hold {hold}" if hold.isdigit() else ""
+    return "something unknown" if name == "unknown" else f"{name.replace('_', ' ')}{at}"
+
+
+def likely(found: Answer) -> str:
     """Names of the set among which the largest share lies, each with its probability; empty where there is no name.
 
     Parameters
     ----------
     found : dict
         Of one experiment, as in ``discovery.json``.
-    spoken : function of str, optional
-        How a name is written.
     """
     shares = [(name, found["probabilities"][name]) for name in found["set"] if name in found["probabilities"]]
     ranked = sorted(shares, key=lambda item: -item[1])
@@ -57,20 +62,18 @@ def families_said(found: Answer) -> list[str]:
     return [family["sentence"] for family in families if family["established"] and family["members"][1:]]
 
 
-def undecided(found: Answer, spoken: Callable[[str], str] = str) -> str:
+def undecided(found: Answer) -> str:
     """What an ambiguous answer is undecided between: an established family in its own words, else the likely names.
 
     Parameters
     ----------
     found : dict
         Of one experiment, as in ``discovery.json``.
-    spoken : function of str, optional
-        How a name is written.
     """
     families = families_said(found)
     if families:
         return f"{listed(families)}; these readings do not tell which"
-    return f"something is missing; these readings do not tell what: {likely(found, spoken)}"
+    return f"something is missing; these readings do not tell what: {likely(found)}"
 
 
 def said_beside(found: Answer) -> list[str]:

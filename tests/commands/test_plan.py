@@ -86,6 +86,9 @@ def test_a_plan_file_is_ranked_within_its_budget(plan_file, tmp_path, capsys):
     page = (out / "report.html").read_text()
     assert "What a test would teach" in page
     assert "steady creep" in page
+    units = {name: width["unit"] for name, width in short["parameters"].items()}
+    assert (units["k1"], units["B"], units["sensor_sd"], units["setting_sd"]) == ("N", "mm N^-U", "N", "mm")
+    assert "error of a setting (setting_sd), mm" in page and "error of a reading (sensor_sd), N" in page
     assert (out / "plan.svg").is_file()
     before = (out / "plan.json").read_bytes()
     assert main(["plan", str(plan_file), "--output", str(out)]) == 0

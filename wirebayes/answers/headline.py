@@ -26,6 +26,7 @@ from wirebayes.sentences import (
     quantity,
     short,
     span,
+    spoken,
     undecided,
 )
 
@@ -82,14 +83,14 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     report : dict
         Its part of ``discovery.json``.
     """
-    effects = [effect.replace("_", " ") for effect in report["effects"]]
+    effects = [spoken(effect) for effect in report["effects"]]
     are = "are" if effects[1:] else "is"
-    candidates = likely(report, lambda effect: effect.replace("_", " "))
+    candidates = likely(report)
     what = {
         "nothing-missing": f"{verdict_in_words(report)}: the plain model and its noise explain these readings",
         "unknown": f"{verdict_in_words(report)}"
         + (f"; beside it most likely {candidates}, none of them established" if candidates else ""),
-        "ambiguous": undecided(report, lambda effect: effect.replace("_", " ")),
+        "ambiguous": undecided(report),
         "named": f"{listed(effects)} {are} missing",
         "partial": f"{listed(effects)} {are} missing, and something else that no effect in the catalogue explains",
     }[report["verdict"]]
@@ -152,7 +153,7 @@ def batch_in_sentences(found: BatchJson) -> list[str]:
     effects = Counter(effect for row in rows for effect in row["effects"])
     for effect, count in effects.most_common():
         where = [row["name"] for row in rows if effect in row["effects"]]
-        out.append(f"{effect.replace('_', ' ').capitalize()}: in {_count(count, 'test')} ({_some(where)}).")
+        out.append(f"{spoken(effect).capitalize()}: in {_count(count, 'test')} ({_some(where)}).")
     unknown = [row["name"] for row in rows if row["verdict"] in ("unknown", "partial")]
     out += [f"Something without a name: in {_some(unknown)}."] if unknown else []
     refused = [row["name"] for row in rows if row["check"] == "failed" and row["verdict"] is None]

@@ -18,14 +18,16 @@ from wirebayes.json_files.pose import PoseJson, known_at_the_end
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
-from wirebayes.json_files.values import UNITS, Quantiles
+from wirebayes.json_files.values import Quantiles
 from wirebayes.sentences import (
     counted,
     families_said,
     likely,
+    listed,
     p_in_words,
     said_beside,
     short,
+    spoken,
     undecided,
     unit_text,
 )
@@ -52,7 +54,7 @@ def _effects(summary: SummaryJson) -> list[str]:
 
 def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     """Of one experiment that something may be missing in: what, how large, and what it is worth."""
-    verdict, effects = report["verdict"], ", ".join(report["effects"])
+    verdict, effects = report["verdict"], listed([spoken(effect) for effect in report["effects"]])
     finding = verdict_in_words(report) or f"{verdict}: {effects}"
     if verdict == "ambiguous":
         finding = f"ambiguous: {undecided(report) if families_said(report) else likely(report)}"
@@ -66,11 +68,11 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     for effect, size in report["amplitudes"].items():
         at = "" if size["hold"] is None else f" at hold {size['hold']}"
         unit = "" if size["unit"] == "-" else f" {size['unit']}"
-        lines.append(f"  {effect}{at} {size['mean']:.3g} [{size['q05']:.3g}, {size['q95']:.3g}]{unit}")
+        lines.append(f"  {spoken(effect)}{at} {size['mean']:.3g} [{size['q05']:.3g}, {size['q95']:.3g}]{unit}")
     lines += [f"  {elsewhere}" for elsewhere in in_other_tests(report)]
     like = [other for other in report["group"] if other not in (*report["effects"], "unknown")]
     if like and verdict in ("named", "ambiguous"):
-        lines.append(f"  hard to distinguish on this protocol: {', '.join(like)}")
+        lines.append(f"  hard to distinguish on this protocol: {', '.join(map(spoken, like))}")
     gain = report["held_out"]
     before, after = (read(gain[model], "rmse") for model in ("plain", "final"))
     if report["effects"] and None not in (before, after):
@@ -81,7 +83,7 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
 def in_other_tests(report: ExperimentFindings) -> list[str]:
     """Which accepted effects are those of other tests: an event there, or an instrument that reads only those."""
     others = [effect for effect in report.get("accepted", []) if effect not in report["amplitudes"]]
-    return [f"{effect}: in other tests of the same material, not in this one" for effect in others]
+    return [f"{spoken(effect)}: in other tests of the same material, not in this one" for effect in others]
 
 
 def of_import(name: str, test: ImportedExperiment) -> list[str]:
@@ -111,7 +113,7 @@ def of_plan(row: JudgedProtocol) -> list[str]:
     budget = "" if row["within_budget"] else ", longer than the available time"
     lines = [f"{row['rank']}. {row['name']}: {row['duration_min']:.3g} min{budget}, {row['information_bits']:.3g} bits"]
     known = [
-        f"{name} {row['parameters'][name]['sd']:.2g} {unit_text(UNITS[name])}".rstrip()
+        f"{name} {row['parameters'][name]['sd']:.2g} {unit_text(row['parameters'][name]['unit'])}".rstrip()
         for name in _SHOWN
         if name in row["parameters"]
     ]
@@ -171,8 +173,8 @@ _SHOWS = {
 
 def _size(effect: str, found: EffectSize) -> str:
     if found["amplitude_80"] is None:
-        return f"{effect} ({found['reason']})"
-    return f"{effect} {found['amplitude_80']:.2g}" + (f" {found['unit']}" if found["unit"] != "-" else "")
+        return f"{spoken(effect)} ({found['reason']})"
+    return f"{spoken(effect)} {found['amplitude_80']:.2g}" + (f" {found['unit']}" if found["unit"] != "-" else "")
 
 
 def _wrapped(title: str, items: list[str]) -> list[str]:

@@ -27,6 +27,7 @@ from wirebayes.json_files.summary import ModelCheckResult, SummaryJson
 from wirebayes.notice import Notice, from_json, to_json
 from wirebayes.processes.workers import ParallelMap, workers
 from wirebayes.results.jobs import Job
+from wirebayes.sentences import spoken
 
 _SHOWN = 3  # most surprising effects that are listed
 
@@ -96,7 +97,7 @@ class ModelCheck:
     def _failed_in_words(self) -> str:
         model = "The model with these effects" if self.with_effects else "The plain model"
         other = "other effects of the catalogue" if self.with_effects else "what is missing"
-        directions = ", ".join(self.surprising).replace("_", " ")
+        directions = ", ".join(map(spoken, self.surprising))
         return (
             f"{model} does not describe the readings (p = {self.p:.2g}, level {self.alpha:.2g}): its parameters, "
             "intervals and predictions can be wrong by more than they say. Run wirebayes discover to look for "

@@ -15,6 +15,7 @@ from wirebayes.model.problem import Problem, with_protocols
 from wirebayes.model.sample import LENGTH_EXPONENT
 from wirebayes.model.scales import NATURAL, Units
 from wirebayes.numeric.typing import Array
+from wirebayes.sentences import spoken
 from wirebayes.wire.control import SET_UNIT
 from wirebayes.wire.protocol import Control, Protocol
 
@@ -153,7 +154,7 @@ def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakes
     if not trials:
         return "No candidate remains; repeating the same holds would narrow the parameters."
     words, ratio = _best_plan(block, lambda target: _separation(target, block, trials))
-    names = " from ".join(t.effect.name for t in trials)
+    names = " from ".join(spoken(t.effect.name) for t in trials)
     if ratio < _WORTH:
         aim = f"distinguish {names}; measure one of them" if pair else f"reveal a smaller {names}; measure it"
         return f"None of the tests considered ({_TRIED}) would {aim} independently."

@@ -12,7 +12,8 @@ class ExpectedWidth(TypedDict):
 
     Medians: `sd` of its standard deviation, `width_90` of the length of its 90 % interval; in 90 % of the tests that
     length lies between `width_90_low` and `width_90_high`. Means would depend on the one test in thirty whose posterior
-    has a second mode or a long tail. `guess_sd` is the standard deviation before the test.
+    has a second mode or a long tail. `guess_sd` is the standard deviation before the test;
+    all are in `unit`.
     """
 
     sd: float
@@ -20,6 +21,7 @@ class ExpectedWidth(TypedDict):
     width_90_low: float
     width_90_high: float
     guess_sd: float
+    unit: str
 
 
 class EffectPower(DetectableAmplitude):

@@ -21,6 +21,7 @@ from wirebayes.model.sample import MATERIAL
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.typing import Array
+from wirebayes.results.parameters import unit_of
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import simulate
 
@@ -163,7 +164,9 @@ def expected_widths(
             pick = rng.choice(weight.shape[1], _KEPT, p=weight[at])
             draws.append({name: v.reshape(weight.shape)[at, pick] for name, v in values.items()})
     before = _quantities(problem, truth[usable], tension, longest, length)
-    widths = {name: _width(np.concatenate([r[name] for r in rows]), before[name]) for name in rows[0]}
+    widths = {
+        name: _width(np.concatenate([r[name] for r in rows]), before[name], _unit(name, test)) for name in rows[0]
+    }
     prior = problem.prior.rvs(4000, np.random.default_rng(0))
     known = _log_volume(prior[None], np.full((1, len(prior)), 1.0 / len(prior)), problem)
     bits = float((known[0] - np.median(np.concatenate(volumes))) / np.log(2.0))
@@ -251,10 +254,14 @@ def _log_volume(theta: Array, weight: Array, problem: Problem) -> Array:
     return np.asarray(0.5 * np.linalg.slogdet(covariance + 1e-24 * np.eye(len(columns)))[1])
 
 
-def _width(rows: Array, before: Array) -> ExpectedWidth:
+def _unit(name: str, test: Experiment) -> str:
+    return "mm" if name.startswith("creep_") else unit_of(name, controls=(test.control,))
+
+
+def _width(rows: Array, before: Array, unit: str) -> ExpectedWidth:
     sd, length = rows.T
     low, middle, high = np.quantile(length, [0.05, 0.5, 0.95])
     return {
         "sd": float(np.median(sd)), "width_90": float(middle), "width_90_low": float(low), "width_90_high": float(high),
-        "guess_sd": float(before.std()),
+        "guess_sd": float(before.std()), "unit": unit,
     }  # fmt: skip

@@ -7,6 +7,7 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.report.blocks import Block, Definitions, Section, Text, unit_text
 from wirebayes.results.parameters import unit_of
+from wirebayes.sentences import spoken
 from wirebayes.wire.effect import Effect
 
 SYMBOLS = {
@@ -91,11 +92,6 @@ def meaning(
     defined = [(term, TERMS[term]) for term in terms]
     blocks += [Definitions("Other words", defined)] if defined else []
     return Section("What the words and symbols mean", blocks, folded=True)
-
-
-def spoken(effect: str) -> str:
-    """An effect's name as people say it."""
-    return "something unknown" if effect == "unknown" else effect.replace("_", " ")
 
 
 def _effect(kind: type[Effect]) -> str:

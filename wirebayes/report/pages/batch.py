@@ -29,6 +29,7 @@ from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.batch import specimens_of_materials
 from wirebayes.results.outliers import FALSE_ALARMS, LEAST_SPECIMENS
 from wirebayes.results.parameters import unit_of
+from wirebayes.sentences import spoken
 
 _MOST_WARNINGS = 10  # shown at once; more push the summary's pictures off the screen
 _MOST_ROWS = 500  # a page of more takes seconds to open; the CSV holds all
@@ -110,7 +111,7 @@ def _table(rows: list[Row]) -> list[Block]:
             {True: "yes", False: "no", None: "–"}[row["converged"]],
             *(_value(row, name) for name in _SHOWN),
             row["error"] or (row["verdict"] or row["check"] or "–").replace("-", " "),
-            (row["best_effect"] or "–").replace("_", " "),
+            spoken(row["best_effect"]) if row["best_effect"] else "–",
         ]
         for row in rows[:_MOST_ROWS]
     ]

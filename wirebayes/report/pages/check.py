@@ -28,8 +28,8 @@ from wirebayes.report.blocks import (
     span,
     unit_text,
 )
-from wirebayes.report.glossary import SYMBOLS, meaning, spoken
-from wirebayes.sentences import counted
+from wirebayes.report.glossary import SYMBOLS, meaning
+from wirebayes.sentences import counted, spoken
 
 _FILES = (
     ("import.json", "what was decided, as JSON"),

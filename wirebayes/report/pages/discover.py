@@ -31,9 +31,9 @@ from wirebayes.report.blocks import (
     span,
     unit_text,
 )
-from wirebayes.report.glossary import SYMBOLS, meaning, spoken
+from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.discover import waterfall
-from wirebayes.sentences import listed, p_in_words, said_beside
+from wirebayes.sentences import listed, p_in_words, said_beside, spoken
 
 
 def page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -230,7 +230,7 @@ def _held_out(v: ExperimentFindings) -> str:
 def _sizes(v: ExperimentFindings) -> list[str]:
     """How large each effect is here, and which are those of other tests."""
     here = [_amplitude(effect, a) for effect, a in v.get("amplitudes", {}).items()]
-    return here + [f"{spoken(sentence)}." for sentence in in_other_tests(v)]
+    return here + [f"{sentence}." for sentence in in_other_tests(v)]
 
 
 def _amplitude(effect: str, a: Amplitude) -> str:

@@ -6,7 +6,6 @@ from typing import Any
 from wirebayes.answers.headline import plan_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson
-from wirebayes.json_files.values import UNITS
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -28,7 +27,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.plan import is_given
-from wirebayes.sentences import counted
+from wirebayes.sentences import counted, spoken
 
 _AIMS = {
     "parameters": "how much they say about the material",
@@ -109,7 +108,8 @@ def _ranking(found: PlanJson) -> Table:
         for row in found["protocols"]
     ]  # fmt: skip
     header = ["rank", "test", "minutes", "bits"]
-    header += [f"sd of {n}, {unit}" if (unit := unit_text(UNITS[n])) else f"sd of {n}" for n in names]
+    units = {n: unit_text(found["protocols"][0]["parameters"][n]["unit"]) for n in names}
+    header += [f"sd of {n}, {units[n]}" if units[n] else f"sd of {n}" for n in names]
     header.append("sd of creep in 1 h, mm")
     header += ["sd of the robot's drift in 1 h, mm"] if robot else []
     return Table(
@@ -130,7 +130,7 @@ def _protocol(row: JudgedProtocol) -> list[Block]:
     }
     lines = [
         [
-            f"{_words(n)}, {unit}" if (unit := unit_text(UNITS.get(n, ""))) else _words(n),
+            f"{_words(n)}, {unit}" if (unit := unit_text(q["unit"])) else _words(n),
             *(number(value, 2) for value in (q["sd"], q["width_90"])),
             span(q["width_90_low"], q["width_90_high"], 2),
             "given" if is_given(q) else number(q["guess_sd"], 2),
@@ -156,7 +156,12 @@ def _protocol(row: JudgedProtocol) -> list[Block]:
 
 
 def _words(name: str) -> str:
-    return _SPOKEN.get(name, name.replace("_", " "))
+    return _SPOKEN.get(name, spoken(name))
 
 
-_SPOKEN = {"creep_longest_hold_mm": "creep after the longest hold, mm", "creep_1h_mm": "creep after 1 h, mm"}
+_SPOKEN = {
+    "creep_longest_hold_mm": "creep after the longest hold",
+    "creep_1h_mm": "creep after 1 h",
+    "sensor_sd": "error of a reading (sensor_sd)",
+    "setting_sd": "error of a setting (setting_sd)",
+}

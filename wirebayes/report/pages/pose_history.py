@@ -25,7 +25,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.robot.mechanics.draws import specimens_in_words
-from wirebayes.sentences import counted
+from wirebayes.sentences import counted, spoken
 
 _CAPTIONS = {
     "motion": "The whole history: where the platform is meant to be (blue) and, enlarged, where it is (red).",
@@ -86,7 +86,7 @@ def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> 
 
 def _requested(pose: PoseHistoryJson) -> list[str]:
     history, wires = pose["history"], pose["wires"]
-    effects = ", ".join(wires["effects"]).replace("_", " ")
+    effects = ", ".join(map(spoken, wires["effects"]))
     model = f"the plain model with {effects}" if effects else "the plain model"
     kind = "measured joint values" if history["kind"] == "measured" else "commanded poses"
     out = [

@@ -22,9 +22,9 @@ from wirebayes.report.blocks import (
     number,
     unit_text,
 )
-from wirebayes.report.glossary import SYMBOLS, meaning, spoken
+from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.results.parameters import unit_of
-from wirebayes.sentences import counted, listed
+from wirebayes.sentences import counted, listed, spoken
 
 _MOST = 12  # tests of which a page shows the readings
 _FILES = (

@@ -16,6 +16,7 @@ from wirebayes.numeric.typing import Array, Floats
 from wirebayes.report.blocks import save
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.results.read_back import Stored
+from wirebayes.sentences import spoken
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.staircase import Linearised, linearise
 
@@ -62,7 +63,7 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings, 
 def _added(verdict: ExperimentFindings) -> str:
     """What the final model has beyond the plain one."""
     unknown = ["something unknown"] if verdict["verdict"] in ("partial", "unknown") else []
-    names = [effect.replace("_", " ") for effect in verdict["accepted"]] + unknown
+    names = [spoken(effect) for effect in verdict["accepted"]] + unknown
     return " + ".join(names) or "what may be missing"
 
 
@@ -77,7 +78,7 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     steps, floor = verdict["steps"], read(verdict["held_out"], "floor")
     heights = [rmse for s in steps if (rmse := read(s, "rmse")) is not None]
     unit = unit_read(steps[0])
-    names = ["plain model", *(s["model"].replace("_", " ") for s in steps[1:]), "left over", "noise"]
+    names = ["plain model", *(spoken(s["model"]) for s in steps[1:]), "left over", "noise"]
     bars = [(0.0, heights[0], _MEASURED)]
     bars += [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
     bars += [(min(floor, heights[-1]), heights[-1], _HELD), (0.0, floor, "0.7")]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from wirebayes.json_files.plan import ExpectedWidth, PlanJson
 from wirebayes.report.blocks import save
 from wirebayes.report.figures import logarithmic, verbatim
+from wirebayes.sentences import spoken
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#b279a2", "#9d755d", "#bab0ac")
 _MOST = 6  # tests that a picture can hold
@@ -75,4 +76,4 @@ _ROUNDING = 1e-9  # of a standard deviation: what is left of a zero
 
 
 def _words(name: str) -> str:
-    return {"creep_1h_mm": "creep after 1 h"}.get(name, name.replace("_", " "))
+    return {"creep_1h_mm": "creep after 1 h"}.get(name, spoken(name))
