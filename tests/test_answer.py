@@ -36,8 +36,8 @@ def stored(kind: type, folder: Path, name: str, content: dict[str, Any]) -> Any:
 def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": SLIP, "b": CLEAN}})
     assert found.lines() == [
-        "a: ambiguous: grip_slip (62 %), nothing known (17 %) or toe (14 %) (p < 0.001)",
-        "  grip_slip at hold 4 0.31 [0.25, 0.38] mm",
+        "a: ambiguous: grip slip (62 %), nothing known (17 %) or toe (14 %) (p < 0.001)",
+        "  grip slip at hold 4 0.31 [0.25, 0.38] mm",
         "  hard to distinguish on this protocol: ageing",
         "  held-out holds: rmse 0.25 -> 0.05 N",
         "b: nothing is missing (p = 0.4)",
@@ -60,9 +60,9 @@ def test_a_p_value_says_no_more_than_its_simulations_can(p: float, simulations: 
 def test_a_part_that_has_a_name_is_said_with_the_rest_that_has_none(tmp_path: Path) -> None:
     part = SLIP | {"verdict": "partial", "effects": ["grip_slip"]}
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": part}})
-    assert found.lines()[0] == "a: grip_slip is missing, and something that is not in the catalogue (p < 0.001)"
+    assert found.lines()[0] == "a: grip slip is missing, and something that is not in the catalogue (p < 0.001)"
     two = stored(Findings, tmp_path, "discovery.json", {"experiments": {"a": part | {"effects": ["grip_slip", "toe"]}}})
-    assert two.lines()[0].startswith("a: grip_slip, toe are missing, and something")
+    assert two.lines()[0].startswith("a: grip slip and toe are missing, and something")
 
 
 def test_something_unknown_does_not_hide_the_names_that_are_likely_beside_it(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from analyses.project import readmes
 from wirebayes.cli import COMMANDS, main
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.robot.mechanics import schema
@@ -203,6 +204,13 @@ def figures_typed_by_hand(page: Path) -> list[str]:
 
 
 FIGURE = re.compile(r"\d[\d.,]*(?: ?%| (?:mm|N|s|ms|min|h|MB|times|of \d[\d,]*|files|tests|wires|robots|holds)\b)")
+
+
+def test_the_readme_is_as_long_and_its_first_result_as_near_as_the_table_of_readmes_says():
+    assert readmes.table() == (DOCS / "readmes.inc").read_text(encoding="utf-8")
+    lines = readmes.README.read_text(encoding="utf-8").splitlines()
+    mine = readmes.ours()
+    assert mine.lines == len(lines) and mine.result is not None and "converged" in lines[mine.result - 1]
 
 
 def test_no_page_has_more_figures_typed_by_hand_than_it_had():

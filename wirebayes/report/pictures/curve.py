@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest, chain_course
-from wirebayes.report.figures import CHAIN, HALF_90, HOLD, INK, QUIET
+from wirebayes.report.figures import CHAIN, HALF_90, HOLD, INK, QUIET, apart
 from wirebayes.results.read_back import Stored
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol
@@ -157,11 +157,11 @@ def draw_curve(axes: Any, stored: Stored, found: Curve, colour: str, label: str)
     found : Curve
     colour, label : str
     """
-    for j in np.flatnonzero(stored.sample.protocol.recorded):
-        low, middle, high = found.quantiles[:, j]
-        axes.fill_between(found.place[j], low, high, color=colour, alpha=0.25, lw=0)
-        axes.plot(found.place[j], middle, color=colour, lw=1.5, label=label)
-        label = "_nolegend_"  # one entry for all holds
+    recorded = stored.sample.protocol.recorded
+    place = apart(found.place[recorded])
+    low, middle, high = (apart(quantile[recorded]) for quantile in found.quantiles)
+    axes.fill_between(place, low, high, color=colour, alpha=0.25, lw=0)
+    axes.plot(place, middle, color=colour, lw=1.5, label=label)
 
 
 def draw_readings(axes: Any, stored: Stored, found: Curve) -> None:
