@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from wirebayes.cli import answer
-from wirebayes.sentences import p_in_words
+from wirebayes.sentences import p_in_words, spoken
 from wirebayes.views.calibration import Calibration
 from wirebayes.views.comparison import Comparison
 from wirebayes.views.findings import Findings
@@ -31,6 +31,13 @@ def stored(kind: type, folder: Path, name: str, content: dict[str, Any]) -> Any:
     """A result whose folder holds just this."""
     (folder / name).write_text(json.dumps(content))
     return kind(ResultFolder(folder))
+
+
+def test_an_effect_is_spoken_of_in_words_with_its_hold() -> None:
+    assert spoken("tension_dependent_rate") == "tension dependent rate"
+    assert spoken("grip_slip@7") == "grip slip at hold 7"
+    assert spoken("discrepancy@13:0.1:60.0") == "discrepancy"
+    assert spoken("unknown") == "something unknown"
 
 
 def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def test_check_says_what_was_understood(start, tmp_path, capsys):
         "0.5 mm",
         "1.08 to 0.78 N",
         "parameters from the data: k1",
-        "thermal_expansion (follows the logged temperature)",
+        "thermal expansion (follows the logged temperature)",
         "nothing suspicious",
         "Next: wirebayes fit",
     ):
