@@ -2,8 +2,8 @@
 
     python -m analyses.project.readmes > docs/readmes.inc
 
-Ours is counted. The others were read by eye, at the commits below: a result is the first output, or the first picture of
-one, that the code above it makes; commands are the statements, or the lines after a prompt, that lead to it.
+Ours is counted. The others were read by eye, at the commits below: a result is the first output, or the first picture
+of one, that the code above it makes; commands are the statements, or the lines after a prompt, that lead to it.
 """
 
 from dataclasses import dataclass
