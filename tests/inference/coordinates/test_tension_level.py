@@ -1,4 +1,4 @@
-"""One hold: wires that end it at one tension lie at one coordinate, whatever their preload, stiffness and creep."""
+"""One hold: wires that are read as one lie at one coordinate, whatever their preload, stiffness and setting error."""
 
 import numpy as np
 import pytest
@@ -9,32 +9,55 @@ from wirebayes.inference.coordinates.transform import Transformation
 from wirebayes.model.build import build
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
-ONE_HOLD = draw([Bench(displacements_mm=(3.0,))], Truth({"k1": 800.0, "preload": 0.0}), seed=8).problem
-LENGTH_MM, HOLD_S = 1000.0, float(ONE_HOLD.samples[0].protocol.duration_s[0])
+WIRE = Truth({"k1": 800.0, "preload": 0.0})
+LENGTH_MM, AT_MM, LATE_S = 1000.0, 3.0, (10.0, 30.0, 60.0, 120.0)
+ONE_HOLD = draw([Bench(displacements_mm=(AT_MM,))], WIRE, seed=8).problem
+READ_LATE = draw([Bench(displacements_mm=(AT_MM,), times_s=LATE_S)], WIRE, seed=8).problem
+NAMES = ("k1", "B", "U", "k2", "N", "preload")
 
 
-def last_reading(k1: float, B: float, U: float, k2: float, N: float, preload: float) -> float:
-    """Tension at the end of the hold, by the model's equations."""
-    start = k1 * (3.0 + preload) / LENGTH_MM
-    creep = B * start**U * -np.expm1(-k2 * HOLD_S**N)
-    return float(k1 * ((LENGTH_MM + 3.0 + preload) / (LENGTH_MM + creep) - 1.0))
+def reading(time_s: float, error: float, k1: float, B: float, U: float, k2: float, N: float, preload: float) -> float:
+    """Tension in the hold by the model's equations, where the wire is longer by a share `error` of its stretch."""
+    stretch = (AT_MM + preload) * (1.0 + error)
+    creep = B * (k1 * stretch / LENGTH_MM) ** U * -np.expm1(-k2 * time_s**N)
+    return float(k1 * ((LENGTH_MM + stretch) / (LENGTH_MM + creep) - 1.0))
 
 
-def test_wires_that_end_at_the_same_tension_lie_at_the_same_coordinate():
-    problem = ONE_HOLD
-    protocol, readings = problem.samples[0].protocol, problem.samples[0].readings[..., 0]
-    reached = float(readings[protocol.mask][-1])
-    rng = np.random.default_rng(0)
+def wires(problem, rng):
+    """Drawn parameters, (200, d), and the columns of a wire's own."""
     theta = problem.prior.rvs(200, rng)
-    column = {name: problem.names.index(name) for name in problem.names}
+    column = {name: problem.names.index(name) for name in NAMES}
     theta[:, column["preload"]] = rng.uniform(-1.0, 3.0, 200)
     theta[:, column["B"]], theta[:, column["U"]] = rng.uniform(0.02, 0.15, 200), rng.uniform(0.3, 0.9, 200)
+    return theta, column
+
+
+def test_wires_that_are_first_read_at_the_same_tension_lie_at_the_same_coordinate():
+    first = float(READ_LATE.samples[0].readings[0, 0, 0])
+    theta, column = wires(READ_LATE, np.random.default_rng(0))
     for row in theta:
-        others = {name: row[column[name]] for name in ("B", "U", "k2", "N", "preload")}
-        row[column["k1"]] = brentq(lambda k1, others=others: last_reading(k1, **others) - reached, 1.0, 5e3)
-    z = Transformation(problem).to_sampled(theta)
+        own = {name: row[column[name]] for name in NAMES if name != "k1"}
+        row[column["k1"]] = brentq(lambda k1, own=own: reading(LATE_S[0], 0.0, k1, **own) - first, 1.0, 5e3)
+    z = Transformation(READ_LATE).to_sampled(theta)
     assert np.log(theta[:, column["k1"]]).std() > 0.3
     assert z[:, column["k1"]].std() < 0.01
+
+
+def test_a_setting_error_moves_one_coordinate_alone():
+    """k1 and B are what they have to be so that the hold is read as it was, though the wire was longer than stated."""
+    read = ONE_HOLD.samples[0].readings[0, [0, -1], 0]
+    theta, column = wires(ONE_HOLD, np.random.default_rng(1))
+    error = np.random.default_rng(2).uniform(-0.2, 0.2, len(theta))
+    for row, each in zip(theta, error, strict=True):
+        own = {name: row[column[name]] for name in ("U", "k2", "N", "preload")}
+        row[column["k1"]] = own_k1 = read[0] * LENGTH_MM / ((AT_MM + own["preload"]) * (1.0 + each))
+        row[column["B"]] = brentq(
+            lambda B, own=own, k1=own_k1, each=each: reading(120.0, each, k1, B, **own) - read[1], 1e-9, 1e3
+        )
+    z = Transformation(ONE_HOLD).to_sampled(theta)
+    assert z[:, column["k1"]] == pytest.approx(-np.log1p(error), abs=1e-9)
+    assert np.ptp(theta[:, column["B"]]) > 0.1
+    assert np.ptp(z[:, column["B"]]) < 0.01
 
 
 @pytest.mark.parametrize(

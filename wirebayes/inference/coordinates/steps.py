@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.inference.coordinates import shares
+from wirebayes.inference.coordinates.displacement_level import DisplacementLevel
 from wirebayes.inference.coordinates.ridge import Ridge
 from wirebayes.inference.coordinates.slack_edge import SlackEdge
 from wirebayes.inference.coordinates.tension_level import TensionLevel
@@ -65,15 +66,15 @@ class Loss(Step):
     """Log B becomes the log of what is lost in a hold, and what creeps beside the creep its share of that."""
 
     ridge: Ridge
-    level: TensionLevel | None
+    level: TensionLevel | DisplacementLevel | None
 
-    def _driven(self, theta: Array) -> Any:
-        """(n,) log creep by which the tension at the beginning of the only hold drives more than its first reading."""
-        return 0.0 if self.level is None else self.ridge.get(theta, "U") * self.level.driven(theta)
+    def _beyond(self, theta: Array) -> Any:
+        """(n,) log of what the only hold of a test shows over what the ridge says."""
+        return 0.0 if self.level is None else self.level.log_beyond(theta, self.ridge.get(theta, "U"))
 
     def to_sampled(self, z: Array, theta: Array) -> None:
         column, stiffness = self.ridge.where["B"], self.ridge.log_stiffness(theta)
-        lost = z[:, column] + (self.ridge.log_creep(theta) + stiffness) + self._driven(theta)
+        lost = z[:, column] + (self.ridge.log_creep(theta) + stiffness) + self._beyond(theta)
         for part in self.ridge.beside:
             own = np.log(theta[:, part.column]) + part.log_gained(theta) + stiffness
             z[:, part.column] = shares.score(own, lost)
@@ -88,7 +89,7 @@ class Loss(Step):
             gained = part.log_gained(theta) + stiffness
             theta[:, part.column] = np.exp(lost + share - gained)
             lost = lost + rest
-        theta[:, column] = np.exp(lost - (self.ridge.log_creep(theta) + stiffness) - self._driven(theta))
+        theta[:, column] = np.exp(lost - (self.ridge.log_creep(theta) + stiffness) - self._beyond(theta))
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         return sum(shares.log_slope(theta[:, part.column], z[:, part.column]) for part in self.ridge.beside)
@@ -124,16 +125,50 @@ class SoftenedStiffness(Step):
 
 @dataclass(frozen=True)
 class Level(Step):
-    """In a test of one hold, the log stiffness becomes that beside the preload."""
+    """In a test of one hold, log k1 becomes that beside preload and loss, and the loss is that of the true stretch."""
 
+    ridge: Ridge
     level: TensionLevel
 
     def to_sampled(self, z: Array, theta: Array) -> None:
-        z[:, self.level.k1] += self.level.stretch(theta)
+        k1, B = self.level.k1, self.ridge.where["B"]
+        z[:, k1] = self.level.log_tension(theta, z[:, k1]) - self._log_expected(theta, z[:, B])
+        z[:, B] -= self.ridge.get(theta, "U") * z[:, k1]
 
     def to_natural(self, theta: Array, z: Array) -> None:
-        z[:, self.level.k1] -= self.level.stretch(theta)  # for the steps before this one
-        theta[:, self.level.k1] = np.exp(z[:, self.level.k1])
+        k1, B = self.level.k1, self.ridge.where["B"]
+        z[:, B] += self.ridge.get(theta, "U") * z[:, k1]
+        tension = z[:, k1] + self._log_expected(theta, z[:, B])
+        z[:, k1] = tension - self.level.log_tension(theta, np.zeros(len(theta)))  # for the steps before this one
+
+    def _log_expected(self, theta: Array, log_lost: Array) -> Any:
+        return self.level.log_expected(log_lost, self.ridge.get(theta, "k2"), self.ridge.get(theta, "N"))
+
+
+@dataclass(frozen=True)
+class WeightLevel(Step):
+    """In a test of one weight, the preload becomes an error of the weight, and log B is that under the true weight."""
+
+    ridge: Ridge
+    level: DisplacementLevel
+    scale: float
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
+        error = self.level.score(theta, U, z[:, B])
+        z[:, self.level.preload] = error
+        z[:, B] += U * error
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        column, B, U = self.level.preload, self.ridge.where["B"], self.ridge.get(theta, "U")
+        error = z[:, column]
+        z[:, B] -= U * error  # for the steps before this one
+        theta[:, column] = self.level.value(error, theta, U, z[:, B])
+
+    def log_jacobian(self, theta: Array, z: Array) -> Array | float:
+        B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
+        log_lost = z[:, B] - U * z[:, self.level.preload]
+        return np.asarray(np.log(self.level.slope(theta, U, log_lost)) - np.log(self.scale))
 
 
 @dataclass(frozen=True)

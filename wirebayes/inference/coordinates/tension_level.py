@@ -1,11 +1,13 @@
 """Coordinates of k1 and B for a test of one hold, which determines tensions and neither the stiffness nor the preload.
 
-A hold at displacement x begins at the tension ``k1 (x + preload) / L0`` and has lost some of it at its last reading,
-which is known. So k1 lies on a curved surface over the preload and the loss, as narrow as the setting error is small:
-a bent funnel, which walkers enter and do not leave. The loss is that of the tension at the beginning, before the first
-reading: where creep follows a power of the time, much of it is over by then.
+A hold at displacement x begins at the tension ``k1 (x + preload) / L0`` and has lost some of it at its first reading,
+which is known: where creep follows a power of the time, much of it is over by then. So k1 lies on a curved surface over
+the preload and that loss, as narrow as the setting error is small: a bent funnel, which walkers enter and do not leave.
+A setting error changes the creep, too, by the power U of the tension.
 
-Beside preload and loss, the logarithm of ``k1 (x + preload) / (last reading + loss)`` is straight.
+Beside preload and loss, the logarithm of ``k1 (x + preload) / (L0 (first reading + loss until then))`` is straight: the
+setting error with which the wire would be read as it was, as a share of its stretch. So is the log of the tension lost
+at the stretch with that error.
 """
 
 from dataclasses import dataclass
@@ -27,26 +29,51 @@ class TensionLevel:
         Columns.
     at, length : float
         Displacement of the hold, and length of the wire, mm.
-    log_first, log_last : float
-        Logarithms of the first and the last tension that was read, N.
+    first, begin_s, end_s : float
+        The first tension that was read, N; when it was, and how long the hold lasted, s.
     """
 
     k1: int
     preload: int
     at: float
     length: float
-    log_first: float
-    log_last: float
+    first: float
+    begin_s: float
+    end_s: float
 
-    def stretch(self, theta: Array) -> Array:
-        """(n,) log of the stretch over that without a preload, of natural parameters (n, d)."""
-        return np.asarray(np.log(np.maximum(1.0 + theta[:, self.preload] / self.at, _LEAST)))
+    def log_tension(self, theta: Array, log_k1: Array) -> Array:
+        """(n,) log of the tension at the beginning, of natural parameters (n, d) but for log k1 (n,)."""
+        stretch = np.maximum(1.0 + theta[:, self.preload] / self.at, _LEAST)
+        return np.asarray(log_k1 + np.log(self.at / self.length) + np.log(stretch))
 
-    def driven(self, theta: Array) -> Array:
-        """(n,) log of the tension at the beginning over the first one that was read."""
+    def log_beyond(self, theta: Array, U: Array | float) -> Array:
+        """(n,) log creep by which the tension at the beginning drives more than the first one that was read.
+
+        Parameters
+        ----------
+        theta : (n, d) array
+            Natural parameters.
+        U : (n,) array or float
+            Exponent of the tension.
+        """
         with np.errstate(all="ignore"):
-            tension = np.log(theta[:, self.k1]) + np.log(self.at / self.length) + self.stretch(theta)
-        return np.asarray(tension - self.log_first)
+            driving = self.log_tension(theta, np.log(theta[:, self.k1]))
+        return np.asarray(U * (driving - np.log(self.first)))
+
+    def log_expected(self, log_lost: Array, k2: Array | float, N: Array | float) -> Array | float:
+        """(n,) log of the first reading and what was lost before it, which is the tension at the beginning.
+
+        Parameters
+        ----------
+        log_lost : (n,) array
+            Log of the tension lost in the hold.
+        k2, N : (n,) arrays or floats
+            Rate of the creep and exponent of time.
+        """
+        if self.begin_s == 0.0:
+            return float(np.log(self.first))
+        before, all_of_it = (-np.expm1(-k2 * time_s**N) for time_s in (self.begin_s, self.end_s))
+        return np.logaddexp(np.log(self.first), log_lost + np.log(before / all_of_it))
 
 
 def tension_level(problem: Problem, slack_edges: list[SlackEdge]) -> TensionLevel | None:
@@ -55,27 +82,28 @@ def tension_level(problem: Problem, slack_edges: list[SlackEdge]) -> TensionLeve
     Parameters
     ----------
     problem : Problem
+        Of one sample, whose k1 and preload are both open.
     slack_edges : list of SlackEdge
         Coordinates of preloads; one that depends on k1 leaves no place for these.
 
     Returns
     -------
     TensionLevel or None
-        None unless there is one test, of one hold that ends taut, in which k1 and the preload are both open.
+        None unless the test is of one hold, which ends taut.
     """
-    if len(problem.samples) != 1 or problem.likelihood != "chain" or any(s.threshold != 0.0 for s in slack_edges):
+    if any(edge.threshold != 0.0 for edge in slack_edges):
         return None
     (sample,) = problem.samples
     protocol = sample.protocol
     if protocol.control == "force" or len(protocol.setting) != 1 or protocol.setting[0] <= 0.0:
         return None
-    k1, preload = problem.column("k1", sample), problem.column("preload", sample)
     read = sample.readings[..., 0][protocol.mask]
-    if k1 not in problem.names or preload not in problem.names or read[0] <= 0.0 or read[-1] <= 0.0:
+    if read[0] <= 0.0 or read[-1] <= 0.0:
         return None
-    columns = problem.names.index(k1), problem.names.index(preload)
-    first, last = np.log(read[[0, -1]])
-    return TensionLevel(*columns, float(protocol.setting[0]), protocol.length_mm, float(first), float(last))
+    k1, preload = (problem.names.index(problem.column(name, sample)) for name in ("k1", "preload"))
+    begin_s, end_s = float(protocol.time_s[0, 0]), float(protocol.duration_s[0])
+    at, length = float(protocol.setting[0]), protocol.length_mm
+    return TensionLevel(k1, preload, at, length, float(read[0]), begin_s, end_s)
 
 
 _LEAST = 1e-3  # of the stretch without a preload: with less the wire is slack, and k1 is what it is

@@ -16,11 +16,13 @@ measured in standard deviations of their prior. Then, one after the other (`wire
   creep is over before a first reading, the readings see this stiffness alone; where there is little, it is k1. Under
   weights it stays log k1. Where a fixture's compliance is sampled, k1 is in all this the stiffness of the wire with its
   fixture, and the compliance becomes its share;
+- ``Level``: in a test of one hold, k1 and B become what its tensions say beside the preload
+  (`wirebayes.inference.coordinates.tension_level`);
+- ``WeightLevel``: in a test of one weight, the preload and B become what its displacements say beside k1
+  (`wirebayes.inference.coordinates.displacement_level`);
 - ``Hazard``: log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
 - ``Power``: log U becomes its distance from the power of tension that suits the measured losses best at this hazard
   (`wirebayes.inference.coordinates.power_of_tension`);
-- ``Level``: in a test of one hold, k1 and B become what its tensions say beside the preload
-  (`wirebayes.inference.coordinates.tension_level`);
 - ``Preload``: the preload becomes what is wide where the first hold hardly creeps
   (`wirebayes.inference.coordinates.slack_edge`). Where a threshold of creep places it, it asks for k1 and comes first.
 
@@ -37,10 +39,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.inference.coordinates.columns import Columns, columns_of
+from wirebayes.inference.coordinates.displacement_level import displacement_level
 from wirebayes.inference.coordinates.ridge import Ridge, ridges_of
 from wirebayes.inference.coordinates.slack_edge import SlackEdge, slack_edge
-from wirebayes.inference.coordinates.steps import Hazard, Level, Loss, Power, Preload, SoftenedStiffness, Step
-from wirebayes.inference.coordinates.tension_level import TensionLevel, tension_level
+from wirebayes.inference.coordinates.steps import (
+    Hazard,
+    Level,
+    Loss,
+    Power,
+    Preload,
+    SoftenedStiffness,
+    Step,
+    WeightLevel,
+)
+from wirebayes.inference.coordinates.tension_level import tension_level
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.typing import Array
 
@@ -98,14 +110,20 @@ class Transformation:
         self.setting_columns = _positive("setting_sd", names, self.columns)
         self.order = np.array(sorted(range(len(names)), key=lambda i: _rank(names[i])))
         slack = _slack_edges(problem, self.columns) if for_draws else []
-        level = _tension_level(problem, self.columns, slack) if for_draws else None
         ridges = ridges_of(problem, self.columns, for_draws)
-        if level is not None:
-            ridges = [replace(ridge, log_step=level.log_last) for ridge in ridges]
-        self.steps = _steps(ridges, level, [Preload(edge, self.scale[edge.preload]) for edge in slack])
+        levels: list[Level | WeightLevel] = []
+        if for_draws and _is_usual(problem, self.columns, ridges):
+            (ridge,) = ridges
+            if (tension := tension_level(problem, slack)) is not None:
+                ridges = [replace(ridge, log_step=np.inf)]  # the level says what k1 is beside the creep
+                levels = [Level(ridges[0], tension)]
+            elif (weight := displacement_level(problem)) is not None:
+                levels = [WeightLevel(ridge, weight, self.scale[weight.preload])]
+        self.steps = _steps(ridges, levels, [Preload(edge, self.scale[edge.preload]) for edge in slack])
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
-        self._own_scale = [*self.shares, *(edge.preload for edge in slack)]
+        preloads = [*(edge.preload for edge in slack), *(s.level.preload for s in levels if isinstance(s, WeightLevel))]
+        self._own_scale = [*self.shares, *preloads]
 
     @property
     def kinds_of_creep(self) -> list[list[int]]:
@@ -165,16 +183,17 @@ class Transformation:
         return np.asarray(out.T)
 
 
-def _steps(ridges: Sequence[Ridge], level: TensionLevel | None, preloads: Sequence[Preload]) -> list[Step]:
+def _steps(ridges: Sequence[Ridge], levels: Sequence[Level | WeightLevel], preloads: Sequence[Preload]) -> list[Step]:
     """The steps, each kind for all materials: what one asks for may be a column that an earlier material owns."""
     asks_for_k1 = [step for step in preloads if step.edge.threshold != 0.0]
+    level = levels[0].level if levels else None
     return [
         *asks_for_k1,
         *(Loss(ridge, level) for ridge in ridges if "B" in ridge.shifted),
         *(SoftenedStiffness(ridge) for ridge in ridges if "k1" in ridge.shifted),
+        *levels,
         *(Hazard(ridge) for ridge in ridges if "k2" in ridge.shifted),
         *(Power(ridge) for ridge in ridges if "U" in ridge.shifted),
-        *([] if level is None else [Level(level)]),
         *(step for step in preloads if step not in asks_for_k1),
     ]
 
@@ -185,11 +204,16 @@ def _slack_edges(problem: Problem, columns: Columns) -> list[SlackEdge]:
     return [edge for edge in found if edge is not None and columns.is_linear(edge.preload)]
 
 
-def _tension_level(problem: Problem, columns: Columns, slack: list[SlackEdge]) -> TensionLevel | None:
-    """Coordinates of a test of one hold, where those of its stiffness and preload are the usual ones."""
-    level = tension_level(problem, slack)
-    usual = level is not None and columns.positive[level.k1] and columns.is_linear(level.preload)
-    return level if usual else None
+def _is_usual(problem: Problem, columns: Columns, ridges: Sequence[Ridge]) -> bool:
+    """Whether stiffness, preload and creep of a problem of one sample have the usual coordinates."""
+    if problem.likelihood != "chain" or len(problem.samples) != 1:
+        return False
+    if len(ridges) != 1 or "B" not in ridges[0].shifted:
+        return False
+    k1, preload = (problem.column(name, problem.samples[0]) for name in ("k1", "preload"))
+    if k1 not in problem.names or preload not in problem.names:
+        return False
+    return bool(columns.positive[problem.names.index(k1)]) and columns.is_linear(problem.names.index(preload))
 
 
 def _noises(problem: Problem, columns: Columns) -> tuple[Noises, ...]:

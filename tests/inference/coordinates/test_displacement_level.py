@@ -1,0 +1,71 @@
+"""One weight: an error of the weight moves one coordinate alone, whatever the stiffness and the law."""
+
+import numpy as np
+import pytest
+
+from wirebayes.inference.coordinates.steps import WeightLevel
+from wirebayes.inference.coordinates.transform import Transformation
+from wirebayes.simulation.synthetic import Bench, Truth, draw
+
+LENGTH_MM, WEIGHT_N, HOLD_S = 1000.0, 20.0, 120.0
+WIRE = {"k1": 800.0, "B": 0.2, "U": 0.5, "k2": 0.03, "N": 0.8, "preload": 0.0}
+NAMES = ("k1", "B", "U", "k2", "N", "preload")
+
+
+def one_weight(law="hooke", weights=(WEIGHT_N,), count=1):
+    benches = [Bench(f"w{i}", weights_N=weights) for i in range(count)]
+    return draw(benches, Truth(WIRE, law=law), seed=3).problem
+
+
+@pytest.mark.parametrize("law", ["hooke", "modified"])
+def test_an_error_of_the_weight_moves_one_coordinate_alone(law):
+    """Preload and B are what they have to be for one end of the hold and one gain, though the weight was not exact."""
+    problem, rng = one_weight(law), np.random.default_rng(0)
+    read = problem.samples[0].readings[0, :, 0]
+    theta = problem.prior.rvs(200, rng)
+    column = {name: problem.names.index(name) for name in NAMES}
+    theta[:, column["k1"]] = np.exp(rng.uniform(np.log(300.0), np.log(30_000.0), 200))
+    k1, U, k2, N = (theta[:, column[name]] for name in ("k1", "U", "k2", "N"))
+    error = rng.uniform(-0.02, 0.02, 200)
+    strain = WEIGHT_N / k1
+    longer = 1.0 + strain if law == "hooke" else 1.0 / (1.0 - strain)
+    gained = (read[-1] - read[0]) / longer
+    creep = gained / (1.0 + U * error)  # under the weight as stated, by the model that is linear in the error
+    theta[:, column["B"]] = creep / (WEIGHT_N**U * -np.expm1(-k2 * HOLD_S**N))
+    stretch = LENGTH_MM * (longer - 1.0)
+    theta[:, column["preload"]] = stretch * (1.0 + error) + creep * longer * (1.0 + U * error) - read[-1]
+    z = Transformation(problem).to_sampled(theta)
+    assert z[:, column["preload"]] == pytest.approx(error, abs=1e-9)
+    assert np.ptp(z[:, column["B"]]) < 0.01
+    assert np.ptp(np.log(theta[:, column["B"]])) > 1.0
+
+
+@pytest.mark.parametrize("law", ["hooke", "modified"])
+def test_the_map_goes_back_and_its_jacobian_is_that_of_differences(law):
+    problem = one_weight(law)
+    coordinates = Transformation(problem)
+    theta = problem.prior.rvs(50, np.random.default_rng(1))
+    theta = theta[theta[:, problem.names.index("k1")] > 2.0 * WEIGHT_N]
+    z = coordinates.to_sampled(theta)
+    assert coordinates.to_natural(z) == pytest.approx(theta, rel=1e-9)
+    step = 1e-6 * np.eye(z.shape[1])
+    slopes = (coordinates.to_natural(z[0] + step) - coordinates.to_natural(z[0] - step)) / 2e-6
+    assert np.linalg.slogdet(slopes)[1] == pytest.approx(coordinates.log_jacobian(theta[:1], z[:1])[0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("problem", "has_one"),
+    [
+        (one_weight(), True),
+        (one_weight(weights=(10.0, 20.0)), False),
+        (one_weight(count=2), False),
+        (draw([Bench(displacements_mm=(3.0,))], seed=1).problem, False),
+    ],
+    ids=["one weight", "two weights", "two tests", "one displacement"],
+)
+def test_only_a_test_of_one_weight_has_this_coordinate(problem, has_one):
+    def has_it(for_draws):
+        return any(isinstance(step, WeightLevel) for step in Transformation(problem, for_draws).steps)
+
+    assert has_it(for_draws=True) == has_one
+    assert not has_it(for_draws=False)

@@ -1,0 +1,100 @@
+"""Coordinates of the preload and B for a test of one weight, which determines displacements, not the preload nor k1.
+
+Under a weight w the wire is stretched by ``L0 w / k1``, and by its creep; what is read is the stretch less the preload.
+So the preload lies on a curve over k1, as narrow as the error of the weight is small: a bent funnel, which walkers
+enter and do not leave. That error drives the creep, too, by the power U.
+
+Beside k1, what the last reading leaves of the stretch under w is straight where it is said as an error of the weight, a
+share of w; and the log of the creep under the weight that hung there, log B plus U times that share.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wirebayes.model.problem import Problem
+from wirebayes.numeric.typing import Array
+
+
+@dataclass(frozen=True)
+class DisplacementLevel:
+    """The only hold of a test under weights.
+
+    Attributes
+    ----------
+    k1, preload : int
+        Columns.
+    weight, length, last : float
+        The weight, N; length of the wire, and the last displacement that was read, mm.
+    modified : bool
+        Whether strain is relative to the stretched length (`wirebayes.wire.laws.Modified`).
+    """
+
+    k1: int
+    preload: int
+    weight: float
+    length: float
+    last: float
+    modified: bool
+
+    def log_beyond(self, theta: Array, U: Array | float) -> Array:
+        """(n,) log of what the readings show of a creep over the creep, which is stretched itself."""
+        return np.log1p(self._strain(theta))
+
+    def score(self, theta: Array, U: Array | float, log_lost: Array) -> Array:
+        """(n,) error of the weight, as a share of it, by which the last reading is what it is.
+
+        Parameters
+        ----------
+        theta : (n, d) array
+            Natural parameters.
+        U : (n,) array or float
+            Exponent of the tension.
+        log_lost : (n,) array
+            Log of what the weight as stated gains by creep, mm.
+        """
+        left = theta[:, self.preload] + self.last - self._stretch(theta) - np.exp(log_lost)
+        return np.asarray(left / self.slope(theta, U, log_lost))
+
+    def value(self, score: Array, theta: Array, U: Array | float, log_lost: Array) -> Array:
+        """(n,) preloads, mm, of scores beside the other natural parameters (n, d)."""
+        known = self._stretch(theta) + np.exp(log_lost) - self.last
+        return np.asarray(known + self.slope(theta, U, log_lost) * score)
+
+    def slope(self, theta: Array, U: Array | float, log_lost: Array) -> Array:
+        """(n,) derivative of the preload by its score, mm."""
+        return np.asarray(self._stretch(theta) + U * np.exp(log_lost))
+
+    def _stretch(self, theta: Array) -> Array:
+        return np.asarray(self.length * self._strain(theta))
+
+    def _strain(self, theta: Array) -> Array:
+        """(n,) elongation under the weight over the length, before any creep."""
+        share = self.weight / theta[:, self.k1]
+        return share / np.maximum(1.0 - share, _LEAST) if self.modified else share
+
+
+def displacement_level(problem: Problem) -> DisplacementLevel | None:
+    """The coordinates for the test of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of one sample, whose k1 and preload are both open.
+
+    Returns
+    -------
+    DisplacementLevel or None
+        None unless the test is of one weight.
+    """
+    (sample,) = problem.samples
+    protocol = sample.protocol
+    if protocol.control != "force" or len(protocol.setting) != 1:
+        return None
+    k1, preload = (problem.names.index(problem.column(name, sample)) for name in ("k1", "preload"))
+    last = float(sample.readings[..., 0][protocol.mask][-1])
+    modified = sample.model.law == "modified"
+    return DisplacementLevel(k1, preload, float(protocol.setting[0]), protocol.length_mm, last, modified)
+
+
+_LEAST = 1e-3  # of the stretched length that is left without strain: below, the law has no wire
