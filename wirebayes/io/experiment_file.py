@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.errors import InputError, shown
+from wirebayes.io import mistaken_table
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings, in_sequence
 from wirebayes.io.readings import SET, STRETCH, Hold, readings_of, readings_table
 from wirebayes.numeric.frozen import frozen
@@ -76,8 +77,11 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     ['roc-line-1m', 'roc-line-1.71m', 'nylon-1.5m', 'kite-1.5m']
     """
     source = Path(path)
-    text = read_text(source, "TOML with at least one [[experiment]]")
-    top = Keys.of_file(source, text)
+    try:
+        text = read_text(source, "TOML with at least one [[experiment]]")
+        top = Keys.of_file(source, text)
+    except InputError as error:
+        raise mistaken_table.complaint(source, error) from None
     top.only(("experiment", "prior"))
     tables = top.tables("experiment")
     shared = top.priors()

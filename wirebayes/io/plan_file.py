@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.errors import shown
+from wirebayes.errors import InputError, shown
+from wirebayes.io import mistaken_table
 from wirebayes.io.experiment import ENOUGH, LEAST_READINGS
 from wirebayes.io.experiment_file import SHORTEST, control_of
 from wirebayes.io.readings import READ, STRETCH
@@ -98,7 +99,10 @@ class PlanFile:
 
 def is_plan(path: Path) -> bool:
     """Whether a TOML file has no ``[[experiment]]``, so that it is read as a plan."""
-    return "experiment" not in read_toml(path, read_text(path, "TOML of a plan, or of experiments"))
+    try:
+        return "experiment" not in read_toml(path, read_text(path, "TOML of a plan, or of experiments"))
+    except InputError as error:
+        raise mistaken_table.complaint(path, error) from None
 
 
 def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
