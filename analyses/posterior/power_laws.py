@@ -15,7 +15,7 @@ from wirebayes.inference.fit import fit
 from wirebayes.io.arrays import from_arrays
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_json
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 from wirebayes.numeric.typing import Array
 
 STRAIN = 0.02  # of a step; of the first reading under weights

@@ -9,7 +9,7 @@ import pytest
 from wirebayes.inference.fit import fit
 from wirebayes.inference.policy import Policy
 from wirebayes.io.arrays import from_arrays
-from wirebayes.model.problem import build
+from wirebayes.model.build import build
 
 FEW = Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=800)
 TIME_S = np.append(0.0, np.geomspace(3.6, 3600.0, 39))
