@@ -57,12 +57,26 @@ class DisplacementLevel:
         return np.asarray(left / self.slope(theta, U, log_lost))
 
     def value(self, score: Array, theta: Array, U: Array | float, log_lost: Array) -> Array:
-        """(n,) preloads, mm, of scores beside the other natural parameters (n, d)."""
+        """(n,) preloads, mm.
+
+        Parameters
+        ----------
+        score : (n,) array
+            Errors of the weight, as shares of it.
+        theta, U, log_lost
+            See `score`; the preload in `theta` is not looked at.
+        """
         known = self._stretch(theta) + np.exp(log_lost) - self.last
         return np.asarray(known + self.slope(theta, U, log_lost) * score)
 
     def slope(self, theta: Array, U: Array | float, log_lost: Array) -> Array:
-        """(n,) derivative of the preload by its score, mm."""
+        """(n,) derivative of the preload by its score, mm.
+
+        Parameters
+        ----------
+        theta, U, log_lost
+            See `score`; the preload in `theta` is not looked at.
+        """
         return np.asarray(self._stretch(theta) + U * np.exp(log_lost))
 
     def _stretch(self, theta: Array) -> Array:
