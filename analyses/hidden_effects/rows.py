@@ -19,8 +19,7 @@ def case_row(truth: dict[str, Any], judged: dict[str, Any], record: dict[str, An
     groups = judged.get("groups", [])
     best = spoken.get("best")
     detected = spoken["verdict"] != NOTHING
-    unknown = detected and (spoken["verdict"] == "unknown" or best == "unknown")
-    chosen = "unknown" if unknown else best if detected else NOTHING
+    chosen = best if detected else NOTHING
     amplitudes = spoken.get("amplitudes") or {}
     hold = truth["effects"][0]["hold"] if truth["effects"] else None
     found_hold = (amplitudes.get(names[0]) or {}).get("hold") if names else None
