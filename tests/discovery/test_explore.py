@@ -9,7 +9,7 @@ import pytest
 from wirebayes.discovery import fitted_sets, stepwise
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence
-from wirebayes.discovery.settings import LEFT_OVER, MORE, MOST_EFFECTS, MOST_LOOKS, REACH, Settings
+from wirebayes.discovery.settings import FALLS_SHORT, LEFT_OVER, MORE, MOST_EFFECTS, MOST_LOOKS, REACH, Settings
 
 NAMES = 20
 ONE = np.ones(1)
@@ -29,6 +29,7 @@ def explored(
     credits: dict[str, float] | None = None,
     remainders: dict[str, float] | None = None,
     families: tuple[tuple[str, ...], ...] = (),
+    own_fits: dict[str, float] | None = None,
 ) -> tuple[stepwise.Explored, list[str]]:
     """What the search makes of sets whose evidence is written down, and the order in which it fitted them."""
     order: list[str] = []
@@ -39,7 +40,8 @@ def explored(
         left = np.array([(remainders or {}).get(order[-1], -20.0)])
         more = (further or {}).get(order[-1])
         found = None if more is None else evidence(more)
-        return stepwise.FittedSet(EffectSet(names, 0.0, {}, left), [], (), found, ([], [], []))
+        block: Any = SimpleNamespace(log_evidence=(own_fits or {}).get(order[-1], np.inf))
+        return stepwise.FittedSet(EffectSet(names, 0.0, {}, left), [block], (), found, ([], [], []))
 
     monkeypatch.setattr(stepwise, "_fit", fit)
     known = {name: np.array([value]) for name, value in (credits or {}).items()}
@@ -47,8 +49,9 @@ def explored(
     monkeypatch.setattr(stepwise, "reference_of", lambda block: None)
     monkeypatch.setattr(stepwise, "remainder_evidence", lambda block, reference: smooth)
     settings = Settings(kinds=dict.fromkeys(range(NAMES)))  # type: ignore[arg-type]
+    plain: Any = SimpleNamespace(log_evidence=0.0)
     found = stepwise.explore(
-        [None], evidence(singles), [], [], families, settings, np.random.default_rng(0), map  # type: ignore[list-item]
+        [plain], evidence(singles), [], [], families, settings, np.random.default_rng(0), map
     )  # fmt: skip
     return found, order
 
@@ -96,6 +99,16 @@ def test_a_set_keeps_the_better_of_two_chains(monkeypatch: pytest.MonkeyPatch) -
     found, _ = explored(monkeypatch, {"a": 10.0, "b": 10.0}, {"a": {"b": 2.5}, "b": {"a": 3.0}})
     (pair,) = [s for s in found.sets if len(s.names) == 2]
     assert pair.log_bayes == 13.0 and pair.names == ("b", "a")
+
+
+@pytest.mark.parametrize(("short", "expected"), [(FALLS_SHORT - 0.1, 35.0), (FALLS_SHORT + 0.1, 32.9)])
+def test_what_a_fit_falls_short_of_is_no_evidence_for_the_next_effect(
+    monkeypatch: pytest.MonkeyPatch, short: float, expected: float
+) -> None:
+    """At a kink of its density the fit with a may have less evidence than a's refits found; b beside it has more."""
+    found, _ = explored(monkeypatch, {"a": 20.0}, {"a": {"b": 15.0}}, own_fits={"a": 20.0 - short})
+    (pair,) = [s for s in found.sets if len(s.names) == 2]
+    assert pair.log_bayes == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("ahead", "names"), [(0.29, "ab"), (0.31, "ba")])

@@ -35,7 +35,9 @@ def scan_of(delta: np.ndarray, one_sided: bool, flexible: float = 0.0) -> Scan:
         shared=np.zeros((1, n)), rss=np.full((1, n), float(degrees)), along=NORM * delta[None, :, None],
         square=np.full((1, n, 1), NORM**2), degrees=degrees, least=np.zeros(n), one_sided=np.array([one_sided]),
     )  # fmt: skip
-    return Scan(0.5 * delta[:, None] ** 2, np.full(n, flexible), delta[:, None] / NORM, np.full((n, 1), NORM), pieces)
+    two = np.full(n, -np.inf)  # there is one effect
+    norm = np.full((n, 1), NORM)
+    return Scan(0.5 * delta[:, None] ** 2, np.full(n, flexible), two, delta[:, None] / NORM, norm, pieces)
 
 
 def test_an_alarm_is_raised_below_four_per_cent_and_not_above(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -111,7 +113,7 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(name_evidence, "refit", refitted)
     pieces = scan_of(np.array([8.0]), False)
     data = Scan(
-        np.where(np.arange(12) == 6, 32.0, 0.0)[None], pieces.flexible, np.full((1, 12), 8.0 / NORM),
+        np.where(np.arange(12) == 6, 32.0, 0.0)[None], pieces.flexible, pieces.two, np.full((1, 12), 8.0 / NORM),
         np.full((1, 12), NORM), Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(12, bool)})),
     )  # fmt: skip
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
@@ -153,7 +155,7 @@ def test_a_value_of_the_scan_takes_no_name_off_the_list(
     pieces = scan_of(np.array([8.0]), False)
     effects = np.array([[60.0, 12.0, -9.0]])
     data = Scan(
-        effects, pieces.flexible, np.full((1, 3), 8.0 / NORM), np.full((1, 3), NORM),
+        effects, pieces.flexible, pieces.two, np.full((1, 3), 8.0 / NORM), np.full((1, 3), NORM),
         Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(3, bool)})),
     )  # fmt: skip
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data], before=before)  # type: ignore[list-item]
@@ -169,7 +171,7 @@ def test_a_form_that_was_not_refitted_counts_for_no_more_than_one_that_was(monke
         effect, tuple(which), 2.0, 8.0, 1.0, ()))  # fmt: skip
     pieces = scan_of(np.array([8.0]), False)
     data = Scan(
-        np.full((1, 12), 34.0), pieces.flexible, np.full((1, 12), 8.0 / NORM), np.full((1, 12), NORM),
+        np.full((1, 12), 34.0), pieces.flexible, pieces.two, np.full((1, 12), 8.0 / NORM), np.full((1, 12), NORM),
         Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(12, bool)})),
     )  # fmt: skip
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]

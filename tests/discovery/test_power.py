@@ -174,7 +174,8 @@ def test_pieces_are_those_of_the_first_simulations() -> None:
     def made(n: int) -> Scan:
         shared, rss, along, square = rng.normal(size=(2, n)), rng.normal(size=(2, n)), *rng.normal(size=(2, 2, n, 3))
         pieces = Pieces(shared, rss, along, square, 5, rng.normal(size=n), np.zeros(3, bool))
-        return Scan(rng.normal(size=(n, 3)), rng.normal(size=n), np.ones((n, 3)), np.ones((n, 3)), pieces)
+        ones = np.ones((n, 3))
+        return Scan(rng.normal(size=(n, 3)), rng.normal(size=n), rng.normal(size=n), ones, ones, pieces)
 
     parts = [made(n) for n in (200, 150, 150)]
     first = joined(parts[:2])

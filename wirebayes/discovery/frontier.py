@@ -9,7 +9,7 @@ from wirebayes.discovery.families import Family
 from wirebayes.discovery.fitted_sets import FittedSet, Key
 from wirebayes.discovery.model_space import EffectSet, family_of, log_prior
 from wirebayes.discovery.name_evidence import NameEvidence
-from wirebayes.discovery.settings import MORE, REACH, SAME_EVIDENCE
+from wirebayes.discovery.settings import FALLS_SHORT, MORE, REACH, SAME_EVIDENCE
 
 
 @dataclass
@@ -24,10 +24,14 @@ class Frontier:
     credit: dict[Key, float] = field(default_factory=dict)
     towards: list[Key] = field(default_factory=list)
 
-    def add(self, parent: EffectSet, name: str, found: NameEvidence, credit: float = -np.inf) -> None:
+    def add(
+        self, parent: EffectSet, name: str, found: NameEvidence, credit: float = -np.inf, own_fit: float = np.inf
+    ) -> None:
         """A set that a refit found, unless another order of the same names is better.
 
         Of orders that found the same, the one with the strongest parent stays: the weakest effect has to prove itself.
+        A refit says what one more effect gains over the parent's own fit. Where that fell short, as at a kink of its
+        density, the effect makes up for it, and that is no evidence for the effect.
 
         Parameters
         ----------
@@ -39,9 +43,12 @@ class Frontier:
             What the refit says of it beside the parent.
         credit : float
             Log Bayes factor that the set may come to with a remainder beside it, as far as is known.
+        own_fit : float
+            Log Bayes factor of the parent by its own fit.
         """
         key = parent.key | {name}
-        value = parent.log_bayes + found.log_bayes[name]
+        falls_short = parent.log_bayes - own_fit > FALLS_SHORT
+        value = (own_fit if falls_short else parent.log_bayes) + found.log_bayes[name]
         known = self.known.get(key)
         if key in self.fitted:  # its fit searched from many starts; of what its refits found, the better counts
             assert known is not None

@@ -9,6 +9,7 @@ from wirebayes.discovery.noise_integral import Expansion, project, without_and_w
 from wirebayes.discovery.probes import Probe, forms
 from wirebayes.discovery.scans import Pieces, Scan, joined
 from wirebayes.discovery.tangent import around_points, block_diagonal, moving_columns, points_of, tangent_of
+from wirebayes.discovery.two_effects import log_bayes_of_two
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.log_sum import log_sum
@@ -68,11 +69,14 @@ def expand(
         added.append(np.concatenate(each, axis=-1))
         functions.append([f[mask][None] / point.sd[:, None, None] for f in reference[at]])
     signatures = np.concatenate(added, axis=1)
-    one_sided = [i < len(trials) and trials[i].one_sided for i in range(signatures.shape[-1])]
+    others = signatures.shape[-1] - len(trials)
+    one_sided = [*(trial.one_sided for trial in trials), *[False] * others]
+    names = list(dict.fromkeys(trial.effect.name for trial in trials))
+    kinds = [*(names.index(trial.effect.name) for trial in trials), *[-1] * others]
     plain = tangent_of(target, around, points)
     processes = [block_diagonal(each) for each in zip(*functions, strict=True)]
     return Expansion(
-        **vars(plain), signatures=signatures, one_sided=np.array(one_sided, bool),
+        **vars(plain), signatures=signatures, one_sided=np.array(one_sided, bool), kinds=np.array(kinds, np.int64),
         flexible=np.concatenate(processes, axis=2), processes=tuple(f.shape[2] for f in processes),
     )  # fmt: skip
 
@@ -97,6 +101,7 @@ def _scan_few(x: Expansion) -> Scan:
     reference = log_sum(plain, axis=1)
     seen = np.isfinite(reference)
     reference = np.where(seen, reference, 0.0)
+    two = log_bayes_of_two(x, found, log_sum(effects, axis=1), reference)
     flexible_value = log_sum(every.reshape(len(every), -1), axis=1) - np.log(every.shape[2]) - reference
     best = np.argmax(effects, axis=1)[:, None]
     amplitude, at_best, c_best = (np.take_along_axis(v, best, axis=1)[:, 0] for v in (b / c, left, c))
@@ -105,6 +110,7 @@ def _scan_few(x: Expansion) -> Scan:
     return Scan(
         np.where(seen[:, None], log_sum(effects, axis=1) - reference[:, None], 0.0),
         np.where(seen, flexible_value, 0.0),
+        np.where(seen, two, 0.0),
         amplitude,
         norm,
         Pieces(shared.T, rss.T, np.swapaxes(b, 0, 1), np.swapaxes(c, 0, 1), degrees, x.least, x.one_sided),

@@ -195,7 +195,8 @@ def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tup
 def _remainder_seen(target: LogPosterior, block: LaplaceFit) -> float:
     """Typical length, in standard deviations of a reading, of a smooth remainder of one unit after projection."""
     x = expand(target, block.modes.z[:1], [])
-    smooth = replace(x, signatures=x.flexible, one_sided=np.zeros(x.flexible.shape[2], bool))
+    count = x.flexible.shape[2]
+    smooth = replace(x, signatures=x.flexible, one_sided=np.zeros(count, bool), kinds=np.full(count, -1))
     return float(np.sqrt((projected(smooth, float(x.ratio[0])) ** 2).sum()))
 
 

@@ -33,6 +33,8 @@ class Expansion(Tangent):
     signatures : (n, N, m)
         What each probe adds, per unit amplitude.
     one_sided : (m,) bool
+    kinds : (m,) int
+        Which effect each is a form of; -1 for what is none.
     flexible : (n, N, q)
         Functions of the flexible reference, one process after the other.
     processes : tuple of int
@@ -41,6 +43,7 @@ class Expansion(Tangent):
 
     signatures: Array
     one_sided: Array
+    kinds: NDArray[np.int64]
     flexible: Array
     processes: tuple[int, ...]
 
@@ -59,8 +62,12 @@ class Projected:
         Of each signature with the residual and with itself; infinite where the parameters take all of a signature.
     smooth_along, smooth_square : (n, k, q) and (n, k, q, q) for each process
         Of its smooth functions with the residual and with each other.
-    smooth_signatures : (n, k, q, m) for each process
-        Of its smooth functions with each signature; none where they are not asked for.
+    form : Functions
+        The signatures, of which `Functions.products` has further products.
+    smooth : Functions, for each process
+        The same of its smooth functions.
+    shrink : (n, k, H)
+        How much of what moves whole holds the noise takes at each ratio.
     """
 
     shared: Array
@@ -69,10 +76,12 @@ class Projected:
     square: Array
     smooth_along: list[Array]
     smooth_square: list[Array]
-    smooth_signatures: list[Array]
+    form: "Functions"
+    smooth: list["Functions"]
+    shrink: Array
 
 
-def project(x: Expansion, *, with_signatures: bool = False) -> Projected:
+def project(x: Expansion) -> Projected:
     """Project residual, signatures and smooth functions on what the parameters leave, in the metric of each ratio."""
     p, m = x.parameters.shape[2], x.signatures.shape[2]
     columns = np.concatenate([x.parameters, x.residual[..., None], x.signatures, x.flexible], axis=2)
@@ -105,8 +114,8 @@ def project(x: Expansion, *, with_signatures: bool = False) -> Projected:
     c = mm - np.einsum("nkpm,nkpm->nkm", signatures, signatures)
     fr = in_metric((x.residual[:, None] @ x.flexible)[:, 0], levels_f, r) - (residual[:, :, None] @ flexible)[:, :, 0]
     each = _slices(x.processes)
-    smooth = [_Functions(x.flexible[..., own], flexible[..., own], levels_f[..., own]) for own in each]
-    form = _Functions(x.signatures, signatures, levels_m)
+    smooth = [Functions(x.flexible[..., own], flexible[..., own], levels_f[..., own]) for own in each]
+    form = Functions(x.signatures, signatures, levels_m)
     shared = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
     return Projected(
         shared=np.where(regular, shared - np.log(np.einsum("nkpp->nkp", factor)).sum(axis=2), -np.inf),
@@ -115,7 +124,9 @@ def project(x: Expansion, *, with_signatures: bool = False) -> Projected:
         square=np.where(c > ABSORBED * square[:, None], c, np.inf),
         smooth_along=[fr[..., own] for own in each],
         smooth_square=[process.products(process, shrink) for process in smooth],
-        smooth_signatures=[process.products(form, shrink) for process in smooth] if with_signatures else [],
+        form=form,
+        smooth=smooth,
+        shrink=shrink,
     )
 
 
@@ -125,14 +136,19 @@ def _slices(processes: Sequence[int]) -> list[slice]:
     return [slice(last - count, last) for last, count in zip(ends, processes, strict=True)]
 
 
-class _Functions(NamedTuple):
+class Functions(NamedTuple):
     """Functions (n, N, q), the parameters' part of them (n, k, p, q) and the setting errors' (n, H, q)."""
 
     plain: Array
     taken: Array
     levels: Array
 
-    def products(self, other: "_Functions", shrink: Array) -> Array:
+    def of(self, columns: NDArray[np.int64]) -> "Functions":
+        """Some of them, by a row of numbers (n, q) each."""
+        plain, levels = (np.take_along_axis(v, columns[:, None], axis=2) for v in (self.plain, self.levels))
+        return Functions(plain, np.take_along_axis(self.taken, columns[:, None, None], axis=3), levels)
+
+    def products(self, other: "Functions", shrink: Array) -> Array:
         """(n, k, q, m) inner products with other functions, as `project` has them."""
         plain = (np.swapaxes(self.plain, 1, 2) @ other.plain)[:, None]
         whole_holds = (np.swapaxes(self.levels, 1, 2)[:, None] * shrink[:, :, None]) @ other.levels[:, None]

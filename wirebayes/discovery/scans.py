@@ -21,6 +21,8 @@ class Scan:
         Of each probe, its amplitude at its best.
     flexible : (n,)
         Of the flexible reference, averaged over its processes and `SIZES`.
+    two : (n,)
+        Of two effects together (`wirebayes.discovery.two_effects`).
     amplitude : (n, m)
         Best amplitude (distance from neutral).
     norm : (n, m)
@@ -30,6 +32,7 @@ class Scan:
 
     effects: Array
     flexible: Array
+    two: Array
     amplitude: Array
     norm: Array
     pieces: "Pieces"
@@ -95,6 +98,7 @@ def joined(scans: Sequence[Scan]) -> Scan:
     return Scan(
         effects=np.concatenate([s.effects for s in scans]),
         flexible=np.concatenate([s.flexible for s in scans]),
+        two=np.concatenate([s.two for s in scans]),
         amplitude=np.concatenate([s.amplitude for s in scans]),
         norm=np.concatenate([s.norm for s in scans]),
         pieces=pieces,

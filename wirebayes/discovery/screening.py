@@ -29,6 +29,7 @@ from wirebayes.wire.protocol import Protocol
 _ROWS = 100  # replicates linearised at once, at most
 _NUMBERS = 4e6  # signatures of these, readings times probes: some copies of them have to fit into memory
 _FLEXIBLE = "unknown"
+TWO = "two effects together"
 FILE_WIDE = ("instrument", "environment")  # scopes of which all blocks share an amplitude
 # What a learned exponent of B says already: the two together are one direction, and a climb along it never ends.
 _LEARNED_EXPONENT = LengthDependence("B").key
@@ -179,10 +180,10 @@ def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
     return np.where(np.isfinite(value), value, -np.inf), mean
 
 
-def flexible_log_bayes(scans: Sequence[Scan]) -> Array:
-    """(b + 1, n) log Bayes factor of the flexible reference on each block alone, and on all."""
-    single = np.array([s.flexible for s in scans])
-    return np.vstack([single, single.sum(axis=0)])
+def _alone_and_together(log_bayes: Sequence[Array]) -> Array:
+    """(n,) the largest log Bayes factor of what each block has for itself (n,): of a block alone, or of all."""
+    each = np.array(log_bayes)
+    return np.asarray(np.maximum(each.max(axis=0), each.sum(axis=0)))
 
 
 @dataclass(frozen=True)
@@ -237,11 +238,13 @@ def joined_replicates(parts: Sequence[Replicates]) -> Replicates:
 
 
 def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str, Array]:
-    """(n,) the largest log Bayes factor of each name, and of the flexible reference on its own or on all blocks.
+    """(n,) the largest log Bayes factor of each name, of two effects together, and of the flexible reference.
 
     None is below `_AGAINST`: clear evidence against a name is no surprise, however rare its size.
     """
-    out = {_FLEXIBLE: np.maximum(flexible_log_bayes(scans).max(axis=0), _AGAINST)}
+    flexible = _alone_and_together([s.flexible for s in scans])
+    two = _alone_and_together([s.two for s in scans])
+    out = {_FLEXIBLE: np.maximum(flexible, _AGAINST), TWO: np.maximum(two, _AGAINST)}
     for c in candidates:
         out[c.name] = np.maximum(out.get(c.name, _AGAINST), log_bayes(c, scans)[0])
     return out

@@ -275,4 +275,4 @@ def _common(
 
 def _only(x: Expansion, m: int) -> Expansion:
     """The expansion with its first m signatures."""
-    return replace(x, signatures=x.signatures[..., :m], one_sided=x.one_sided[:m])
+    return replace(x, signatures=x.signatures[..., :m], one_sided=x.one_sided[:m], kinds=x.kinds[:m])

@@ -31,6 +31,9 @@ REACH = 4.0  # nats below the best: a set further down holds less than 2 % of it
 WORTH_A_REFIT = 1.3  # log Bayes factor by the linear scan, of an effect beside others
 WORTH_ADDING = 2.0  # the same, refitted
 SAME_EVIDENCE = 0.3  # nats by which two orders of refits may differ where both found the best parameters
+# Nats by which a set's own fit, a normal approximation, may fall short of the refits that led to it: with a skew
+# amplitude it does by 2 at most, and at a kink of its density by 10.
+FALLS_SHORT = 2.0
 MOST_BESIDE = 6  # effects refitted beside a set: what it leaves over is small, and the linear scan nearly right
 FIRST_LOOK, MOST_LOOKS = 3, 7  # sets fitted in full: at first, and in all
 

@@ -20,7 +20,7 @@ def beside_smooth(x: Expansion) -> Array:
     first, nothing = x.of(np.array([0])), np.full(x.signatures.shape[2], -np.inf)
     if not has_tangent(first)[0]:
         return nothing
-    found = project(first, with_signatures=True)
+    found = project(first)
     seen = np.isfinite(found.shared[0])  # ratios at which the parameters can be distinguished
     if not seen.any():
         return nothing
@@ -46,7 +46,8 @@ class _Products(NamedTuple):
 
 def _with_remainder(found: Projected, seen: NDArray[np.bool_]) -> _Products:
     """The first row's inner products at some ratios, free of what a remainder of one process takes, too."""
-    (functions,), (with_residual,), (crossed,) = found.smooth_square, found.smooth_along, found.smooth_signatures
+    (functions,), (with_residual,), (smooth,) = found.smooth_square, found.smooth_along, found.smooth
+    crossed = smooth.products(found.form, found.shrink)
     # along the eigenvectors of its functions' products the remainder is a sum of independent ones
     values, vectors = eigh(functions[0][seen])
     values, turn = np.maximum(values, 0.0), np.swapaxes(vectors, 1, 2)

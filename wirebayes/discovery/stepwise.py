@@ -83,7 +83,7 @@ def explore(
         common = repeat(families), repeat(references), repeat(settings)
         fitted_sets = parallel_map(_fit, parents, names, *common, rng.spawn(len(wave)))
         for key, new in zip(wave, fitted_sets, strict=True):
-            _keep(frontier, key, new)
+            _keep(frontier, key, new, _log_evidence(new.blocks) - _log_evidence(plain))
     return Explored((root, *frontier.known.values()), done, _left_over(frontier), frontier.parents, start)
 
 
@@ -93,8 +93,16 @@ def _looks(done: int) -> int:
     return max(min(wave, MOST_LOOKS - done), 0)
 
 
-def _keep(frontier: Frontier, key: Key, new: FittedSet) -> None:
-    """Note a fitted set, and go on from it: to what it lacks, to what may stand in its place, and forward."""
+def _log_evidence(blocks: Sequence[LaplaceFit]) -> float:
+    """Of fits to all blocks."""
+    return sum(block.log_evidence for block in blocks)
+
+
+def _keep(frontier: Frontier, key: Key, new: FittedSet, own_fit: float) -> None:
+    """Note a fitted set, and go on from it: to what it lacks, to what may stand in its place, and forward.
+
+    `own_fit` is its log Bayes factor by its own fit.
+    """
     known = frontier.known[key]
     fitted_set = replace(new, effects=replace(known, remainder=new.effects.remainder))
     frontier.fitted[key], frontier.known[key] = fitted_set, fitted_set.effects
@@ -105,7 +113,7 @@ def _keep(frontier: Frontier, key: Key, new: FittedSet) -> None:
     if new.further is not None and len(key) < MOST_EFFECTS:
         for name in new.further.winners:
             if new.further.log_bayes[name] > 0.0:
-                frontier.add(fitted_set.effects, name, new.further)
+                frontier.add(fitted_set.effects, name, new.further, own_fit=own_fit)
 
 
 def _left_over(frontier: Frontier) -> dict[Key, float]:

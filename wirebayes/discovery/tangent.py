@@ -63,7 +63,8 @@ class Tangent:
 
     def of(self, rows: Array) -> Self:
         """That of some parameter sets."""
-        every = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("one_sided", "processes")}
+        alike = ("one_sided", "kinds", "processes")  # for all parameter sets
+        every = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in alike}
         return replace(self, **{name: value[rows] for name, value in every.items()})
 
     @property

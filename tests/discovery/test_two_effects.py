@@ -1,0 +1,98 @@
+"""Two effects together: the linear scan's pairs against regressions written out, and what only a pair shows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from tests.simulated import simulated_tests
+from wirebayes.discovery import noise_integral, screening, two_effects
+from wirebayes.discovery.linear_scan import expand, scan
+from wirebayes.discovery.noise_integral import Expansion
+from wirebayes.effects import CATALOGUE, named
+from wirebayes.inference.laplace_fit import LaplaceFit, fitted
+from wirebayes.numeric.typing import Array
+from wirebayes.simulation.synthetic import Bench, Truth
+
+NAMES = ("toe", "unrecorded_hold", "steady_creep")
+
+
+@pytest.fixture(scope="module")
+def block() -> LaplaceFit:
+    truth = Truth({"k1": 900.0, "B": 0.25, "setting_sd": 0.01, "toe.w": 0.6}, [named("toe")])
+    experiments = simulated_tests([Bench(displacements_mm=tuple(range(1, 8)))], truth, seed=3)
+    return fitted(experiments, (), "hooke", "saturating", np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def expansion(block: LaplaceFit) -> Expansion:
+    trials, _ = screening.candidate_probes([block], {name: CATALOGUE[name] for name in NAMES})
+    return expand(block.target, block.modes.z[:1], trials)
+
+
+def left_by(columns: Array, x: Expansion, ratio: float) -> tuple[float, Array]:
+    """The residual's sum of squares beside columns, and their amplitudes, by a dense regression at one noise ratio."""
+    k = x.left[0] * x.singular[0]
+    whiten = np.linalg.inv(np.linalg.cholesky(np.eye(len(k)) + ratio * k @ k.T))
+    root = np.linalg.cholesky(x.prior_precision[0]).T  # the prior as further rows
+    design = np.vstack([whiten @ x.parameters[0], root])
+    aside = np.linalg.solve(root.T, x.prior_gradient[0])
+    more = np.vstack([whiten @ columns, np.zeros((len(root), columns.shape[1]))])
+    target = np.concatenate([whiten @ x.residual[0], aside])
+    every = np.hstack([design, more])
+    solved = np.linalg.lstsq(every, target, rcond=None)[0]
+    return float(((target - every @ solved) ** 2).sum()), solved[design.shape[1] :]
+
+
+def test_a_pair_explains_what_a_regression_on_both_explains(
+    expansion: Expansion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x, ratio = expansion, 10.0
+    monkeypatch.setattr(noise_integral, "RATIOS", np.array([ratio]))
+    found = noise_integral.project(x)
+    first = np.array([[0]])
+    explained = two_effects._explained(x, found, first)[0, 0, 0]
+    compared = 0
+    for m in np.flatnonzero(x.kinds != x.kinds[0]):
+        left, amplitudes = left_by(x.signatures[0][:, [0, m]], x, ratio)
+        possible = all(a >= 0.0 or not x.one_sided[i] for a, i in zip(amplitudes, (0, m), strict=True))
+        if possible and np.isfinite(explained[m]):
+            none, _ = left_by(np.zeros((len(x.residual[0]), 0)), x, ratio)
+            assert explained[m] == pytest.approx(none - left, rel=1e-6, abs=1e-8)
+            compared += 1
+        else:
+            assert explained[m] == -np.inf
+    assert compared > 3
+
+
+def test_all_pairs_of_different_effects_count_and_forms_share_the_weight_of_theirs(expansion: Expansion) -> None:
+    """The sum written out: over the best form of each effect, every form of another, and noise ratios."""
+    x, found = expansion, noise_integral.project(expansion)
+    sizes = np.log(np.bincount(x.kinds)) - np.log(2.0) * np.array([x.one_sided[x.kinds == k][0] for k in range(3)])
+    half = 0.5 * x.degrees
+    upward = np.where(x.one_sided, np.maximum(found.along[0], 0.0), found.along[0])
+    alone = logsumexp(found.shared[0][:, None] - half * np.log(found.rss[0][:, None] - upward**2 / found.square[0]), 0)
+    terms = []
+    for kind in range(3):
+        best = max(np.flatnonzero(x.kinds == kind), key=lambda m: alone[m])
+        explained = two_effects._explained(x, found, np.array([[best]]))[0, :, 0]
+        for m in np.flatnonzero(x.kinds != kind):
+            each = found.shared[0] - half * np.log(found.rss[0] - explained[:, m])
+            terms.append(logsumexp(each) - sizes[kind] - sizes[x.kinds[m]])
+    plain = logsumexp(found.shared[0] - half * np.log(found.rss[0]))
+    assert scan(x).two[0] == pytest.approx(logsumexp(terms) - plain, abs=1e-8)
+
+
+def test_one_effect_makes_no_pair(expansion: Expansion) -> None:
+    alone = expansion.kinds == 0
+    one = replace(
+        expansion, signatures=expansion.signatures[..., alone], one_sided=expansion.one_sided[alone],
+        kinds=expansion.kinds[alone],
+    )  # fmt: skip
+    assert scan(one).two[0] == -np.inf
+
+
+def test_the_largest_of_each_block_and_of_all_counts() -> None:
+    each = [np.array([3.0, -4.0, 2.0]), np.array([-5.0, -1.0, 1.0])]
+    np.testing.assert_array_equal(screening._alone_and_together(each), [3.0, -1.0, 3.0])

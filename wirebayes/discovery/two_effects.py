@@ -1,0 +1,73 @@
+"""Two effects together, linearised: what shows beside another effect, and by itself does not.
+
+The parameters may bend to absorb most of two effects where they cannot absorb what is left of either once the other is
+there; a setting error takes the place of a slip only until the elastic curve has its form.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.discovery.noise_integral import Expansion, Projected
+from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.typing import Array
+
+# effects that are tried beside every other one; those of a pair that shows are hardly ever all farther down
+FIRST = 6
+# of two signatures, of what is left of the second beside the first: with less they are one direction
+LEAST_LEFT = 1e-4
+
+
+def log_bayes_of_two(x: Expansion, found: Projected, single: Array, plain: Array) -> Array:
+    """(n,) log Bayes factor of two effects, summed over pairs; the forms of an effect share its weight.
+
+    One of the two is among the `FIRST` that explain most alone, in its best form. Amplitudes are at their best: what
+    their prior takes, and how many pairs there are, is the same for the readings and for all simulations, and left out.
+
+    Parameters
+    ----------
+    x : Expansion
+    found : Projected
+        Its inner products.
+    single : (n, m) array
+        Log evidence of each signature alone.
+    plain : (n,) array
+        Log evidence of none.
+    """
+    groups = [np.flatnonzero(x.kinds == kind) for kind in np.unique(x.kinds[x.kinds >= 0])]
+    if len(groups) < 2:
+        return np.full(len(single), -np.inf)
+    first = _leading(single, groups)
+    explained = _explained(x, found, first)
+    left = np.maximum(found.rss[:, :, None, None] - explained, x.least[:, None, None, None])
+    evidence = log_sum(found.shared[:, :, None, None] - 0.5 * x.degrees * np.log(left), axis=1)
+    prior = np.full(len(x.kinds), -np.inf)
+    for group in groups:
+        prior[group] = np.where(x.one_sided[group], np.log(2.0), 0.0) - np.log(len(group))
+    different = x.kinds[first][:, :, None] != x.kinds
+    value = np.where(different, evidence + prior[first][:, :, None] + prior, -np.inf)
+    return np.asarray(log_sum(value.reshape(len(value), -1), axis=1) - plain)
+
+
+def _leading(single: Array, groups: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """(n, j) the best signatures of the effects that explain most."""
+    best = np.stack([group[np.argmax(single[:, group], axis=1)] for group in groups], axis=1)
+    order = np.argsort(-np.take_along_axis(single, best, axis=1), axis=1, kind="stable")
+    return np.take_along_axis(best, order[:, :FIRST], axis=1)
+
+
+def _explained(x: Expansion, found: Projected, first: NDArray[np.int64]) -> Array:
+    """(n, k, j, m) of the sum of squares by some signatures with each one; -inf where an amplitude has no meaning."""
+    own = first[:, None, :]
+    b, c = found.along[:, :, None, :], found.square[:, :, None, :]
+    b_first, c_first = (np.take_along_axis(v, own, axis=2)[..., None] for v in (found.along, found.square))
+    cross = found.form.of(first).products(found.form, found.shrink)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        determinant = c_first * c - cross**2
+        a_first = (c * b_first - cross * b) / determinant
+        a = (c_first * b - cross * b_first) / determinant
+        explained = a_first * b_first + a * b
+        apart = determinant > LEAST_LEFT * c_first * c
+    possible = apart & np.isfinite(explained)
+    possible &= (a_first >= 0.0) | ~x.one_sided[first][:, None, :, None]
+    possible &= (a >= 0.0) | ~x.one_sided
+    return np.where(possible, explained, -np.inf)
