@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 from wirebayes import cli
-from wirebayes.discovery import global_test, model_check
+from wirebayes.discovery import global_test, model_check, screening
 from wirebayes.discovery.model_check import ModelCheck, check_model, level
 from wirebayes.discovery.search import discover
 from wirebayes.discovery.settings import ALPHA
@@ -42,6 +42,13 @@ def test_a_p_near_the_level_is_distinguished_from_one_that_is_not() -> None:
     assert not global_test.is_close(0.02, ALPHA, 999) and not global_test.is_close(0.065, ALPHA, 999)
     # No exceedance at all decides, also against the smaller level of one of four fits.
     assert not global_test.is_close(0.001, level(4), 999)
+
+
+def test_a_pair_is_listed_only_where_nothing_is_as_surprising() -> None:
+    one = {"toe": 3.0, "ageing": 1.0, "unknown": 2.0}
+    assert model_check.directions(one) == ("toe", "a smooth discrepancy", "ageing")
+    assert model_check.directions(one | {screening.TWO: 2.9}) == ("toe", "a smooth discrepancy", "ageing")
+    assert model_check.directions(one | {screening.TWO: 3.1})[:2] == ("two effects together", "toe")
 
 
 def test_a_p_too_close_to_the_level_gets_more_simulations(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ simulated at the fit and refitted, so the readings are not used twice, and for o
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from wirebayes.discovery.global_test import Report, examine
+from wirebayes.discovery.screening import TWO
 from wirebayes.discovery.settings import ALPHA, SIMULATIONS
 from wirebayes.effects import catalogue, named
 from wirebayes.errors import InputError
@@ -154,9 +155,7 @@ def check_model(
         gate = examine([block], kinds, simulations or SIMULATIONS, rng, alpha=alpha, parallel_map=parallel_map)
     except InputError:
         return unchecked(reason="no further effect could show in these holds")
-    p, surprises = gate.test.p, gate.test.surprises
-    order = sorted(surprises, key=lambda name: -surprises[name])
-    names = tuple("a smooth discrepancy" if name == "unknown" else name for name in order[:_SHOWN])
+    p, names = gate.test.p, directions(gate.test.surprises)
     failed = p <= alpha
     return ModelCheck(
         p,
@@ -167,6 +166,19 @@ def check_model(
         "",
         bool(effects),
     )
+
+
+def directions(surprises: Mapping[str, float]) -> tuple[str, ...]:
+    """What readings deviate towards, the most surprising first; a pair of effects is none, but may be all that shows.
+
+    Parameters
+    ----------
+    surprises : mapping of name to float
+        Of the global test.
+    """
+    order = sorted(surprises, key=lambda name: -surprises[name])
+    shown = [name for place, name in enumerate(order) if name != TWO or place == 0]
+    return tuple("a smooth discrepancy" if name == "unknown" else name for name in shown[:_SHOWN])
 
 
 def write_checks(
