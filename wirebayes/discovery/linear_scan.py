@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.discovery import smooth_reference
 from wirebayes.discovery.noise_integral import Expansion, project, without_and_with, without_tangent
@@ -69,16 +70,22 @@ def expand(
         added.append(np.concatenate(each, axis=-1))
         functions.append([f[mask][None] / point.sd[:, None, None] for f in reference[at]])
     signatures = np.concatenate(added, axis=1)
-    others = signatures.shape[-1] - len(trials)
-    one_sided = [*(trial.one_sided for trial in trials), *[False] * others]
-    names = list(dict.fromkeys(trial.effect.name for trial in trials))
-    kinds = [*(names.index(trial.effect.name) for trial in trials), *[-1] * others]
+    one_sided, kinds = _described(trials, signatures.shape[-1])
     plain = tangent_of(target, around, points)
     processes = [block_diagonal(each) for each in zip(*functions, strict=True)]
     return Expansion(
-        **vars(plain), signatures=signatures, one_sided=np.array(one_sided, bool), kinds=np.array(kinds, np.int64),
+        **vars(plain), signatures=signatures, one_sided=one_sided, kinds=kinds,
         flexible=np.concatenate(processes, axis=2), processes=tuple(f.shape[2] for f in processes),
     )  # fmt: skip
+
+
+def _described(trials: Sequence[Probe], m: int) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+    """(m,) whether a signature is one-sided, and (m,) which effect it is of: -1 for those behind the probes'."""
+    one_sided, kinds = np.zeros(m, bool), np.full(m, -1)
+    one_sided[: len(trials)] = [trial.one_sided for trial in trials]
+    names = list(dict.fromkeys(trial.effect.name for trial in trials))
+    kinds[: len(trials)] = [names.index(trial.effect.name) for trial in trials]
+    return one_sided, kinds
 
 
 def scan(x: Expansion) -> Scan:
