@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from wirebayes.json_files.calibrate import (
     CalibratedPoses,
@@ -99,7 +99,7 @@ def usable(known: Calibration) -> bool:
 
 def _named(robot: Robot, prior: LengthPrior, session: Session, known: Calibration) -> NamedEstimates:
     """Estimates in the words of a whole robot's calibration; its geometry is exact here."""
-    half = float(norm.ppf(0.95))
+    half = float(ndtri(0.95))
     zero = np.zeros((robot.legs, 3))
     sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
     turn = rotation.vector(np.where(np.isfinite(known.ended_rotation[0]), known.ended_rotation[0], np.eye(3)))
@@ -184,7 +184,7 @@ def _at_fault(robot: Robot, prior: LengthPrior, session: Session, readings: Floa
 
 
 def _lengths(robot: Robot, prior: LengthPrior, known: Calibration) -> EstimatedLengths:
-    half = float(norm.ppf(0.95)) * known.length_sd_m[0]
+    half = float(ndtri(0.95)) * known.length_sd_m[0]
     sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
     found: EstimatedLengths = {
         "converged": bool(known.converged[0]),

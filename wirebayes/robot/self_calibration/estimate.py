@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from wirebayes.numeric.linear_algebra import inv, solve
 from wirebayes.numeric.typing import Floats
@@ -65,7 +65,7 @@ class Calibration:
 
     def interval(self, probability: float = 0.9) -> tuple[Floats, Floats]:
         """Central intervals of the lengths, two ``(m, w)`` arrays."""
-        half = float(norm.ppf(0.5 + probability / 2)) * self.length_sd_m
+        half = float(ndtri(0.5 + probability / 2)) * self.length_sd_m
         return self.length_m - half, self.length_m + half
 
 

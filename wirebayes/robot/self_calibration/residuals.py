@@ -1,8 +1,7 @@
 """What the residuals of a calibration show: the noise in them, and whether they are as small as they should be."""
 
 import numpy as np
-from scipy.stats import chi2
-from scipy.stats import f as f_distribution
+from scipy.special import chdtrc, fdtrc
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
@@ -36,7 +35,7 @@ def trust(found: Whole) -> float:
     p = float(joint_test(np.array([found.cost - beyond]), max(count, 1.0), white[None], spread[None], len(first))[0])
     if not unread.any():
         return p
-    tensions = float(chi2.sf(beyond, max(unread.sum() - open_, 1.0)))
+    tensions = float(chdtrc(max(unread.sum() - open_, 1.0), beyond))
     return min(1.0, 2.0 * p, 4.0 * tensions, 4.0 * _usual_noise(found))  # p has the better of two tests times two
 
 
@@ -98,4 +97,4 @@ def _usual_noise(found: Whole) -> float:
     usual, worth = _BLIND * found.unknowns.robot.span_m, _BLIND_DEGREES
     free = max(found.degrees - worth, 1e-9)
     shown = (found.degrees * found.noise.joint_m**2 - worth * usual**2) / free
-    return float(f_distribution.sf(max(shown, 0.0) / usual**2, free, worth))
+    return float(fdtrc(free, worth, max(shown, 0.0) / usual**2))

@@ -8,7 +8,7 @@ have more errors than one: where none explains all, one that explains most of it
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from wirebayes.json_files.calibrate import SensorsAtFault
 from wirebayes.notice import Notice
@@ -74,9 +74,9 @@ def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
     least = 1e-9 * np.trace(information) / w  # of a combination that the readings do not show
     total = float(score @ solve(information + least * np.eye(w), score[:, None])[:, 0])
     left = np.maximum(total - score**2 / own, 0.0)
-    alone = chi2.sf(left, w - 1) if w > 1 else np.ones(w)
+    alone = chdtrc(w - 1, left) if w > 1 else np.ones(w)
     share = np.clip(score**2 / own / max(total, 1e-300), 0.0, 1.0)
-    return Suspects(score / own, own**-0.5, float(chi2.sf(total, w)), alone, share)
+    return Suspects(score / own, own**-0.5, float(chdtrc(w, max(total, 0.0))), alone, share)
 
 
 def suspects(found: Whole, holds: Holds) -> Suspects | None:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
@@ -76,7 +75,7 @@ def summarised(found: Whole) -> Summary:
         "pull_N": np.maximum(state.pull_N, 0.0),
     }
     sds = _standard_deviations(found)
-    halves = {name: np.full(np.shape(sd), norm.ppf(0.95)) for name, sd in sds.items()}
+    halves = {name: np.full(np.shape(sd), ndtri(0.95)) for name, sd in sds.items()}
     if np.isfinite(found.degrees):
         wider = _standard_deviations(at_joint_error(found, _FACTOR))
         halves = {name: _half(sd, wider[name], found.degrees) for name, sd in sds.items()}
@@ -88,7 +87,7 @@ def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         follows = np.nan_to_num(np.log(wider / sd) / np.log(_FACTOR))  # what is exact follows nothing
         own = np.minimum(degrees / follows**2, _MANY)
-    return np.asarray(student.ppf(0.95, own))
+    return np.asarray(stdtrit(own, 0.95))
 
 
 def _standard_deviations(found: Whole) -> dict[str, Floats]:

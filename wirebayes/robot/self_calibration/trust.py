@@ -1,7 +1,7 @@
 """Whether a calibration's residuals, and its estimates against their priors, are as large as they should be."""
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from wirebayes.json_files.calibrate import Interval
 from wirebayes.notice import Notice
@@ -38,7 +38,7 @@ def joint_test(cost: Floats, count: float, white: Floats, spread: Floats, count_
     reference = white[:, :count_alone, None]
     learnt = (1.0 + _UNLEARNT) * np.eye(count_alone) - spread[:, :count_alone, :count_alone]
     moved = (reference * solve(learnt, reference)).sum((1, 2))
-    least = np.minimum(chi2.sf(cost, count), chi2.sf(moved, count_alone))
+    least = np.minimum(chdtrc(count, np.maximum(cost, 0.0)), chdtrc(count_alone, np.maximum(moved, 0.0)))
     return np.asarray(np.minimum(1.0, 2.0 * least))
 
 

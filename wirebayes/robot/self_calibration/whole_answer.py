@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtr
 
 from wirebayes.json_files.calibrate import (
     CalibratedPoses,
@@ -189,7 +189,7 @@ def _too_good(found: Whole) -> bool:
     values, vectors = np.linalg.eigh(found.covariance[np.ix_(part, part)])
     seen = np.sqrt(np.maximum(values, 0.0)) < _WELL
     deviations = vectors[:, seen].T @ found.state.white[part]
-    return bool(seen.any() and chi2.cdf(float(deviations @ deviations), int(seen.sum())) < _CHANCE)
+    return bool(seen.any() and chdtr(int(seen.sum()), float(deviations @ deviations)) < _CHANCE)
 
 
 def _prior(robot: Robot, prior: LengthPrior, errors: StatedErrors, session: Session) -> CalibrationPrior:
