@@ -33,6 +33,7 @@ from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import ParallelMap
 
 _FIRST_ROWS, _ROWS = 40, 160  # data sets that lead at once, at first and at most
+_MOST_ROWS = 320  # in all: a name that decides has two or three as high, and many forms cost a tenth of a second each
 _CLEARLY = 3.0  # nats of surprise beyond all simulations, from which a name needs no more of them
 _TRIED = 3  # names
 _LEVEL = 0.95  # of chance, which a name has to exceed by most to be tried first
@@ -124,6 +125,7 @@ class Continuation:
         That is until so many are as high as the data that these cannot be as surprising as `needed`, or until these are
         clearly more surprising than all simulations, of which the most surprising one is by `largest`.
         """
+        linear = linear[:_MOST_ROWS]
         known = self._known.get(name, np.empty(0))
         ways = [way for way in self._ways if way.effect.name == name]
         out, decided = np.empty(0), False
