@@ -3,6 +3,7 @@
 import pytest
 
 import wirebayes as wb
+from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.convert import convert
 from wirebayes.io.bench.undecided import Choices, Undecided
@@ -49,6 +50,11 @@ def rows_of(made):
             ["red", "blue"],
         ),
         (",Roc,,nylon,\nTime [s],Stroke [mm],Load [N],Stroke [mm],Load [N]", COMMON, ["Roc", "nylon"]),
+        # columns that a unit alone names
+        ("Probe 1,,,Probe 2,,\ns,mm,N,s,mm,N", APART, ["Probe-1", "Probe-2"]),
+        ("red,red,red,blue,blue,blue\ns,mm,N,s,mm,N", APART, ["red", "blue"]),
+        (",Roc,,nylon,\n[s],[mm],[N],[mm],[N]", COMMON, ["Roc", "nylon"]),
+        ("Time,Roc,Roc,nylon,nylon\ns,mm,N,mm,N", COMMON, ["Roc", "nylon"]),
     ],
 )
 def test_specimens_side_by_side_are_a_test_each(tmp_path, header, rows, names):
@@ -56,6 +62,19 @@ def test_specimens_side_by_side_are_a_test_each(tmp_path, header, rows, names):
     assert [each.experiment.name for each in made] == names
     assert [rows_of(each) for each in made] == [SOFT, STIFF]
     assert all("specimens side by side" in each.notes[0] for each in made)
+
+
+def test_a_unit_alone_names_no_column_of_one_specimen(tmp_path):
+    """It may be a diameter."""
+    rows = [row.rpartition(",")[0].rpartition(",")[0] for row in COMMON]
+    for header in ("s,mm,N", "Roc,,\ns,mm,N"):
+        with pytest.raises(InputError, match="found no column of displacement, time or tension among s, mm, N"):
+            read(tmp_path, header, rows)
+
+
+def test_a_unit_that_is_of_no_quantity_leaves_the_names_as_they_are(tmp_path):
+    with pytest.raises(InputError, match="found s a second time"):
+        read(tmp_path, "red,,,blue,,\ns,mm,V,s,mm,V", APART)
 
 
 def test_a_shorter_test_ends_earlier(tmp_path):

@@ -17,6 +17,7 @@ from wirebayes.io.bench.header import is_of, name_and_unit
 from wirebayes.io.bench.quantities import ROLES, Role
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Specimens, Undecided
+from wirebayes.io.bench.unit_names import with_quantities
 from wirebayes.io.bench.unread import speaks_of_specimens
 from wirebayes.io.bench.words import speaks_of_a_quantity
 from wirebayes.numeric.typing import Floats
@@ -76,6 +77,7 @@ def side_by_side(
     InputError
         Two columns have one name and are not of two specimens; `Undecided` where two specimens read nearly the same.
     """
+    table = with_quantities(table)
     marked = None if stated == "one" else _marked(table, mapping, stated == "several")
     if marked is None:
         table.check_names()

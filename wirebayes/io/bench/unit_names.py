@@ -1,0 +1,56 @@
+"""Columns that a unit alone names, under names of specimens: ``Rope A;;Rope B;`` over ``mm;N;mm;N``.
+
+A unit under the name of a specimen says which quantity of it the column holds. Without names of several specimens above
+it does not: a column of millimetres may be a diameter.
+"""
+
+from dataclasses import replace
+
+from wirebayes.io.bench.header import NO_UNIT
+from wirebayes.io.bench.quantities import ROLES, Role, unit_of
+from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.words import speaks_of_a_quantity
+
+
+def with_quantities(table: RawTable) -> RawTable:
+    """The table with the quantity of each column as its name, and the specimens in the row above.
+
+    Parameters
+    ----------
+    table : RawTable
+        Its header holds the units, and the row above the specimens; or the header holds the specimens, each over all
+        columns of its own, and the units stand below.
+
+    Returns
+    -------
+    RawTable
+        The same where columns have names of their own.
+    """
+    cells = tuple(cell.strip("[]() ") for cell in table.header)
+    if _are_named_by_units(cells) and len({label for label in table.above if label}) > 1:
+        return replace(table, header=_quantities(cells, cells), units=cells, header_line=table.header_line - 1)
+    repeated = {name for name in table.header if name and table.header.count(name) > 1}
+    under_repeated = tuple(
+        unit if name in repeated else "" for name, unit in zip(table.header, table.units, strict=True)
+    )
+    of_specimens = len(repeated) > 1 and not any(map(speaks_of_a_quantity, repeated))
+    if of_specimens and _are_named_by_units(under_repeated):
+        return replace(table, header=_quantities(table.header, under_repeated), above=table.header)
+    return table
+
+
+def _are_named_by_units(cells: tuple[str, ...]) -> bool:
+    """Whether all cells but empty ones are units, each of one quantity."""
+    filled = [cell for cell in cells if cell not in NO_UNIT]
+    return len(filled) > 1 and all(_quantity(cell) for cell in filled)
+
+
+def _quantities(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, ...]:
+    """The quantities of units, and the names of columns without one."""
+    return tuple(_quantity(unit) or name for name, unit in zip(names, units, strict=True))
+
+
+def _quantity(unit: str) -> Role | None:
+    """The only quantity that has a unit."""
+    of = [role for role in ROLES if unit_of(unit, role)]
+    return of[0] if len(of) == 1 else None
