@@ -190,13 +190,8 @@ def _together(lines: dict[str, WireDraws]) -> WireDraws:
     return replace(first, others=lines)
 
 
-def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effects: Path | None) -> WireDraws:
-    """A line known from several specimens: what they have in common, and how they differ."""
-    folders = [folder_of(line, experiment) for line in lines]
-    if len(folders) < 2:
-        raise InputError(f"--wires: found {len(folders)} specimen, expected two or more")
-    tests = [read_back.load(folder, experiment, own_effects) for folder in folders]
-    ones = [_usable(stored, str(folder), count) for folder, stored in zip(folders, tests, strict=True)]
+def _check_plain_and_alike(folders: Sequence[Path], ones: Sequence[WireDraws]) -> None:
+    """Refuse fits that cannot be compared: with effects, or with other laws than the first."""
     first = ones[0]
     for folder, one in zip(folders, ones, strict=True):
         if one.material() or LENGTH_EXPONENT in one.parameters:
@@ -206,6 +201,17 @@ def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effec
                 f"{folder}: found a fit with {one.law} and {one.history}, expected {first.law} and {first.history} as "
                 f"in {folders[0]}"
             )
+
+
+def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effects: Path | None) -> WireDraws:
+    """A line known from several specimens: what they have in common, and how they differ."""
+    folders = [folder_of(line, experiment) for line in lines]
+    if len(folders) < 2:
+        raise InputError(f"--wires: found {len(folders)} specimen, expected two or more")
+    tests = [read_back.load(folder, experiment, own_effects) for folder in folders]
+    ones = [_usable(stored, str(folder), count) for folder, stored in zip(folders, tests, strict=True)]
+    first = ones[0]
+    _check_plain_and_alike(folders, ones)
     logarithms = []
     for stored, one in zip(tests, ones, strict=True):
         values = np.log(np.column_stack([stored.draws[name] for name in CORE]))

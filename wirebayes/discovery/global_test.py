@@ -105,9 +105,8 @@ def examine(
     data, patterns, expansions = [], [], []
     for block in blocks:
         listed, columns = residual_patterns.patterns(block.target.problem)
-        x = expand(block.target, block.modes.z[:1], trials, columns=columns)
-        expansions.append(x)
-        data.append(scan(x))
+        expansions.append(expand(block.target, block.modes.z[:1], trials, columns=columns))
+        data.append(scan(expansions[-1]))
         patterns.append(listed)
     simulated: list[Replicates] = []
     larger: Continuation | None = None
@@ -119,9 +118,7 @@ def examine(
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
         by_larger = 1.0
-        # They only make p smaller: nothing is gained where it can be no smaller, or is below the level beyond doubt.
-        could_be_smaller = test.p > 1.0 / (1 + len(test.null))
-        if could_be_smaller and (test.p > alpha or is_close(test.p, alpha, len(test.null))):
+        if _larger_effects_could_decide(test, alpha):
             report("larger effects", 0, 1)
             larger = larger or Continuation(blocks, trials, candidates, data, parallel_map)
             test = larger.test(simulated, test)
@@ -131,6 +128,12 @@ def examine(
             break
     report("simulations", len(blocks), len(blocks))
     return Gate(blocks, struck, trials, candidates, patterns, expansions, data, nulls, test)
+
+
+def _larger_effects_could_decide(test: GlobalTest, alpha: float) -> bool:
+    """They only make p smaller: nothing is gained where it can be no smaller, or is below the level beyond doubt."""
+    could_be_smaller = test.p > 1.0 / (1 + len(test.null))
+    return could_be_smaller and (test.p > alpha or is_close(test.p, alpha, len(test.null)))
 
 
 def _next_total(made: int, simulations: int) -> int:

@@ -111,9 +111,8 @@ def _scan_few(x: Expansion) -> Scan:
     two = log_bayes_of_two(x, found, log_sum(effects, axis=1), reference)
     flexible_value = log_sum(every.reshape(len(every), -1), axis=1) - np.log(every.shape[2]) - reference
     best = np.argmax(effects, axis=1)[:, None]
-    amplitude, at_best, c_best = (np.take_along_axis(v, best, axis=1)[:, 0] for v in (b / c, left, c))
-    # there may be fewer readings than parameters, of which nothing is known
-    norm = np.sqrt(np.maximum(np.where(np.isfinite(c_best), c_best, 0.0) * degrees / at_best, 0.0))
+    amplitude = np.take_along_axis(b / c, best, axis=1)[:, 0]
+    norm = _norm(np.take_along_axis(c, best, axis=1)[:, 0], np.take_along_axis(left, best, axis=1)[:, 0], degrees)
     return Scan(
         np.where(seen[:, None], log_sum(effects, axis=1) - reference[:, None], 0.0),
         np.where(seen, flexible_value, 0.0),
@@ -122,6 +121,13 @@ def _scan_few(x: Expansion) -> Scan:
         norm,
         Pieces(shared.T, rss.T, np.swapaxes(b, 0, 1), np.swapaxes(c, 0, 1), degrees, x.least, x.one_sided),
     )
+
+
+def _norm(square: Array, left: Array, degrees: int) -> Array:
+    """Size of an effect of amplitude one beside the noise."""
+    # there may be fewer readings than parameters, of which nothing is known
+    known = np.where(np.isfinite(square), square, 0.0)
+    return np.sqrt(np.maximum(known * degrees / left, 0.0))
 
 
 _PIECE = 16  # parameter sets scanned at once: what stays in the cache

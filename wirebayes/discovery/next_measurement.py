@@ -67,34 +67,36 @@ def alternatives(p: Protocol, alone: bool, units: Units = NATURAL, settings: str
     settings : str
         What is set in all the samples; displacements or weights, as in this one, when left out.
     """
-    recorded = p.recorded
     unit, settings = SET_UNIT[p.control], settings or _SETTINGS[p.control]
     one, second = units.of(unit), units.time_s
-    x = p.setting[recorded]
-    down = x[-2::-1] if len(x) > 1 else x
+    x = p.setting[p.recorded]
     times = _longest_series(p)
     long = LONGER * (times[-1] or p.duration_s.max() or 1.0)
     log_times = np.concatenate([[0.0], np.geomspace(long / 300.0, long, 24)])
     ends = list(dict.fromkeys(f"{one * end:g}" for end in (x.min(), x.max())))
     span = f"{' to '.join(ends)} {unit}" if alone else f"each sample's {settings}"
     dense = f"{second * long:g} s with 25 readings spaced evenly in the logarithm of time"
-    there_and_back = np.concatenate([x, down])
-    halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
-    finer = f"take twice as many, half as large steps over {span}"
-    if len(x) == 1:  # nothing between holds to halve: the way to the only one
-        halved = x * np.linspace(0.25, 1.0, 4)
-        finer = f"go to {span} in four steps, each held {second * times[-1]:g} s"
+    held = f"each held {second * times[-1]:g} s"
+    there_and_back = np.concatenate([x, x[-2::-1] if len(x) > 1 else x])
     last = f" from {one * x.max():g} to {one * x.min():g} {unit}" if alone else ", of every sample"
-    back = f"the same {settings} back{last}, each held {second * times[-1]:g} s"
+    halved, finer = _halved(x, span, held)
     return [
         MeasurementPlan(words, holds, moments, p.length_mm, p.control)
         for words, holds, moments in (
-            (f"unload the wire after the last hold: {back}", there_and_back, times),
+            (f"unload the wire after the last hold: the same {settings} back{last}, {held}", there_and_back, times),
             (f"hold each of the {settings} {span} for {dense}", x, log_times),
             (f"load and unload over {span}, each hold {dense}", there_and_back, log_times),
             (finer, halved, times),
         )
     ]
+
+
+def _halved(x: Array, span: str, held: str) -> tuple[Array, str]:
+    """Settings with steps half as large, in words too; of a single hold, which has no step, the way to it."""
+    if len(x) == 1:
+        return x * np.linspace(0.25, 1.0, 4), f"go to {span} in four steps, {held}"
+    halved = np.sort(np.concatenate([x, x[:-1] + 0.5 * np.diff(x)]))
+    return halved, f"take twice as many, half as large steps over {span}"
 
 
 LONGER = 5.0  # times the longest series: holds in which slow and fast creep part

@@ -49,7 +49,6 @@ def remainder_evidence(block: LaplaceFit, reference: Reference) -> float:
         The mean over processes and over their sizes.
     """
     target, best = block.target, block.modes.z[:1]
-    noise = _noise_columns(target)
     fit = expand(target, best, [], reference=reference)
     plain, beside = evidences(fit)
     without = float(log_sum(plain, axis=1)[0])
@@ -62,15 +61,23 @@ def remainder_evidence(block: LaplaceFit, reference: Reference) -> float:
         starts.append((other[None], there, evidences(there)[1]))
     for start, here, known in starts:
         z, moved = _refitted(target, start, here, _most_probable(known), reference)
-        with_noise_of_fit = z.copy()
-        with_noise_of_fit[:, noise] = best[:, noise]
-        # the scale of the noise is integrated out: only the prior of the other parameters counts
-        prior = residuals(target, np.concatenate([z, with_noise_of_fit]))[1]
+        prior = _priors(target, z, best)
         tops = _top_of_prior(moved) - prior[0] + prior[1] - _top_of_prior(fit)
         units = _log_units(target, z) - _log_units(target, best)
         found.append(_mean(evidences(moved)[1]) + tops - units)
     values = np.array(found)
     return float(values[np.isfinite(values)].max(initial=-np.inf)) - without
+
+
+def _priors(target: LogPosterior, z: Array, best: Array) -> Array:
+    """Log prior at a point, and at the same point with the noise of the best fit.
+
+    The scale of the noise is integrated out: only the prior of the other parameters counts.
+    """
+    noise = _noise_columns(target)
+    with_noise_of_fit = z.copy()
+    with_noise_of_fit[:, noise] = best[:, noise]
+    return residuals(target, np.concatenate([z, with_noise_of_fit]))[1]
 
 
 def _noise_columns(target: LogPosterior) -> list[int]:

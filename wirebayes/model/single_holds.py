@@ -115,37 +115,36 @@ def hold_courses(
     theta = dict(theta) | {"preload": np.zeros(n)}
     if protocol.control == "force":
         return _under_weights(protocol, theta | {"k1": np.full(n, np.inf)}, model, first)
+    first = np.broadcast_to(first, (len(protocol.setting), n))
     call = compiled.call(protocol, theta, model)
     if call is not None:
-        first = np.broadcast_to(first, (len(protocol.setting), n))
         tension, slope = compiled.kernel.courses(*call, first, _NEWTON_STEPS)
         valid = (first > 0) & (slope[:, 0] > 0)
         recorded = protocol.recorded
         return [(t, s, v) if known else None for t, s, v, known in zip(tension, slope, valid, recorded, strict=True)]
     walk = Walk(protocol, theta, model)
-    out: list[tuple[Array, Array, Array] | None] = []
-    for j in range(len(protocol.setting)):
-        if not protocol.mask[j].any():
-            out.append(None)
-            continue
-        target = np.broadcast_to(first[j], (n,))
-        valid = target > 0
-        target = np.where(valid, target, 1.0)
-        strain = target / walk.k1
-        displacement = protocol.length_mm * strain
-        if model.law == "modified":
-            displacement = displacement / np.maximum(1.0 - strain, 0.1)
-        for _ in range(_NEWTON_STEPS):
-            tension, slope = walk.fresh(j, displacement, slice(1))
-            # A slack guess has no slope: go out until it pulls.
-            pulls = slope[0] > 0
-            move = np.where(pulls, (target - tension[0]) / np.where(pulls, slope[0], 1.0), strain * protocol.length_mm)
-            displacement = displacement + move
-            if np.max(np.abs(move)) < 1e-12 * protocol.length_mm:
-                break
-        tension, slope = walk.fresh(j, displacement)
-        out.append((tension, slope, valid & (slope[0] > 0)))
-    return out
+    return [_course(walk, j, first[j]) if protocol.mask[j].any() else None for j in range(len(protocol.setting))]
+
+
+def _course(walk: Walk, j: int, first: Array) -> tuple[Array, Array, Array]:
+    """The course of a hold from its first reading (n,), as `hold_courses` returns it."""
+    length_mm = walk.protocol.length_mm
+    valid = first > 0
+    target = np.where(valid, first, 1.0)
+    strain = target / walk.k1
+    displacement = length_mm * strain
+    if walk.model.law == "modified":
+        displacement = displacement / np.maximum(1.0 - strain, 0.1)
+    for _ in range(_NEWTON_STEPS):
+        tension, slope = walk.fresh(j, displacement, slice(1))
+        # A slack guess has no slope: go out until it pulls.
+        pulls = slope[0] > 0
+        move = np.where(pulls, (target - tension[0]) / np.where(pulls, slope[0], 1.0), strain * length_mm)
+        displacement = displacement + move
+        if np.max(np.abs(move)) < 1e-12 * length_mm:
+            break
+    tension, slope = walk.fresh(j, displacement)
+    return tension, slope, valid & (slope[0] > 0)
 
 
 def _under_weights(

@@ -131,6 +131,8 @@ def identify(
     low, high = (_logged(end, logarithmic) for end in (wide.min(axis=0), wide.max(axis=0)))
     if "k1" in names:
         low[names.index("k1")] = np.log(_LEAST_STIFFNESS * experiment.tension().max())
+    predicted = _predicted(experiment, variant)
+    measured = experiment.tension()[predicted]
 
     def natural(z: Array) -> dict[str, Array]:
         """(n, d) search coordinates as parameters, each (n,)."""
@@ -143,23 +145,31 @@ def identify(
         values = residuals(experiment, natural(z), variant)[predicted]
         return np.where(np.isfinite(values), values, measured[:, None])
 
-    protocol = experiment.protocol()
-    predicted = protocol.mask.copy()
+    draws = prior.rvs(_DRAWS, rng)[:, columns]
+    end, cost = _best_descent(misfit, _logged(draws, logarithmic), low, high)
+    found = {name: float(value[0]) for name, value in natural(end[None]).items()}
+    ordered = {name: found[name] for name in adjusted(variant)}
+    loose = np.maximum(0.01 * (high - low), cost * _per_unit_misfit(misfit, end))
+    edge = np.minimum(end - low, high - end) < loose
+    return Identified(ordered, cost, tuple(name for name, on in zip(names, edge, strict=True) if on))
+
+
+def _predicted(experiment: Experiment, variant: ModelSpec) -> NDArray[np.bool_]:
+    """Which readings (H, R) are predicted: hold by hold all but the first of each."""
+    predicted = experiment.protocol().mask.copy()
     if variant.likelihood == "hold":
         predicted[:, 0] = False
-    measured = experiment.tension()[predicted]
-    draws = prior.rvs(_DRAWS, rng)[:, columns]
+    return predicted
+
+
+def _best_descent(misfit: Callable[[Array], Array], points: Array, low: Array, high: Array) -> tuple[Array, float]:
+    """Where the best descent ends, of those from the best of many points, and its rms misfit."""
     with np.errstate(all="ignore"):
-        starts = np.clip(_logged(draws, logarithmic), low + 1e-9, high - 1e-9)
+        starts = np.clip(points, low + 1e-9, high - 1e-9)
         best = starts[np.argsort((misfit(starts) ** 2).sum(axis=0), kind="stable")[:_STARTS]]
         ends = [_descend(misfit, start, low, high) for start in best]
     costs = np.array([np.sqrt(np.mean(misfit(z[None]) ** 2)) for z in ends])
-    end = ends[int(np.argmin(costs))]
-    found = {name: float(value[0]) for name, value in natural(end[None]).items()}
-    ordered = {name: found[name] for name in adjusted(variant)}
-    loose = np.maximum(0.01 * (high - low), costs.min() * _per_unit_misfit(misfit, end))
-    edge = np.minimum(end - low, high - end) < loose
-    return Identified(ordered, float(costs.min()), tuple(name for name, on in zip(names, edge, strict=True) if on))
+    return ends[int(np.argmin(costs))], float(costs.min())
 
 
 def leading(experiment: Experiment, holds: int) -> int:

@@ -119,10 +119,20 @@ class Gallery:
             Posteriors of all holds, ``hold`` and ``chain``.
         """
         draws = {kind: {k: some(v) for k, v in full[kind].draws.items()} for kind in ("hold", "chain")}
+        self._stiffness_and_amount(e, published, draws, full["hold"].draws)
+        self._amount_and_rate(e, published, draws, full["hold"].draws)
+
+    def _stiffness_and_amount(
+        self,
+        e: Experiment,
+        published: Mapping[str, float],
+        draws: Mapping[str, Mapping[str, Array]],
+        by_hold: Mapping[str, Array],
+    ) -> None:
         mark = (published["k1"], published["B"])
-        k1, B, k2 = ({kind: d[name] for kind, d in draws.items()} for name in ("k1", "B", "k2"))
+        k1, B = ({kind: d[name] for kind, d in draws.items()} for name in ("k1", "B"))
         figure = figures.joint(k1, B, figures.named("k1"), figures.named("B"), e.name, mark)
-        low, high = np.quantile(full["hold"].draws["k1"], [0.05, 0.95])
+        low, high = np.quantile(by_hold["k1"], [0.05, 0.95])
         caption = f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B changes with it."
         jump = stiffest_step(e)
         if abs(jump / published["k1"] - 1) < 0.02:
@@ -130,11 +140,19 @@ class Gallery:
             caption += f" The published {nearest}, {number(jump, 4)} N."
         alt = f"Posterior draws of k1 and B of {e.name}: a long ridge hold by hold, a small cloud as a chain."
         self.add("ridge", e.name, figure, alt, caption)
+
+    def _amount_and_rate(
+        self,
+        e: Experiment,
+        published: Mapping[str, float],
+        draws: Mapping[str, Mapping[str, Array]],
+        by_hold: Mapping[str, Array],
+    ) -> None:
+        k2 = {kind: d["k2"] for kind, d in draws.items()}
         product = {kind: d["k1"] * d["B"] for kind, d in draws.items()}
         mark = (published["k2"], published["k1"] * published["B"])
         figure = figures.joint(k2, product, figures.named("k2"), "k1·B, N mm N⁻ᵁ", e.name, mark)
-        whole = full["hold"].draws
-        correlation = float(np.corrcoef(np.log(whole["k1"] * whole["B"]), np.log(whole["k2"]))[0, 1])
+        correlation = float(np.corrcoef(np.log(by_hold["k1"] * by_hold["B"]), np.log(by_hold["k2"]))[0, 1])
         time_s = e.recorded_holds[-1].duration_s
         theirs = (np.asarray(published[name]) for name in ("k2", "N"))
         share = 100 * float(creep_fraction(np.asarray(time_s), *theirs))

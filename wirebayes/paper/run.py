@@ -121,48 +121,68 @@ def _tables_and_pictures(
     with workers(len(experiments)) as parallel_map:
         write_table(directory, "least_squares", identification.rows(experiments, table_4, training, seed, parallel_map))
     report("tables and pictures", 1, 3)
-    posterior: list[Row] = []
-    creep: list[Row] = []
-    forecasts: list[Row] = []
-    sampling: list[Row] = []
-    chains: dict[str, Stored] = {}
     drawn = pictures.Gallery(directory)
+    tables: dict[str, list[Row]] = {"posterior": [], "creep": [], "held_out": [], "sampling": []}
+    chains: dict[str, Stored] = {}
     for e in experiments:
-        full: dict[str, Stored] = {}
-        first: dict[str, Stored] = {}
-        seen: dict[str, HeldOut] = {}
-        for likelihood in LIKELIHOODS:
-            full[likelihood] = load(directory / e.name / likelihood)
-            first[likelihood] = load(directory / e.name / f"{likelihood}-first-{training}")
-            prior = _prior_draws(e, likelihood, seed)
-            posterior += verdicts.rows(e.name, likelihood, full[likelihood].draws, prior, table_4[e.name])
-            tension = round(full[likelihood].sample.model.tension_ref_N, 3)
-            creep += verdicts.creep_rows(
-                e.name, likelihood, full[likelihood].draws, table_4[e.name], tension, e.length_mm
-            )
-            rng = np.random.default_rng(seed_of(seed, "held out", e.name, likelihood))
-            seen[likelihood] = held_out(first[likelihood], e, rng)
-            forecasts.append(_forecast_row(e.name, likelihood, seen[likelihood]))
-            for suffix in ("", f"-first-{training}"):
-                sampling.append(_sampling_row(directory, e.name, likelihood, suffix))
+        full, first = _stored(directory / e.name, training)
+        seen = {
+            likelihood: held_out(stored, e, np.random.default_rng(seed_of(seed, "held out", e.name, likelihood)))
+            for likelihood, stored in first.items()
+        }
+        own = _rows(directory, e, full, seen, table_4[e.name], training, seed)
+        for name, rows in own.items():
+            tables[name] += rows
         chains[e.name] = full["chain"]
-        mine = [row for row in posterior if row["experiment"] == e.name]
-        _draw(drawn, e, table_4[e.name], full, first, seen, mine, seed)
-    for name, rows in (("posterior", posterior), ("creep", creep), ("held_out", forecasts), ("sampling", sampling)):
+        _draw(drawn, e, table_4[e.name], full, first, seen, own["posterior"], seed)
+    for name, rows in tables.items():
         write_table(directory, name, rows)
     write_table(directory, "measured", [_measured_row(e) for e in experiments])
     report("tables and pictures", 2, 3)
+    lengths = {e.name: e.length_mm for e in experiments}
+    lines = {name: section_4.as_line(chain) for name, chain in chains.items()}
     robot = section_4.rows(chains, seed)
     write_table(directory, "robot", robot)
-    lines, lengths = {n: section_4.as_line(c) for n, c in chains.items()}, {e.name: e.length_mm for e in experiments}
     write_table(directory, "robot_claim", claim_steps.rows(section_4.MAPPED, table_4, lengths, lines))
     write_table(directory, "robot_mass", section_4.needed(chains))
-    limit_mm = published["pose_claim"]["centre_moves_less_than_mm"]
-    section_4.draw(drawn, robot, limit_mm)
-    section_4.draw_poses(drawn, chains, limit_mm)
-    section_4.draw_maps(drawn, chains)
+    _draw_robot(drawn, robot, chains, published["pose_claim"]["centre_moves_less_than_mm"])
     drawn.finish()
     report("tables and pictures", 3, 3)
+
+
+def _draw_robot(drawn: pictures.Gallery, rows: list[Row], chains: Mapping[str, Stored], limit_mm: float) -> None:
+    section_4.draw(drawn, rows, limit_mm)
+    section_4.draw_poses(drawn, chains, limit_mm)
+    section_4.draw_maps(drawn, chains)
+
+
+def _stored(folder: Path, training: int) -> tuple[dict[str, Stored], dict[str, Stored]]:
+    """An experiment's posteriors by likelihood: of all holds, and of the first ones."""
+    full: dict[str, Stored] = {likelihood: load(folder / likelihood) for likelihood in LIKELIHOODS}
+    return full, {likelihood: load(folder / f"{likelihood}-first-{training}") for likelihood in LIKELIHOODS}
+
+
+def _rows(
+    directory: Path,
+    e: Experiment,
+    full: Mapping[str, Stored],
+    seen: Mapping[str, HeldOut],
+    published: Mapping[str, float],
+    training: int,
+    seed: int,
+) -> dict[str, list[Row]]:
+    """What each table says of one experiment."""
+    out: dict[str, list[Row]] = {"posterior": [], "creep": [], "held_out": [], "sampling": []}
+    for likelihood in LIKELIHOODS:
+        draws = full[likelihood].draws
+        tension = round(full[likelihood].sample.model.tension_ref_N, 3)
+        prior = _prior_draws(e, likelihood, seed)
+        out["posterior"] += verdicts.rows(e.name, likelihood, draws, prior, published)
+        out["creep"] += verdicts.creep_rows(e.name, likelihood, draws, published, tension, e.length_mm)
+        out["held_out"].append(_forecast_row(e.name, likelihood, seen[likelihood]))
+        for suffix in ("", f"-first-{training}"):
+            out["sampling"].append(_sampling_row(directory, e.name, likelihood, suffix))
+    return out
 
 
 def _draw(

@@ -5,12 +5,14 @@ posterior is found from the truth; draws of a Student t at the mode, weighted by
 include the curvature of the posterior and the priors of a fit; a second mode far from the truth is not found.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wirebayes.inference.climb import climb
+from wirebayes.inference.climb import Optimum, climb
 from wirebayes.inference.log_posterior import Density, LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import ExpectedWidth
@@ -140,37 +142,69 @@ def expected_widths(
     truth = np.column_stack([guess[name] for name in problem.names])
     y = readings(problem, truth, sample, rng)
     usable = np.isfinite(y[sample.protocol.mask]).all(axis=0) & np.isfinite(problem.prior.log_density()(truth))
-    start = target.coordinates.to_sampled(truth[usable])
     y = y[..., usable]
-    density, residuals = target.rowwise([y])
-    found = climb(density, start, residuals, iterations=40, tolerance=1e-3)
-    good = np.flatnonzero(np.isfinite(found.log_density))
+    found, good = _climbed(target, truth[usable], y)
     longest = float(sample.protocol.duration_s.max())
     tension = typical_tension(test) if tension_N is None else tension_N
     length = test.length_mm if length_mm is None else length_mm
+    quantities = partial(_quantities, problem, tension_N=tension, longest_s=longest, length_mm=length)
+    widths, volumes, draws = list[dict[str, Array]](), list[Array](), list[dict[str, Array]]()
+    for part in _posteriors(target, found, good, y, rng):
+        values = {name: v.reshape(part.weight.shape) for name, v in quantities(part.theta).items()}
+        widths.append({name: _row_widths(v, part.weight) for name, v in values.items()})
+        volumes.append(_log_volume(part.theta.reshape(*part.weight.shape, -1), part.weight, problem))
+        for weight, row in list(zip(part.weight, _rows(values), strict=True))[: kept_draws - len(draws)]:
+            pick = rng.choice(len(weight), _KEPT, p=weight)
+            draws.append({name: v[pick] for name, v in row.items()})
+    before = quantities(truth[usable])
+    expected = {
+        name: _width(np.concatenate([w[name] for w in widths]), before[name], _unit(name, test)) for name in widths[0]
+    }
+    bits = _bits(problem, np.concatenate(volumes))
+    return Expected(expected, tension, length, longest, bits, len(good), tuple(draws))
+
+
+@dataclass(frozen=True)
+class _Posteriors:
+    """Of some simulated tests: draws of all of them after each other (tests * draws, d), and their weights."""
+
+    theta: Array
+    weight: Array
+
+
+def _posteriors(
+    target: LogPosterior, found: Optimum, good: NDArray[np.intp], y: Array, rng: np.random.Generator
+) -> Iterator[_Posteriors]:
+    """Weighted draws around the best parameters of each test, some tests at once."""
     covariance = found.covariance
-    good = good[np.isfinite(covariance[good]).all(axis=(1, 2))]
-    if not len(good):
-        raise ValueError("no simulated test could be fitted")
-    rows: list[dict[str, Array]] = []
-    volumes, draws = list[Array](), list[dict[str, Array]]()
     for begin in range(0, len(good), _ROWS):
         part = good[begin : begin + _ROWS]
-        theta, weight = _weighted(target, found.z[part], covariance[part], y[..., part], rng)
-        values = _quantities(problem, theta, tension, longest, length)
-        rows.append({name: _row_widths(v.reshape(weight.shape), weight) for name, v in values.items()})
-        volumes.append(_log_volume(theta.reshape(*weight.shape, -1), weight, problem))
-        for at in range(min(len(part), kept_draws - len(draws))):
-            pick = rng.choice(weight.shape[1], _KEPT, p=weight[at])
-            draws.append({name: v.reshape(weight.shape)[at, pick] for name, v in values.items()})
-    before = _quantities(problem, truth[usable], tension, longest, length)
-    widths = {
-        name: _width(np.concatenate([r[name] for r in rows]), before[name], _unit(name, test)) for name in rows[0]
-    }
+        yield _Posteriors(*_weighted(target, found.z[part], covariance[part], y[..., part], rng))
+
+
+def _rows(values: Mapping[str, Array]) -> list[dict[str, Array]]:
+    """The quantities (tests, draws) of each test."""
+    return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+
+
+def _climbed(target: LogPosterior, truth: Array, y: Array) -> tuple[Optimum, NDArray[np.intp]]:
+    """The best parameters of each simulated test, and of which tests there is a posterior around them."""
+    density, residuals = target.rowwise([y])
+    start = target.coordinates.to_sampled(truth)
+    found = climb(density, start, residuals, iterations=40, tolerance=1e-3)
+    good = np.flatnonzero(np.isfinite(found.log_density))
+    good = good[np.isfinite(found.covariance[good]).all(axis=(1, 2))]
+    if not len(good):
+        raise ValueError("no simulated test could be fitted")
+    return found, good
+
+
+def _bits(problem: Problem, log_volumes: Array) -> float:
+    """Information in a test: how many times the volume of the parameters is halved (median over tests)."""
     prior = problem.prior.rvs(4000, np.random.default_rng(0))
-    known = _log_volume(prior[None], np.full((1, len(prior)), 1.0 / len(prior)), problem)
-    bits = float((known[0] - np.median(np.concatenate(volumes))) / np.log(2.0))
-    return Expected(widths, tension, length, longest, bits, len(good), tuple(draws))
+    equal = np.full((1, len(prior)), 1.0 / len(prior))
+    known = _log_volume(prior[None], equal, problem)
+    return float((known[0] - np.median(log_volumes)) / np.log(2.0))
 
 
 def _weighted(

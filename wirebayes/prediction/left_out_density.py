@@ -54,14 +54,7 @@ def log_densities(
     z = target.coordinates.to_sampled(draws)
     pool = importance.from_draws(joined(target, holds), z, target.coordinates.order, rng, _ESS)
     elpd, settled = -pool.log_ratio[1:], pool.settled[0] & pool.settled[1:]
-    told = np.flatnonzero(settled & doubtful).tolist()
-    further = searches(target, rng, len(told), without_holds(problem, [holds[m] for m in told])) if told else []
-    for m, found in zip(told, further, strict=True):
-        left = copy(target)  # in the same coordinates, under the same prior
-        left.problem = without_hold(problem, *holds[m])
-        log_integral = float(pool.log_integral[0] + pool.log_ratio[1 + m])
-        others = importance.widened(found)
-        settled[m] = abs(overlooked(left, pool, 1 + m, log_integral, others, rng)) <= _MISSED
+    _bear_witness(target, holds, pool, settled, doubtful, rng)
     log_whole, known = float(pool.log_integral[0]), bool(pool.settled[0])
     missing = np.flatnonzero(~settled & (known | doubtful)).tolist()
     if missing and not known:
@@ -71,11 +64,38 @@ def log_densities(
         s, j = holds[m]
         alone = weighted_posterior(without_hold(problem, s, j), seed_of(seed, str(s), str(j)), _ALONE)
         elpd[m], settled[m] = log_whole - alone.log_evidence, known and alone.converged
-    log_units = [
-        sample.protocol.mask[j].sum() * np.log(problem.read_unit(sample) / asked.read_unit(sample))
-        for sample, j in ((problem.samples[s], j) for s, j in holds)
-    ]
-    return elpd - np.array(log_units), settled
+    return elpd - _log_units(asked, problem, holds), settled
+
+
+def _bear_witness(
+    target: LogPosterior,
+    holds: Holds,
+    pool: importance.Weighted,
+    settled: NDArray[np.bool_],
+    doubtful: NDArray[np.bool_],
+    rng: np.random.Generator,
+) -> None:
+    """Of the doubtful holds that seem settled, those stay so of which a search of its own finds nothing overlooked."""
+    told = np.flatnonzero(settled & doubtful).tolist()
+    if not told:
+        return
+    without = without_holds(target.problem, [holds[m] for m in told])
+    for m, found in zip(told, searches(target, rng, len(told), without), strict=True):
+        left = copy(target)  # in the same coordinates, under the same prior
+        left.problem = without_hold(target.problem, *holds[m])
+        log_integral = float(pool.log_integral[0] + pool.log_ratio[1 + m])
+        others = importance.widened(found)
+        settled[m] = abs(overlooked(left, pool, 1 + m, log_integral, others, rng)) <= _MISSED
+
+
+def _log_units(asked: Problem, own: Problem, holds: Holds) -> Array:
+    """By how much the log density of each hold's readings differs in own units from that in the units asked for."""
+    out = []
+    for s, j in holds:
+        sample = own.samples[s]
+        readings = sample.protocol.mask[j].sum()
+        out.append(readings * np.log(own.read_unit(sample) / asked.read_unit(sample)))
+    return np.array(out)
 
 
 def without_hold(problem: Problem, sample: int, hold: int) -> Problem:

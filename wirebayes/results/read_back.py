@@ -194,18 +194,10 @@ def _measured(
     """One experiment's holds, unrecorded ones at their place, and its (H, R) readings, padded with zeros."""
     read_as = READ[control] if READ[control] in observed else READING
     set_as = SET[control] if SET[control] in constant else SETTING
-    holds = constant["hold"]
-    own = constant["experiment"] == name if "experiment" in constant else np.full(len(holds), True)
-    if not np.array_equal(observed["hold"], holds):
-        raise ValueError("readings and holds that do not belong together")
-    here = {key: constant[key][own] for key in (set_as, "duration_s", "time_s")}
+    own = _of_experiment(constant, observed, name)
     measured = observed[read_as][own]
     width = int(np.isfinite(measured).sum(axis=1).max())
-    before, unrecorded = np.zeros(0, int), dict[str, Array]()
-    if "unrecorded_before_hold" in constant:
-        mine = constant["unrecorded_experiment"] == name
-        before = constant["unrecorded_before_hold"][mine]
-        unrecorded = {key: constant[f"unrecorded_{key}"][mine] for key in (set_as, "duration_s")}
+    before, unrecorded = _unrecorded(constant, name, set_as)
     number = constant["number" if "number" in constant else "hold"][own]
     # An unrecorded hold stands before the recorded one it names; several keep their order.
     place = np.argsort(np.concatenate([before - 0.5, number]), kind="stable")
@@ -214,11 +206,11 @@ def _measured(
         none = np.full((len(before), *recorded.shape[1:]), np.nan) if others is None else others
         return np.concatenate([none, recorded])[place]
 
-    readings, times = (whole(values)[:, :width] for values in (measured, here["time_s"]))
+    readings, times = (whole(values)[:, :width] for values in (measured, constant["time_s"][own]))
     mask = np.isfinite(readings)
     if not np.array_equal(mask, np.isfinite(times)):
         raise ValueError("readings and times that do not belong together")
-    setting, duration = (whole(here[key], unrecorded.get(key)) for key in (set_as, "duration_s"))
+    setting, duration = (whole(constant[key][own], unrecorded.get(key)) for key in (set_as, "duration_s"))
     protocol = Protocol(
         length_mm,
         setting,
@@ -232,6 +224,24 @@ def _measured(
     )
     padding = protocol.mask.shape[1] - readings.shape[1]  # a column where a hold went on after its last reading
     return protocol, np.pad(np.nan_to_num(readings), [(0, 0), (0, padding)])
+
+
+def _of_experiment(constant: Group, observed: Group, name: str) -> Array:
+    """Which holds are those of an experiment."""
+    holds = constant["hold"]
+    if not np.array_equal(observed["hold"], holds):
+        raise ValueError("readings and holds that do not belong together")
+    return constant["experiment"] == name if "experiment" in constant else np.full(len(holds), True)
+
+
+def _unrecorded(constant: Group, name: str, set_as: str) -> tuple[Array, dict[str, Array]]:
+    """Of an experiment's unrecorded holds the recorded one that each stands before, what was set, and how long."""
+    if "unrecorded_before_hold" not in constant:
+        return np.zeros(0, int), {}
+    mine = constant["unrecorded_experiment"] == name
+    return constant["unrecorded_before_hold"][mine], {
+        key: constant[f"unrecorded_{key}"][mine] for key in (set_as, "duration_s")
+    }
 
 
 def datatree(folder: Path) -> "xr.DataTree":

@@ -212,7 +212,8 @@ def _em(
     the others with it.
     """
     x, weight = x.astype(kind), weight.astype(kind)
-    (n, d), k, degrees = x.shape, len(mixture.weights), mixture.degrees
+    n, d = x.shape
+    degrees = mixture.degrees
     squares = (x[:, :, None] * x[:, None, :]).reshape(n, d * d)
     last = -np.inf
     for _ in range(EM_STEPS):
@@ -224,10 +225,7 @@ def _em(
         if not (members >= fewest * d).all():
             raise np.linalg.LinAlgError("empty component")
         heavy = share * (degrees + d) / (degrees + distances)
-        mass = heavy.sum(axis=1)
-        centres = (heavy @ x) / mass[:, None]
-        scale = (heavy @ squares).reshape(k, d, d) - mass[:, None, None] * centres[:, :, None] * centres[:, None, :]
-        centres, scale = centres.astype(float), scale.astype(float)
+        centres, scale = _moments(heavy, x, squares)
         scale += of_the_whole * np.eye(d)
         factors = np.linalg.cholesky(scale / (members + of_the_whole)[:, None, None])
         mixture = Mixture(members / members.sum(), centres, factors, degrees)
@@ -236,3 +234,13 @@ def _em(
             break
         last = log_likelihood
     return mixture
+
+
+def _moments(heavy: Array, x: Array, squares: Array) -> tuple[Array, Array]:
+    """Centre of each component, and the sum of squares around it, of points that count so heavily in it."""
+    k, d = len(heavy), x.shape[1]
+    mass = heavy.sum(axis=1)
+    centres = (heavy @ x) / mass[:, None]
+    around_origin = (heavy @ squares).reshape(k, d, d)
+    scale = around_origin - mass[:, None, None] * centres[:, :, None] * centres[:, None, :]
+    return centres.astype(float), scale.astype(float)

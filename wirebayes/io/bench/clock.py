@@ -53,16 +53,7 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
     InputError
         A cell is no clock; `Undecided` where ``a:b`` may be minutes or hours.
     """
-    moments: list[re.Match[str]] = []
-    for row in table.rows:
-        found = moment(row.cell(column))
-        if found is None or found["first"] is None or (found["half"] and not 1 <= int(found["first"]) <= 12):
-            raise table.complain(row.line, column, shown(row.cell(column)), UNDERSTOOD)
-        moments.append(found)
-        for part, called in (("date", "a date"), ("zone", "an offset from UTC")):
-            if (found[part] is None) != (moments[0][part] is None):
-                expected = f"a time with{'out' * (moments[0][part] is None)} {called}, as in the lines before"
-                raise table.complain(row.line, column, shown(row.cell(column)), expected)
+    moments = _moments(table, column)
     # what follows a date or stands before AM is of the day, and leaves no doubt
     of_clock = [m["date"] is None and m["half"] is None for m in moments]
     short = next((i for i, m in enumerate(moments) if of_clock[i] and m["third"] is None), None)
@@ -77,6 +68,21 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
     of_day = short is None and (not of_clock[0] or values[0] >= 3600.0)
     falls = np.concatenate([[False], np.diff(values) < -_MIDNIGHT])
     return values + _DAY * np.cumsum(falls), of_day
+
+
+def _moments(table: RawTable, column: int) -> list[re.Match[str]]:
+    """The parts of each cell; either all have a date, or none, and likewise an offset from UTC."""
+    moments: list[re.Match[str]] = []
+    for row in table.rows:
+        found = moment(row.cell(column))
+        if found is None or found["first"] is None or (found["half"] and not 1 <= int(found["first"]) <= 12):
+            raise table.complain(row.line, column, shown(row.cell(column)), UNDERSTOOD)
+        moments.append(found)
+        for part, called in (("date", "a date"), ("zone", "an offset from UTC")):
+            if (found[part] is None) != (moments[0][part] is None):
+                expected = f"a time with{'out' * (moments[0][part] is None)} {called}, as in the lines before"
+                raise table.complain(row.line, column, shown(row.cell(column)), expected)
+    return moments
 
 
 def _value(found: re.Match[str], leading: float) -> float:

@@ -1,10 +1,11 @@
 """The rows of a table that are readings: gaps filled, repetitions left out."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 from wirebayes.io.bench.columns import Column
 from wirebayes.io.bench.quantities import Role
-from wirebayes.io.bench.sheet import is_value
+from wirebayes.io.bench.sheet import Row, is_value
 from wirebayes.io.bench.stamps import is_coarse
 from wirebayes.io.bench.table import RawTable
 from wirebayes.sentences import counted
@@ -14,37 +15,57 @@ WHERE_MISSING = "; where a reading is missing, delete its row"
 
 def complete(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, list[str]]:
     """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows."""
-    notes, rows = [], list(table.rows)
     indices = [column.index for column in columns.values()]
-    measured = [columns[role].index for role in ("time", "tension")]
-    while rows and not any(is_value(rows[-1].cell(i)) for i in indices):
-        rows.pop()  # what stands under the readings
-    below = len(table.rows) - len(rows)
-    rows = [row for row in rows if any(row.cell(i) for i in indices)]
+    rows, below = _without_what_is_below(table, indices)
+    filled = _filled(rows, table, columns)
+    kept = _without_repetitions(filled, table, columns["time"].index)
+    gaps = sum(a.cells[i] != b.cell(i) for a, b in zip(filled, rows, strict=True) for i in indices)
+    notes = []
     if below:
         notes.append(f"{counted(below, 'line')} under the readings left out")
-    filled = []
-    last = dict.fromkeys(indices, "")
-    for row in rows:
-        cells = list(row.cells) + [""] * (len(table.header) - len(row.cells))
-        for role in ("hold", "displacement"):
-            if role in columns and not cells[columns[role].index]:
-                cells[columns[role].index] = last[columns[role].index]
-        last = {index: cells[index] for index in indices}
-        filled.append(replace(row, cells=tuple(cells)))
-    gaps = sum(a.cells[i] != b.cell(i) for a, b in zip(filled, rows, strict=True) for i in indices)
     if gaps:
         notes.append(f"{gaps} empty cells of hold or displacement filled with the value above them")
-    kept = [row for i, row in enumerate(filled) if not i or row.cells != filled[i - 1].cells]
-    times = [row.cells[columns["time"].index] for row in kept]
-    repeating = any(a == b for a, b in zip(times, times[1:], strict=False))
-    if repeating and is_coarse(replace(table, rows=tuple(filled)), columns["time"].index):
-        kept = filled  # readings that agree, not copies
     if len(kept) < len(filled):
         notes.append(f"rows that repeat the row above left out: {len(filled) - len(kept)}")
-    for row in kept:
-        for index in indices:
-            if not row.cells[index]:
-                missing = f"a number{WHERE_MISSING}" if index in measured else "a value here or in a line above"
-                raise table.complain(row.line, index, "an empty cell", missing)
+    _check_no_cell_is_empty(kept, table, columns)
     return replace(table, rows=tuple(kept)), notes
+
+
+def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Row], int]:
+    """Rows in which something is read, and how many lines without numbers stand under them."""
+    rows = list(table.rows)
+    while rows and not any(is_value(rows[-1].cell(i)) for i in indices):
+        rows.pop()
+    below = len(table.rows) - len(rows)
+    return [row for row in rows if any(row.cell(i) for i in indices)], below
+
+
+def _filled(rows: list[Row], table: RawTable, columns: dict[Role, Column]) -> list[Row]:
+    """Rows with the hold and the displacement of the row above where they have none."""
+    may_be_left_out = [columns[role].index for role in ("hold", "displacement") if role in columns]
+    last = dict.fromkeys(may_be_left_out, "")
+    filled = []
+    for row in rows:
+        cells = list(row.cells) + [""] * (len(table.header) - len(row.cells))
+        for index in may_be_left_out:
+            cells[index] = last[index] = cells[index] or last[index]
+        filled.append(replace(row, cells=tuple(cells)))
+    return filled
+
+
+def _without_repetitions(rows: list[Row], table: RawTable, time: int) -> list[Row]:
+    """Rows that do not repeat the one above; with coarse times those are readings that agree, not copies."""
+    kept = [row for i, row in enumerate(rows) if not i or row.cells != rows[i - 1].cells]
+    times = [row.cells[time] for row in kept]
+    repeating = any(a == b for a, b in pairwise(times))
+    return rows if repeating and is_coarse(replace(table, rows=tuple(rows)), time) else kept
+
+
+def _check_no_cell_is_empty(rows: list[Row], table: RawTable, columns: dict[Role, Column]) -> None:
+    for row in rows:
+        for role, column in columns.items():
+            if not row.cells[column.index]:
+                missing = (
+                    f"a number{WHERE_MISSING}" if role in ("time", "tension") else "a value here or in a line above"
+                )
+                raise table.complain(row.line, column.index, "an empty cell", missing)

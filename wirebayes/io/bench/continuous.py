@@ -30,11 +30,7 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
         The setting never stays, a stretch of it would be dropped, or times do not rise.
     """
     x, time = readings.setting, readings.time_s
-    stays = np.flatnonzero(np.diff(time) <= 0)
-    if len(stays):
-        row = int(stays[0]) + 1
-        found = f"{time[row]:g} s after {time[row - 1]:g} s"
-        raise readings.complain(row, "time", found, "times that rise")
+    _check_rising(readings)
     found_holds = plateaus(x, time, readings.step)
     kept = sum(p.end - p.begin for p in found_holds)
     if not found_holds or kept < COVERED * len(x):
@@ -46,19 +42,31 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
     zeros = [_moved(x, time, left, p) for p, left in zip(found_holds, lefts, strict=True)]
     moves[0] = min(moves[0], 2.0 * (float(time[found_holds[0].begin]) - zeros[0]))  # without a rest before the test
     rows = [_after_move(time, p, move) for p, move in zip(found_holds, moves, strict=True)]
-    noise = noise_of(x, readings.step)
-    holds = counted(len(rows), "hold")
-    notes = [
-        *resets,
-        f"a continuous recording of {len(x)} readings: {holds} where the {readings.role} stays within "
-        f"{noise:.2g} {readings.unit} or so, {len(x) - kept} readings of moves dropped",
-        f"each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
-        f"{np.median(moves):.3g} s (median), and readings as soon after one are left out",
-    ]
     since = [time[r] - zero for r, zero in zip(rows, zeros, strict=True)]
     last_s = float(time[found_holds[-1].left - 1])
     ends: list[float | None] = [end - zero for end, zero in zip([*zeros[1:], last_s], zeros, strict=True)]
+    notes = [*resets, *_notes(readings, len(rows), kept, float(np.median(moves)))]
     return Cut(rows, list(range(1, len(rows) + 1)), [level_of(x[r]) for r in rows], since, ends, True, notes, time)
+
+
+def _check_rising(readings: Readings) -> None:
+    time = readings.time_s
+    stays = np.flatnonzero(np.diff(time) <= 0)
+    if len(stays):
+        row = int(stays[0]) + 1
+        raise readings.complain(row, "time", f"{time[row]:g} s after {time[row - 1]:g} s", "times that rise")
+
+
+def _notes(readings: Readings, holds: int, kept: int, move_s: float) -> list[str]:
+    """What was understood and done."""
+    noise = noise_of(readings.setting, readings.step)
+    count = len(readings.setting)
+    return [
+        f"a continuous recording of {count} readings: {counted(holds, 'hold')} where the {readings.role} stays within "
+        f"{noise:.2g} {readings.unit} or so, {count - kept} readings of moves dropped",
+        f"each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
+        f"{move_s:.3g} s (median), and readings as soon after one are left out",
+    ]
 
 
 def _check_only_hold(readings: Readings, hold: Plateau) -> None:

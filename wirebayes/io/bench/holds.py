@@ -127,12 +127,7 @@ def _ingroups_between(
     """Holds whose rows are known."""
     x, notes = readings.setting, list(resets)
     times = [readings.time_s[rows] for rows in groups]
-    for rows, of_hold in zip(groups, times, strict=True):
-        stays = np.flatnonzero(np.diff(of_hold) <= 0)
-        if len(stays):
-            row = int(rows[stays[0] + 1])
-            found = f"{of_hold[stays[0] + 1]:g} s after {of_hold[stays[0]]:g} s in one hold"
-            raise readings.complain(row, "time", found, "times that rise; a later hold needs another number or place")
+    _check_rising(readings, groups, times)
     of_test = _since(readings, times, time_since) == "test"
     ends: list[float | None] = [None] * len(groups)
     if of_test:
@@ -158,6 +153,16 @@ def _ingroups_between(
         count = counted(len(groups), "hold")
         notes.append(f"{count}: a new one wherever the {readings.role} changes or the time starts again")
     return Cut(groups, number, levels, times, ends, of_test, notes, readings.time_s)
+
+
+def _check_rising(readings: Readings, groups: list[Rows], times: list[Floats]) -> None:
+    """Refuse times that do not rise within a hold."""
+    for rows, of_hold in zip(groups, times, strict=True):
+        stays = np.flatnonzero(np.diff(of_hold) <= 0)
+        if len(stays):
+            row = int(rows[stays[0] + 1])
+            found = f"{of_hold[stays[0] + 1]:g} s after {of_hold[stays[0]]:g} s in one hold"
+            raise readings.complain(row, "time", found, "times that rise; a later hold needs another number or place")
 
 
 def _scatter(readings: Readings, groups: Sequence[Rows]) -> str:

@@ -1,5 +1,6 @@
 """The readings of a sheet: where the header stands, whether a row of units follows, where the numbers begin and end."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wirebayes.errors import InputError
@@ -107,31 +108,46 @@ def find_table(sheet: Sheet) -> RawTable:
     units: tuple[str, ...] = ()
     if len(above) > 1 and _are_units(above[-1]) and len(above[-2].filled) >= max(2, len(above[-1].filled)):
         units = tuple(cell.strip("[]() ") for cell in above.pop().cells)
-    head = above[-1] if above else None
-    if head is None or len(head.filled) < 2 or sum(map(is_value, head.filled)) > len(head.filled) // 2:
+    if not above or not _is_header(above[-1]):
         raise InputError(
             f"{sheet.path}, line {rows[first].line}: found numbers without a header above them, expected a line of "
             "names and units such as displacement [mm], time [s], force [N]"
         )
-    wordy = next((column for column, cell in enumerate(head.cells) if len(cell) > LONGEST_HEADER), None)
-    if wordy is not None:
-        where = f"line {head.line}, column {sheet.column_name(wordy)}"
-        found = f"a header of {len(head.cells[wordy])} characters"
-        raise InputError(f"{sheet.path}, {where}: found {found}, expected at most {LONGEST_HEADER}")
+    head = above[-1]
+    _check_names_are_short(sheet, head)
     width = max(len(head.cells), *(len(row.cells) for row in rows[first : first + _SHOWN]))
-    header = tuple(head.cell(column) for column in range(width))
-    padded = tuple(units[column] if column < len(units) else "" for column in range(width))
-    names = tuple(above[-2].cell(column) for column in range(width)) if len(above) > 1 else ()
+    every = range(width)
+    header = tuple(head.cell(column) for column in every)
+    padded = tuple(units[column] if column < len(units) else "" for column in every)
+    names = tuple(above[-2].cell(column) for column in every) if len(above) > 1 else ()
     body = tuple(row for row in rows[first:] if not row.comment)
+    _check_width(sheet, head, body, width)
+    return RawTable(sheet, header, padded, body, head.line, names)
+
+
+def _is_header(row: Row) -> bool:
+    """Whether a row names two columns or more, by words rather than by numbers."""
+    return len(row.filled) > 1 and sum(map(is_value, row.filled)) <= len(row.filled) // 2
+
+
+def _check_names_are_short(sheet: Sheet, head: Row) -> None:
+    for column, cell in enumerate(head.cells):
+        if len(cell) > LONGEST_HEADER:
+            where = f"line {head.line}, column {sheet.column_name(column)}"
+            found = f"a header of {len(cell)} characters"
+            raise InputError(f"{sheet.path}, {where}: found {found}, expected at most {LONGEST_HEADER}")
+
+
+def _check_width(sheet: Sheet, head: Row, body: Sequence[Row], width: int) -> None:
+    """Refuse values to the right of the header."""
     named = len(head.cells)
     for row in body:
         if len(row.cells) > width or any(map(is_value, row.cells[named:])):
+            sign = " (a comma as decimal sign needs another sign between cells)" if "comma" in sheet.described else ""
             raise InputError(
                 f"{sheet.path}, line {row.line}, column {sheet.column_name(named)}: found {len(row.cells)} cells, "
-                f"expected {named} as in the header of line {head.line}"
-                + (" (a comma as decimal sign needs another sign between cells)" if "comma" in sheet.described else "")
+                f"expected {named} as in the header of line {head.line}{sign}"
             )
-    return RawTable(sheet, header, padded, body, head.line, names)
 
 
 def _first(rows: tuple[Row, ...]) -> int | None:

@@ -84,19 +84,23 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     bars += [(min(floor, heights[-1]), heights[-1], _HELD), (0.0, floor, "0.7")]
     figure = Figure(figsize=(max(1.1 * len(bars), 5.4), 3.4), layout="constrained")
     axis = figure.subplots()
-    labels = [f"{heights[0]:.3g} {unit}", *(f"{b - a:+.2g} {unit}".replace("-", "−") for a, b in pairwise(heights))]
-    labels += [f"{max(heights[-1] - floor, 0.0):.2g} {unit}", f"{floor:.2g} {unit}"]
-    for x, ((low, high, colour), label) in enumerate(zip(bars, labels, strict=True)):
+    for x, ((low, high, colour), label) in enumerate(zip(bars, _sizes(heights, floor, unit), strict=True)):
         axis.bar(x, max(high - low, 0.002 * max(heights)), bottom=low, color=colour, width=0.7)
         axis.text(x, high, label, ha="center", va="bottom", fontsize=8)
-    ends = [heights[0], *heights[1:], floor]
-    for x, height in enumerate(ends):
+    for x, height in enumerate([*heights, floor]):
         axis.plot([x + 0.35, x + 0.65], [height, height], color="0.4", lw=0.8)
     axis.set_xticks(range(len(names)), [textwrap.fill(n, 12) for n in names], fontsize=9)
     axis.set_ylabel(f"rms error on held-out holds ({unit})")
     axis.margins(y=0.12)
     axis.spines[["top", "right"]].set_visible(False)
     return figure
+
+
+def _sizes(heights: list[float], floor: float, unit: str) -> list[str]:
+    """What stands on each bar of the waterfall: where it begins, by how much each effect changes it, what is left."""
+    changes = [f"{b - a:+.2g} {unit}".replace("-", "−") for a, b in pairwise(heights)]
+    left = max(heights[-1] - floor, 0.0)
+    return [f"{heights[0]:.3g} {unit}", *changes, f"{left:.2g} {unit}", f"{floor:.2g} {unit}"]
 
 
 def pictures_of_findings(stored: Stored, verdict: ExperimentFindings, folder: Path) -> None:

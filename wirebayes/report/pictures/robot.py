@@ -82,7 +82,6 @@ def scene(
     view = scene_points(robot, position_m, rotation, course, exaggeration)
     exaggeration, here = view["exaggeration"], np.asarray(view["platform"])
     there = here + exaggeration * (view["drifted"][-1] - here)
-    size = np.ptp(robot.exit_m, axis=0).max()
     figure = Figure(figsize=(6.0, 5.2))
     axes: Any = figure.add_axes((0.0, 0.06, 0.92, 0.86), projection="3d")
     for i, (a, p, q) in enumerate(zip(robot.exit_m, here, there, strict=True)):
@@ -93,19 +92,24 @@ def scene(
             axes.plot(*points[[i, j]].T, color=colour, lw=1.6)
         axes.plot(*points.T, color=colour, lw=0, marker="o", ms=3.5, label=name)
     axes.scatter(*robot.exit_m.T, color=INK, s=14, label="exit points")
+    _label_axes(axes, np.concatenate([robot.exit_m, here, there]), position_m, np.ptp(robot.exit_m, axis=0).max())
+    head = f"{verbatim(robot.name)}: mean drift after {course.times_s[-1]:g} s, enlarged {exaggeration:g} times"
+    figure.text(0.02, 0.95, head, fontsize=10.5, color=INK)
+    figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False, fontsize=8.5)
+    return figure
+
+
+def _label_axes(axes: Any, points: Floats, position_m: Floats, size_m: float) -> None:
+    """Labels and ticks in metres; along an axis in which the robot is flat one tick is all there is room for."""
     axes.set_xlabel("x, m", labelpad=6)
     axes.set_ylabel("y, m", labelpad=6)
     axes.set_zlabel("z, m", labelpad=5)
     axes.tick_params(labelsize=8)
     axes.locator_params(nbins=5)
-    for axis in np.flatnonzero(np.ptp(np.concatenate([robot.exit_m, here, there]), axis=0) < 1e-6 * size):
-        getattr(axes, f"set_{'xyz'[axis]}ticks")([float(position_m[axis])])  # flat: one tick is all there is room for
+    for axis in np.flatnonzero(np.ptp(points, axis=0) < 1e-6 * size_m):
+        getattr(axes, f"set_{'xyz'[axis]}ticks")([float(position_m[axis])])
     axes.set_aspect("equal")
     axes.set_box_aspect(axes._box_aspect, zoom=0.94)
-    head = f"{verbatim(robot.name)}: mean drift after {course.times_s[-1]:g} s, enlarged {exaggeration:g} times"
-    figure.text(0.02, 0.95, head, fontsize=10.5, color=INK)
-    figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False, fontsize=8.5)
-    return figure
 
 
 def scene_points(

@@ -178,13 +178,14 @@ def moving(robot: Robot, history: History, found: HistoryAnswer) -> str:
     str
         An SVG document that plays by itself.
     """
-    whole = np.linspace(history.times_s[0], history.times_s[-1], _FRAMES)
-    rows = np.clip(np.searchsorted(history.times_s, whole), 0, len(history.times_s) - 1)
+    times_s = history.times_s
+    whole = np.linspace(times_s[0], times_s[-1], _FRAMES)
+    rows = np.clip(np.searchsorted(times_s, whole), 0, len(times_s) - 1)
     meant, moved, factor = _shapes(robot, found, rows)
-    drawn = [points @ _OBLIQUE.T for points in (meant, moved)]
-    drawn[1] = np.where(np.isfinite(drawn[1]), drawn[1], drawn[0])
+    commanded, drifted = meant @ _OBLIQUE.T, moved @ _OBLIQUE.T
+    drifted = np.where(np.isfinite(drifted), drifted, commanded)
     exits = robot.exit_m @ _OBLIQUE.T
-    every = np.concatenate([exits, *(points.reshape(-1, 2) for points in drawn)])
+    every = np.concatenate([exits, commanded.reshape(-1, 2), drifted.reshape(-1, 2)])
     low, high = every.min(0), every.max(0)
     scale = 420.0 / max(float((high - low).max()), 1e-9)
     width, height = (high - low) * scale + 40
@@ -193,24 +194,18 @@ def moving(robot: Robot, history: History, found: HistoryAnswer) -> str:
         flat = (points - low) * scale + 20
         return np.asarray(np.stack([flat[..., 0], height - flat[..., 1]], -1))
 
+    fixed = at(exits)
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height + 34:.0f}" '
         f'font-family="sans-serif" font-size="12" role="img">',
         f'<rect width="100%" height="100%" fill="white"/>'
-        f'<text x="10" y="16" fill="{INK}">drift enlarged {factor:g} times; {history.times_s[-1]:g} s in {_SECONDS} s'
+        f'<text x="10" y="16" fill="{INK}">drift enlarged {factor:g} times; {times_s[-1]:g} s in {_SECONDS} s'
         "</text>",
+        *_moving_platform(robot, fixed, at(commanded), CHAIN, f'stroke="{QUIET}" stroke-width="0.9"'),
+        *_moving_platform(
+            robot, fixed, at(drifted), HOLD, f'stroke="{HOLD}" stroke-width="0.9" stroke-dasharray="2 3"'
+        ),
     ]
-    fixed = at(exits)
-    for points, colour, line, dash in ((drawn[0], CHAIN, QUIET, ""), (drawn[1], HOLD, HOLD, ' stroke-dasharray="2 3"')):
-        seen = at(points)
-        for i in range(robot.legs):
-            frames = [np.stack([fixed[i], p[i]]) for p in seen]
-            parts.append(_moving_line(frames, f'stroke="{line}" stroke-width="0.9"{dash}'))
-        for i, j in platform_edges(robot.platform_m):
-            parts.append(_moving_line([p[[i, j]] for p in seen], f'stroke="{colour}" stroke-width="2"'))
-        if not list(platform_edges(robot.platform_m)):
-            tick = np.array([[-4.0, 0.0], [4.0, 0.0]])
-            parts.append(_moving_line([p[0] + tick for p in seen], f'stroke="{colour}" stroke-width="8"'))
     parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{INK}"/>' for x, y in fixed]
     parts.append(
         f'<rect x="10" y="{height + 18:.0f}" height="4" width="{width - 20:.0f}" fill="{QUIET}"/>'
@@ -218,6 +213,21 @@ def moving(robot: Robot, history: History, found: HistoryAnswer) -> str:
         f'values="0;{width - 20:.0f}" dur="{_SECONDS}s" repeatCount="indefinite"/></rect>'
     )
     return "\n".join([*parts, "</svg>"]) + "\n"
+
+
+def _moving_platform(robot: Robot, exits: Floats, points: Floats, colour: str, wire: str) -> list[str]:
+    """Wires from the exit points (w, 2) to the platform points of each frame (f, w, 2), and the platform's edges."""
+    parts = []
+    for i in range(robot.legs):
+        frames = [np.stack([exits[i], p[i]]) for p in points]
+        parts.append(_moving_line(frames, wire))
+    edges = list(platform_edges(robot.platform_m))
+    for i, j in edges:
+        parts.append(_moving_line([p[[i, j]] for p in points], f'stroke="{colour}" stroke-width="2"'))
+    if not edges:  # a point: a short stroke
+        tick = np.array([[-4.0, 0.0], [4.0, 0.0]])
+        parts.append(_moving_line([p[0] + tick for p in points], f'stroke="{colour}" stroke-width="8"'))
+    return parts
 
 
 def _moving_line(frames: list[Floats], style: str) -> str:

@@ -36,27 +36,17 @@ def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]
     if not np.nanmax(fields["tilt"][0], initial=0.0):
         del fields["tilt"]  # parallel lines: nothing tilts
     across, along = (np.unique(result.position_m[:, k]) for k in (across_axis, along_axis))
-    height = 2.6 * (np.ptp(along) / max(np.ptp(across), 1e-9) if len(across) > 1 else 1.0)
     figures = {}
     for name, (value, label) in fields.items():
-        size = (4.0, 0.8 + len(slices) * (min(max(height, 1.0), 3.6) + 0.35))
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Figure(figsize=_size(across, along, len(slices)), layout="constrained")
         panels: Any = figure.subplots(len(slices), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-        what = f"median {name} within {TIME_S:g} s"
-        figure.suptitle(f"{title}: {what}" if title else what.capitalize(), fontsize=10.5, x=0.02, ha="left", color=INK)
+        figure.suptitle(_headed(name, title), fontsize=10.5, x=0.02, ha="left", color=INK)
         image: Any = None
-        low, high = (f(value[np.isfinite(value)], initial=np.inf * s) for f, s in ((np.min, 1), (np.max, -1)))
         for axes, level in zip(panels, slices[::-1], strict=True):
             here = result.position_m[:, slice_axis] == level
-            field = np.full((len(along), len(across)), np.nan)
-            x, y = result.position_m[here][:, [across_axis, along_axis]].T
-            field[np.searchsorted(along, y), np.searchsorted(across, x)] = value[here]
-            lost = np.nonzero(np.isnan(field))
-            axes.plot(across[lost[1]], along[lost[0]], "x", color=QUIET, ms=5)
-            if np.isfinite(low):
-                image = axes.pcolormesh(_edges(across), _edges(along), field, vmin=low, vmax=high, rasterized=True)
-            axes.set_aspect("equal")
-            axes.tick_params(labelsize=8)
+            places = result.position_m[here][:, [across_axis, along_axis]]
+            field = _field(across, along, places, value[here])
+            image = _draw_slice(axes, across, along, field, _ends(value)) or image
             axes.set_title(f"{'xyz'[slice_axis]} = {level:.3g} m", fontsize=9.5)
             axes.set_ylabel(f"{'xyz'[along_axis]}, m")
         panels[-1].set_xlabel(f"{'xyz'[across_axis]}, m")
@@ -64,6 +54,44 @@ def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]
             figure.colorbar(image, ax=list(panels), label=label)
         figures[name] = figure
     return figures
+
+
+def _ends(values: Floats) -> tuple[float, float]:
+    """Least and largest of what is known; infinite where nothing is."""
+    known = values[np.isfinite(values)]
+    return float(np.min(known, initial=np.inf)), float(np.max(known, initial=-np.inf))
+
+
+def _headed(name: str, title: str) -> str:
+    what = f"median {name} within {TIME_S:g} s"
+    return f"{title}: {what}" if title else what.capitalize()
+
+
+def _size(across: Floats, along: Floats, slices: int) -> tuple[float, float]:
+    """Of a figure with so many slices above each other, inches."""
+    height = 2.6 * (np.ptp(along) / max(np.ptp(across), 1e-9) if len(across) > 1 else 1.0)
+    return 4.0, 0.8 + slices * (min(max(height, 1.0), 3.6) + 0.35)
+
+
+def _field(across: Floats, along: Floats, places: Floats, values: Floats) -> Floats:
+    """Values at places (n, 2) as a grid, NaN where there is none."""
+    x, y = places.T
+    field = np.full((len(along), len(across)), np.nan)
+    field[np.searchsorted(along, y), np.searchsorted(across, x)] = values
+    return field
+
+
+def _draw_slice(axes: Any, across: Floats, along: Floats, field: Floats, ends: tuple[float, float]) -> Any:
+    """One slice, a cross where no wires hold the platform; the image, if there is anything to colour."""
+    lost = np.nonzero(np.isnan(field))
+    axes.plot(across[lost[1]], along[lost[0]], "x", color=QUIET, ms=5)
+    image = None
+    low, high = ends
+    if np.isfinite(low):
+        image = axes.pcolormesh(_edges(across), _edges(along), field, vmin=low, vmax=high, rasterized=True)
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=8)
+    return image
 
 
 def orientation(one: Map) -> str:

@@ -45,29 +45,18 @@ def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> Imp
     """
     link = _platform(bodies)
     joint, physical = link.one("joint"), link.one("physical")
-    kind = joint.attribute("type")
-    if kind not in _JOINTS:
-        expected = f"a free platform, one in a plane or on a ball joint: {', '.join(_JOINTS)}"
-        raise joint.fail(f"the type {kind!r}", expected)
-    moves, turns = _JOINTS[kind]
+    moves, turns = _ways(joint)
     freedom: Freedom = "orientation" if not moves else "pose" if turns else "position"
     normal = np.eye(3)[turns[0]] if len(turns) == 1 else None
     centre = physical.one("com_location").vector()
     base = link.one("parent").one("location").vector()
     home, turn = _home(joint, moves, turns, base)
     chosen = _set(cables, cable_set)
-    legs = [_leg(cable, centre) for cable in chosen.children if cable.tag.startswith("cable_")]
+    wires = [cable for cable in chosen.children if cable.tag.startswith("cable_")]
+    legs = [_leg(cable, centre) for cable in wires]
     if len(legs) < 2:
         raise chosen.fail(f"{len(legs)} cables", "at least two")
-    low, high = (np.array([_force(c, key) for c in chosen.children if c.tag.startswith("cable_")])
-                 for key in ("force_min", "force_max"))  # fmt: skip
-    notes = ["Lengths, mass and bounds of the tensions are that file's; its stiffnesses are left out."]
-    if np.ptp(low) or np.ptp(high):
-        notes.append("Its cables have bounds of their own: the highest force_min and the lowest force_max are taken.")
-    if normal is not None:
-        notes.append("Its planar joint is a rail: the plane holds the platform both ways.")
-    if freedom == "orientation":
-        notes.append("Its spherical joint is a ball joint: it carries the platform both ways.")
+    bounds, own_bounds = _bounds(wires)
     names = " and ".join(Path(root.file).name for root in (bodies, cables))
     return ImportedRobot(
         link.attributes.get("name") or Path(bodies.file).stem.removesuffix("_bodies"),
@@ -75,8 +64,36 @@ def robot(bodies: Element, cables: Element, cable_set: str | None = None) -> Imp
         freedom, physical.one("mass").number(), centre,
         np.array([leg.exit_m for leg in legs]), np.array([leg.platform_m for leg in legs]),
         np.array([leg.pulley_radius_m for leg in legs]), np.array([leg.swivel_axis for leg in legs]),
-        (float(low.max()), float(high.min())), home, turn, tuple(notes), normal=normal,
+        bounds, home, turn, _notes(own_bounds, normal is not None, freedom),
+        normal=normal,
     )  # fmt: skip
+
+
+def _ways(joint: Element) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """The ways in which a joint moves and turns, as `_JOINTS` has them."""
+    kind = joint.attribute("type")
+    if kind not in _JOINTS:
+        expected = f"a free platform, one in a plane or on a ball joint: {', '.join(_JOINTS)}"
+        raise joint.fail(f"the type {kind!r}", expected)
+    return _JOINTS[kind]
+
+
+def _bounds(wires: list[Element]) -> tuple[tuple[float, float], bool]:
+    """The tensions that every wire can bear, and whether wires differ in them."""
+    low, high = (np.array([_force(wire, key) for wire in wires]) for key in ("force_min", "force_max"))
+    return (float(low.max()), float(high.min())), bool(np.ptp(low) or np.ptp(high))
+
+
+def _notes(own_bounds: bool, in_a_plane: bool, freedom: Freedom) -> tuple[str, ...]:
+    """What a reader of the robot's file should know of how it was read."""
+    notes = ["Lengths, mass and bounds of the tensions are that file's; its stiffnesses are left out."]
+    if own_bounds:
+        notes.append("Its cables have bounds of their own: the highest force_min and the lowest force_max are taken.")
+    if in_a_plane:
+        notes.append("Its planar joint is a rail: the plane holds the platform both ways.")
+    if freedom == "orientation":
+        notes.append("Its spherical joint is a ball joint: it carries the platform both ways.")
+    return tuple(notes)
 
 
 def _platform(bodies: Element) -> Element:

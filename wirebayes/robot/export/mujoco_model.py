@@ -48,8 +48,6 @@ def mjcf(
         Where the pulleys look; default: to the platform points at the home pose.
     """
     m, arm2 = robot.mass_kg, robot.size_m**2
-    stiffness = k1_N * robot.lines**2 / zero_m
-    rest = np.maximum((zero_m - offset_m) / robot.lines, 0.0)
     turn = matrix(robot.home_rotation_rad)
     joints = _joints(robot, turn, damping_N_s_m)
     if towards_m is None:
@@ -59,13 +57,8 @@ def mjcf(
     pulleys = "".join(
         _rim(int(i), robot.exit_m[i], float(radius[i, 0]), axis[i], towards_m[i]) for i in np.flatnonzero(radius[:, 0])
     )
-    rest = np.where(radius[:, 0] > 0, (zero_m - offset_m) / robot.lines + radius[:, 0], rest).clip(0.0)
     points = "".join(f'<site name="point{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.platform_m))
-    tendons = "".join(
-        f'<spatial stiffness="{float(k)!r}" springlength="0 {float(rest_m)!r}">'
-        f'<site site="exit{i}"/>{_wrapped(i) if radius[i, 0] else ""}<site site="point{i}"/></spatial>'
-        for i, (k, rest_m) in enumerate(zip(stiffness, rest, strict=True))
-    )
+    tendons = _tendons(robot, k1_N, zero_m, offset_m, radius[:, 0])
     comment = "".join(f"<!-- {text.replace('--', '- -')} -->" for text in (remark, _STILL if pulleys else "") if text)
     inertia = _row(np.full(3, m * arm2))
     return (
@@ -74,6 +67,18 @@ def mjcf(
         f'<body pos="{_row(robot.home_m)}" quat="{_row(_quaternion(robot.home_rotation_rad))}">{joints}'
         f'<inertial pos="{_row(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
         f"</body>{pulleys}</worldbody><tendon>{tendons}</tendon></mujoco>\n"
+    )
+
+
+def _tendons(robot: Robot, k1_N: Floats, zero_m: Floats, offset_m: Floats, radius_m: Floats) -> str:
+    """Wires as springs that only pull; around a pulley MuJoCo counts the way to its centre, a radius more."""
+    stiffness = k1_N * robot.lines**2 / zero_m
+    free = (zero_m - offset_m) / robot.lines
+    rest = np.where(radius_m > 0, free + radius_m, free).clip(0.0)
+    return "".join(
+        f'<spatial stiffness="{float(k)!r}" springlength="0 {float(rest_m)!r}">'
+        f'<site site="exit{i}"/>{_wrapped(i) if radius_m[i] else ""}<site site="point{i}"/></spatial>'
+        for i, (k, rest_m) in enumerate(zip(stiffness, rest, strict=True))
     )
 
 

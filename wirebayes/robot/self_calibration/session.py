@@ -4,7 +4,7 @@ Unknown are the error of every wire's reference length, the line's parameters, e
 a prior allows it, the bias of each tension sensor: its zero, or friction of guides and winch between it and the wire.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -227,31 +227,33 @@ def predict(
         Where the holds are known to begin, about; default: the requested poses.
     """
     wires, error = prior.wires(robot, unknowns)
-    n, legs = len(unknowns), robot.legs
-    bias, sign = prior.bias_N(legs, unknowns), iter(session.bias_sign)
+    n = len(unknowns)
+    bias, sign = prior.bias_N(robot.legs, unknowns), iter(session.bias_sign)
     solved = np.ones(n, bool)
-    tensions, poses, turns, lengths, begun, ended = [], [], [], [], [], []
+    tensions, lengths, begun, read, ended = [], [], [], [], []
     for k, hold in enumerate(_holds(robot, wires, error, session, longest_step, near)):
         here, length = hold.here, hold.bare_m * (1 + hold.state.strain(wires).T)
         begun.append(hold.begun)
         ended.append(here)
         solved &= here.found
         if session.read[k]:
+            read.append(here)
             tensions.append(here.tension_N + bias * next(sign))
-            poses.append(here.position_m)
-            turns.append(here.rotation)
             lengths.append(length)
-    normals = np.stack(turns, 1)[:, :, :2, 2].reshape(n, -1)
+    position, turn = _poses(read)
     readings = np.concatenate(tensions, 1) / session.tension_sd_N
     if session.tilt_sd_rad is not None:
+        normals = turn[:, :, :2, 2].reshape(n, -1)
         readings = np.concatenate([readings, normals / session.tilt_sd_rad], 1)
     strain = np.broadcast_to(hold.state.strain(wires).T, length.shape)
     return Prediction(
-        readings, length, strain, np.stack(poses, 1), np.stack(turns, 1),
-        np.stack([b.position_m for b in begun], 1), np.stack([b.rotation for b in begun], 1),
-        np.stack([b.position_m for b in ended], 1), np.stack([b.rotation for b in ended], 1),
-        np.stack(lengths, 1), solved,
-    )  # fmt: skip
+        readings, length, strain, position, turn, *_poses(begun), *_poses(ended), np.stack(lengths, 1), solved
+    )
+
+
+def _poses(solved: Sequence[forward.Equilibria]) -> tuple[Floats, Floats]:
+    """Positions (n, p, 3) and rotations (n, p, 3, 3) of solved holds."""
+    return np.stack([one.position_m for one in solved], 1), np.stack([one.rotation for one in solved], 1)
 
 
 def carried(robot: Robot, prior: LengthPrior, session: Session, unknowns: Floats) -> CreepState:

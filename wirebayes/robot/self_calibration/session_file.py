@@ -110,16 +110,13 @@ def parse(
     plausible.refuse(robot, joint, table, joints)
     tension, normal = some(tensions), some(NORMAL if tilted else ())
     position, turn = some(POSITION), some(TURN)
-    measured = np.concatenate([tension, normal], axis=1)
-    for values, name in ((measured, "the readings"), (position, "the position"), (turn, "the rotation")):
-        _refuse_half(table, values, name)
-    if robot.degrees != 6:
-        turn = np.tile(robot.home_rotation_rad, (len(cells), 1))
-    known = np.asarray(np.isfinite(position).all(1))
+    _refuse_half(table, np.concatenate([tension, normal], axis=1), "the readings")
+    _refuse_half(table, position, "the position")
+    _refuse_half(table, turn, "the rotation")
     was_read = np.asarray(np.isfinite(tension).all(1))
     session = Session(
         position,
-        np.where(known[:, None, None], matrix(turn), np.nan),
+        _rotations(robot, position, turn),
         joint,
         some(("duration_s",))[:, 0],
         was_read,
@@ -131,6 +128,14 @@ def parse(
     # without any tension read, what is left is for the calibration of the whole robot
     read_N, read_normal = tension[was_read].ravel(), normal[was_read].ravel()
     return session, np.concatenate([read_N / tension_sd_N, read_normal / tilt_sd_rad])
+
+
+def _rotations(robot: Robot, position: Floats, turn: Floats) -> Floats:
+    """Requested orientations (p, 3, 3), NaN at a pose that nobody knows; a platform that cannot turn stays as it is."""
+    if robot.degrees != 6:
+        turn = np.tile(robot.home_rotation_rad, (len(position), 1))
+    known = np.asarray(np.isfinite(position).all(1))
+    return np.asarray(np.where(known[:, None, None], matrix(turn), np.nan))
 
 
 def _motions_without_bias(table: Table) -> InputError:
