@@ -96,6 +96,7 @@ TESTS = (
     Test("relax-0.3-tissue", False, 0.3, 1e-2, length_mm=15.0, step_N=2.0, hold_s=180.0),
     Test("relax-0.05-rope", False, 0.05, 1e-4, length_mm=10_000.0, step_N=50_000.0, hold_s=86_400.0),
     Test("relax-0.1-four", False, 0.1, 1e-3, holds=4, readings=30),
+    Test("relax-0.1-eight", False, 0.1, 3e-4, holds=8, readings=12),
     Test("relax-0.2-eight", False, 0.2, 3e-4, holds=8, readings=12),
 )
 

@@ -8,6 +8,7 @@ tail.
 """
 
 import argparse
+import importlib
 import json
 import subprocess
 from pathlib import Path
@@ -15,8 +16,6 @@ from typing import Any, Literal
 
 import numpy as np
 from scipy import stats
-
-from wirebayes.model.spec import ModelSpec
 
 LIKELIHOODS: tuple[Literal["chain", "hold"], ...] = ("chain", "hold")
 HOLDS = {"all holds": None, "first 5": 5}
@@ -28,16 +27,26 @@ def fits_here(seed: int) -> dict[str, Any]:
     """All fits by this process's package."""
     from wirebayes.inference.fit import fit
     from wirebayes.io.paper import experiments
-    from wirebayes.model.build import build
 
     out = {}
     for experiment in experiments():
         for likelihood in LIKELIHOODS:
             for words, holds in HOLDS.items():
                 trained = experiment if holds is None else experiment.train(holds)
-                done = fit(build([trained], spec=ModelSpec(likelihood=likelihood)), seed)
+                done = fit(problem_of(trained, likelihood), seed)
                 out[f"{experiment.name}, {likelihood}, {words}"] = kept(done)
     return out
+
+
+def problem_of(test: Any, likelihood: Literal["chain", "hold"]) -> Any:
+    """The posterior of a test, as this process's package builds it."""
+    try:
+        from wirebayes.model.build import build
+        from wirebayes.model.spec import ModelSpec
+    except ImportError:  # an older checkout
+        older: Any = importlib.import_module("wirebayes.model.problem")
+        return older.build([test], likelihood=likelihood)
+    return build([test], spec=ModelSpec(likelihood=likelihood))
 
 
 def kept(done: Any) -> dict[str, Any]:
