@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.discovery import smooth_reference
-from wirebayes.discovery.noise_integral import Expansion, project, without_and_with, without_tangent
+from wirebayes.discovery.noise_integral import Expansion, Projected, project, without_and_with, without_tangent
 from wirebayes.discovery.probes import Probe, forms
 from wirebayes.discovery.scans import Pieces, Scan, joined
 from wirebayes.discovery.tangent import around_points, block_diagonal, moving_columns, points_of, tangent_of
@@ -99,35 +99,46 @@ def scan(x: Expansion) -> Scan:
 
 def _scan_few(x: Expansion) -> Scan:
     """Scan at once: noise of every ratio is integrated out, each amplitude is at its best."""
-    found, degrees, least = project(x), x.degrees, x.least[:, None]
-    shared, rss, b, c = found.shared, found.rss, found.along, found.square
-    positive = np.where(x.one_sided, np.maximum(b, 0.0), b)
-    left = np.maximum(rss[..., None] - positive**2 / c, least[..., None])
-    effects = shared[..., None] - 0.5 * degrees * np.log(left)
-    plain, every = without_and_with(x, found)
-    reference = log_sum(plain, axis=1)
-    seen = np.isfinite(reference)
-    reference = np.where(seen, reference, 0.0)
-    two = log_bayes_of_two(x, found, log_sum(effects, axis=1), reference)
-    flexible_value = log_sum(every.reshape(len(every), -1), axis=1) - np.log(every.shape[2]) - reference
-    best = np.argmax(effects, axis=1)[:, None]
-    amplitude = np.take_along_axis(b / c, best, axis=1)[:, 0]
-    norm = _norm(np.take_along_axis(c, best, axis=1)[:, 0], np.take_along_axis(left, best, axis=1)[:, 0], degrees)
+    found = project(x)
+    b, c = found.along, found.square
+    upward = np.where(x.one_sided, np.maximum(b, 0.0), b)
+    left = np.maximum(found.rss[..., None] - upward**2 / c, x.least[:, None, None])
+    effects = found.shared[..., None] - 0.5 * x.degrees * np.log(left)
+    by_effect = log_sum(effects, axis=1)
+    plain, beside = without_and_with(x, found)
+    nothing = log_sum(plain, axis=1)
+    seen = np.isfinite(nothing)
+    nothing = np.where(seen, nothing, 0.0)
+    flexible = log_sum(beside.reshape(len(beside), -1), axis=1) - np.log(beside.shape[2])
+    two = log_bayes_of_two(x, found, by_effect, nothing)
+    amplitude, norm = _most_probable(effects, found, left, x.degrees)
     return Scan(
-        np.where(seen[:, None], log_sum(effects, axis=1) - reference[:, None], 0.0),
-        np.where(seen, flexible_value, 0.0),
+        np.where(seen[:, None], by_effect - nothing[:, None], 0.0),
+        np.where(seen, flexible - nothing, 0.0),
         np.where(seen, two, 0.0),
         amplitude,
         norm,
-        Pieces(shared.T, rss.T, np.swapaxes(b, 0, 1), np.swapaxes(c, 0, 1), degrees, x.least, x.one_sided),
+        Pieces(
+            found.shared.T, found.rss.T, np.swapaxes(b, 0, 1), np.swapaxes(c, 0, 1), x.degrees, x.least, x.one_sided
+        ),
     )
 
 
-def _norm(square: Array, left: Array, degrees: int) -> Array:
-    """Size of an effect of amplitude one beside the noise."""
+def _most_probable(effects: Array, found: Projected, left: Array, degrees: int) -> tuple[Array, Array]:
+    """(n, m) amplitude, and δ per amplitude, of each signature at the noise ratio that makes it most probable.
+
+    `effects` and `left` (n, k, m) are its log evidence, and the sum of squares beside it, at each ratio.
+    """
+    best = np.argmax(effects, axis=1)[:, None]
+
+    def at_best(values: Array) -> Array:
+        return np.asarray(np.take_along_axis(values, best, axis=1)[:, 0])
+
+    square = at_best(found.square)
     # there may be fewer readings than parameters, of which nothing is known
     known = np.where(np.isfinite(square), square, 0.0)
-    return np.sqrt(np.maximum(known * degrees / left, 0.0))
+    norm = np.sqrt(np.maximum(known * degrees / at_best(left), 0.0))
+    return at_best(found.along / found.square), norm
 
 
 _PIECE = 16  # parameter sets scanned at once: what stays in the cache

@@ -4,7 +4,7 @@ A set is evaluated together with the remainder, so an effect is credited for wha
 probability of a remainder is part of the answer.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -177,33 +177,80 @@ def posterior(
     """
     total = logsumexp([*without, *beside])
     p_without, p_beside = np.exp(without - total), np.exp(beside - total)
-    nothing, remainder = np.zeros(blocks), np.zeros(blocks)
     own = dict.fromkeys(name for s in sets for name in s.names)
-    inclusion = {name: np.zeros(blocks) for name in own}
-    every = tuple(dict.fromkeys(family_of(name, families) for name in own))
-    together = [np.zeros(blocks) for _ in every]
-    shares: list[dict[str, float]] = [{} for _ in range(blocks)]
+    sums = _Sums.over(own, tuple(dict.fromkeys(family_of(name, families) for name in own)), blocks)
     for s, bare, more in zip(sets, p_without, p_beside, strict=True):
-        remains = np.ones(blocks) if s.remainder is None else over_subsets(s.remainder)[1]
-        remainder += more * remains
-        idle = np.ones(blocks)  # no effect before acts here
+        sums.add(s, bare, more)
+    shares = [_shares({name: float(value[b]) for name, value in sums.first.items()}) for b in range(blocks)]
+    return ModelPosterior(
+        tuple(sets), p_without, p_beside, sums.nothing, sums.remainder, sums.inclusion, tuple(sums.together),
+        list(sums.together.values()), shares,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Probabilities (b,) in each material, added up over sets.
+
+    Attributes
+    ----------
+    nothing, remainder : that nothing is missing, and that there is a remainder.
+    inclusion, together : that a name acts, and that any of a family does.
+    first : that a name is the first of those that act, and as *unknown*, that a remainder is there and none acts.
+    """
+
+    nothing: Array
+    remainder: Array
+    inclusion: dict[str, Array]
+    together: dict[Family, Array]
+    first: dict[str, Array]
+
+    @classmethod
+    def over(cls, names: Iterable[str], families: Iterable[Family], blocks: int) -> "_Sums":
+        """Of nothing yet.
+
+        Parameters
+        ----------
+        names, families
+            In any of the sets.
+        blocks : int
+            Number of materials.
+        """
+        inclusion = {name: np.zeros(blocks) for name in names}
+        together = {family: np.zeros(blocks) for family in families}
+        first = {name: np.zeros(blocks) for name in (*names, "unknown")}
+        return cls(np.zeros(blocks), np.zeros(blocks), inclusion, together, first)
+
+    def add(self, s: EffectSet, without: float, beside: float) -> None:
+        """Add a set.
+
+        Parameters
+        ----------
+        s : EffectSet
+        without, beside : float
+            Its probability without a remainder and with one.
+        """
+        whole = without + beside
+        remains = np.ones(len(self.nothing)) if s.remainder is None else over_subsets(s.remainder)[1]
+        idle = np.ones(len(self.nothing))  # no effect before acts here
         for name in s.names:
             acts = s.presence[name]
-            for b in range(blocks):
-                shares[b][name] = shares[b].get(name, 0.0) + float((bare + more) * idle[b] * acts[b])
+            self.first[name] += whole * idle * acts
+            self.inclusion[name] += whole * acts
             idle = idle * (1.0 - acts)
-        for name in s.names:
-            inclusion[name] = inclusion[name] + (bare + more) * s.presence[name]
-        for family, probability in zip(every, together, strict=True):
-            absent = np.prod([1.0 - s.presence[n] for n in s.names if n in family], axis=0)
-            probability += (bare + more) * (1.0 - absent)
-        nothing += bare * idle + more * (1.0 - remains) * idle
-        for b in range(blocks):
-            shares[b]["unknown"] = shares[b].get("unknown", 0.0) + float(more * remains[b] * idle[b])
-    for b, here in enumerate(shares):
-        missing = sum(here.values())
-        shares[b] = {n: v / missing for n, v in sorted(here.items(), key=lambda item: -item[1])} if missing > 0 else {}
-    return ModelPosterior(tuple(sets), p_without, p_beside, nothing, remainder, inclusion, every, together, shares)
+        for family, probability in self.together.items():
+            absent = np.prod([1.0 - s.presence[name] for name in s.names if name in family], axis=0)
+            probability += whole * (1.0 - absent)
+        self.remainder[:] += beside * remains
+        self.first["unknown"] += beside * remains * idle
+        self.nothing[:] += without * idle + beside * (1.0 - remains) * idle
+
+
+def _shares(leading: Mapping[str, float]) -> dict[str, float]:
+    """Probabilities that sum to one, the largest first; none where nothing is missing for certain."""
+    missing = sum(leading.values())
+    ordered = sorted(leading.items(), key=lambda item: -item[1])
+    return {name: value / missing for name, value in ordered} if missing > 0.0 else {}
 
 
 def smallest_set(shares: Mapping[str, float], level: float = IN_SET) -> list[str]:

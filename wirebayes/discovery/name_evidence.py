@@ -198,36 +198,51 @@ def reaches(
     return out
 
 
+@dataclass(frozen=True)
+class _Summed:
+    """A form's log Bayes factor, the probability (b,) that it acts in each block, and its refits if all are known."""
+
+    log_bayes: float
+    presence: Array
+    refits: list[Refit]
+
+
 def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int) -> NameEvidence:
     """Add up the forms of every name: its variants equally, its blocks by `over_subsets`."""
-    parts: dict[str, list[tuple[float, Array, list[Refit]]]] = {}
-    known = {place: r.log_bayes for place, r in found.items()}
-    refitted_best: dict[str, float] = {}
-    for place, value in known.items():
-        name = found[place].effect.name
-        refitted_best[name] = max(refitted_best.get(name, -np.inf), value)
+    most: dict[str, float] = {}
+    for r in found.values():
+        most[r.effect.name] = max(most.get(r.effect.name, -np.inf), r.log_bayes)
+    variants: dict[str, list[_Summed]] = {}
     for form in forms:
-        refits = [found.get(place) for place in form.places]
-        # what was not refitted counts for no more than the best of its name that was
-        most = refitted_best.get(form.effect.name, np.inf)
-        pairs = zip(form.places, form.linear, strict=True)
-        values = np.array([known.get(place, min(linear, most)) for place, linear in pairs])
-        total, each, chosen = over_subsets(values)
-        presence = np.zeros(blocks)
-        for share, (_, on) in zip(each, form.places, strict=True):
-            presence[list(on)] = share
-        winners = [refits[i] for i in chosen]
-        kept = [r for r in winners if r is not None] if all(r is not None for r in winners) else []
-        parts.setdefault(form.effect.name, []).append((total, presence, kept))
-    log_bayes, winners_, presence_ = {}, {}, {}
-    for name, options in parts.items():
-        totals = np.array([total for total, _, _ in options])
-        log_bayes[name] = float(logsumexp(totals) - np.log(len(totals)))
-        # no form is possible where no climb of any ended
-        share = np.exp(totals - logsumexp(totals)) if np.isfinite(totals).any() else np.zeros(len(totals))
-        presence = np.sum([s * presence for s, (_, presence, _) in zip(share, options, strict=True)], axis=0)
-        presence_[name] = np.minimum(presence, 1.0)
-        refitted = [option for option in options if option[2]]
+        name = form.effect.name
+        variants.setdefault(name, []).append(_over_blocks(form, found, most.get(name, np.inf), blocks))
+    log_bayes, winners, presence = {}, {}, {}
+    for name, each in variants.items():
+        log_bayes[name], presence[name] = _over_variants(each)
+        refitted = [variant for variant in each if variant.refits]
         if refitted:
-            winners_[name] = max(refitted, key=lambda option: option[0])[2]
-    return NameEvidence(log_bayes, winners_, presence_)
+            winners[name] = max(refitted, key=lambda variant: variant.log_bayes).refits
+    return NameEvidence(log_bayes, winners, presence)
+
+
+def _over_blocks(form: _Form, found: Mapping[_Place, Refit], most: float, blocks: int) -> _Summed:
+    """One form at all its places; what was not refitted counts for no more than `most`, the best of its name."""
+    refits = [found.get(place) for place in form.places]
+    pairs = zip(refits, form.linear, strict=True)
+    values = np.array([min(linear, most) if r is None else r.log_bayes for r, linear in pairs])
+    total, each, chosen = over_subsets(values)
+    presence = np.zeros(blocks)
+    for share, (_, on) in zip(each, form.places, strict=True):
+        presence[list(on)] = share
+    winners = [refits[i] for i in chosen]
+    known = [r for r in winners if r is not None]
+    return _Summed(total, presence, known if len(known) == len(winners) else [])
+
+
+def _over_variants(each: Sequence[_Summed]) -> tuple[float, Array]:
+    """A name's log Bayes factor, and the probability (b,) that it acts in each block."""
+    totals = np.array([variant.log_bayes for variant in each])
+    # no form is possible where no climb of any ended
+    shares = np.exp(totals - logsumexp(totals)) if np.isfinite(totals).any() else np.zeros(len(totals))
+    presence = np.sum([s * variant.presence for s, variant in zip(shares, each, strict=True)], axis=0)
+    return float(logsumexp(totals) - np.log(len(totals))), np.minimum(presence, 1.0)

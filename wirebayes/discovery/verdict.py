@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from scipy.special import logsumexp
@@ -74,22 +75,15 @@ def decide(
     -------
     Decision
     """
-    sets, gains = list(explored.sets), dict[Key, float]()
-    count, blocks = len(settings.kinds), len(plain)
-    fits = Fits(plain, explored, settings, rng)
+    predicts = _Predicting(Fits(plain, explored, settings, rng), left_out)
+    weigh = partial(model_space.log_weights, names=len(settings.kinds), families=families, other=explored.left_over)
 
-    def predicts(candidate: FittedSet, found: ModelPosterior) -> bool:
-        """Whether the last family of a set, if it is not the only one, predicts holds that are left out."""
-        names = candidate.effects.names
-        if len(names) > 1 and candidate.effects.key not in gains:
-            gains[candidate.effects.key] = last_gain(candidate, found, fits, left_out)
-        return len(names) == 1 or gains[candidate.effects.key] > KEEP_ELPD
+    def posterior(sets: Sequence[EffectSet], without: Array, beside: Array) -> ModelPosterior:
+        return model_space.posterior(sets, without, beside, len(plain), families)
 
-    def weighed() -> tuple[Array, Array]:
-        return model_space.log_weights(sets, count, families, explored.left_over)
-
+    sets = list(explored.sets)
     while True:
-        found = model_space.posterior(sets, *weighed(), blocks, families)
+        found = posterior(sets, *weigh(sets))
         best = _best_fitted(found, explored)
         if best is None:
             return Decision(found, None, None)
@@ -102,18 +96,44 @@ def decide(
         if passing is not None:
             sets = [s for s in sets if s.key != best.effects.key and s.key not in passing.failed]
             best, retest = passing.best, passing.retest
-    without, beside = weighed()
-    if retest.p is not None:
-        alike = [k for k, s in enumerate(sets) if _kinds(s, found) == _kinds(best.effects, found)]
-        beside = _more_beside(sets, without, beside, alike, float(-P_SLOPE * np.log(retest.p / ALPHA_AFTER)))
-    found = model_space.posterior(sets, without, beside, blocks, families)
+    found = posterior(sets, *_after(retest, sets, weigh(sets), best, found))
     if not found.best.names:
         return Decision(found, None, retest)
     if any(len(e.recorded_holds) < LEAST_HOLDS for block in plain for e in block.experiments):
         return Decision(found, best, retest)
     own = dict.fromkeys(found.family(name) for name in best.effects.names)
-    by_family = {family: family_gain(best, family, found, fits, left_out) for family in own}
-    return Decision(found, best, retest, by_family, name_gain(best, best.effects.names[0], fits, left_out))
+    by_family = {family: family_gain(best, family, found, predicts.fits, left_out) for family in own}
+    first_gain = name_gain(best, best.effects.names[0], predicts.fits, left_out)
+    return Decision(found, best, retest, by_family, first_gain)
+
+
+@dataclass(frozen=True)
+class _Predicting:
+    """Whether the last family of a set, if it is not the only one, predicts holds that are left out."""
+
+    fits: Fits
+    left_out: LeftOut
+    gains: dict[Key, float] = field(default_factory=dict)
+
+    def __call__(self, candidate: FittedSet, found: ModelPosterior) -> bool:
+        key = candidate.effects.key
+        if len(key) == 1:
+            return True
+        if key not in self.gains:
+            self.gains[key] = last_gain(candidate, found, self.fits, self.left_out)
+        return self.gains[key] > KEEP_ELPD
+
+
+def _after(
+    retest: Retest, sets: Sequence[EffectSet], weights: tuple[Array, Array], best: FittedSet, found: ModelPosterior
+) -> tuple[Array, Array]:
+    """The log weights of sets, without a remainder and with one, once the best one has been tested."""
+    without, beside = weights
+    if retest.p is None:
+        return without, beside
+    alike = [k for k, s in enumerate(sets) if _kinds(s, found) == _kinds(best.effects, found)]
+    odds = float(-P_SLOPE * np.log(retest.p / ALPHA_AFTER))
+    return without, _more_beside(sets, without, beside, alike, odds)
 
 
 def _kinds(s: EffectSet, found: ModelPosterior) -> frozenset[tuple[Family, int]]:
