@@ -96,7 +96,6 @@ def p_in_words(p: float, simulations: int) -> str:
 
     Parameters
     ----------
-    p : float
     simulations : int
         Data sets of which it is a share: with them it cannot be less than one in all of them and the data.
     """
@@ -160,10 +159,6 @@ def span(low: Any, high: Any, digits: int = 3) -> str:
     low, high : float
     digits : int
         Significant ones.
-
-    Returns
-    -------
-    str
     """
     return f"{number(low, digits)} … {number(high, digits)}"
 

@@ -88,8 +88,6 @@ class Jobs:
 
         Parameters
         ----------
-        test : Test
-        step : str
         options : dict
         """
         before = self.of(test)

@@ -25,8 +25,6 @@ def add_pages(shelf: Shelf, jobs: Jobs, seed: int) -> None:
 
     Parameters
     ----------
-    shelf : Shelf
-    jobs : Jobs
     seed : int
         Of all fits.
     """

@@ -20,7 +20,6 @@ def do(send: Connection, folder: Path, step: str, options: dict[str, Any]) -> No
 
     Parameters
     ----------
-    send : Connection
     folder : Path
         Of the test.
     step : str

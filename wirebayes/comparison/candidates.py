@@ -60,7 +60,6 @@ def candidates(
 
     Parameters
     ----------
-    experiment : Experiment
     base : Candidate
         Law, history and likelihood that the others share.
     known : mapping of name to effect class
@@ -152,7 +151,6 @@ def effects_of(
 
     Parameters
     ----------
-    candidate : Candidate
     training : Experiment
         The training holds only, so that an event is never placed by readings that are predicted later.
     known : mapping of name to effect class
@@ -193,13 +191,8 @@ def problem_of(candidate: Candidate, training: Experiment, effects: Sequence[Eff
     ----------
     candidate : Candidate
         Parameters that it fixes leave the posterior.
-    training : Experiment
     effects : sequence of Effect
         What `effects_of` returned.
-
-    Returns
-    -------
-    Problem
     """
     problem = build([training], effects, candidate.spec)
     prior = problem.prior

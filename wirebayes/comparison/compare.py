@@ -72,8 +72,6 @@ def judge(task: Task, seed: int, policy: Policy = POLICY) -> ModelJson:
 
     Parameters
     ----------
-    task : Task
-    seed : int
     policy : Policy
         When a fit counts as converged; lower than that of `fit`, as a comparison samples dozens of posteriors.
 
@@ -179,8 +177,6 @@ def run(
     tasks : sequence of Task
     directory : Path
         Of the run; each task names its file within it.
-    seed : int
-    policy : Policy
     report : callable
         Called with a name, the number of models judged and the number of all that were missing.
     """

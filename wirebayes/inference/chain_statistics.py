@@ -64,7 +64,6 @@ def power_scaled(log_component: Array, power: float) -> Array:
     ----------
     log_component : (n,) array
         Log density of the component, such as the prior, at the draws.
-    power : float
     """
     independent = tail_ess(log_component[None]) / log_component.size
     n = log_component.size

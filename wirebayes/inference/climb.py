@@ -98,7 +98,6 @@ class _Ends:
         ----------
         which : (n,) int array
             Their densities.
-        ended : Optimum
         """
         out = self
         for i in np.argsort(-ended.log_density):
@@ -148,7 +147,6 @@ def climb(
     start : (n, d) array
     residuals : function of ((m, d) points, (m,) row numbers) to (m,) values and (k, m) residuals, optional
         The density with what its curvature is made of, as `LogPosterior.standardised` returns them.
-    iterations : int
     tolerance : float
         Stop a row when half its squared Newton decrement is below this.
     of : (n,) int array, optional
@@ -161,10 +159,6 @@ def climb(
         than the best of their density, if there are several.
     curvature_at_end : bool
         Where only the places matter, the curvature may stay that of the last step: the Hessian takes d² evaluations.
-
-    Returns
-    -------
-    Optimum
     """
     n, d = start.shape
     look = partial(_by_differences, density) if residuals is None else partial(_by_residuals, residuals)
@@ -343,10 +337,6 @@ def distinct(found: Sequence[Optimum]) -> Optimum:
     ----------
     found : sequence of Optimum
         What climbs returned, put together.
-
-    Returns
-    -------
-    Optimum
     """
     every = together(found)
     order = np.argsort(-every.log_density)

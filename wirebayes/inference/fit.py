@@ -68,9 +68,6 @@ def fit(
 
     Parameters
     ----------
-    problem : Problem
-    seed : int
-    policy : Policy
     checkpoint : Path, optional
         See `wirebayes.inference.sampler.ensemble.sample`.
     progress : function of a share between 0 and 1
@@ -78,10 +75,6 @@ def fit(
         Parameters known to be good, where the search for modes looks too.
     rough : (n, d) array, optional
         Parameters drawn from nearly this posterior, which save burn-in a part of its work.
-
-    Returns
-    -------
-    Fit
     """
     own = problem.in_units(problem.own_units)
     target = LogPosterior(integrated(own))

@@ -70,8 +70,6 @@ class Weighted:
 
         Parameters
         ----------
-        density : int
-        n : int
         rng : numpy Generator
         """
         return self.z[truncated_rows(self.log_weight[:, density], n, rng)]
@@ -149,10 +147,6 @@ def sample(
     rng : numpy Generator
     ess : float
         Effective draws wanted of each density.
-
-    Returns
-    -------
-    Weighted
     """
     witness = draws[rng.permutation(len(draws))[:_WITNESSES]]
     height = densities(witness)[:, 0] if len(witness) else np.empty(0)
@@ -201,7 +195,6 @@ def from_draws(
         Of the first density, roughly.
     order : (d,) array of int
     rng : numpy Generator
-    ess : float
     """
     height = densities(draws)
     width = draws.std(axis=0)

@@ -70,7 +70,6 @@ class LaplaceFit:
 
         Parameters
         ----------
-        effect : Effect
         deviations : sequence of float
         amplitude : int
             Its number; the shape constants come after the amplitude itself.
@@ -134,16 +133,10 @@ def fitted(
     experiments : sequence of Experiment
         Samples of one material, fitted jointly.
     effects : sequence of Effect
-    spec : ModelSpec
-    rng : numpy.random.Generator
     near : (d,) array, optional
         Parameters known to be good, in units of the scales: one more start.
     scales : Scales, optional
         In whose units the fit is made; those of the experiments when left out.
-
-    Returns
-    -------
-    LaplaceFit
     """
     problem = build(experiments, effects, spec, scales=scales)
     target = LogPosterior(integrated(problem.in_units(problem.own_units)), for_draws=False)

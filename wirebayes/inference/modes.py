@@ -35,15 +35,10 @@ def modes(target: LogPosterior, rng: np.random.Generator, extra: Array | None = 
 
     Parameters
     ----------
-    target : LogPosterior
     rng : numpy.random.Generator
         Draws the starts.
     extra : (m, d) array, optional
         Further starts, in the coordinates that are sampled.
-
-    Returns
-    -------
-    Optimum
     """
     return searches(target, rng, 1, extra=extra)[0]
 
@@ -69,7 +64,6 @@ def searches(
 
     Parameters
     ----------
-    target : LogPosterior
     rng : numpy Generator
     n : int
         How many searches.
@@ -121,14 +115,9 @@ def search(target: LogPosterior, rng: np.random.Generator, *, extra: Array | Non
 
     Parameters
     ----------
-    target : LogPosterior
     rng : numpy Generator
     extra : (m, d) array, optional
         Further starts, in sampled coordinates.
-
-    Returns
-    -------
-    Search
     """
     alone = _SideBySide(target, 1, None)
     z = _prior(target, _ANNEALED, rng)

@@ -26,10 +26,8 @@ def draws(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int
 
     Parameters
     ----------
-    target : LogPosterior
     found : Optimum
         The modes of `target`; no search is made.
-    rng : numpy.random.Generator
     n : int
         Number of draws.
 

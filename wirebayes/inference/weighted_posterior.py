@@ -59,13 +59,8 @@ def weighted_posterior(problem: Problem, seed: int, ess: float) -> WeightedPoste
     ----------
     problem : Problem
         What its readings depend on linearly is integrated out, and drawn at the end.
-    seed : int
     ess : float
         Effective draws wanted.
-
-    Returns
-    -------
-    WeightedPosterior
     """
     rng = np.random.default_rng(seed)
     own = problem.in_units(problem.own_units)
@@ -89,9 +84,7 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
 
     Parameters
     ----------
-    target : LogPosterior
     rng : numpy Generator
-    ess : float
 
     Returns
     -------
@@ -155,8 +148,6 @@ def overlooked(
 
     Parameters
     ----------
-    target : LogPosterior
-    pool : Weighted
     column : int
         Which of the pool's densities the target is.
     log_integral : float

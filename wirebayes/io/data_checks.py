@@ -91,7 +91,6 @@ def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Noti
 
     Parameters
     ----------
-    protocol : Protocol
     values : (H, R) array
         What was read.
     resolution : float
@@ -123,7 +122,6 @@ def one_hold(protocol: Protocol, stated: Set[str]) -> list[Notice]:
 
     Parameters
     ----------
-    protocol : Protocol
     stated : set of str
         Parameters with a prior of the user's own.
     """

@@ -192,7 +192,6 @@ def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | 
     Parameters
     ----------
     holds : tuple of Hold
-    length_mm : float
     reference_C : float, optional
         Temperature from which warming counts; without it there is no warming.
 

@@ -220,12 +220,10 @@ def _unrecorded(keys: Keys, last: int, where: str, length_mm: float, control: Co
 
     Parameters
     ----------
-    keys : Keys
     last : int
         Number of the last recorded hold.
     where : str
         What errors call the readings.
-    length_mm : float
     control : {"displacement", "force"}
     """
     keys.only(("before_hold", SET[control], "duration_s"))

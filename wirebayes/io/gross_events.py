@@ -89,7 +89,6 @@ def of_readings(protocol: Protocol, readings: Floats, resolution: float) -> list
 
     Parameters
     ----------
-    protocol : Protocol
     readings : (H, R) array
         Tensions, or displacements where tensions were set; padded as the protocol is.
     resolution : float
@@ -127,7 +126,6 @@ def left(protocol: Protocol, readings: Floats, events: Sequence[Event]) -> tuple
 
     Parameters
     ----------
-    protocol : Protocol
     readings : (H, R) array
     events : sequence of Event
     """
@@ -154,7 +152,6 @@ def without(experiment: Experiment, events: Sequence[Event]) -> Experiment:
 
     Parameters
     ----------
-    experiment : Experiment
     events : sequence of Event
     """
     dropped = np.unique(np.concatenate([np.empty(0, np.int64), *(event.readings for event in events)]))

@@ -20,7 +20,6 @@ def complaint(path: Path, wrong: InputError) -> InputError:
 
     Parameters
     ----------
-    path : Path
     wrong : InputError
         What its reader said.
 

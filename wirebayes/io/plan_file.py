@@ -110,7 +110,6 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
 
     Parameters
     ----------
-    path : Path
     effects : sequence of str
         Effects that an aim may name.
 

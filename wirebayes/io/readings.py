@@ -85,7 +85,6 @@ def readings_of(table: Table, length_mm: float, control: Control = "displacement
 
     Parameters
     ----------
-    table : Table
     length_mm : float
         Zero-tension length, so that a displacement that leaves no wire is found.
     control : {"displacement", "force"}
@@ -144,7 +143,6 @@ def protocol_holds(table: Table, length_mm: float, control: Control = "displacem
 
     Parameters
     ----------
-    table : Table
     length_mm : float
         Zero-tension length, so that a displacement that leaves no wire is found.
     control : {"displacement", "force"}
@@ -184,8 +182,6 @@ class _Rows:
 
         Parameters
         ----------
-        row : int
-        column : str
         expected : str
             As the message shows it.
         """

@@ -99,7 +99,6 @@ def write_parquet(path: Path, header: Sequence[str], rows: Sequence[Sequence[Any
 
     Parameters
     ----------
-    path : Path
     header : sequence of str
     rows : sequence of sequences
         As long as the header; a column holds values of one type, or None.
@@ -120,7 +119,6 @@ def read_json(path: Path, otherwise: str = "") -> Any:
 
     Parameters
     ----------
-    path : Path
     otherwise : str
         What to say where it is absent.
 
@@ -146,7 +144,6 @@ def stored_results(path: Path, instead: str = "run its command again in a new fo
 
     Parameters
     ----------
-    path : Path
     instead : str
         What the user can do.
 

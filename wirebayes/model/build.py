@@ -101,7 +101,6 @@ def default_prior(
 
     Parameters
     ----------
-    length_mm : float
     scales : Scales
         Of the test, which defaults refer to.
     instead : mapping of name to float or Distribution

@@ -16,7 +16,6 @@ def unit_of_column(name: str, samples: Sequence[Sample]) -> str:
 
     Parameters
     ----------
-    name : str
     samples : sequence of Sample
         Of the problem: what is set and what is read decides the units of errors and of amplitudes of instruments.
     """
@@ -52,7 +51,6 @@ def sample_in(sample: Sample, old: Units, new: Units) -> Sample:
 
     Parameters
     ----------
-    sample : Sample
     old, new : Units
         Those it is written in, and those it shall be written in.
     """

@@ -57,10 +57,6 @@ def chain(
     variance : (n,) array
         Of one reading, rounding included.
     setting_sd : (n,) array
-
-    Returns
-    -------
-    Filtered
     """
     if compiled.kernel is not None:
         return Filtered(*compiled.kernel.chain(*_compiled(line, readings, mask, variance, setting_sd)))
@@ -368,11 +364,8 @@ class _Later:
 
         Parameters
         ----------
-        line : Linearised
-        j : int
         readings : (R, n) or (R, 1) array
         mask : (R,) bool array
-        noise : _Noise
         """
         a, c, q = line.carry_by_creep[j], line.carry_by_setting[j], noise.setting_var
         by_c, by_s = line.by_creep[j][mask], line.by_setting[j][mask]

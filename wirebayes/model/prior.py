@@ -163,7 +163,6 @@ def wire_defaults(
     ----------
     length_mm : float
         Of the sample.
-    scales : Scales
     control : {"displacement", "force"}
         What is set in the test: its setting error is one of that, its sensor error one of what is read.
     zero_mm : float

@@ -245,15 +245,10 @@ def with_protocols(problem: Problem, protocols: Sequence[Protocol], readings: Se
 
     Parameters
     ----------
-    problem : Problem
     protocols : sequence of Protocol
         One a sample, in the problem's order.
     readings : sequence of (H, R, 1) arrays
         One a sample, padded as its protocol is, N.
-
-    Returns
-    -------
-    Problem
     """
     return replace(
         problem,

@@ -22,7 +22,6 @@ def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Gene
         Parameters, for instance draws of a posterior.
     sample : Sample
         The test that is repeated: its protocol, its model and its resolution.
-    rng : numpy.random.Generator
 
     Returns
     -------

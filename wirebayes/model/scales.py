@@ -112,7 +112,6 @@ def planned_scales(experiments: Sequence[Experiment], k1_N: float = TYPICAL_K1_N
     ----------
     experiments : sequence of Experiment
         Their readings do not count.
-    k1_N : float
     """
     found = scales_of([_stretched(e, k1_N) if e.control == "force" else e for e in experiments])
     if all(e.control == "force" for e in experiments):

@@ -21,10 +21,8 @@ def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array
 
     Parameters
     ----------
-    protocol : Protocol
     theta : mapping of name to (n,) array
         ``k1 B U k2 N`` and the amplitudes of the model's effects; `preload` plays no part.
-    model : Model
     readings : (H, R, n) or (H, R, 1) array
         Tensions, N; what the protocol's mask leaves out is ignored.
     variance : (n,) array
@@ -98,10 +96,8 @@ def hold_courses(
 
     Parameters
     ----------
-    protocol : Protocol
     theta : mapping of name to (n,) array
         ``k1 B U k2 N`` and the amplitudes of the model's effects; `preload` plays no part, nor does `k1` under weights.
-    model : Model
     first : (H, n) or (H, 1) array
         First reading of each hold, N, or mm under weights.
 

@@ -14,7 +14,6 @@ def log_sum(logs: Array, axis: int = 0) -> Array:
     ----------
     logs : array
         No NaN, no +inf.
-    axis : int
     """
     top = logs.max(axis=axis, keepdims=True)
     top = np.where(np.isfinite(top), top, 0.0)

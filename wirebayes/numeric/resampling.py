@@ -15,7 +15,6 @@ def systematic_rows(weight: Array, n: int, rng: np.random.Generator) -> NDArray[
         Not negative; need not sum to one.
     n : int
         Number of draws.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -39,7 +38,6 @@ def truncated_rows(log_weight: Array, n: int, rng: np.random.Generator) -> NDArr
         -inf for a row without weight.
     n : int
         Number of draws.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -83,7 +81,6 @@ def thinned(weight: Array, n: int, rng: np.random.Generator) -> tuple[NDArray[np
         Positive.
     n : int
         Positive.
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -121,10 +118,6 @@ def next_power(log_weight: Array, most: float, share: float) -> float:
         Positive.
     share : float
         Between 0 and 1: of the rows' effective number, (sum w)² / sum w².
-
-    Returns
-    -------
-    float
     """
 
     def effective(power: float) -> float:

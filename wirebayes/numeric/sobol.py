@@ -20,7 +20,6 @@ def strata(dimensions: int, size: int) -> NDArray[np.uint32]:
 
     Parameters
     ----------
-    dimensions : int
     size : int
         Points: a power of two.
 

@@ -13,7 +13,6 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator, weight: Array | None
     x : (n, d) array
     k : int
         How many rows.
-    rng : numpy.random.Generator
     weight : (n,) array, optional
         Of the rows, summing to one.
 

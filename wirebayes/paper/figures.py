@@ -108,7 +108,6 @@ def prior_predictive(protocol: Protocol, drawn_N: Array, tension_N: Array, title
 
     Parameters
     ----------
-    protocol : Protocol
     drawn_N : (H, R, n) array
     tension_N : (H, R) array
     """

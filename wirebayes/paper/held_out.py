@@ -63,11 +63,6 @@ def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -
         Posterior of the first holds.
     experiment : Experiment
         All holds.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    HeldOut
     """
     protocol, measured = experiment.protocol(), experiment.tension()
     trained = len(stored.sample.protocol.setting)
@@ -89,10 +84,8 @@ def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng:
     ----------
     stored : Stored
         Posterior that has not seen the hold.
-    experiment : Experiment
     time_s : (t,) array
         Times since the hold began; they need not be those of the readings.
-    rng : numpy.random.Generator
 
     Returns
     -------

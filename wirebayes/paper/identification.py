@@ -29,7 +29,6 @@ def rows(
     published : mapping of experiment name to parameters
     training_holds : int
         Both are adjusted to these first holds: all parameters, or the preload that the published ones lack.
-    seed : int
     parallel_map : function, optional
         The built-in `map`, or one over processes.
 

@@ -67,10 +67,8 @@ def residuals(experiment: Experiment, theta: Mapping[str, Array], variant: Model
 
     Parameters
     ----------
-    experiment : Experiment
     theta : mapping of name to (n,) array
         Without ``preload`` hold by hold.
-    variant : ModelSpec
 
     Returns
     -------
@@ -108,16 +106,10 @@ def identify(
 
     Parameters
     ----------
-    experiment : Experiment
-    variant : ModelSpec
     rng : numpy Generator
         For the starts: the best of many draws of the prior.
     known : mapping of name to float, optional
         Parameters that are not adjusted, such as published ones of which only the preload is missing.
-
-    Returns
-    -------
-    Identified
     """
     known = dict(known or {})
     names = [name for name in adjusted(variant) if name not in known]

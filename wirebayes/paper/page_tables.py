@@ -34,11 +34,6 @@ def table_4(rows: Rows, likelihood: str, history: str, law: str, caption: str) -
     history : {"saturating", "additive"}
     law : {"hooke", "modified"}
         Which rows are shown.
-    caption : str
-
-    Returns
-    -------
-    Table
     """
     chosen = [r for r in rows if (r["likelihood"], r["history"], r["elastic_law"]) == (likelihood, history, law)]
     header = ["sample", "parameters", "k1, N", "B, mm N⁻ᵁ", "U", "k2, s⁻ᴺ", "N", "preload, mm"]

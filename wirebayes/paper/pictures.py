@@ -41,10 +41,8 @@ class Gallery:
             Part of the page that shows it; the file's name begins with it.
         name : str
             Unique within the section.
-        figure : matplotlib.figure.Figure
         alt : str
             What the picture shows, for those who cannot see it.
-        caption : str
         """
         file = f"{section}-{name}.svg"
         write_bytes(self.folder / file, svg(figure))
@@ -71,12 +69,10 @@ class Gallery:
 
         Parameters
         ----------
-        e : Experiment
         published : dict of name to float
             The wire's row of Table 4.
         first : Stored
             Posterior of the first holds, hold by hold.
-        rng : numpy.random.Generator
         """
         hold = e.recorded_holds[-1]
         times = np.linspace(0.0, hold.duration_s, 49)
@@ -93,7 +89,6 @@ class Gallery:
 
         Parameters
         ----------
-        e : Experiment
         published : dict of name to float
             The wire's row of Table 4; its curve is drawn hold by hold.
         seen : mapping of likelihood to HeldOut
@@ -112,7 +107,6 @@ class Gallery:
 
         Parameters
         ----------
-        e : Experiment
         published : mapping of name to float
             The wire's row of Table 4, marked in the pictures.
         full : mapping of likelihood to Stored

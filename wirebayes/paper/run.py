@@ -44,7 +44,6 @@ def reproduce(
     directory : Path
         Gets the page, the tables, the pictures, and ``NAME/LIKELIHOOD`` for each fit: of all holds, and of the first
         five with ``-first-5`` behind.
-    seed : int
     report : callable
         ``report(name, done, total)``, for a progress bar.
     policy : Policy
@@ -79,8 +78,6 @@ def configuration(experiments: Sequence[Experiment], seed: int, policy: Policy) 
     ----------
     experiments : sequence of Experiment
         The paper's; their content counts, as a hash.
-    seed : int
-    policy : Policy
 
     Returns
     -------
@@ -259,7 +256,6 @@ def write_table(directory: Path, name: str, rows: Sequence[Row]) -> None:
 
     Parameters
     ----------
-    directory : Path
     name : str
         Of both files, without its ending.
     rows : sequence of dict

@@ -42,7 +42,6 @@ def rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
     Parameters
     ----------
     chains : mapping of wire name to Stored
-    seed : int
     """
     out = []
     for wire, stored in chains.items():
@@ -97,7 +96,6 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
 
     Parameters
     ----------
-    gallery : Gallery
     chains : mapping of wire to Stored
         Posteriors of all holds.
     limit_mm : float
@@ -128,7 +126,6 @@ def draw(gallery: Gallery, claims: Sequence[Row], limit_mm: float) -> None:
 
     Parameters
     ----------
-    gallery : Gallery
     claims : sequence of rows
         Those of ``robot_claim.csv``.
     limit_mm : float

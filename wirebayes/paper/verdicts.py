@@ -26,7 +26,6 @@ def verdict(published: float, low: float, high: float, shrunk: float) -> Verdict
 
     Parameters
     ----------
-    published : float
     low, high : float
         Ends of the posterior's 90 % interval.
     shrunk : float

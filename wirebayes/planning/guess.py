@@ -72,11 +72,6 @@ def from_tables(
         What is planned; the guess speaks of a sample as long as the first one's.
     n : int
         Number of draws.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    GuessedWire
     """
     stated = {}
     for name, value in tables.items():
@@ -107,10 +102,6 @@ def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n:
         What the guess rests on, for people.
     n : int
         How many draws; all of them where there are fewer.
-
-    Returns
-    -------
-    GuessedWire
     """
     count = len(draws["k1"])
     pick = np.linspace(0, count - 1, min(n, count)).round().astype(int)
@@ -122,15 +113,8 @@ def from_readings(experiment: Experiment, n: int, rng: np.random.Generator, spec
 
     Parameters
     ----------
-    experiment : Experiment
     n : int
         Number of draws.
-    rng : numpy.random.Generator
-    spec : ModelSpec
-
-    Returns
-    -------
-    GuessedWire
     """
     block = fitted([experiment], (), spec, rng)
     theta = rough_draws(block.target, block.modes, rng, n)

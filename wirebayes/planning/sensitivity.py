@@ -71,10 +71,6 @@ def sensitivity(
         The plain model.
     simulations : int
         Refitted tests behind the level of chance.
-
-    Returns
-    -------
-    Sensitivity
     """
     block = _fit_at(test, central(guess), spec)
     trials, candidates = screening.candidate_probes([block], kinds)

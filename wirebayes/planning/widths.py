@@ -79,12 +79,6 @@ def at_centre(test: Experiment, guess: Guess, spec: ModelSpec) -> Experiment:
     ----------
     test : Experiment
         The planned test; the readings that it holds are replaced.
-    guess : Guess
-    spec : ModelSpec
-
-    Returns
-    -------
-    Experiment
     """
     problem = build([test], (), spec)
     (sample,) = problem.samples
@@ -120,16 +114,11 @@ def expected_widths(
     guess : mapping of name to (n,) array
         Draws of the plain model's parameters; ``n`` tests are simulated.
     rng : numpy Generator
-    spec : ModelSpec
     tension_N, length_mm : float, optional
         For which creep is stated, so that tests of several lengths can be compared (creep is a strain of the whole
         wire); this test's `typical_tension` and length when left out.
     kept_draws : int
         Of how many tests posterior draws are kept.
-
-    Returns
-    -------
-    Expected
 
     Raises
     ------

@@ -108,10 +108,6 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
     rng : numpy Generator
     sample : int
         Which sample.
-
-    Returns
-    -------
-    HeldOut
     """
     problem, here = fitted.problem, fitted.problem.samples[sample]
     whole, trained = experiment.protocol(), len(here.protocol.number)
@@ -171,7 +167,6 @@ def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[
     draws : (rows, n) array
         Joint draws of all readings: each is compared with the others as the observed ones are.
     observed : (rows,) array
-    probability : float
 
     Returns
     -------

@@ -95,10 +95,6 @@ def smoothed_leave_one_hold_out(
     exact : bool
         Fit without every hold, one by one, whatever the diagnostic says.
     progress : function of a share between 0 and 1
-
-    Returns
-    -------
-    LeftOut
     """
     problem = fitted.problem
     theta = thinned(fitted.flat)

@@ -31,11 +31,9 @@ def log_densities(
 
     Parameters
     ----------
-    problem : Problem
     holds : list of (sample, row of its protocol)
     draws : (n, d) array
         Parameters in the problem's units, of the full posterior.
-    seed : int
     doubtful : (m,) bool array
         Those that draws of the full posterior do not settle: a search bears witness against each of them. Where the
         common proposal does not even settle the full posterior, they alone are looked at.
@@ -103,7 +101,6 @@ def without_hold(problem: Problem, sample: int, hold: int) -> Problem:
 
     Parameters
     ----------
-    problem : Problem
     sample : int
         Position among the problem's samples.
     hold : int
@@ -126,7 +123,6 @@ def without_holds(problem: Problem, holds: Holds) -> list[Array]:
 
     Parameters
     ----------
-    problem : Problem
     holds : list of (sample, row of its protocol)
     """
     out = [np.repeat(sample.readings, len(holds), axis=2) for sample in problem.samples]
@@ -140,7 +136,6 @@ def joined(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:
 
     Parameters
     ----------
-    target : LogPosterior
     holds : list of (sample, row of its protocol)
     """
 

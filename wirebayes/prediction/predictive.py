@@ -60,7 +60,6 @@ def predict(
         Posterior draws.
     sample : Sample
         The one of the problem's samples that goes on; its readings are the history.
-    request : PredictionRequest
     rng : numpy Generator
 
     Returns
@@ -139,8 +138,6 @@ def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator
     ----------
     own : mapping of name to (n,) array
         Posterior draws of the sample's parameters.
-    sample : Sample
-    rng : numpy.random.Generator
 
     Returns
     -------
@@ -188,7 +185,6 @@ def given_first(drawn: Floats, request: PredictionRequest) -> Floats:
     ----------
     drawn : (H, R, n) array
         Joint draws of all readings of a likelihood along the chain; changed in place.
-    request : PredictionRequest
 
     Returns
     -------

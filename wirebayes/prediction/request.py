@@ -55,10 +55,6 @@ def request_of(table: Table, stored: Stored, *, fresh: bool = False) -> Protocol
         The table is the whole history of another sample. Otherwise its holds are those of the tested sample: repeated
         ones are replicated, later ones begin when the last trained hold ended.
 
-    Returns
-    -------
-    ProtocolRequest
-
     Raises
     ------
     InputError
@@ -154,7 +150,6 @@ class _File:
         ----------
         hold, reading : int
             Positions of the hold in the file and of the reading in its hold.
-        column : str
         found, expected : str
             As the message shows them.
         """

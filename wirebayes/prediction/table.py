@@ -38,7 +38,6 @@ def mixture_table(
     ----------
     members : sequence of (probability, ProtocolRequest)
         One protocol requested of each model, as often among the draws as it is probable; the probabilities sum to one.
-    seed : int
     draws : int
         In all, evenly spread over the stored ones.
     """
@@ -63,7 +62,6 @@ def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: in
     ----------
     members : sequence of (probability, ProtocolRequest)
         As for `mixture_table`.
-    seed : int
     """
     request = members[0][1]
     given = np.isfinite(request.prediction.first) & request.prediction.requested

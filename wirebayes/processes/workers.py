@@ -236,7 +236,6 @@ def as_finished(
 
     Parameters
     ----------
-    pool : Executor
     function : function of one piece of work
     work : iterable of pairs
     at_once : int

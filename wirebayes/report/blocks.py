@@ -273,7 +273,6 @@ def pictures_in(folder: Path, captions: Mapping[str, str]) -> list[Picture]:
 
     Parameters
     ----------
-    folder : Path
     captions : mapping of file name without ending to caption
     """
     files = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in _KINDS}
@@ -293,7 +292,6 @@ def files_beside(folder: Path, contents: Sequence[tuple[str, str]]) -> Links:
 
     Parameters
     ----------
-    folder : Path
     contents : sequence of (name, what it holds)
     """
     found = [

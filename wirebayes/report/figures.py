@@ -64,10 +64,8 @@ def legend_below(figure: Figure, axes: Any, columns: int = 2) -> None:
 
     Parameters
     ----------
-    figure : matplotlib.figure.Figure
     axes : matplotlib.axes.Axes
         Whose labelled lines the legend names.
-    columns : int
     """
     place: Any = "outside lower center"
     figure.legend(
@@ -85,7 +83,6 @@ def measured(protocol: Protocol, readings: Array, title: str) -> Figure:
 
     Parameters
     ----------
-    protocol : Protocol
     readings : (H, R) array
     """
     weights = protocol.control == "force"
@@ -137,7 +134,6 @@ def named(name: str, effects: tuple[Any, ...] = (), control: Control = "displace
 
     Parameters
     ----------
-    name : str
     effects : tuple of Effect
     control : {"displacement", "force"}
     """

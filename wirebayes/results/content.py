@@ -32,7 +32,6 @@ def groups_of(
 
     Parameters
     ----------
-    fit : Fit
     sample : Sample or None
         None for all.
     provenance : mapping

@@ -193,7 +193,6 @@ def extrapolation(fitted: Fit, tension_N: float, times_s: Array = TIMES_S, sampl
     ----------
     fitted : Fit
         Its own time law is extrapolated, with all effects of the wire.
-    tension_N : float
     times_s : (t,) array
     sample : int
         Whose length B refers to.

@@ -97,12 +97,10 @@ def one(
 
     Parameters
     ----------
-    job : Job
     directory : Path
         Of the run; the job's folders are made in it.
     seed : int
         Of the run; the fit's own follows from it and the name of the job's folder.
-    policy : Policy
     progress : callable
         Called with the share of the work that is done, from 0 to 1.
     """
@@ -124,18 +122,12 @@ def fitted(
 
     Parameters
     ----------
-    job : Job
     seed : int
         Of the run; the fit's own follows from it and the name of the job's folder.
-    policy : Policy
     checkpoint : Path, optional
         See `wirebayes.inference.fit.fit`; without one nothing is written meanwhile.
     progress : callable
         Called with the share of the work that is done, from 0 to 1.
-
-    Returns
-    -------
-    Fit
     """
     known = catalogue(job.own_effects)
     effects = [named(key, known) for key in job.effects]
@@ -149,13 +141,10 @@ def store(job: Job, result: Fit, directory: Path, seed: int, policy: Policy, *, 
 
     Parameters
     ----------
-    job : Job
-    result : Fit
     directory : Path
         Of the run.
     seed : int
         Of the run.
-    policy : Policy
     draws : bool
         Write the posterior draws, not only their summary.
     """

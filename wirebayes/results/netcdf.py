@@ -80,7 +80,6 @@ def read(path: Path, names: Sequence[str]) -> dict[str, Group]:
 
     Parameters
     ----------
-    path : Path
     names : sequence of str
         Of the groups.
     """

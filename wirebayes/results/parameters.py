@@ -20,7 +20,6 @@ def variables(problem: Problem, theta: Array, sample: Sample | None) -> dict[str
 
     Parameters
     ----------
-    problem : Problem
     theta : (chains, draws, d) array
     sample : Sample or None
         None for all.
@@ -77,7 +76,6 @@ def unit_of(name: str, effects: tuple[Effect, ...] = (), controls: Sequence[Cont
 
     Parameters
     ----------
-    name : str
     effects : tuple of Effect
     controls : sequence of {"displacement", "force"}
         What was set in the tests that it belongs to.

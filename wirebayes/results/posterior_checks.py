@@ -34,7 +34,6 @@ def warnings(fit: Fit, sample: Sample) -> list[Notice]:
 
     Parameters
     ----------
-    fit : Fit
     sample : Sample
         One of the fit's.
 
@@ -75,7 +74,6 @@ def of_posterior(own: Mapping[str, Floats], prior: Mapping[str, Floats], sample:
     ----------
     own, prior : mapping of name to (n,) array
         Draws of its posterior and of its prior.
-    sample : Sample
     """
     found = [
         ("data", loose_steps(own, sample)),

@@ -23,7 +23,6 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
 
     Parameters
     ----------
-    prior : Prior
     theta : (n, d) array
         Draws of the posterior, in the prior's columns.
     columns : sequence of str

@@ -22,8 +22,6 @@ def save(
 
     Parameters
     ----------
-    fit : Fit
-    folder : Path
     provenance : mapping
         Data hash, configuration, seed: stored as attributes.
     seed : int
@@ -45,8 +43,6 @@ def save_summary(fit: Fit, folder: Path, *, sample: Sample | None = None) -> Sum
 
     Parameters
     ----------
-    fit : Fit
-    folder : Path
     sample : Sample, optional
         See `save`.
     """

@@ -19,8 +19,6 @@ def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
     Parameters
     ----------
     draws : mapping of name to (n,) array
-    sample : Sample
-    likelihood : str
     """
     _check_words(sample, likelihood)
     _check_draws(draws, sample, likelihood)

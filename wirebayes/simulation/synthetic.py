@@ -222,14 +222,7 @@ def write(folder: Path, benches: Sequence[Bench], truth: Truth = Truth(), seed: 
 
     Parameters
     ----------
-    folder : Path
     benches : sequence of Bench
-    truth : Truth
-    seed : int
-
-    Returns
-    -------
-    Simulated
     """
     made = draw(benches, truth, seed)
     for bench, sample in zip(benches, made.problem.samples, strict=True):
@@ -246,7 +239,6 @@ def effect_option(text: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> t
 
     Parameters
     ----------
-    text : str
     known : mapping of name to effect class, optional
 
     Raises

@@ -28,7 +28,6 @@ def hint(word: str, known: Sequence[str]) -> str:
 
     Parameters
     ----------
-    word : str
     known : sequence of str
         What is expected; a last part ``_mm``, ``_m``, ``_rad``, ``_N``, ``_s`` or ``_C`` is a unit.
 

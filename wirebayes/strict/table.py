@@ -138,7 +138,6 @@ class Table:
         ----------
         row : int
             Position among the rows of readings, from 0.
-        column : str
         found, expected : str
             As the message shows them: what stands there, and what should.
 
@@ -203,7 +202,6 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> 
 
     Parameters
     ----------
-    path : Path
     required, optional : sequence of str
         Names of the columns.
 

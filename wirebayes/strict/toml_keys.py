@@ -56,7 +56,6 @@ class Keys:
 
         Parameters
         ----------
-        key : str
         found, expected : str
             As the message shows them: what stands there, and what should.
 
@@ -106,7 +105,6 @@ class Keys:
 
         Parameters
         ----------
-        key : str
         default : dict, optional
             For a key that is missing; without a default that is an error.
         expected : str
@@ -135,7 +133,6 @@ class Keys:
 
         Parameters
         ----------
-        key : str
         expected : str
             What the message says is expected.
         default : any, optional
@@ -155,7 +152,6 @@ class Keys:
 
         Parameters
         ----------
-        key : str
         expected : str
             What the message says is expected, where there is no choice.
         default : str, optional
@@ -184,7 +180,6 @@ class Keys:
 
         Parameters
         ----------
-        key : str
         expected : str
             What the message says is expected; without it the limits.
         above : float
@@ -211,7 +206,6 @@ class Keys:
 
         Parameters
         ----------
-        key : str
         expected : str
             What the message says is expected.
         least, most : int
@@ -228,7 +222,6 @@ class Keys:
 
         Parameters
         ----------
-        key : str
         expected : str
             What the message says is expected.
         count : int, optional
@@ -264,7 +257,6 @@ def line_of(text: str, key: str, index: int | None = None, kind: str = "experime
 
     Parameters
     ----------
-    text : str
     key : str
         With the names of its tables, such as ``prior.k1.sd``.
     index : int, optional

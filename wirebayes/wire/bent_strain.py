@@ -18,7 +18,6 @@ def bent(effects: Placed, strain: Array, hold: HoldContext) -> tuple[Array, Arra
         Those at ``strain`` take part.
     strain : array
         Geometric strain, as `wirebayes.wire.laws` gives it.
-    hold : HoldContext
 
     Returns
     -------
@@ -36,10 +35,8 @@ def strain_of(effects: Placed, effective: Array, hold: HoldContext) -> Array:
 
     Parameters
     ----------
-    effects : Placed
     effective : array
         Tension over k1, real or complex.
-    hold : HoldContext
 
     Returns
     -------

@@ -41,9 +41,7 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
 
     Parameters
     ----------
-    protocol : Protocol
     theta : mapping of name to (n,) array
-    model : Model
     """
     if kernel is None or len(model.effects) > kernel.MOST_EFFECTS:
         return None

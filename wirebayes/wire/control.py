@@ -33,7 +33,6 @@ class Steps:
         ----------
         setting : (n,) or (1,) array
             What was set, with its error.
-        hold : HoldContext
 
         Returns
         -------
@@ -51,7 +50,6 @@ class Steps:
         held : (1, n) array
         elongation_mm : (R, n) array
             Of the zero-tension length.
-        hold : HoldContext
         """
         return self.elastic.tension(held, elongation_mm, hold)
 
@@ -63,7 +61,6 @@ class Steps:
         held : (1, n) array
         elongation_mm : (R, n) array
             Of the zero-tension length.
-        hold : HoldContext
         """
         tension = self.effects.change("guide", self.elastic.tension(held, elongation_mm, hold), hold)
         readings: Array = self.effects.change("reading", tension, hold)

@@ -65,7 +65,6 @@ class Creep:
             What `creep` returned.
         beside : mapping of effect key to (R, n) array
             What `beside` returned.
-        hold : HoldContext
 
         Returns
         -------

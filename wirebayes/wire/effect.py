@@ -240,7 +240,6 @@ class Effect:
 
         Parameters
         ----------
-        amplitude : Amplitude
         control : {"displacement", "force"}
         """
         swapped = control == "force" and cls.place == "reading"
@@ -294,10 +293,8 @@ class Placed:
 
         Parameters
         ----------
-        place : Place
         value : array, or dict at ``sample``
             The quantity as the plain model has it.
-        hold : HoldContext
 
         Returns
         -------
@@ -329,7 +326,6 @@ def steady_hold(
         All parameters of the model.
     length_mm, length_ref_mm : float or array
         The reference is the length itself when left out.
-    tension_ref_N : float
     law : {"hooke", "modified"}
     index, start_s : int, float
         Number of earlier holds, and the time since the first of them began.

@@ -33,7 +33,6 @@ class Elastic:
             Stretched length.
         elongation_mm : array
             Of the zero-tension length.
-        hold : HoldContext
         """
         hold.zero_mm = self._zero(elongation_mm, hold)
         strain = self.effects.change("strain", self.law.strain(position_mm, hold.zero_mm), hold)
@@ -47,7 +46,6 @@ class Elastic:
         tension_N : array
         elongation_mm : array
             Of the zero-tension length.
-        hold : HoldContext
         """
         hold.zero_mm = self._zero(elongation_mm, hold)
         return self.law.stretched(strain_of(self.effects, tension_N / self.k1, hold), hold.zero_mm)

@@ -58,10 +58,8 @@ def simulate(
 
     Parameters
     ----------
-    protocol : Protocol
     theta : mapping of name to (n,) array
         ``k1 B U k2 N preload`` and ``effect_name.parameter`` of every effect of the model.
-    model : Model
     setting_error : (H, n) array, optional
         Of each hold, in the unit of what is set; zero when left out. May be complex (derivatives).
 
@@ -111,14 +109,8 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> Lineari
 
     Parameters
     ----------
-    protocol : Protocol
     theta : mapping of name to (n,) array
         ``k1 B U k2 N preload`` and ``effect_name.parameter`` of every effect of the model.
-    model : Model
-
-    Returns
-    -------
-    Linearised
     """
     call = compiled.call(protocol, theta, model)
     if call is not None:

@@ -121,7 +121,6 @@ def ridges_of(problem: Problem, columns: Columns, for_draws: bool) -> list[Ridge
 
     Parameters
     ----------
-    problem : Problem
     columns : Columns
         How each parameter is measured by itself.
     for_draws : bool

@@ -63,7 +63,6 @@ def init(
 
     Parameters
     ----------
-    target : LogPosterior
     seed : int
         Of everything that is random in this run.
     policy : Policy
@@ -106,8 +105,6 @@ def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampli
 
     Parameters
     ----------
-    target : LogPosterior
-    state : BurnIn
     policy : Policy
         How many rounds, how many draws in each, and what acceptance is enough.
 
@@ -187,9 +184,6 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy, *, draws_stay
 
     Parameters
     ----------
-    target : LogPosterior
-    state : Sampling
-    policy : Policy
     draws_stay : bool
         False where walkers are still about where they were placed, by the weights of few draws.
     """

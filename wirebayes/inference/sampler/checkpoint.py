@@ -28,7 +28,6 @@ def write(path: Path, fit: Mapping[str, Any], values: Mapping[str, Any], arrays:
 
     Parameters
     ----------
-    path : Path
     fit : mapping
         What distinguishes this fit from others.
     values : mapping

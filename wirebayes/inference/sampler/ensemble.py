@@ -84,9 +84,6 @@ def sample(
 
     Parameters
     ----------
-    target : LogPosterior
-    seed : int
-    policy : Policy
     checkpoint : Path, optional
         A file that is rewritten whole after each block; a later call with the same arguments goes on from it and
         ends with the same bytes. Readings and model are the caller's business, the file knows only the seed, the
@@ -98,10 +95,6 @@ def sample(
         Sampled coordinates that the search should climb from, too.
     rough : (n, d) array, optional
         Sampled coordinates of draws from nearly this posterior: what the first proposal is learned from.
-
-    Returns
-    -------
-    Chains
 
     Raises
     ------

@@ -93,10 +93,6 @@ def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixtur
     covariances : (k, d, d) array
     log_weights : (k,) array
         Log evidence of each mode.
-
-    Returns
-    -------
-    Mixture
     """
     weights = np.maximum(np.exp(log_weights - log_weights.max()), LEAST_EVIDENCE)
     return Mixture(weights / weights.sum(), centres, np.linalg.cholesky(covariances))
@@ -114,7 +110,6 @@ def fit_mixture(
 
     Parameters
     ----------
-    points : Points
     rng : numpy.random.Generator
         Draws the starts.
     most : int
@@ -123,10 +118,6 @@ def fit_mixture(
         Degrees of freedom of every component.
     before : Mixture, optional
         A mixture of nearly these points, used as the start if it has `most` components.
-
-    Returns
-    -------
-    Mixture
 
     Raises
     ------
@@ -169,15 +160,10 @@ def fit_around(points: Points, of: Mixture, rng: np.random.Generator, *, most: i
         However few.
     of : Mixture
         Of what the points lie around.
-    rng : numpy.random.Generator
     most : int
         Largest number of components; no more than the points are worth, each as many as there are coordinates.
     wider : float
         Times the other covariance: what every component counts as much as so many points as there are coordinates.
-
-    Returns
-    -------
-    Mixture
 
     Raises
     ------

@@ -67,7 +67,6 @@ class Points:
 
         Parameters
         ----------
-        n : int
         rng : numpy Generator
         """
         rows, weight = thinned(self.weight, min(n, int(np.ceil(self.distinct))), rng)

@@ -181,16 +181,10 @@ def with_excess(of: Proposal, drawn: Points, value: Array, rng: np.random.Genera
 
     Parameters
     ----------
-    of : Proposal
     drawn : Points
         Places (n, d) by posterior mass.
     value : (n,) array
         Their log posterior densities.
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    Proposal
 
     References
     ----------

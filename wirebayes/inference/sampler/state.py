@@ -217,16 +217,9 @@ def advance(target: LogPosterior, walkers: Walkers, move: Move, steps: int, powe
 
     Parameters
     ----------
-    target : LogPosterior
-    walkers : Walkers
     move : emcee Move
-    steps : int
     power : float
         The density is taken to this power; below one, walls between modes are lower.
-
-    Returns
-    -------
-    Stretch
     """
 
     def density(z: Array) -> Array:
@@ -246,7 +239,6 @@ def move_of(learned: Learned, ensembles: int, steps: int, *, frozen: bool) -> Mo
 
     Parameters
     ----------
-    learned : Learned
     ensembles : int
         Number of independent ensembles among the walkers.
     steps : int

@@ -118,7 +118,6 @@ def fit_map(points: Points, order: NDArray[np.int64]) -> Straight:
 
     Parameters
     ----------
-    points : Points
     order : (d,) array of int
         In which coordinates are straightened.
 

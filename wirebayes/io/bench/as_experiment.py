@@ -60,7 +60,6 @@ def as_experiment(
 
     Parameters
     ----------
-    table : RawTable
     columns : dict of Role to Column
         Of the table, which errors name.
     header : tuple of str
@@ -69,7 +68,6 @@ def as_experiment(
         Its rows.
     origin : list of int
         The row of the table that each comes from.
-    about : About
     resolution : float or None
         Step of what is read, N or mm.
     control : {"displacement", "force"}

@@ -37,8 +37,6 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
 
     Parameters
     ----------
-    table : RawTable
-    column : int
     unit : Unit or None
         Where the header says how clocks are written.
 

@@ -52,7 +52,6 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
 
     Parameters
     ----------
-    table : RawTable
     mapping : sequence of str
         What the user says: ``HEADER=COLUMN`` or ``HEADER=COLUMN [UNIT]``; ``HEADER=ignore`` leaves a column out.
 

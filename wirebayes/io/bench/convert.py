@@ -85,7 +85,6 @@ def convert(path: Path, about: About, choices: Choices) -> list[Converted]:
         Text with columns, or an xlsx workbook.
     about : About
         Specimens side by side are named after what the file calls them, or by a number after this name.
-    choices : Choices
 
     Returns
     -------

@@ -43,7 +43,6 @@ def decode(path: Path, raw: bytes, known_words: Callable[[str], int]) -> tuple[s
     ----------
     path : Path
         Named in messages.
-    raw : bytes
     known_words : function of a text that returns a number
         How many different words of it name a quantity.
 

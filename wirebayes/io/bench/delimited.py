@@ -25,7 +25,6 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     ----------
     path : Path
         Named in messages.
-    text : str
     encoding : str
         In which it was written.
 

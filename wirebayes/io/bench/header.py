@@ -17,7 +17,6 @@ def is_of_sample(table: RawTable, index: int, role: Role) -> bool:
 
     Parameters
     ----------
-    table : RawTable
     index : int
         Of the column.
     role : str
@@ -32,7 +31,6 @@ def is_copy(table: RawTable, column: int, other: int) -> bool:
 
     Parameters
     ----------
-    table : RawTable
     column, other : int
     """
     units = [
@@ -62,8 +60,6 @@ def is_of(table: RawTable, index: int, role: Role) -> bool:
 
     Parameters
     ----------
-    table : RawTable
-    index : int
     role : str
     """
     return may_be(table, index, role) or is_of_rig(table, index, role)
@@ -74,7 +70,6 @@ def may_be(table: RawTable, index: int, role: Role) -> bool:
 
     Parameters
     ----------
-    table : RawTable
     index : int
         Of the column.
     role : str
@@ -106,7 +101,6 @@ def is_of_rig(table: RawTable, index: int, role: Role) -> bool:
 
     Parameters
     ----------
-    table : RawTable
     index : int
         Of the column.
     role : str
@@ -122,7 +116,6 @@ def is_called_of_sample(table: RawTable, index: int, role: Role) -> bool:
 
     Parameters
     ----------
-    table : RawTable
     index : int
         Of the column.
     role : str

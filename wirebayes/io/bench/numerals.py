@@ -22,7 +22,6 @@ def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None
 
     Parameters
     ----------
-    table : RawTable
     columns : sequence of int
         Those of which numbers are read.
     stated : {"point", "comma"}, optional

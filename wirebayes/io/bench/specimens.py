@@ -60,7 +60,6 @@ def side_by_side(
 
     Parameters
     ----------
-    table : RawTable
     mapping : sequence of str
         What the user says of columns: by a common name of every specimen's, by the whole name of one specimen's, which
         is then the only one that is read unless the column is to be ignored.

@@ -97,7 +97,6 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
 
     Parameters
     ----------
-    table : RawTable
     about : About
         The sample, whose length and area strains and stresses are multiplied by.
     choices : Choices

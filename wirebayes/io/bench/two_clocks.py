@@ -39,8 +39,6 @@ def clock_of(table: RawTable, column: int, unit: Unit | None) -> Clock | None:
 
     Parameters
     ----------
-    table : RawTable
-    column : int
     unit : Unit or None
         None for clocks and dates.
     """

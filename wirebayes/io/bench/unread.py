@@ -32,7 +32,6 @@ def unread(
 
     Parameters
     ----------
-    table : RawTable
     columns : dict of Role to Column
         Those that are read.
     mapping : sequence of str

@@ -31,10 +31,6 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Shee
         Content of the file.
     chosen : str, optional
         Name of a sheet; left out, the only one with readings is taken.
-
-    Returns
-    -------
-    Sheet
     """
     import openpyxl
 

@@ -88,10 +88,6 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
         Draws of the prior.
     summary : dict
         The fit's ``summary.json``.
-
-    Returns
-    -------
-    Section
     """
     sample, draws = stored.sample, stored.draws
     sampled = [name for name in draws if name in prior and np.ptp(draws[name]) > 0]

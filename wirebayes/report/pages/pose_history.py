@@ -50,15 +50,10 @@ def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> 
 
     Parameters
     ----------
-    folder : Path
     configuration : dict
         Content of ``configuration.json``.
     pose : PoseHistoryJson
         Content of ``pose.json``.
-
-    Returns
-    -------
-    Page
     """
     measured = pose["history"]["kind"] == "measured"
     about = "from measured joint values" if measured else "where commanded poses lead"

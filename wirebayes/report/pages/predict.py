@@ -37,7 +37,6 @@ def write_beside(predicted: Prediction, table: Path) -> Path:
 
     Parameters
     ----------
-    predicted : Prediction
     table : Path
         What the rows were written to.
     """
@@ -55,7 +54,6 @@ def page(predicted: Prediction, table: Path) -> Page:
 
     Parameters
     ----------
-    predicted : Prediction
     table : Path
         What the rows were written to.
     """

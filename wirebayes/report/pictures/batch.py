@@ -28,10 +28,6 @@ def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
         Fitted rows of ``batch.json``.
     far : list of dict
         Its outliers.
-
-    Returns
-    -------
-    Figure
     """
     count = Counter(row["material"] for row in rows if row["material"])
     materials = sorted(count, key=lambda material: -count[material])[:_MOST_MATERIALS]

@@ -24,7 +24,6 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
 
     Parameters
     ----------
-    experiment : Experiment
     target : Path
         The picture to write.
     recording : Recording, optional

@@ -19,7 +19,6 @@ def save_pictures(folder: Path, name: str, table: ComparedModels, models: list[M
 
     Parameters
     ----------
-    folder : Path
     name : str
         Of the experiment.
     table : dict

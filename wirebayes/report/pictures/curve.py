@@ -106,7 +106,6 @@ def on_axes(stored: Stored, axes: Any = None) -> Any:
 
     Parameters
     ----------
-    stored : Stored
     axes : matplotlib.axes.Axes, optional
         New ones when left out.
 
@@ -153,8 +152,6 @@ def draw_curve(axes: Any, stored: Stored, found: Curve, colour: str, label: str)
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-    stored : Stored
-    found : Curve
     colour, label : str
     """
     recorded = stored.sample.protocol.recorded
@@ -170,8 +167,6 @@ def draw_readings(axes: Any, stored: Stored, found: Curve) -> None:
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-    stored : Stored
-    found : Curve
     """
     x, (j, r) = _places(stored, found)
     axes.plot(x, stored.sample.readings[j, r, 0], "o", color=INK, ms=3, label="readings")
@@ -201,7 +196,6 @@ def name_holds(axes: Any, stored: Stored) -> None:
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-    stored : Stored
     """
     protocol = stored.sample.protocol
     numbers = protocol.number[protocol.recorded]

@@ -38,8 +38,6 @@ def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -
 
     Parameters
     ----------
-    folder : Path
-    robot : Robot
     request : PoseRequest
         The pose, its load and the times.
     found : Answer
@@ -72,7 +70,6 @@ def scene(
 
     Parameters
     ----------
-    robot : Robot
     position_m, rotation : (3,), (3, 3) arrays
     course : Course
         Its mean over the draws at the last time is drawn.
@@ -119,7 +116,6 @@ def scene_points(
 
     Parameters
     ----------
-    robot : Robot
     position_m, rotation : (3,), (3, 3) arrays
     course : Course
         Its mean over the draws is taken.
@@ -150,7 +146,6 @@ def still_points(robot: Robot, position_m: Floats, rotation: Floats) -> SceneJso
 
     Parameters
     ----------
-    robot : Robot
     position_m, rotation : (3,), (3, 3) arrays
     """
     here = position_m + robot.platform_m @ rotation.T
@@ -208,11 +203,6 @@ def in_time(drifts: Sequence[Drift], key: Distance, label: str, title: str) -> F
         Which band is drawn.
     label : str
         Of the vertical axis.
-    title : str
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     figure, axes = panel("time, s", label, title)
     for entry, colour in zip(drifts, (CHAIN, HOLD), strict=True):

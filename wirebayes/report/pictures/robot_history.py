@@ -29,8 +29,6 @@ def save(folder: Path, robot: Robot, history: History, found: HistoryAnswer) -> 
 
     Parameters
     ----------
-    folder : Path
-    robot : Robot
     history : History
         The rows that were read.
     found : HistoryAnswer
@@ -63,13 +61,8 @@ def banded(drift: DriftOverTime, key: Distance, label: str, title: str, history:
         Which band is drawn.
     label : str
         Of the vertical axis.
-    title : str
     history : History
         For what the platform carries.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     figure, axes = panel("time, s", label, title)
     _band(axes, drift["times_s"], np.array([drift[key][q] for q in INTERVAL]), CHAIN, "median and 90 % of the draws")
@@ -138,10 +131,6 @@ def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
     robot : Robot
     history : History
     found : HistoryAnswer
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     rows = np.unique(np.linspace(0, len(history.times_s) - 1, _PANELS).round().astype(int))
     meant, moved, factor = _shapes(robot, found, rows)

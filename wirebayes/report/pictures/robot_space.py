@@ -20,7 +20,6 @@ def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]
     ----------
     result : WorkspaceDrift
         On a regular grid.
-    title : str
 
     Returns
     -------
