@@ -5,7 +5,7 @@ So the preload lies on a curve over k1, as narrow as the error of the weight is 
 enter and do not leave. That error drives the creep, too, by the power U.
 
 Beside k1, what the last reading leaves of the stretch under w is straight where it is said as an error of the weight, a
-share of w; and the log of the creep under the weight that hung there, log B plus U times that share.
+share of w; and the log of the creep that was read, which the likelihood has linear in this error.
 """
 
 from dataclasses import dataclass
@@ -69,6 +69,16 @@ class DisplacementLevel:
         known = self._stretch(theta) + np.exp(log_lost) - self.last
         return np.asarray(known + self.slope(theta, U, log_lost) * score)
 
+    def log_gain(self, theta: Array, U: Array | float, score: Array) -> Array:
+        """(n,) log of the creep that is read under the true weight over that under the stated one.
+
+        Parameters
+        ----------
+        theta, U, score
+            See `value`.
+        """
+        return np.log(np.maximum(1.0 + self._power(theta, U) * score, _LEAST_GAIN))
+
     def slope(self, theta: Array, U: Array | float, log_lost: Array) -> Array:
         """(n,) derivative of the preload by its score, mm.
 
@@ -77,10 +87,20 @@ class DisplacementLevel:
         theta, U, log_lost
             See `score`; the preload in `theta` is not looked at.
         """
-        return np.asarray(self._stretch(theta) + U * np.exp(log_lost))
+        elastic = self._stretch(theta) * self._steepness(theta)
+        return np.asarray(elastic + self._power(theta, U) * np.exp(log_lost))
 
     def _stretch(self, theta: Array) -> Array:
         return np.asarray(self.length * self._strain(theta))
+
+    def _steepness(self, theta: Array) -> Array | float:
+        """Derivative of the log strain by the log weight."""
+        return 1.0 + self._strain(theta) if self.modified else 1.0
+
+    def _power(self, theta: Array, U: Array | float) -> Array:
+        """(n,) derivative of the log of the creep that is read by the log weight, which stretches it, too."""
+        strain = self._strain(theta)
+        return np.asarray(U + strain / (1.0 + strain) * self._steepness(theta))
 
     def _strain(self, theta: Array) -> Array:
         """(n,) elongation under the weight over the length, before any creep."""
@@ -112,3 +132,6 @@ def displacement_level(problem: Problem) -> DisplacementLevel | None:
 
 
 _LEAST = 1e-3  # of the stretched length that is left without strain: below, the law has no wire
+_LEAST_GAIN = (
+    0.02  # of the creep under the stated weight: a setting error is at most half of the weight, and U seldom 2
+)

@@ -157,17 +157,17 @@ class WeightLevel(Step):
         B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
         error = self.level.score(theta, U, z[:, B])
         z[:, self.level.preload] = error
-        z[:, B] += U * error
+        z[:, B] += self.level.log_gain(theta, U, error)
 
     def to_natural(self, theta: Array, z: Array) -> None:
         column, B, U = self.level.preload, self.ridge.where["B"], self.ridge.get(theta, "U")
         error = z[:, column]
-        z[:, B] -= U * error  # for the steps before this one
+        z[:, B] -= self.level.log_gain(theta, U, error)  # for the steps before this one
         theta[:, column] = self.level.value(error, theta, U, z[:, B])
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
-        log_lost = z[:, B] - U * z[:, self.level.preload]
+        log_lost = z[:, B] - self.level.log_gain(theta, U, z[:, self.level.preload])
         return np.asarray(np.log(self.level.slope(theta, U, log_lost)) - np.log(self.scale))
 
 
