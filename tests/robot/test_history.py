@@ -160,7 +160,7 @@ def test_corrected_joint_values_bring_the_platform_back():
     found = estimate(robot, _line(40), history, (robot.home_m, np.eye(3)), Uncertain(1e-3), np.random.default_rng(0))
     to = corrections.target(robot, history, found)
     np.testing.assert_allclose(to.position_m, _places(robot), atol=2e-4)  # nothing creeps there: about what was told
-    joint = corrections.wanted(robot, found, to)
+    joint = corrections.wanted(robot, history, found, to)
     rows = np.arange(len(TIMES))
     away = np.linalg.norm(found.track.position_m - to.position_m, axis=-1)
     assert away[:, -1].min() > 5e-4

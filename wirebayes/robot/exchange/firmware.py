@@ -1,8 +1,9 @@
 """Hangprinters as their firmware knows them: ``config.g`` of RepRapFirmware, ``printer.cfg`` of Klipper.
 
-RepRapFirmware: anchors in M669, lines, masses, forces and wire beyond the anchors in M666, in millimetres; of a letter
-given twice the last counts, as when the file is run. Klipper: anchors in the sections of its winches, the rest under
-``[printer]`` as the Hangprinter branch has it. Spools and springs are left out: zero-tension lengths need neither.
+RepRapFirmware: anchors in M669; lines (parts of a wire, U, and wires on a spool, O), masses, forces and wire beyond the
+anchors in M666, in millimetres; of a letter given twice the last counts, as when the file is run. Klipper: anchors in
+the sections of its winches, the rest under ``[printer]`` as the Hangprinter branch has it. Spools and springs are left
+out: zero-tension lengths need neither.
 """
 
 import re
@@ -10,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Floats
@@ -20,6 +22,7 @@ SUFFIXES = (".g", ".cfg")
 _WORD = re.compile(r"([A-Z])\s*((?:[-+]?[0-9.]+)(?::[-+]?[0-9.]+)*)")
 _ANCHORS = "ABCDI"
 _STEPPERS = "abcdefghi"
+_MOST_ON_SPOOL = 9  # lines: a printer has two or three
 _SMALLEST_MM = 20.0  # no printer's anchors lie so near to one another; those of metres do
 
 
@@ -83,7 +86,7 @@ def _reprapfirmware(text: str, where: str) -> tuple[list[list[float]], _Settings
     names = [f"M669 {letter}" for letter in _ANCHORS]
     count = int(found.values.get("M669 N", [4])[0])
     anchors = _anchors(found, names[:count], where, "M669 with A, B, C, D")
-    renamed = {"U": "lines", "W": "mass", "Y": "beyond", "I": "least", "X": "most"}
+    renamed = {"U": "lines", "O": "on spool", "W": "mass", "Y": "beyond", "I": "least", "X": "most"}
     for letter, name in renamed.items():
         if f"M666 {letter}" in found.values:
             found.values[name], found.line[name] = found.values[f"M666 {letter}"], found.line[f"M666 {letter}"]
@@ -154,10 +157,26 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
     bounds = None
     if "least" in found.values and "most" in found.values:
         bounds = float(each("least", 0.0).max()), float(each("most", 0.0).min())
-    zero = np.zeros((legs, 3))
-    notes = ("Spools, motors and the spring constant of the line are left out.",)
+    notes, winch = ["Spools, motors and the spring constant of the line are left out."], None
+    leg = np.repeat(np.arange(legs), _on_spools(path, found, each("on spool", 1.0)))
+    if len(leg) > legs:
+        winch = tuple(_ANCHORS[i] if firmware == "RepRapFirmware" else _STEPPERS[i].upper() for i in leg)
+        notes.append(
+            "The lines of a spool begin and end at one point, all that the firmware knows; give each its exit and "
+            "platform point."
+        )
+    zero = np.zeros((len(leg), 3))
     return ImportedRobot(
         path.stem, f"Imported from {path.name} of {firmware}.", "position", found.values["mass"][0], np.zeros(3),
-        np.array(anchors) / 1000, zero, np.zeros(legs), zero + [0.0, 0.0, 1.0], bounds, np.zeros(3), np.zeros(3),
-        notes, each("lines", 1.0), each("beyond", 0.0) / 1000, on_bed=True,
+        np.array(anchors)[leg] / 1000, zero, np.zeros(len(leg)), zero + [0.0, 0.0, 1.0], bounds, np.zeros(3),
+        np.zeros(3), tuple(notes), each("lines", 1.0)[leg], each("beyond", 0.0)[leg] / 1000, winch=winch, on_bed=True,
     )  # fmt: skip
+
+
+def _on_spools(path: Path, found: _Settings, count: Floats) -> NDArray[np.intp]:
+    """How many lines each spool winds."""
+    if not ((count >= 1) & (count <= _MOST_ON_SPOOL) & (count == np.round(count))).all():
+        given = ":".join(f"{value:g}" for value in found.values["on spool"])
+        expected = f"whole numbers from 1 to {_MOST_ON_SPOOL}, lines on each spool"
+        raise InputError(f"{path}, line {found.line['on spool']}, M666 O: found {given}, expected {expected}")
+    return count.astype(int)

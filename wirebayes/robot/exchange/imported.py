@@ -33,6 +33,8 @@ class ImportedRobot:
         Parallel lines of each wire, and wire beyond its exit point, where the file says so.
     normal : (3,) array or None
         Of the plane in which a rail holds the platform.
+    winch : tuple of str or None
+        Name of each leg's winch, where some drive several lines.
     on_bed : bool
         Whether the workspace begins at the home pose's height, as above a printer's bed.
     """
@@ -53,6 +55,7 @@ class ImportedRobot:
     lines: Floats | None = None
     beyond_m: Floats | None = None
     normal: Floats | None = None
+    winch: tuple[str, ...] | None = None
     on_bed: bool = False
 
 
@@ -100,7 +103,10 @@ def robot_file(robot: ImportedRobot, tension_N: tuple[float, float], home_m: Flo
         lines += ["", "[plane]", f"normal = {_row(robot.normal)}", 'contact = "rail"']
     legs = zip(robot.exit_m, robot.platform_m, robot.pulley_m, robot.axis, strict=True)
     for i, (exit_m, point, radius, axis) in enumerate(legs):
-        lines += ["", "[[leg]]", f"exit_point_m = {_row(exit_m)}", f"platform_point_m = {_row(point)}"]
+        lines += ["", "[[leg]]"]
+        if robot.winch is not None:
+            lines.append(f"winch = {_text(robot.winch[i])}")
+        lines += [f"exit_point_m = {_row(exit_m)}", f"platform_point_m = {_row(point)}"]
         if radius:
             lines += [f"pulley_radius_m = {float(radius)!r}", f"swivel_axis = {_row(axis)}"]
         if robot.lines is not None:

@@ -3,11 +3,12 @@
 Hangprinter firmware models a line as a spring of ``constant / length`` with the length in mm, so its constant is k1 in
 newtons. It ignores creep: the table beside it says how much each line will have grown. Where the line's stiffness
 changes with its tension, firmware and simulator get the tangent at the tensions at which the robot works. Of legs that
-hang on several lines, firmware gets the one constant it takes, with those of the others in comments.
+hang on several lines, firmware gets the one constant it takes, with those of the others in comments. Of a winch that
+drives several lines it knows the middle.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +20,8 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts, for_robot, lines_of
 from wirebayes.robot.mechanics.drums import motor_angle, paid_out
-from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.rotation import matrix, vector
+from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch, turned_by
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
 from wirebayes.robot.motion import inverse
 from wirebayes.wire.fresh import FreshSample
@@ -32,29 +34,51 @@ TABLE = ("tension_N", "time_s", "mean_mm_per_m", "sd_mm_per_m", "q05_mm_per_m", 
 
 def is_hangprinter(robot: Robot) -> bool:
     """Whether Hangprinter firmware can describe it: four or five drums, orientation held by parallel lines."""
-    return robot.freedom == "position" and not robot.is_linear.any() and 4 <= robot.legs <= 5
+    parallel = robot.freedom == "position" or (robot.freedom == "pose" and robot.winch is not None)
+    return parallel and not robot.is_linear.any() and 4 <= robot.joints <= 5
+
+
+def _anchors(robot: Robot) -> Floats:
+    """(j, 3) Where firmware sees each winch's anchor from the reference point, m: the middle of its lines.
+
+    Firmware takes the platform for a point, so a platform point counts as if its exit point were moved the other way.
+    """
+    apart = robot.exit_m - robot.platform_m @ matrix(robot.home_rotation_rad).T
+    return mean_of_each_winch(robot, apart.T).T
 
 
 def reprapfirmware(robot: Robot, line: WireDraws) -> str:
     """Lines for ``config.g`` of RepRapFirmware (M669 and M666), each value with its 90 % interval in a comment."""
-    count = "" if robot.legs == ANCHORS_UNLESS_SAID else f"N{robot.legs} "
-    anchors = " ".join(f"{letter}{_joined(1e3 * a, '.2f')}" for letter, a in zip(ANCHORS, robot.exit_m, strict=False))
+    count = "" if robot.joints == ANCHORS_UNLESS_SAID else f"N{robot.joints} "
+    anchors = " ".join(
+        f"{letter}{_joined(1e3 * a, '.2f')}" for letter, a in zip(ANCHORS, _anchors(robot), strict=False)
+    )
+    parts, beyond = (mean_of_each_winch(robot, v) for v in (robot.lines, robot.beyond_m))
+    on_spool = turned_by(robot).sum(0)
     spring = working_spring(robot, line)
     rows = [
         (f"M669 K6 {count}{anchors}", "anchors, mm"),
-        (f"M666 U{_joined(robot.lines, '.0f')}", "mechanical advantages"),
+        (f"M666 U{_joined(parts, '.0f')}", "mechanical advantages"),
         (f"M666 W{robot.mass_kg:g}", "mover, kg"),
         (f"M666 S{spring.mean_N:.0f}", f"spring constant per unit length, N: {spring.described}"),
-        (f"M666 Y{_joined(1e3 * robot.beyond_m, '.0f')}", "wire beyond each anchor, mm"),
-        (f"M666 I{_joined(np.full(robot.legs, robot.rule.lowest_N), 'g')}", "smallest planned force, N"),
-        (f"M666 X{_joined(np.full(robot.legs, robot.rule.highest_N), 'g')}", "largest planned force, N"),
+        (f"M666 Y{_joined(1e3 * beyond, '.0f')}", "wire beyond each anchor, mm"),
+        (f"M666 I{_joined(np.full(robot.joints, robot.rule.lowest_N), 'g')}", "smallest planned force, N"),
+        (f"M666 X{_joined(np.full(robot.joints, robot.rule.highest_N), 'g')}", "largest planned force, N"),
     ]
+    if robot.winch is not None:
+        rows.append(
+            (f"M666 O{_joined(on_spool, '.0f')}", "lines on each spool; anchors are the middle of their points")
+        )
     if robot.drums is not None and robot.drums.radius_m.all():
         radius, growth = _spools(robot, robot.drums)
+        gear = of_each_winch(robot, robot.drums.gear)
         rows += [
             (f"M666 R{_joined(1e3 * radius, '.3f')}", "spool radii at the origin, mm"),
-            (f"M666 Q{1e3 * growth.mean():.5f}", f"buildup, mm: {_joined(1e3 * growth, '.5f', ', ')}"),
-            ("", f"M666 L and H, teeth of motor and spool: their ratio is {_joined(robot.drums.gear, 'g', ', ')}"),
+            (
+                f"M666 Q{1e3 * (growth / on_spool).mean():.5f}",
+                f"buildup of one line, mm: {_joined(1e3 * growth / on_spool, '.5f', ', ')}",
+            ),
+            ("", f"M666 L and H, teeth of motor and spool: their ratio is {_joined(gear, 'g', ', ')}"),
         ]
     return _head(robot, line, spring, ";") + "".join(f"{code} ; {comment}\n".lstrip() for code, comment in rows)
 
@@ -62,25 +86,26 @@ def reprapfirmware(robot: Robot, line: WireDraws) -> str:
 def klipper(robot: Robot, line: WireDraws) -> str:
     """Sections for ``printer.cfg``: anchors for every Klipper, spring settings for the Hangprinter branch."""
     spring = working_spring(robot, line)
+    parts, beyond = (mean_of_each_winch(robot, v) for v in (robot.lines, robot.beyond_m))
     text = _head(robot, line, spring, "#") + (
         "[printer]\nkinematics: winch\n"
         "# The next options are those of the Hangprinter branch of Klipper; upstream does not know them.\n"
         f"winch_mover_weight: {robot.mass_kg:g}  # kg\n"
         f"winch_spring_constant: {spring.mean_N:.0f}  # N per unit strain: {spring.described}\n"
-        f"winch_mechanical_advantage: {_joined(robot.lines, '.0f', ', ')}\n"
-        f"winch_guy_wire_lengths: {_joined(1e3 * robot.beyond_m, '.0f', ', ')}  # mm\n"
-        f"winch_min_force: {_joined(np.full(robot.legs, robot.rule.lowest_N), 'g', ', ')}  # N\n"
-        f"winch_max_force: {_joined(np.full(robot.legs, robot.rule.highest_N), 'g', ', ')}  # N\n"
+        f"winch_mechanical_advantage: {_joined(parts, '.0f', ', ')}\n"
+        f"winch_guy_wire_lengths: {_joined(1e3 * beyond, '.0f', ', ')}  # mm\n"
+        f"winch_min_force: {_joined(np.full(robot.joints, robot.rule.lowest_N), 'g', ', ')}  # N\n"
+        f"winch_max_force: {_joined(np.full(robot.joints, robot.rule.highest_N), 'g', ', ')}  # N\n"
     )
     if robot.drums is not None and robot.drums.radius_m.all():
         growth = 1e3 * _spools(robot, robot.drums)[1]
         text += f"winch_buildup_factor: {growth.mean():.5f}  # mm: {_joined(growth, '.5f', ', ')}\n"
-    for leg, (letter, (x, y, z)) in enumerate(zip(STEPPERS, 1e3 * robot.exit_m, strict=False)):
+    for winch, (letter, (x, y, z)) in enumerate(zip(STEPPERS, 1e3 * _anchors(robot), strict=False)):
         text += f"\n[stepper_{letter}]\nanchor_x: {x:.2f}\nanchor_y: {y:.2f}\nanchor_z: {z:.2f}\n"
         if robot.drums is not None and robot.drums.radius_m.all():
-            turn = 2e3 * np.pi * _spools(robot, robot.drums)[0][leg] / robot.lines[leg]
+            turn = 2e3 * np.pi * _spools(robot, robot.drums)[0][winch] / parts[winch]
             text += f"rotation_distance: {turn:.4f}  # straight mm a turn of the spool, at the origin\n"
-            text += f"gear_ratio: {robot.drums.gear[leg]:g}:1\n"
+            text += f"gear_ratio: {of_each_winch(robot, robot.drums.gear)[winch]:g}:1\n"
     return text
 
 
@@ -91,9 +116,10 @@ def _spools(robot: Robot, drums: Drums) -> tuple[Floats, Floats]:
     squared grows by ``t / (pi n)`` per length: the firmware's buildup factor.
     """
     shape = statics.geometry(robot, np.zeros((3, 1)), np.eye(3)[..., None])
-    joint = statics.stretched(robot, shape, robot.beyond_m[:, None])[:, 0]
+    joint = statics.stretched(robot, shape, robot.beyond_m[:, None])[:, 0] - robot.beyond_joint_m
+    joint = of_each_leg(robot, mean_of_each_winch(robot, joint))
     slope = paid_out(drums, motor_angle(drums, joint))[1] * drums.gear
-    return slope, drums.layer_m / (np.pi * drums.layer_turns)
+    return of_each_winch(robot, slope), of_each_winch(robot, drums.layer_m / (np.pi * drums.layer_turns))
 
 
 def creep_table(
@@ -253,6 +279,8 @@ def mujoco(robot: Robot, line: WireDraws) -> str | None:
         return None
     zero, tau = commands.zero_m.T, commands.tension_N.T
     k1 = np.broadcast_to(wires.theta["k1"], zero.shape)
+    if robot.winch is not None:
+        robot = replace(robot, home_rotation_rad=vector(commands.rotation)[0])
     which = cut_from(robot)
     if wires.law == "hooke" and not wires.at("strain"):
         return mjcf(robot, k1[:, 0], zero[:, 0], commands.offset_m[0], remark=which)

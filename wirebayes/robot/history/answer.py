@@ -19,7 +19,7 @@ from wirebayes.robot.history.estimate import Estimate, Progress, estimate
 from wirebayes.robot.history.follow import RESTART, Track, follow
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
-from wirebayes.robot.mechanics import draws, sag
+from wirebayes.robot.mechanics import draws, sag, winches
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -116,7 +116,7 @@ def answer(
         sentence = "No draw of the wires holds the platform at the first row; see --position for where it starts."
         return HistoryAnswer(_without_answer(content, sentence), {}, rows)
     to = corrections.target(robot, history, found)
-    change = corrections.wanted(robot, found, to) - joint
+    change = corrections.wanted(robot, history, found, to) - joint
     best = _mean(joint + change) if joint.ndim == 2 else joint + _mean(change)
     course = _course(history, found, rows)
     content |= {
@@ -126,7 +126,7 @@ def answer(
         "rotation_vector_rad": _bands(_turn(course.rotation)) if robot.degrees == 6 else None,
         "corrections": {
             "times_s": course.times_s,
-            "change_mm": _bands(1e3 * change[:, rows]),
+            "change_mm": _bands(1e3 * winches.of_each_winch(robot, change)[:, rows]),
             "left_mm": _bands(1e3 * corrections.left(robot, history, found, to, best, rows)),
         },
         "clock": _clock(line, again),
@@ -361,13 +361,15 @@ def _correction_table(
     """Corrected joint values (motor angles too), and what they change, with its standard deviation."""
     columns: dict[str, Any] = {"time_s": history.times_s}
     described = _described(change_m)
-    mean, sd = described["mean"], described["sd"]
-    for i in range(joint_m.shape[-1]):
-        columns[f"joint_{i + 1}_m"] = joint_m[:, i] + mean[:, i]
+    mean, sd = (winches.of_each_winch(robot, described[name]) for name in ("mean", "sd"))
+    joint = winches.of_each_winch(robot, joint_m) + mean
+    for i in range(robot.joints):
+        columns[f"joint_{i + 1}_m"] = joint[:, i]
     if robot.drums is not None:
-        angle = motor_angle(robot.drums, joint_m + mean)
-        columns |= {f"motor_{i + 1}_rad": angle[:, i] for i in np.flatnonzero(robot.drums.radius_m > 0)}
-    for i in range(joint_m.shape[-1]):
+        angle = winches.of_each_winch(robot, motor_angle(robot.drums, joint_m + described["mean"]))
+        known = winches.of_each_winch(robot, robot.drums.radius_m)
+        columns |= {f"motor_{i + 1}_rad": angle[:, i] for i in np.flatnonzero(known)}
+    for i in range(robot.joints):
         columns[f"change_{i + 1}_mm"], columns[f"change_{i + 1}_sd_mm"] = 1e3 * mean[:, i], 1e3 * sd[:, i]
     return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
 

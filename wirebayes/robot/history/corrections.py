@@ -50,12 +50,14 @@ def target(robot: Robot, history: History, found: Estimate) -> Target:
     return Target(history.position_m, history.rotation, tension)
 
 
-def wanted(robot: Robot, found: Estimate, to: Target) -> Floats:
+def wanted(robot: Robot, history: History, found: Estimate, to: Target) -> Floats:
     """Joint values that bring every draw to its target, creep so far included.
 
     Parameters
     ----------
     robot : Robot
+    history : History
+        Has the payloads.
     found : Estimate
         Of n draws at t rows.
     to : Target
@@ -69,7 +71,8 @@ def wanted(robot: Robot, found: Estimate, to: Target) -> Floats:
     for k in range(out.shape[1]):
         strain = found.track.strain[:, k].T
         x, R, tau = to.position_m[k][None], to.rotation[k][None], to.tension_N[k][None]
-        out[:, k] = inverse.commands(robot, found.wires, x, R, tau, strain, found.error_m.T).joint_m
+        loaded = history.robot_at(robot, k)
+        out[:, k] = inverse.commands(loaded, found.wires, x, R, tau, strain, found.error_m.T).joint_m
     return out
 
 

@@ -22,6 +22,7 @@ from wirebayes.robot.mechanics import firmware
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts
 from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, mixed, path, plausible
 from wirebayes.robot.motion.creep import CreepState, HoldCreep
@@ -49,11 +50,11 @@ class LivePose:
         Mean orientation.
     rotation_sd_rad : (3,) array
         About the world's axes.
-    joint_m, joint_sd_m : (w,) arrays
+    joint_m, joint_sd_m : (j,) arrays
         Joint values that bring the platform to where the nominal joint values would hold it if no wire crept.
-    correction_m : (w,) array
+    correction_m : (j,) array
         What that is beyond the nominal joint values: wire of all lines.
-    straight_correction_m : (w,) array
+    straight_correction_m : (j,) array
         The same in one line, as firmware counts: `correction_m` over the number of lines.
     tension_N : (w,) array
         Mean.
@@ -144,12 +145,12 @@ class LiveEstimator:
         self._joint = np.empty((self._columns, robot.legs))
 
     def wire_m(self, straight_m: ArrayLike) -> Floats:
-        """Joint values, ``(w,)`` m, of the straight lengths that firmware counts: ``lines x straight + beyond_exit``.
+        """Joint values, ``(j,)`` m, of the straight lengths that firmware counts: ``lines x straight + beyond_exit``.
 
         Parameters
         ----------
-        straight_m : (w,) array
-            From exit point to platform point.
+        straight_m : (j,) array
+            From exit point to platform point, one of each winch.
 
         Raises
         ------
@@ -158,7 +159,7 @@ class LiveEstimator:
         """
         if self.robot.is_linear.any():
             raise InputError(f"straight_m: found lengths, expected displacements of the actuators of {self.robot.name}")
-        return firmware.wire_of(self.robot, checked_vector("straight_m", straight_m, self.robot.legs))
+        return firmware.wire_of(self.robot, checked_vector("straight_m", straight_m, self.robot.joints))
 
     def load(self, mass_kg: float, centre_m: ArrayLike | None = None) -> None:
         """Set what the platform carries from now on beside its own mass.
@@ -196,13 +197,13 @@ class LiveEstimator:
         ----------
         time_s : float
             Later than at the step before; at the first step the wires are new.
-        joint_m : (w,) array
-            Joint values, corrections included; a drum's is the length of the whole wire (`wire_m`).
+        joint_m : (j,) array
+            Joint values, one of each winch, corrections included; a drum's is the length of the whole wire (`wire_m`).
         tension_N : (w,) array, optional
             NaN where a sensor was not read.
         tilt_rad : (2,) array, optional
             Roll and pitch.
-        nominal_m : (w,) array, optional
+        nominal_m : (j,) array, optional
             Joint values before any correction; `joint_m` when left out.
 
         Returns
@@ -234,14 +235,17 @@ class LiveEstimator:
 
     def _joints(self, name: str, values: ArrayLike) -> Floats:
         """Joint values as they can be: a drum has paid out some length, a linear actuator may stand on either side."""
-        given, linear = checked_vector(name, values, self.robot.legs), self.robot.is_linear
+        given = checked_vector(name, values, self.robot.joints)
+        linear = of_each_winch(self.robot, self.robot.is_linear)
         refuse_bad(name, given, np.isfinite(given) | ~linear, "a finite number")
         refuse_bad(name, given, (np.isfinite(given) & (given > 0)) | linear, "a finite length above 0")
-        unlikely = plausible.wrong(self.robot, given[None]) if self._leaps(given) else None
+        each = of_each_leg(self.robot, given)
+        unlikely = plausible.wrong(self.robot, each[None]) if self._leaps(each) else None
         if unlikely is not None:
             (_, leg), expected = unlikely
-            raise InputError(f"{name}[{leg}]: found {given[leg]:g}, expected {expected}; wire_m() turns straight ones")
-        return given
+            joint = leg if self.robot.winch is None else self.robot.winch[leg]
+            raise InputError(f"{name}[{joint}]: found {each[leg]:g}, expected {expected}; wire_m() turns straight ones")
+        return each
 
     def _leaps(self, given: Floats) -> bool:
         """Whether joint values are the first, or far from the last: only those may be of another kind."""
@@ -366,10 +370,13 @@ class LiveEstimator:
         below = at.astype(int)
         low, high = ordered[below] + (at - below)[:, None] * (ordered[np.minimum(below + 1, last)] - ordered[below])
         w = self.robot.legs
-        joint = mean[6 : 6 + w]
+        joint, joint_sd, change = (
+            of_each_winch(self.robot, v) for v in (mean[6 : 6 + w], sd[6 : 6 + w], mean[6 : 6 + w] - nominal)
+        )
+        straight = change / mean_of_each_winch(self.robot, self.robot.lines)
         return LivePose(
-            time_s, mean[:3], sd[:3], low, high, matrix(mean[3:6]) @ centre, sd[3:6], joint, sd[6 : 6 + w],
-            joint - nominal, (joint - nominal) / self.robot.lines, mean[6 + w :], float(live.mean()),
+            time_s, mean[:3], sd[:3], low, high, matrix(mean[3:6]) @ centre, sd[3:6], joint, joint_sd,
+            change, straight, mean[6 + w :], float(live.mean()),
         )  # fmt: skip
 
 

@@ -148,6 +148,10 @@ class Robot:
         Standard deviation of a tension sensor's bias, for calibration; 0: no bias.
     plane : Plane or None
         What carries the platform; None where it hangs on its wires alone.
+    winch : (w,) int array or None
+        Number of the winch that drives each leg, from 0 in the order of the legs; None where each has its own.
+    joint_offset_m : (w,) array or None
+        What a drum's zero-tension length is beyond the joint value; None where it is nothing.
 
     Examples
     --------
@@ -181,11 +185,23 @@ class Robot:
     tension_bias_N: float = 0.0
     mass_kg_m: Floats | None = None
     plane: Plane | None = None
+    winch: NDArray[np.intp] | None = None
+    joint_offset_m: Floats | None = None
 
     @property
     def legs(self) -> int:
         """Number of legs."""
         return len(self.exit_m)
+
+    @property
+    def joints(self) -> int:
+        """Number of winches and linear actuators: of joint values."""
+        return self.legs if self.winch is None else int(self.winch.max()) + 1
+
+    @property
+    def beyond_joint_m(self) -> Floats:
+        """(w,) `joint_offset_m`, zeros where there is none."""
+        return np.zeros(self.legs) if self.joint_offset_m is None else self.joint_offset_m
 
     @property
     def degrees(self) -> int:

@@ -1,7 +1,8 @@
 """Lengths as firmware counts them, and as the wires are: straight from exit to platform point, or all of the wire.
 
 A wire that runs in several lines is ``lines`` times as long as the straight way, and has what is beyond the exit point:
-``wire = lines x straight + beyond_exit``. Firmware for Hangprinters counts straight lengths, wirebayes wires.
+``wire = lines x straight + beyond_exit``. Firmware for Hangprinters counts straight lengths, wirebayes wires. It knows
+one straight length of each winch: of several lines the joint value is the mean of what each would have.
 """
 
 import numpy as np
@@ -9,25 +10,33 @@ from numpy.typing import ArrayLike
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.winches import mean_of_each_winch
 
 
 def wire_of(robot: Robot, straight_m: ArrayLike) -> Floats:
-    """Lengths of whole wires, m, of straight lengths ``(..., w)``, m.
+    """Joint values, m, of straight lengths ``(..., j)``, m: lengths of whole wires, less their joint offsets.
 
     Parameters
     ----------
     robot : Robot
-    straight_m : (..., w) array
+    straight_m : (..., j) array
     """
-    return np.asarray(robot.lines * np.asarray(straight_m, float) + robot.beyond_m)
+    lines, beyond = _of_winches(robot)
+    return np.asarray(lines * np.asarray(straight_m, float) + beyond)
 
 
 def straight_of(robot: Robot, wire_m: ArrayLike) -> Floats:
-    """Straight lengths, m, of whole wires ``(..., w)``, m: the inverse of `wire_of`.
+    """Straight lengths, m, of joint values ``(..., j)``, m: the inverse of `wire_of`.
 
     Parameters
     ----------
     robot : Robot
-    wire_m : (..., w) array
+    wire_m : (..., j) array
     """
-    return np.asarray((np.asarray(wire_m, float) - robot.beyond_m) / robot.lines)
+    lines, beyond = _of_winches(robot)
+    return np.asarray((np.asarray(wire_m, float) - beyond) / lines)
+
+
+def _of_winches(robot: Robot) -> tuple[Floats, Floats]:
+    """Parallel parts of the wires of each winch, and what their lengths are beyond these, less the joint offsets."""
+    return mean_of_each_winch(robot, robot.lines), mean_of_each_winch(robot, robot.beyond_m - robot.beyond_joint_m)

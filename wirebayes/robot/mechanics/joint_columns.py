@@ -8,12 +8,13 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.firmware import wire_of
+from wirebayes.robot.mechanics.winches import of_each_leg, of_each_winch
 
 _MOTOR, _STRAIGHT = "motor_", "straight_"
 
 
 def joint_columns(robot: Robot, header: Sequence[str] = ()) -> tuple[str, ...]:
-    """The column of every leg, in the units that a header uses.
+    """The column of every winch or actuator, in the units that a header uses.
 
     Motor angles stand in place of joint values for drums of known radius, straight lengths for all drums.
 
@@ -23,35 +24,51 @@ def joint_columns(robot: Robot, header: Sequence[str] = ()) -> tuple[str, ...]:
     header : sequence of str
         Any column names; units are told by those of joint values among them.
     """
-    turned = np.zeros(robot.legs, bool)
+    turned = np.zeros(robot.joints, bool)
     if _has(header, _MOTOR) and robot.drums is not None:
-        turned = robot.drums.radius_m > 0
-    straight = _has(header, _STRAIGHT) & ~robot.is_linear
+        turned = of_each_winch(robot, robot.drums.radius_m) > 0
+    straight = _has(header, _STRAIGHT) & ~of_each_winch(robot, robot.is_linear)
 
-    def name(leg: int) -> str:
-        if turned[leg]:
-            return f"{_MOTOR}{leg + 1}_rad"
-        return f"{_STRAIGHT}{leg + 1}_mm" if straight[leg] else f"joint_{leg + 1}_m"
+    def name(joint: int) -> str:
+        if turned[joint]:
+            return f"{_MOTOR}{joint + 1}_rad"
+        return f"{_STRAIGHT}{joint + 1}_mm" if straight[joint] else f"joint_{joint + 1}_m"
 
-    return tuple(name(leg) for leg in range(robot.legs))
+    return tuple(name(joint) for joint in range(robot.joints))
 
 
-def joint_values(robot: Robot, names: Sequence[str], cells: Floats) -> Floats:
-    """Joint values ``(t, w)``, m, of cells ``(t, w)`` in the units of their columns.
+def column_of_leg(robot: Robot, names: Sequence[str], leg: int) -> str:
+    """The column that a leg's joint value stands in.
 
     Parameters
     ----------
     robot : Robot
     names : sequence of str
         As `joint_columns` gives them.
-    cells : (t, w) array
+    leg : int
+        From 0.
     """
-    joint = np.array(cells, float)
-    turned = np.array([name.startswith(_MOTOR) for name in names])
-    straight = np.array([name.startswith(_STRAIGHT) for name in names])
+    return names[leg if robot.winch is None else robot.winch[leg]]
+
+
+def joint_values(robot: Robot, names: Sequence[str], cells: Floats) -> Floats:
+    """Joint values leg by leg, ``(t, w)`` m, of cells ``(t, j)`` in the units of their columns.
+
+    Parameters
+    ----------
+    robot : Robot
+    names : sequence of str
+        As `joint_columns` gives them.
+    cells : (t, j) array
+    """
+    joint = of_each_leg(robot, np.array(cells, float))
+    turned, straight = (
+        of_each_leg(robot, np.array([name.startswith(unit) for name in names])) for unit in (_MOTOR, _STRAIGHT)
+    )
+    wire = of_each_leg(robot, wire_of(robot, 1e-3 * cells))
     if robot.drums is not None:
-        joint = np.where(turned, paid_out(robot.drums, cells)[0], joint)
-    return np.where(straight, wire_of(robot, 1e-3 * cells), joint)
+        joint = np.where(turned, paid_out(robot.drums, joint)[0], joint)
+    return np.where(straight, wire, joint)
 
 
 def meant(name: str, joint_m: float) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, cast, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.errors import InputError, shown
 from wirebayes.numeric.typing import Floats
@@ -98,11 +99,13 @@ def _robot(top: Keys) -> Robot:
     bias = _bias(top.inside("sensors", {}))
     plane = _plane(top)
     given, declared, masses = _wires(top)
-    legs = [_leg(leg, declared) for leg in top.tables("leg", least=2)]
+    tables = [replace(leg, name="", prefix=f"leg[{leg.index}].") for leg in top.tables("leg", least=2)]
+    legs = [_leg(leg, declared) for leg in tables]
     top.finish()
     if freedom == "orientation":
         _check_ball_joint(top, plane, np.array([lower, upper]) - position, len(legs))
     mass_kg_m = np.array([masses.get(leg["wire"], 0.0) for leg in legs])
+    winch = _winches(tables, legs)
 
     def stack(key: str) -> Any:
         return np.array([leg[key] for leg in legs])
@@ -133,6 +136,8 @@ def _robot(top: Keys) -> Robot:
         tension_bias_N=bias,
         mass_kg_m=mass_kg_m if mass_kg_m.any() else None,
         plane=plane,
+        winch=winch,
+        joint_offset_m=stack("joint_offset") if stack("joint_offset").any() else None,
     )
 
 
@@ -233,9 +238,8 @@ def _wires(top: Keys) -> tuple[dict[str, GivenWire], set[str], dict[str, float]]
     return given, set(tables.table), masses
 
 
-def _leg(keys: Keys, declared: set[str]) -> dict[str, Any]:
+def _leg(leg: Keys, declared: set[str]) -> dict[str, Any]:
     """One leg; `declared` are the names under ``[wires]``."""
-    leg = replace(keys, name="", prefix=f"leg[{keys.index}].")
     actuator = leg.string("actuator", default="drum", among=("drum", "linear"))
     row: dict[str, Any] = {
         "exit": _triple(leg, "exit_point_m"),
@@ -244,6 +248,8 @@ def _leg(keys: Keys, declared: set[str]) -> dict[str, Any]:
         "beyond": leg.number("beyond_exit_m", default=0.0, least=0),
         "actuator": actuator,
         "wire": leg.string("wire", default="default"),
+        "winch": leg.string("winch") if "winch" in leg.table else "",
+        "joint_offset": 0.0,
         "ratio": 0.0,
         "wire_m": 0.0,
         "pulley": 0.0,
@@ -254,6 +260,8 @@ def _leg(keys: Keys, declared: set[str]) -> dict[str, Any]:
     if actuator == "linear":
         row["ratio"] = leg.number("pulley_ratio", above=0)
         row["wire_m"] = leg.number("wire_length_m", above=0)
+    else:
+        row["joint_offset"] = leg.number("joint_offset_m", default=0.0)
     if "pulley_radius_m" in leg.table:
         row["pulley"] = leg.number("pulley_radius_m", above=0)
         row["axis"] = _direction(leg, "swivel_axis")
@@ -264,8 +272,29 @@ def _leg(keys: Keys, declared: set[str]) -> dict[str, Any]:
     return row
 
 
+def _winches(tables: list[Keys], legs: list[dict[str, Any]]) -> NDArray[np.intp] | None:
+    """Number of each leg's winch in the order of the legs; None where each has its own.
+
+    Legs of one winch turn together: what their joint value means must be the same.
+    """
+    number: dict[object, int] = {}
+    winch = np.array([number.setdefault(leg["winch"] or i, len(number)) for i, leg in enumerate(legs)])
+    if len(number) == len(legs):
+        return None
+    for i, leg in enumerate(legs):
+        first = legs[int(np.argmax(winch == winch[i]))]
+        for key, name in {"actuator": "actuator", "ratio": "pulley_ratio", **_DRUM}.items():
+            if leg[key] != first[key]:
+                expected = f"that of the first leg of winch {leg['winch']}, {first[key]}"
+                raise tables[i].complain(name, str(leg[key]), expected)
+    return winch
+
+
 _TURNING = 3  # wires that turn a platform every way
-_DRUM = ("drum_radius", "drum_pitch", "drum_turns", "drum_layer", "drum_wire", "gear")
+_DRUM = {
+    "drum_radius": "drum_radius_m", "drum_pitch": "drum_pitch_m", "drum_turns": "drum_layer_turns",
+    "drum_layer": "drum_layer_height_m", "drum_wire": "wire_length_m", "gear": "gear_ratio",
+}  # fmt: skip
 _MOST_LAYERS = 10_000  # more wire than any drum holds: a slip of the unit
 
 

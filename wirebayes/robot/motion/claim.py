@@ -121,6 +121,7 @@ def over_workspace(
     if loaded_s > 0:
         state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
     commands = inverse.commands(robot, many, where, R, pull, state.strain(many))
+    R = commands.rotation
     held = drift.stably(robot, many, commands, where, R)
     course = drift.hold(
         robot, many, np.where(held[:, None], commands.joint_m, np.nan), np.array([time_s]), where, R, state

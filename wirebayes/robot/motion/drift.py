@@ -285,9 +285,9 @@ def from_command(
     """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
     commands = inverse.commands(robot, wires, position_m[None], rotation[None], tau)
-    stable = stably(robot, wires, commands, position_m, rotation)
+    stable = stably(robot, wires, commands, position_m, commands.rotation)
     joint = np.where(stable[:, None], commands.joint_m, np.nan)
-    course = hold(robot, wires, joint, times_s, position_m, rotation, follow=follow)
+    course = hold(robot, wires, joint, times_s, position_m, commands.rotation, follow=follow)
     course.status[commands.feasible & ~stable] = forward.NOT_HELD
     return course
 

@@ -9,7 +9,9 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.tensions import CHOICES, Choice
+from wirebayes.robot.mechanics.winches import lengths as lengths
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, zero_tension_length
+from wirebayes.robot.motion.tied import tied
 
 
 @dataclass(frozen=True)
@@ -21,12 +23,15 @@ class Commands:
     zero_m : (n, w) array
         Zero-tension length between exit (and beyond) and platform, creep included.
     joint_m : (n, w) array
-        Drum: the zero-tension length paid out, creep subtracted. Linear actuator: its displacement q.
+        Drum: the zero-tension length paid out, creep subtracted. Linear actuator: its displacement q. Leg by leg, legs
+        of one winch alike.
     offset_m : (n, w) array
         Stretched length that is not between exit and platform point.
     tension_N : (n, w) array
     feasible : (n,) bool array
         False where no tensions within the bounds hold the pose; the other values are NaN there.
+    rotation : (n, 3, 3) array
+        The orientation: the one asked for, or what winches that drive several lines make of it.
     """
 
     zero_m: Floats
@@ -34,6 +39,7 @@ class Commands:
     offset_m: Floats
     tension_N: Floats
     feasible: NDArray[np.bool_]
+    rotation: Floats
 
 
 def tensions(robot: Robot, position_m: Floats, rotation: Floats, choice: Choice | None = None) -> Floats:
@@ -95,34 +101,51 @@ def commands(
     -------
     Commands
     """
+    each = _of_each_line(robot, wires, position_m, rotation, tension_N, creep, error_m)
+    if robot.winch is None:
+        return each
+    n = len(each.joint_m)
+    x = np.broadcast_to(position_m, (n, 3))
+    found = tied(robot, wires, x, each.rotation, each.tension_N, each.joint_m, creep, error_m)
+    joint, pull = (np.where(found.held[:, None], v, np.nan) for v in (found.joint_m, found.tension_N))
+    bare, offset = lengths(robot, joint)
+    zero = (bare.T + error_m) * (1.0 + creep)
+    return Commands(zero.T, joint, offset, pull, found.held, found.rotation)
+
+
+def _of_each_line(
+    robot: Robot,
+    wires: Wires,
+    position_m: Floats,
+    rotation: Floats,
+    tension_N: Floats,
+    creep: Floats | float,
+    error_m: Floats | float,
+) -> Commands:
+    """`commands` as if every line had a winch of its own."""
     grown = 1.0 + creep
     shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
     linear = robot.is_linear[:, None]
     tau = tension_N.T
     free = statics.stretched(robot, shape, robot.beyond_m[:, None])
     drum = zero_tension_length(wires, free, tau)
+    beyond_joint = robot.beyond_joint_m[:, None] + error_m
     if not linear.any():
-        return _of_drums(robot, drum, grown, error_m, tau)
+        return _of_drums(robot, drum, drum / grown - beyond_joint, tau, rotation)
     fixed = (robot.wire_m[:, None] + error_m) * grown
     moved = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
     zero = np.where(linear, fixed, drum)
-    joint = np.where(linear, moved / np.where(linear, robot.ratio[:, None], 1.0), drum / grown - error_m)
+    joint = np.where(linear, moved / np.where(linear, robot.ratio[:, None], 1.0), drum / grown - beyond_joint)
     offset = robot.beyond_m[:, None] + np.where(linear, moved, 0.0)
     feasible = np.isfinite(zero).all(0) & np.isfinite(tau).all(0)
     zero, joint, offset, tau = np.broadcast_arrays(zero, joint, offset, tau)
-    return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, zero.shape[1:]))
+    turn = np.broadcast_to(rotation, (zero.shape[1], 3, 3))
+    return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, zero.shape[1:]), turn)
 
 
-def _of_drums(robot: Robot, zero: Floats, grown: Floats | float, error_m: Floats | float, tau: Floats) -> Commands:
+def _of_drums(robot: Robot, zero: Floats, joint: Floats, tau: Floats, rotation: Floats) -> Commands:
     """Commands of a robot without linear actuators, whose lengths beyond the exit points stay."""
     feasible = np.isfinite(zero).all(0) & np.isfinite(tau).all(0)
-    joint = zero / grown - error_m
     zero, offset, tau = (np.broadcast_to(v, joint.shape) for v in (zero, robot.beyond_m[:, None], tau))
-    return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, joint.shape[1:]))
-
-
-def lengths(robot: Robot, joint_m: Floats) -> tuple[Floats, Floats]:
-    """Zero-tension lengths before creep and offsets of joint values, ``(n, w)`` each: what forward kinematics needs."""
-    zero = np.where(robot.is_linear, robot.wire_m, joint_m)
-    offset = robot.beyond_m + np.where(robot.is_linear, robot.ratio * joint_m, 0.0)
-    return zero, offset
+    turn = np.broadcast_to(rotation, (joint.shape[1], 3, 3))
+    return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, joint.shape[1:]), turn)

@@ -9,7 +9,7 @@ from wirebayes.errors import shown
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
-from wirebayes.robot.mechanics.joint_columns import meant
+from wirebayes.robot.mechanics.joint_columns import column_of_leg, meant
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
@@ -60,7 +60,7 @@ def refuse(robot: Robot, joint_m: Floats, table: Table, columns: Sequence[str]) 
     table : Table
         Where they were read, a row a time.
     columns : sequence of str
-        The column of each leg.
+        The columns of the joint values.
 
     Raises
     ------
@@ -71,8 +71,9 @@ def refuse(robot: Robot, joint_m: Floats, table: Table, columns: Sequence[str]) 
     if unlikely is None:
         return
     (row, leg), expected = unlikely
-    found = shown(table.cell(row, columns[leg])) + meant(columns[leg], joint_m[row, leg])
-    raise table.complain(row, columns[leg], found, expected)
+    column = column_of_leg(robot, columns, leg)
+    found = shown(table.cell(row, column)) + meant(column, joint_m[row, leg])
+    raise table.complain(row, column, found, expected)
 
 
 def _first(bad: NDArray[np.bool_]) -> tuple[int, int]:

@@ -1,6 +1,6 @@
 """Everything that `pose` reports about one robot, one line and one pose, as plain numbers with bands."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,13 +23,14 @@ from wirebayes.robot.mechanics import draws, drums, plane, sag, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, control, drift, forward, inverse, one_sided
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose import controllers, on_plane, stability, variance_shares
 from wirebayes.robot.pose.maps import Map, map_slices, summaries
-from wirebayes.robot.pose.orientation import Orientation
+from wirebayes.robot.pose.orientation import Orientation, by_lines
 from wirebayes.robot.pose.request import PoseRequest, band
 from wirebayes.robot.proof import proofs
 
@@ -91,6 +92,13 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
         content["warnings"] = unheld(content["sentence"])
         return Answer(content, {})
     rng = np.random.default_rng(request.seed)
+    if robot.winch is not None:
+        tau = commands.tension_N[commands.feasible].mean(0, keepdims=True)
+        R = inverse.commands(robot, control.known(shared), x[None], R[None], tau).rotation[0]
+        request = replace(request, rotation=R)
+        content["pose"]["rotation_vector_rad"] = turning.vector(R[None])[0]
+        if robot.joints < robot.freedoms:
+            content["orientation"] = by_lines(robot)
     content["inverse"] = _inverse(robot, commands, tau[0])
     if robot.plane is not None:
         content["plane"] = on_plane.on_plane(robot, shared, commands, x, R, tau[0])
@@ -172,9 +180,9 @@ def _inverse(robot: Robot, commands: inverse.Commands, tension_N: Floats) -> Inv
     found: InverseKinematics = {
         "tension_N": tension_N,
         "zero_tension_length_m": band(commands.zero_m),
-        "joint_value_m": band(commands.joint_m),
+        "joint_value_m": band(of_each_winch(robot, commands.joint_m)),
     }
-    return found if robot.drums is None else {**found, **_motors(robot.drums, commands.joint_m)}
+    return found if robot.drums is None else {**found, **_motors(robot, robot.drums, commands.joint_m)}
 
 
 def _weak(commands: inverse.Commands) -> list[Notice]:
@@ -200,10 +208,11 @@ def _emptied(known: Drums, joint_m: Floats) -> list[Notice]:
     ]
 
 
-def _motors(known: Drums, joint_m: Floats) -> MotorAngles:
+def _motors(robot: Robot, known: Drums, joint_m: Floats) -> MotorAngles:
     """Motor angles and the wire that a radian pays out there; null for legs without a drum of known radius."""
     angle = drums.motor_angle(known, joint_m)
-    return {"motor_angle_rad": _by_leg(angle), "wire_per_motor_angle_m_rad": _by_leg(drums.paid_out(known, angle)[1])}
+    angle, slope = (of_each_winch(robot, v) for v in (angle, drums.paid_out(known, angle)[1]))
+    return {"motor_angle_rad": _by_leg(angle), "wire_per_motor_angle_m_rad": _by_leg(slope)}
 
 
 def _by_leg(values: Floats) -> Band:
@@ -219,7 +228,7 @@ def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Float
     beside = plane.onto(robot, (x + 0.01 * robot.size_m)[None], R[None])
     back = forward.solve(robot, wires, commands.zero_m, commands.offset_m, beside[0][0], beside[1][0])
     n = len(commands.zero_m)
-    pose = np.repeat(x[None], n, 0), np.repeat(R[None], n, 0)
+    pose = np.repeat(x[None], n, 0), commands.rotation
     stiff = one_sided.lowest_stiffness(robot, wires, pose, (commands.zero_m, commands.offset_m))[commands.feasible]
     return {
         "solved": float(back.found.mean()),
@@ -235,7 +244,7 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.ra
     mean = control.known(wires)
     tau = inverse.tensions(robot, x[None], R[None])
     commands = inverse.commands(robot, mean, x[None], R[None], tau)
-    lengths = commands.zero_m[0], commands.offset_m[0]
+    lengths, R = (commands.zero_m[0], commands.offset_m[0]), commands.rotation[0]
     if not commands.feasible[0]:  # some draws are strong enough, their mean is not
         return {"stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []}
     here = forward.solve(robot, mean, commands.zero_m, commands.offset_m, x, R)

@@ -81,6 +81,29 @@ def orientation(robot: Robot, position_m: Floats, asked_rad: Floats | None) -> O
     return _described(robot, position_m, found, asked, had)
 
 
+def by_lines(robot: Robot) -> OrientationFound:
+    """What winches command that drive several lines, which leave the orientation to their lengths and to balance.
+
+    Parameters
+    ----------
+    robot : Robot
+        With fewer winches than degrees of freedom.
+    """
+    places = min(robot.joints, 2 if robot.plane is not None else 3)
+    return {
+        "commanded_degrees": robot.joints,
+        "of_degrees": robot.freedoms,
+        "position_directions": places,
+        "rotation_choice": 0,
+        "commanded_components": [],
+        "free_components": list(COMPONENTS),
+        "refused_components": [],
+        "other_rotation_vectors_rad": np.empty((0, 3)),
+        "sentence": f"{robot.joints} winches with {robot.legs} lines command {robot.joints} of {robot.freedoms} "
+        "degrees of freedom; the lines' lengths and balance decide the orientation.",
+    }
+
+
 def _clear(robot: Robot, x: Floats, R: Floats) -> bool:
     """Whether every wire runs somewhere: no platform point lies on an exit point or inside a pulley."""
     return bool(statics.geometry(robot, x[:, None], R[..., None]).clear[0])

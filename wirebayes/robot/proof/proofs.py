@@ -45,7 +45,7 @@ def alone(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> C
     here = inverse.commands(robot, mean, position_m[None], rotation[None], tau)
     lengths = here.zero_m[0], here.zero_m[0]
     try:
-        proof = certify(robot, wires.law, (k1, k1), lengths, here.offset_m[0], position_m, rotation)
+        proof = certify(robot, wires.law, (k1, k1), lengths, here.offset_m[0], position_m, here.rotation[0])
     except ImportError:
         return {"proved": None, "sentence": "python-flint is not installed (extra: certificate)."}
     return {"proved": proof.proved, "enclosure_m": proof.radius_m, "alone_within_m": proof.unique_m}
@@ -96,7 +96,7 @@ def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rot
         stiff = np.minimum(stiff[0], known), np.maximum(stiff[1], known)
         try:
             way = _Way(robot, wires.law, stiff, grown, bare, offset)
-            proof = way.proved(position_m, rotation, known)
+            proof = way.proved(position_m, commands.rotation[0], known)
         except ImportError:
             return {}
         if proof is not None:

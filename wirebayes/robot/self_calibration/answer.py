@@ -18,6 +18,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
+from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.motion import control, hanging, inverse
 from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
@@ -127,10 +128,10 @@ def _poses(robot: Robot, prior: LengthPrior, known: Calibration) -> CalibratedPo
     held = bool(np.isfinite(joint).all())
     found: CalibratedPoses = {
         "pose_now": {"position_m": known.position_m[0], "rotation_vector_rad": turn},
-        "joint_values_for_home_m": joint if held else None,
+        "joint_values_for_home_m": of_each_winch(robot, joint) if held else None,
     }
     if robot.drums is not None and held:
-        found["motor_angles_for_home_rad"] = drums.motor_angle(robot.drums, joint)
+        found["motor_angles_for_home_rad"] = of_each_winch(robot, drums.motor_angle(robot.drums, joint))
     return found
 
 

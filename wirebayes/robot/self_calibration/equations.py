@@ -14,6 +14,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.winches import turned_by
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.strain import Grown, stretch
@@ -197,12 +198,26 @@ def _loops(
     wires -= bare[..., None] * (creep.by_wires * elastic.ratio[..., None] + (1 + strain)[..., None] * elastic.by_wires)
     wires[:, leg, leg] -= longer * unknowns.prior.reference_sd_m
     if unknowns.errors.drum > 0:
-        by_robot[:, leg, at["drum"].start + leg] = (
+        by_robot[:, leg, at["drum"].start + (leg if robot.winch is None else robot.winch)] = (
             np.where(robot.is_linear, drawn, -drawn * longer) * unknowns.errors.drum
         )
     _points(by_robot[:, loop], unknowns, -u, np.einsum("pwi,pij->pwj", u, state.rotation))
+    alone = _errors_apart(robot)
     for values in (residual, by_robot, by_hold):
         values[:, loop] /= noise.joint_m
+        if alone is not None:
+            values[:, loop] = np.einsum("ij,pj...->pi...", alone, values[:, loop])
+
+
+def _errors_apart(robot: Robot) -> Floats | None:
+    """(w, w) What makes the errors of all lines' lengths independent of each other; None where they are.
+
+    Half of the variance is the winch's, whose encoder and drum its lines share; half is each line's, as it lies there.
+    """
+    if robot.winch is None:
+        return None
+    share = turned_by(robot)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(0.5 * (np.eye(robot.legs) + share @ share.T))))
 
 
 def _balance(

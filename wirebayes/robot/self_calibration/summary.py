@@ -12,6 +12,7 @@ from scipy.special import ndtri, stdtrit
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
+from wirebayes.robot.mechanics.winches import of_each_leg
 from wirebayes.robot.self_calibration.posterior import Whole, at_joint_error
 
 _FACTOR = 1.05  # of the error of the joint values: a step for slopes of logarithms, which are smooth
@@ -108,13 +109,14 @@ def _standard_deviations(found: Whole) -> dict[str, Floats]:
     leg = np.arange(w)
     slope[leg, unknowns.references.start + leg] += (1 + strain) * prior.reference_sd_m
     if unknowns.errors.drum > 0:
-        slope[leg, at["drum"].start + leg] = unknowns.errors.drum * joint * ~robot.is_linear
+        drum = leg if robot.winch is None else robot.winch
+        slope[leg, at["drum"].start + drum] = unknowns.errors.drum * joint * ~robot.is_linear
     return {
         "exit_m": unknown("exit", unknowns.errors.exit_m, (w, 3)),
         "platform_m": unknown("platform", unknowns.errors.platform_m, (w, 3)),
         "reference_m": prior.reference_sd_m * sd[unknowns.references],
         "length_m": np.sqrt(np.einsum("wi,ij,wj->w", slope, found.covariance, slope)),
-        "drum": unknown("drum", unknowns.errors.drum, (w,)),
+        "drum": of_each_leg(robot, unknown("drum", unknowns.errors.drum, (robot.joints,))),
         "bias_N": prior.bias_sd_N * sd[at["wires"]][-w:] if prior.bias_sd_N > 0 else np.zeros(w),
         "position_m": hold[:, :3],
         "turn_rad": hold[:, 3:d] / robot.size_m if d == 6 else np.zeros((len(hold), 3)),

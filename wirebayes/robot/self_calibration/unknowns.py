@@ -10,6 +10,7 @@ import numpy as np
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.winches import of_each_leg
 from wirebayes.robot.self_calibration.session import LengthPrior
 
 
@@ -99,7 +100,7 @@ class Unknowns:
         counts = {
             "exit": 3 * legs if self.errors.exit_m > 0 else 0,
             "platform": 3 * legs if self.errors.platform_m > 0 else 0,
-            "drum": legs if self.errors.drum > 0 else 0,
+            "drum": self.robot.joints if self.errors.drum > 0 else 0,
             "wires": len(self.moments[0]),
             "level": legs if self.errors.level_N > 0 else 0,
         }
@@ -135,7 +136,7 @@ class Unknowns:
             moved("platform", self.robot.platform_m, self.errors.platform_m),
             wires[:legs],
             self.prior.bias_N(legs, wires[None])[0],
-            self.errors.drum * drum if len(drum) else np.zeros(legs),
+            of_each_leg(self.robot, self.errors.drum * drum) if len(drum) else np.zeros(legs),
             wires,
             self.errors.level_N * level if len(level) else np.zeros(legs),
         )

@@ -18,6 +18,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
+from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated
@@ -261,9 +262,9 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
     tau = inverse.tensions(there, home, turn)
     joint = inverse.commands(there, wires, home, turn, tau, s.strain[:, None], parts.reference_m[:, None]).joint_m[0]
     if usable and np.isfinite(joint).all():
-        out["joint_values_for_home_m"] = joint
+        out["joint_values_for_home_m"] = of_each_winch(robot, joint)
         if robot.drums is not None:
-            out["motor_angles_for_home_rad"] = drums.motor_angle(robot.drums, joint)
+            out["motor_angles_for_home_rad"] = of_each_winch(robot, drums.motor_angle(robot.drums, joint))
     return out
 
 
