@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wirebayes.robot.mechanics import draws
-from wirebayes.robot.motion import drift, forward, inverse
+from wirebayes.robot.motion import drift, equilibria, forward, inverse
 from wirebayes.robot.pose import stability
 from wirebayes.robot.pose.answer import answer
 from wirebayes.robot.pose.request import PoseRequest
@@ -41,7 +41,7 @@ def _statics(d, rng):
     errors = [np.abs(commands.zero_m - zero).max() / robot.span_m]
     stable = rig.softest(q, zero)[0] > 0
     here = d.position_m, d.rotation
-    every = forward.equilibria(robot, wires, commands.zero_m[0], commands.offset_m[0], rng, 16, known=here)
+    every = equilibria.equilibria(robot, wires, commands.zero_m[0], commands.offset_m[0], rng, 16, known=here)
     own = np.abs(every.position_m - d.position_m).max(1).min(initial=np.inf) < 1e-6 * robot.span_m
     assert own == stable
     for x, R in zip(every.position_m, every.rotation, strict=True):

@@ -6,7 +6,8 @@ import pytest
 from tests.robot.cases import HANGING
 from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward, inverse
+from wirebayes.robot.motion import equilibria, forward, inverse
+from wirebayes.robot.motion.balance import balance_at, tensions_at
 
 from . import cases
 
@@ -126,7 +127,7 @@ def test_a_platform_on_two_points_in_line_with_its_weight_is_not_held():
 def test_several_equilibria_are_found_distinguished_and_ordered():
     robot = schema.read("cogiro-desk")
     c = cases.commanded(robot, "hooke", 1, np.random.default_rng(8))
-    every = forward.equilibria(robot, c.wires, c.zero_m[0], c.offset_m[0], np.random.default_rng(0))
+    every = equilibria.equilibria(robot, c.wires, c.zero_m[0], c.offset_m[0], np.random.default_rng(0))
     assert len(every.position_m) >= 2
     height = statics.potential(
         robot, c.wires, every.position_m.T, np.moveaxis(every.rotation, 0, -1), c.zero_m.T, c.offset_m.T
@@ -321,22 +322,22 @@ def test_a_point_has_the_energy_and_the_forces_of_its_pose():
     stiff = statics.stiffness(robot, c.wires, c.position_m.T, R, c.zero_m.T, c.offset_m.T)
     np.testing.assert_allclose(np.moveaxis(at.H, -1, 0), stiff * scale[:, 0] * scale, rtol=1e-12)
     np.testing.assert_allclose(at.size, np.abs(at.gradient).max(0))
-    tau = forward.tensions_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, c.offset_m)
+    tau = tensions_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, c.offset_m)
     assert tau.shape == (n, 8)
     np.testing.assert_array_equal(tau, at.tau.T)
     shape = statics.geometry(robot, c.position_m.T, R)
     balance = -(cases.wrench(robot, shape, tau.T) + statics.weight(robot, R)) * scale
     np.testing.assert_allclose(at.gradient, balance, atol=1e-12)
-    gradient, hessian = forward.balance_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, c.offset_m)
+    gradient, hessian = balance_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, c.offset_m)
     np.testing.assert_array_equal(gradient, at.gradient)
     np.testing.assert_array_equal(hessian, at.H)
     # one offset for all poses
-    same = forward.balance_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, robot.beyond_m)[0]
+    same = balance_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, robot.beyond_m)[0]
     each = np.tile(robot.beyond_m, (n, 1))
-    expected = forward.balance_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, each)[0]
+    expected = balance_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, each)[0]
     np.testing.assert_array_equal(same, expected)
-    single = forward.tensions_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, robot.beyond_m)
-    np.testing.assert_array_equal(single, forward.tensions_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, each))
+    single = tensions_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, robot.beyond_m)
+    np.testing.assert_array_equal(single, tensions_at(robot, c.wires, c.position_m, c.rotation, c.zero_m, each))
 
 
 def test_rows_that_cannot_be_tried_are_not_found_and_do_no_harm():
@@ -401,11 +402,11 @@ def test_starts_lie_among_the_exits_and_below_and_the_known_pose_is_one_of_them(
         asked.append((zero, start, np.broadcast_to(turn, (len(start), 3, 3)), most))
         return true(robot, wires, zero, offset, start, turn, most)
 
-    monkeypatch.setattr(forward, "solve", solve)
+    monkeypatch.setattr(equilibria, "solve", solve)
     known = (c.position_m[0] + 1e-3, c.rotation[0])
     given = robot, c.wires, c.zero_m[0], np.broadcast_to(c.offset_m, c.zero_m.shape)[0]
-    found = forward.equilibria(*given, np.random.default_rng(0), 40, known)
-    forward.equilibria(*given, np.random.default_rng(0))
+    found = equilibria.equilibria(*given, np.random.default_rng(0), 40, known)
+    equilibria.equilibria(*given, np.random.default_rng(0))
     (zero, start, turn, most), (_, plain, _, _) = asked
     assert len(start) == 41 and len(plain) == 64 and most == 400
     np.testing.assert_array_equal(zero, np.tile(c.zero_m[0], (41, 1)))

@@ -312,6 +312,7 @@ def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pyt
     commands: Any = SimpleNamespace(
         zero_m=np.ones((4, 3)), offset_m=np.zeros((4, 3)), feasible=np.array([True, True, False, True]),
         tension_N=np.array([[0.0, 5.0, -1.0], [9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [9.0, 9.0, 9.0]]),
+        rotation=np.tile(R, (4, 1, 1)),
     )  # fmt: skip
     status = np.array([forward.FOUND, forward.FOUND, forward.NOT_CONVERGED, forward.NOT_HELD])
     back: Any = SimpleNamespace(
@@ -361,7 +362,7 @@ def test_what_holds_the_commanded_pose_is_marked_among_all_poses(hung: Any, monk
             x + away, np.tile(R, (n, 1, 1)), tension, np.zeros(n, int), np.zeros(n, int), np.zeros(n)
         )
 
-    monkeypatch.setattr(answer.forward, "equilibria", others)
+    monkeypatch.setattr(answer.equilibria, "equilibria", others)
     rows = [0, 1, 2]
     found = answer._all_equilibria(robot, wires, x, R, rng)
     assert [pose["commanded"] for pose in found["poses"]] == [False, True, False] and found["stable_found"] == 3

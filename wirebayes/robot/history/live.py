@@ -24,7 +24,7 @@ from wirebayes.robot.mechanics.draws import WireDraws, doubts
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward, inverse, mixed, path, plausible
+from wirebayes.robot.motion import balance, forward, inverse, mixed, path, plausible
 from wirebayes.robot.motion.creep import CreepState, HoldCreep
 
 _LONG = 5e-2  # of the platform's size: a longer Newton step is followed with care instead
@@ -320,7 +320,7 @@ class LiveEstimator:
                 self._carefully(np.flatnonzero(hard), zero, offset)
             if not (length[self._live & ~hard] > _AGAIN * robot.size_m).any():
                 break
-        self._tension = forward.tensions_at(robot, wires, self._x, self._R, zero, offset)
+        self._tension = balance.tensions_at(robot, wires, self._x, self._R, zero, offset)
         self._lengths = zero, offset
 
     def _carefully(self, rows: NDArray[np.intp], zero: Floats, offset: Floats) -> None:

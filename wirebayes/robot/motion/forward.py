@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from wirebayes.numeric import cholesky
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.mechanics import plane, statics
 from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
 from wirebayes.robot.motion import one_sided
+from wirebayes.robot.motion.balance import scaled
 
 FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD, FELL = 0, 1, 2, 3, 4
 _GOING_ON = -1  # of a case that is still being solved
@@ -355,127 +356,10 @@ def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Float
     shape = statics.geometry(robot, x, R)
     S = statics.stretched(robot, shape, offset)
     tau, slope = tension(wires, S, zero)
-    gradient, H = _scaled(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
+    gradient, H = scaled(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
     height = x[2]
     if robot.degrees == 6:
         c = robot.centre_of_mass_m
         height = height + (R[2, 0] * c[0] + R[2, 1] * c[1] + R[2, 2] * c[2])
     total = energy(wires, S, zero).sum(0) + robot.mass_kg * GRAVITY * height
     return _Point(total, gradient, H, tau, np.abs(gradient).max(0))
-
-
-def _scaled(gradient: Floats, H: Floats, scale: Floats) -> tuple[Floats, Floats]:
-    """Gradient and Hessian by rotations in metres at the platform's edge."""
-    if len(gradient) == 6:
-        H[3:] *= scale[3, 0]
-        H[:, 3:] *= scale[3, 0]
-    return gradient * scale, H
-
-
-def balance_at(
-    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
-) -> tuple[Floats, Floats]:
-    """Gradient and Hessian of the energy at poses; rotations count in metres at the platform's edge.
-
-    Parameters
-    ----------
-    robot : Robot
-    wires : Wires
-    position_m : (n, 3) array
-    rotation : (n, 3, 3) array
-    zero_m : (n, w) array
-        Zero-tension lengths, creep included.
-    offset_m : (n, w) or (w,) array
-        Length beyond the exit points.
-
-    Returns
-    -------
-    gradient : (6 or 3, n) array
-        N.
-    hessian : (6, 6, n) or (3, 3, n) array
-        N/m.
-    """
-    scale = np.ones((robot.degrees, 1))
-    scale[3:] = 1.0 / robot.size_m
-    R = rotation.transpose(1, 2, 0)
-    shape = statics.geometry(robot, position_m.T, R)
-    tau, slope = tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)
-    return _scaled(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
-
-
-def tensions_at(
-    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
-) -> Floats:
-    """Tensions that lengths give at poses, in balance or not.
-
-    Parameters
-    ----------
-    robot, wires, position_m, rotation, zero_m, offset_m
-        As for `balance_at`.
-
-    Returns
-    -------
-    (n, w) array
-        N.
-    """
-    shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
-    return tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)[0].T
-
-
-def equilibria(
-    robot: Robot,
-    wires: Wires,
-    zero_m: Floats,
-    offset_m: Floats,
-    rng: np.random.Generator,
-    starts: int = 64,
-    known: tuple[Floats, Floats] | None = None,
-) -> Equilibria:
-    """Every stable equilibrium that many random starts find for one set of lengths.
-
-    Parameters
-    ----------
-    robot : Robot
-    wires : Wires
-        Of one draw (``n`` = 1).
-    zero_m, offset_m : (w,) arrays
-    rng : numpy Generator
-    starts : int
-        Starting poses: anywhere below and among the exit points, any orientation.
-    known : (3,), (3, 3) arrays, optional
-        A pose to start from too: the commanded one, say, which few random starts may reach.
-
-    Returns
-    -------
-    Equilibria
-        Distinct ones, the lowest energy first.
-    """
-    low, high = robot.exit_m.min(0), robot.exit_m.max(0)
-    low = low - np.array([0.0, 0.0, 0.5 * zero_m.max()])
-    begin = rng.uniform(low, high, (starts, 3))
-    turn = np.eye(3) if robot.degrees == 3 else turning.matrix(1.2 * rng.standard_normal((starts, 3)))
-    turn = np.broadcast_to(turn, (starts, 3, 3))
-    if known is not None:
-        begin, turn = np.concatenate([known[0][None], begin]), np.concatenate([known[1][None], turn])
-    begin, turn = plane.onto(robot, begin, turn)
-    tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
-    found = solve(robot, wires, tiled, offset_m, begin, turn, 400)
-    good = np.flatnonzero(found.found)
-    near_m = 1e-6 * robot.span_m  # poses nearer than this, rotations at the platform's edge, are one
-    height = statics.potential(
-        robot, wires, found.position_m.T, np.moveaxis(found.rotation, 0, -1), zero_m[:, None], offset_m[:, None]
-    )
-    kept: list[int] = []
-    for i in good[np.argsort(height[good], kind="stable")]:
-        apart = [
-            max(np.abs(found.position_m[i] - found.position_m[k]).max(),
-                robot.size_m * np.abs(found.rotation[i] - found.rotation[k]).max())
-            for k in kept
-        ]  # fmt: skip
-        if all(a > near_m for a in apart):
-            kept.append(int(i))
-    pick = np.array(kept, int)
-    return Equilibria(
-        found.position_m[pick], found.rotation[pick], found.tension_N[pick], found.status[pick],
-        found.iterations[pick], found.residual_N[pick],
-    )  # fmt: skip

@@ -15,6 +15,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, mixed
+from wirebayes.robot.motion.balance import balance_at, tensions_at
 
 _SMALLEST = 2.0**-20  # of a step: a jump that is left there is a fall
 _TRUST = 0.5  # a step that ends further from its prediction, relative to its length, is divided
@@ -70,7 +71,7 @@ def follow(
     """
     n = len(start[0])
     x, R = (np.array(v) for v in start)
-    tau = forward.tensions_at(robot, wires, x, R, *old)
+    tau = tensions_at(robot, wires, x, R, *old)
     whole, good = _step(robot, wires, (x, R), tau, new)  # most need no division: all at once
     share, drop = np.where(good, 1.0, 0.0), np.zeros(n)
     step = np.full(n, 0.5)
@@ -138,7 +139,7 @@ def _let_go(
     offset = np.broadcast_to(lengths[1], lengths[0].shape)
     part, own = wires.part(loose), (lengths[0][loose], offset[loose])
     balance = there.position_m[loose], there.rotation[loose]
-    stiffness = np.moveaxis(forward.balance_at(robot, part, *balance, *own)[1], -1, 0)
+    stiffness = np.moveaxis(balance_at(robot, part, *balance, *own)[1], -1, 0)
     softest = np.linalg.eigh(stiffness)[1][..., 0]
     aside = mixed.moved(robot, balance, _ASIDE * robot.size_m * softest)
     found = forward.solve(robot, part, *own, *aside)
@@ -168,7 +169,7 @@ def settle(
     step = newton_step(robot, wires, near, lengths)
     x, R = mixed.moved(robot, near, step)
     n = len(x)
-    tau = forward.tensions_at(robot, wires, x, R, *lengths)
+    tau = tensions_at(robot, wires, x, R, *lengths)
     out = forward.Equilibria(x, R, tau, np.full(n, forward.FOUND), np.ones(n, np.int64), np.zeros(n))
     # the error left is of the order of the step's square over a wire's length
     far = np.flatnonzero(~(np.linalg.norm(step, axis=1) < _SMALL * robot.size_m))
@@ -196,6 +197,6 @@ def newton_step(robot: Robot, wires: Wires, start: tuple[Floats, Floats], length
     (n, 6 or 3) array
         Displacement, m, then turn in metres at the platform's edge; NaN where the stiffness is not positive definite.
     """
-    gradient, H = forward.balance_at(robot, wires, *start, *lengths)
+    gradient, H = balance_at(robot, wires, *start, *lengths)
     step, positive = cholesky.solve(H, -gradient)
     return np.where(positive, step, np.nan).T

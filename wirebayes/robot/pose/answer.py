@@ -25,7 +25,7 @@ from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import claim, control, drift, forward, inverse, one_sided
+from wirebayes.robot.motion import claim, control, drift, equilibria, forward, inverse, one_sided
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose import controllers, on_plane, stability, variance_shares
@@ -244,13 +244,15 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.ra
     mean = control.known(wires)
     tau = inverse.tensions(robot, x[None], R[None])
     commands = inverse.commands(robot, mean, x[None], R[None], tau)
-    lengths, R = (commands.zero_m[0], commands.offset_m[0]), commands.rotation[0]
+    lengths = commands.zero_m[0], commands.offset_m[0]
+    if robot.winch is not None:
+        R = commands.rotation[0]
     if not commands.feasible[0]:  # some draws are strong enough, their mean is not
         return {"stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []}
     here = forward.solve(robot, mean, commands.zero_m, commands.offset_m, x, R)
     near_m = 1e-6 * robot.span_m
     stable = bool(here.found[0]) and bool(np.abs(here.position_m[0] - x).max() < near_m)
-    found = forward.equilibria(robot, mean, *lengths, rng, known=(x, R))
+    found = equilibria.equilibria(robot, mean, *lengths, rng, known=(x, R))
     own = np.maximum(
         np.abs(found.position_m - x).max(1), robot.size_m * np.abs(found.rotation - R).max((1, 2))
     ) < near_m  # fmt: skip

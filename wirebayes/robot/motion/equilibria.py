@@ -1,0 +1,69 @@
+"""Every stable equilibrium of one set of lengths, as far as many starts find them."""
+
+import numpy as np
+
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.mechanics import plane, statics
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.motion.forward import Equilibria, solve
+
+
+def equilibria(
+    robot: Robot,
+    wires: Wires,
+    zero_m: Floats,
+    offset_m: Floats,
+    rng: np.random.Generator,
+    starts: int = 64,
+    known: tuple[Floats, Floats] | None = None,
+) -> Equilibria:
+    """Every stable equilibrium that many random starts find for one set of lengths.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        Of one draw (``n`` = 1).
+    zero_m, offset_m : (w,) arrays
+    rng : numpy Generator
+    starts : int
+        Starting poses: anywhere below and among the exit points, any orientation.
+    known : (3,), (3, 3) arrays, optional
+        A pose to start from too: the commanded one, say, which few random starts may reach.
+
+    Returns
+    -------
+    Equilibria
+        Distinct ones, the lowest energy first.
+    """
+    low, high = robot.exit_m.min(0), robot.exit_m.max(0)
+    low = low - np.array([0.0, 0.0, 0.5 * zero_m.max()])
+    begin = rng.uniform(low, high, (starts, 3))
+    turn = np.eye(3) if robot.degrees == 3 else turning.matrix(1.2 * rng.standard_normal((starts, 3)))
+    turn = np.broadcast_to(turn, (starts, 3, 3))
+    if known is not None:
+        begin, turn = np.concatenate([known[0][None], begin]), np.concatenate([known[1][None], turn])
+    begin, turn = plane.onto(robot, begin, turn)
+    tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
+    found = solve(robot, wires, tiled, offset_m, begin, turn, 400)
+    good = np.flatnonzero(found.found)
+    near_m = 1e-6 * robot.span_m  # poses nearer than this, rotations at the platform's edge, are one
+    height = statics.potential(
+        robot, wires, found.position_m.T, np.moveaxis(found.rotation, 0, -1), zero_m[:, None], offset_m[:, None]
+    )
+    kept: list[int] = []
+    for i in good[np.argsort(height[good], kind="stable")]:
+        apart = [
+            max(np.abs(found.position_m[i] - found.position_m[k]).max(),
+                robot.size_m * np.abs(found.rotation[i] - found.rotation[k]).max())
+            for k in kept
+        ]  # fmt: skip
+        if all(a > near_m for a in apart):
+            kept.append(int(i))
+    pick = np.array(kept, int)
+    return Equilibria(
+        found.position_m[pick], found.rotation[pick], found.tension_N[pick], found.status[pick],
+        found.iterations[pick], found.residual_N[pick],
+    )  # fmt: skip
