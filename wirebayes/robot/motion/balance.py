@@ -9,7 +9,20 @@ from wirebayes.robot.mechanics.wires import Wires, tension
 
 
 def scaled(gradient: Floats, H: Floats, scale: Floats) -> tuple[Floats, Floats]:
-    """Gradient and Hessian by rotations in metres at the platform's edge."""
+    """Gradient and Hessian by rotations in metres at the platform's edge.
+
+    Parameters
+    ----------
+    gradient : (d, n) array
+    H : (d, d, n) array
+        Changed in place.
+    scale : (d, 1) array
+        Radians of a metre at the platform's edge; 1 for displacements.
+
+    Returns
+    -------
+    gradient, H
+    """
     if len(gradient) == 6:
         H[3:] *= scale[3, 0]
         H[:, 3:] *= scale[3, 0]
