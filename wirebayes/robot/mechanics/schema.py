@@ -99,13 +99,10 @@ def _robot(top: Keys) -> Robot:
     bias = _bias(top.inside("sensors", {}))
     plane = _plane(top)
     given, declared, masses = _wires(top)
-    tables = [replace(leg, name="", prefix=f"leg[{leg.index}].") for leg in top.tables("leg", least=2)]
-    legs = [_leg(leg, declared) for leg in tables]
+    legs, winch = _legs(top, declared)
     top.finish()
     if freedom == "orientation":
         _check_ball_joint(top, plane, np.array([lower, upper]) - position, len(legs))
-    mass_kg_m = np.array([masses.get(leg["wire"], 0.0) for leg in legs])
-    winch = _winches(tables, legs)
 
     def stack(key: str) -> Any:
         return np.array([leg[key] for leg in legs])
@@ -134,10 +131,10 @@ def _robot(top: Keys) -> Robot:
         pulleys=_pulleys(stack("pulley"), stack("axis")),
         drums=_drums(*(stack(key) for key in _DRUM)),
         tension_bias_N=bias,
-        mass_kg_m=mass_kg_m if mass_kg_m.any() else None,
+        mass_kg_m=_or_none(np.array([masses.get(leg["wire"], 0.0) for leg in legs])),
         plane=plane,
         winch=winch,
-        joint_offset_m=stack("joint_offset") if stack("joint_offset").any() else None,
+        joint_offset_m=_or_none(stack("joint_offset")),
     )
 
 
@@ -236,6 +233,18 @@ def _wires(top: Keys) -> tuple[dict[str, GivenWire], set[str], dict[str, float]]
             given[name] = GivenWire(values, wire.number("length_mm", above=0))
         wire.finish()
     return given, set(tables.table), masses
+
+
+def _or_none(values: Floats) -> Floats | None:
+    """Values of the legs; None where all are zero."""
+    return values if values.any() else None
+
+
+def _legs(top: Keys, declared: set[str]) -> tuple[list[dict[str, Any]], NDArray[np.intp] | None]:
+    """All legs, and the number of each one's winch."""
+    tables = [replace(leg, name="", prefix=f"leg[{leg.index}].") for leg in top.tables("leg", least=2)]
+    legs = [_leg(leg, declared) for leg in tables]
+    return legs, _winches(tables, legs)
 
 
 def _leg(leg: Keys, declared: set[str]) -> dict[str, Any]:

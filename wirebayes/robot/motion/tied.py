@@ -17,6 +17,7 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.winches import lengths, mean_of_each_winch, turned_by
 from wirebayes.robot.mechanics.wires import Wires, tension
+from wirebayes.robot.motion.loose_balance import scale_of
 
 _STEPS = 60  # half a dozen are usual; every line that comes to its bound takes as many more
 _LONGEST_RAD, _LONGEST = 0.3, 0.1  # turned and, in spans, moved in a step: beyond, what was linearised means little
@@ -102,27 +103,31 @@ def tied(
     cases = _Cases(
         position_m[live], rotation[live], mean_of_each_winch(robot, joint_m)[live], np.zeros((len(live), legs), int)
     )
-    scale = np.ones(robot.degrees)
-    scale[3:] = 1.0 / robot.size_m  # rotations are stepped in metres at the platform's edge
+    scale = scale_of(robot)
     for _ in range(_STEPS):
         if not live.size:
             break
         here = _here(robot, wires.part(live), cases, creep[live], error[live], scale)
         step = _step(robot, here, cases, (position_m[live], rotation[live], tension_N[live]))
-        size, unit = np.abs(step).max(1), robot.mass_kg * GRAVITY + np.abs(here.tension_N).max(1)
-        still = (size < _SETTLED * robot.span_m) & (np.abs(here.force).max(1) < _BALANCED * unit)
-        newly = _newly_bound(robot, here.tension_N, cases.bound) & still[:, None]
-        cases.bound += np.where(here.tension_N < robot.rule.lowest_N, -1, 1) * newly
-        done = still & ~newly.any(1)
+        done = _settled(robot, here, cases, step)
         at = live[done]
         reached = np.abs(cases.x - position_m[live]).max(1)[done] < _REACHED * robot.span_m
         out.rotation[at], out.tension_N[at] = cases.R[done], here.tension_N[done]
         out.joint_m[at] = cases.joint[done] @ turned_by(robot).T
         out.held[at] = reached
-        go = ~done & np.isfinite(size)
+        go = ~done & np.isfinite(step).all(1)
         live, step = live[go], step[go]
         _move(robot, cases, go, step, scale)
     return out
+
+
+def _settled(robot: Robot, here: _Here, cases: _Cases, step: Floats) -> NDArray[np.bool_]:
+    """(n,) Which cases are in balance and at rest; a line outside its bounds then is bound, and its case goes on."""
+    size, unit = np.abs(step).max(1), robot.mass_kg * GRAVITY + np.abs(here.tension_N).max(1)
+    still = (size < _SETTLED * robot.span_m) & (np.abs(here.force).max(1) < _BALANCED * unit)
+    newly = _newly_bound(robot, here.tension_N, cases.bound) & still[:, None]
+    cases.bound += np.where(here.tension_N < robot.rule.lowest_N, -1, 1) * newly
+    return np.asarray(still & ~newly.any(1))
 
 
 def _here(robot: Robot, wires: Wires, cases: _Cases, creep: Floats, error: Floats, scale: Floats) -> _Here:
