@@ -47,7 +47,11 @@ STUDIES = {
     "coverage": ("-m analyses.posterior.coverage --output {folder}", "coverage.json"),
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
     "robot_calibration": ("-m analyses.robots.whole_calibration coverage 120 --output {folder}/it.json", "it.json"),
-    "robot_lengths_alone": ("-m analyses.robots.whole_calibration lengths 30 --output {folder}/it.json", "it.json"),
+    "robot_calibration_again": (
+        "-m analyses.robots.whole_calibration coverage 54 --seed 21 --output {folder}/it.json",
+        "it.json",
+    ),
+    "robot_lengths_alone": ("-m analyses.robots.whole_calibration lengths 100 --output {folder}/it.json", "it.json"),
     "discover_clean": (
         "-m analyses.hidden_effects --size small --answer api --simulations 199 --kinds clean --clean 1200 --seed 5000 "
         "--output {folder}",
@@ -109,7 +113,9 @@ def texts() -> dict[Path, str]:
         DOCS / "calibration-weights.inc": _calibration(kept["weights_calibration"]),
         DOCS / "wires-before.inc": _wires_before(kept["wires_before"]),
         DOCS / "coverage.inc": _coverage(kept["coverage"]),
-        DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"], kept["robot_lengths_alone"])
+        DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"])
+        + _robots_again(kept["robot_calibration_again"])
+        + _lengths_alone(kept["robot_lengths_alone"])
         + _exact_geometry(kept["robot_exact_geometry"]),
         DOCS / "real-wires.inc": _real_wires(kept["real_wires"]),
         DOCS / "discover-clean-said.inc": _clean(kept["discover_clean"]),
@@ -329,29 +335,52 @@ def _three(value: float) -> str:
     return f"{float(f'{value:.3g}'):g}"
 
 
-def _robot_calibration(kept: dict[str, Any], alone: dict[str, Any]) -> str:
-    """A table of intervals of drawn robots by what is known of the poses, and a sentence on lengths alone."""
-    names = {"exit_points": "exit points", "references": "references", "lengths": "lengths", "poses": "poses"}
-    found, blind = kept["result"], alone["result"]
+_HELD = {"exit_points": "exit points", "references": "references", "lengths": "lengths", "poses": "poses"}
+
+
+def _robot_calibration(kept: dict[str, Any]) -> str:
+    """A table of intervals of drawn robots by what is known of the poses."""
+    found = kept["result"]
     lines = [
         f"{_run_of(kept)} draws {found['robots']} robots of 2 to 9 wires",
         f"and takes {found['median_seconds_each']:.1f} s each at the median. Shares of 90 % intervals that hold",
         "the truth, and of calibrations that converge and are usable, in %:",
         "",
-        *_head("poses", "robots", *names.values(), "converged", "usable"),
+        *_head("poses", "robots", *_HELD.values(), "converged", "usable"),
     ]
     for mode in ("all", "poses known", "poses roughly known", "some poses", "poses unknown"):
         share = found["shares"][mode]
-        lines += _row(mode, share["robots"], *(f"{100 * share[name]:.0f}" for name in (*names, "converged", "usable")))
-    right, wrong, error = (100 * blind[name] for name in ("found", "silently_wrong", "distance_error_over_before"))
-    lines += [
-        "",
+        lines += _row(mode, share["robots"], *(f"{100 * share[name]:.0f}" for name in (*_HELD, "converged", "usable")))
+    return "\n".join(lines) + "\n\n"
+
+
+def _robots_again(kept: dict[str, Any]) -> str:
+    """The shares of other robots by later code, with their standard errors."""
+    share = kept["result"]["shares"]["all"]
+    held = ", ".join(
+        f"{words} {100 * share[name]:.0f} ± {100 * share[f'{name}_se']:.1f} %" for name, words in _HELD.items()
+    )
+    usable = f"{100 * share['usable']:.0f} % [{100 * share['usable_low']:.0f}, {100 * share['usable_high']:.0f} %]"
+    return (
+        f"{_run_of(kept)},\n{kept['result']['robots']} other robots (mean and standard error over robots): {held};\n"
+        f"usable {usable}.\n\n"
+    )
+
+
+def _lengths_alone(kept: dict[str, Any]) -> str:
+    """Sentences on anchors from lengths alone."""
+    blind = kept["result"]
+    right, wrong = (
+        f"{100 * share['share']:.0f} % [{100 * share['low']:.0f}, {100 * share['high']:.0f} %]"
+        for share in (blind["found"], blind["silently_wrong"])
+    )
+    lines = [
         "Lengths alone, of 24 unknown poses, on four or five anchors that are 2 % of the span off, with unread",
         "tensions that the robot's file bounds at 0.3 of what the lines may bear:",
-        f"{_run_of(alone)} finds {right:.0f} % of {blind['robots']}",
-        "calibrations usable with every coordinate within four standard errors,",
-        f"{wrong:.0f} % usable and wrong; the others are refused. Distances between anchors are then {error:.0f} %",
-        "as wrong as before, at the median.",
+        f"{_run_of(kept)} finds {right} of {blind['robots']}",
+        "calibrations usable with every coordinate within four standard errors (95 % interval),",
+        f"{wrong} usable and wrong; the others are refused. Distances between anchors are then",
+        f"{100 * blind['distance_error_over_before']:.0f} % as wrong as before, at the median.",
     ]
     return "\n".join(lines) + "\n"
 

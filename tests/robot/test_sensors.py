@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from wirebayes.robot.self_calibration import sensors
+from wirebayes.robot.self_calibration import answer, sensors
 from wirebayes.robot.self_calibration.sensors import named, to_json, weighed
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 
@@ -101,3 +101,26 @@ def test_at_a_single_hold_no_sensor_is_looked_at(read, looked_at, monkeypatch):
     with pytest.raises(StopIteration) if looked_at else contextlib.nullcontext():
         sensors.suspects(found, SimpleNamespace(tension_N=tension))
     assert len(began) == looked_at
+
+
+@pytest.mark.parametrize(("read", "times", "wires"), [(2, 0.99, []), (2, 1.01, [2]), (1, 1.01, None)])
+def test_with_exact_geometry_a_sensor_is_named_from_the_same_level_and_holds_on(read, times, wires, monkeypatch):
+    """Lengths alone are unknown there; the sensors' errors stand last among the unknowns."""
+    size = np.sqrt(times * chi2.isf(SIGNIFICANT, 4))
+    bias, covariance = _estimate(size * np.eye(4)[2], np.eye(4))
+    whole = np.eye(9)
+    whole[5:, 5:] = covariance
+
+    def calibrated(robot, prior, session, readings):
+        assert prior.bias_sd_N == PRIOR_N  # as much as a sensor ever read
+        unknowns = np.concatenate([np.full(5, 7.0), bias])
+        return SimpleNamespace(unknowns=unknowns[None], covariance=whole[None], converged=np.array([True]))
+
+    monkeypatch.setattr(answer, "calibrate", calibrated)
+    monkeypatch.setattr(answer, "replace", lambda prior, **changed: SimpleNamespace(**{**vars(prior), **changed}))
+    session = SimpleNamespace(read=np.arange(3) < read, tension_sd_N=0.5)
+    readings = np.full(4 * read + 3, PRIOR_N / 0.5)
+    readings[4 * read :] = 1e6  # of an inclinometer, which comes after the tensions
+    found = answer._at_fault(SimpleNamespace(legs=4), SimpleNamespace(bias_sd_N=0.0), session, readings)
+    assert wires is None if found is None else found.wires == wires
+    assert answer._at_fault(SimpleNamespace(legs=4), SimpleNamespace(bias_sd_N=1.0), session, readings) is None
