@@ -27,6 +27,7 @@ def seconds(k1_N: float) -> tuple[float, float]:
     rows = np.loadtxt(FIELD / "ua-j2.csv", delimiter=",", skiprows=1)
     still, middle = np.zeros(len(rows)), np.tile(robot.centre_of_mass_m, (len(rows), 1))
     fine, _ = follow.refined(robot, History(rows[:, 0], rows[:, 1:], None, None, still, middle))
+    assert fine.joint_m is not None
     given = next(iter(robot.given.values())).parameters
     theta = {name: np.full((1, DRAWS), value) for name, value in given.items()}
     theta |= {"k1": np.full((1, DRAWS), k1_N), "B": np.full((1, DRAWS), CREEP_N / k1_N)}
