@@ -48,7 +48,7 @@ STUDIES = {
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
     "robot_calibration": ("-m analyses.robots.whole_calibration coverage 120 --output {folder}/it.json", "it.json"),
     "robot_calibration_again": (
-        "-m analyses.robots.whole_calibration coverage 54 --seed 21 --output {folder}/it.json",
+        "-m analyses.robots.whole_calibration coverage 108 --seed 21 --output {folder}/it.json",
         "it.json",
     ),
     "robot_lengths_alone": ("-m analyses.robots.whole_calibration lengths 100 --output {folder}/it.json", "it.json"),
