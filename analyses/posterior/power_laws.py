@@ -1,4 +1,5 @@
-"""What a fit of a power law costs: relaxations and creep curves of one hold and of several, at several scales.
+"""What does a fit cost whose readings follow a power law of time, which the law approaches only at the ends of its
+priors?
 
 ``python -m analyses.posterior.power_laws``: the toolkit's law approaches a power law of the time only at the far ends
 of k2 and N, so that these posteriors lie against priors. A row each: likelihood evaluations of the fit, whether it
