@@ -17,7 +17,7 @@ KNOWN = {
     "TruncatedNormal, hardly": stats.truncnorm(-7.9, np.inf, loc=7.9, scale=1.0),
 }
 SHARES = np.concatenate([[0.0, 1e-12], np.linspace(0.01, 0.99, 99), [1.0 - 1e-12, 1.0]])
-given = pytest.mark.parametrize(("name", "theirs"), KNOWN.items(), ids=str)
+given = pytest.mark.parametrize(("name", "theirs"), KNOWN.items(), ids=list(KNOWN))
 
 
 @given
