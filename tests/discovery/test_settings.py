@@ -22,7 +22,7 @@ def documented() -> dict[str, float | tuple[float, ...]]:
 
 
 def test_every_threshold_is_documented_with_its_value() -> None:
-    numbers = {name: value for name, value in vars(settings).items() if name.isupper()}
+    numbers = {name: value for name, value in vars(settings).items() if name.isupper() and name != "PLAIN_SPEC"}
     assert documented() == numbers
 
 

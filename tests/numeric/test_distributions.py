@@ -29,6 +29,13 @@ def test_draws_are_those_of_scipy_to_the_last_bit(name, theirs):
 
 
 @given
+def test_a_seed_stands_for_a_generator(name, theirs):
+    mine = ours(theirs)
+    assert np.array_equal(mine.rvs(3, random_state=7), mine.rvs(3, random_state=np.random.default_rng(7)))
+    assert np.isfinite(mine.rvs())
+
+
+@given
 def test_densities_quantiles_and_moments_are_those_of_scipy(name, theirs):
     mine = ours(theirs)
     x = np.concatenate([theirs.rvs(100, random_state=0), [-3.0, 0.0, 1e-12, 1.0, 7.0]])

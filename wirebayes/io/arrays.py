@@ -64,6 +64,10 @@ def from_arrays(
     preload_mm : float, optional
         The stretch at displacement zero, where it is known.
 
+    Returns
+    -------
+    Experiment
+
     Raises
     ------
     InputError

@@ -36,8 +36,8 @@ class Distribution:
         raise NotImplementedError
 
     def rvs(self, size: int | None = None, random_state: Any = None) -> Any:
-        """Draws; `random_state` is a numpy Generator."""
-        return self.ppf(random_state.uniform(size=size))
+        """Draws; `random_state` is a numpy Generator, or what makes one."""
+        return self.ppf(np.random.default_rng(random_state).uniform(size=size))
 
     def support(self) -> tuple[float, float]:
         """Its ends."""
@@ -83,7 +83,7 @@ class Normal(Distribution):
         return ndtri(q) * self.sd + self.centre
 
     def rvs(self, size: int | None = None, random_state: Any = None) -> Any:
-        return random_state.standard_normal(size) * self.sd + self.centre
+        return np.random.default_rng(random_state).standard_normal(size) * self.sd + self.centre
 
     def support(self) -> tuple[float, float]:
         return -np.inf, np.inf
@@ -117,7 +117,7 @@ class HalfNormal(Distribution):
         return ndtri((1.0 + np.asarray(q)) / 2.0) * self.sd + self.least
 
     def rvs(self, size: int | None = None, random_state: Any = None) -> Any:
-        return np.abs(random_state.standard_normal(size=size)) * self.sd + self.least
+        return np.abs(np.random.default_rng(random_state).standard_normal(size=size)) * self.sd + self.least
 
     def support(self) -> tuple[float, float]:
         return self.least, np.inf
@@ -195,7 +195,7 @@ class LogNormal(Distribution):
         return np.exp(self.sd_log * ndtri(q)) * self.middle
 
     def rvs(self, size: int | None = None, random_state: Any = None) -> Any:
-        return np.exp(self.sd_log * random_state.standard_normal(size)) * self.middle
+        return np.exp(self.sd_log * np.random.default_rng(random_state).standard_normal(size)) * self.middle
 
     def support(self) -> tuple[float, float]:
         return 0.0, np.inf
