@@ -50,7 +50,7 @@ def batch(
     quiet: Quiet = False,
 ) -> None:
     """Fit many experiments and find what each model is missing: DIR/summary.csv and a folder DIR/NAME for each."""
-    from wirebayes.processes.workers import load_early, load_meanwhile
+    from wirebayes.processes.workers import load_early
 
     load_early()
     from wirebayes.cli.answer import conclude
@@ -58,7 +58,6 @@ def batch(
     from wirebayes.commands.batch import batch as run
     from wirebayes.views.result import Given
 
-    load_meanwhile("wirebayes.report.pages.batch")
     with progress() as report:
         many = run(
             files, discover=discover, check=check, posteriors=posteriors, keep_going=keep_going,

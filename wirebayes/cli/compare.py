@@ -44,7 +44,7 @@ def compare(
     Every model is judged twice: each hold left out in turn, and the last third of the holds (with --train-holds K, all
     after the K-th, and none of them is used before) predicted from the rest.
     """
-    from wirebayes.processes.workers import load_early, load_meanwhile
+    from wirebayes.processes.workers import load_early
 
     load_early()
     from wirebayes.cli.answer import conclude
@@ -59,7 +59,6 @@ def compare(
     said = [f"warning: {notice.text}" for notice in planned.warnings]
     for line in said:  # before the work, which takes minutes
         typer.echo(line, err=True)
-    load_meanwhile("wirebayes.report.pages.compare")
     with progress() as report:
         found = carry_out(planned, folder_for("compare", file, output), report)
     for line in found.messages:

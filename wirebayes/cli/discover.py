@@ -34,7 +34,7 @@ def discover(
     quiet: Quiet = False,
 ) -> None:
     """Find the missing effect: DIR/discovery.json, pictures, and DIR/NAME/{plain,final}/posterior.nc."""
-    from wirebayes.processes.workers import load_early, load_meanwhile
+    from wirebayes.processes.workers import load_early
 
     load_early()
     from wirebayes.cli.answer import conclude
@@ -42,7 +42,6 @@ def discover(
     from wirebayes.commands.discover import discover as run
     from wirebayes.views.result import Given
 
-    load_meanwhile("wirebayes.report.pages.discover")
     with progress() as report:
         findings = run(
             file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,

@@ -50,7 +50,7 @@ def fit(
     quiet: Quiet = False,
 ) -> None:
     """Posterior of the wire's parameters: DIR/NAME/posterior.nc and DIR/NAME/summary.json for each experiment."""
-    from wirebayes.processes.workers import load_early, load_meanwhile
+    from wirebayes.processes.workers import load_early
 
     if check:
         load_early()
@@ -59,7 +59,6 @@ def fit(
     from wirebayes.commands.fit import fit as run
     from wirebayes.views.result import Given
 
-    load_meanwhile("wirebayes.report.pages.fit")
     with progress() as report:
         fitted = run(
             file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,

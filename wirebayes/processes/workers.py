@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -42,13 +41,6 @@ def load_early() -> None:
     """
     if _FORKS:
         _prepared(["wirebayes.preloaded"])
-
-
-def load_meanwhile(module: str) -> None:
-    """Load a module in a thread, while this one computes outside of Python or waits for its workers."""
-    from threading import Thread
-
-    Thread(target=import_module, args=(module,), daemon=True).start()
 
 
 def _prepared(preload: list[str]) -> None:
