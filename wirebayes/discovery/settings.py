@@ -42,10 +42,8 @@ LEFT_OVER = 8.0  # nats: the most that a further effect may explain of what one 
 LEFT_OVER_WEIGHT = 0.1  # of such a remainder, to a further effect
 RETESTS = 299  # simulations of the second global test
 ALPHA_AFTER = 0.03  # its p at which a remainder is as likely as none
-GIVE_WAY, MOST_RETESTS = (
-    2.0,
-    4,
-)  # nats below the best set, and sets, among which one that passes that test is looked for
+# nats below the best set, and sets, among which one that passes that test is looked for
+GIVE_WAY, MOST_RETESTS = 2.0, 4
 P_SLOPE = 0.8  # below it the odds grow as p to the power -0.8, the density of p where more is missing than was added
 
 # What may be called established.

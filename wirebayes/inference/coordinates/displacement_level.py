@@ -132,6 +132,5 @@ def displacement_level(problem: Problem) -> DisplacementLevel | None:
 
 
 _LEAST = 1e-3  # of the stretched length that is left without strain: below, the law has no wire
-_LEAST_GAIN = (
-    0.02  # of the creep under the stated weight: a setting error is at most half of the weight, and U seldom 2
-)
+# of the creep under the stated weight: a setting error is at most half of the weight, and U seldom 2
+_LEAST_GAIN = 0.02
