@@ -238,13 +238,10 @@ def _warnings(found: Investigation, output: Path) -> None:
 
 def _pictures(found: Investigation, output: Path, own_effects: Path | None) -> None:
     """Before and after, hold by hold, and one of each finding."""
-    from wirebayes.report.pictures.discover import (  # matplotlib only where it is needed
-        before_and_after,
-        pictures_of_findings,
-    )
+    from wirebayes.report.blocks import save_together  # matplotlib only where it is needed
+    from wirebayes.report.pictures.discover import pictures
 
     for e in (e for block in found.final for e in block.experiments):
         verdict = found.report["experiments"][e.name]
         plain, final = (load(output / e.name / model, own_effects=own_effects) for model in ("plain", "final"))
-        before_and_after(plain, final, verdict, output / f"{e.name}.svg")
-        pictures_of_findings(plain, verdict, output / e.name)
+        save_together(pictures(plain, final, verdict), output)

@@ -150,7 +150,8 @@ def check_model(
         return unchecked(reason="a smooth discrepancy stands in for whatever is missing")
     rng = np.random.default_rng(seed_of(seed, "discover"))
     first = rng.spawn(1)[0]
-    block = fitted(job.experiments, effects, job.spec, first)
+    # where the check runs beside the sampler, a fit in this process would take turns with it
+    (block,) = parallel_map(fitted, [job.experiments], [effects], [job.spec], [first])
     try:
         gate = examine([block], kinds, simulations or SIMULATIONS, rng, alpha=alpha, parallel_map=parallel_map)
     except InputError:

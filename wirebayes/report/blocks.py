@@ -4,7 +4,7 @@ import base64
 import io
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from wirebayes.io.run_folder import write_bytes
 from wirebayes.json_files.plain import plain
 from wirebayes.json_files.scene import SceneJson
 from wirebayes.notice import Notice, Warned, from_json
+from wirebayes.processes.copies import in_copies
 from wirebayes.sentences import number as number
 from wirebayes.sentences import span as span
 from wirebayes.sentences import unit_text as unit_text
@@ -202,6 +203,21 @@ def drawn(figure: Figure) -> str:
     return _address(svg(figure), ".svg")
 
 
+def drawn_together(figures: Sequence[Callable[[], Figure]]) -> list[str]:
+    """Figures as data addresses, drawn on all cores.
+
+    Parameters
+    ----------
+    figures : sequence of functions without arguments
+        Each makes one.
+    """
+
+    def drawing(figure: Callable[[], Figure]) -> Callable[[], str]:
+        return lambda: drawn(figure())
+
+    return in_copies([drawing(figure) for figure in figures])
+
+
 def _address(content: bytes, suffix: str) -> str:
     if suffix == ".svg":  # text in a data address is smaller than base64 of it
         return f"data:{_KINDS[suffix]},{quote(content, safe=_READ_AS_THEY_ARE)}"
@@ -266,6 +282,23 @@ _LONG = re.compile(r"\d+\.\d+")
 def save(figure: Figure, path: Path) -> None:
     """Write a figure as SVG, whole or not at all."""
     write_bytes(path, svg(figure))
+
+
+def save_together(figure_of: Mapping[str, Callable[[], Figure]], folder: Path) -> None:
+    """Write figures as SVG, drawn on all cores.
+
+    Parameters
+    ----------
+    figure_of : mapping of file name to a function without arguments
+        Each makes the figure of its file.
+    folder : Path
+        Receives the files.
+    """
+
+    def saving(path: Path, figure: Callable[[], Figure]) -> Callable[[], None]:
+        return lambda: save(figure(), path)
+
+    in_copies([saving(folder / name, figure) for name, figure in figure_of.items()])
 
 
 def pictures_in(folder: Path, captions: Mapping[str, str]) -> list[Picture]:

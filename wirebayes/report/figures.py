@@ -4,11 +4,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import LineCollection, PatchCollection
+from contourpy import FillType, contour_generator
+from matplotlib.collections import LineCollection, PatchCollection, PathCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.path import Path
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from wirebayes.json_files.summary import ExtrapolatedCreep
 from wirebayes.numeric.typing import Array
@@ -48,7 +50,8 @@ def panel(xlabel: str, ylabel: str, title: str = "", size: tuple[float, float] =
     axes.set_xlabel(xlabel)
     axes.set_ylabel(ylabel)
     if title:
-        axes.set_title(title, fontsize=10.5, loc="left", color=INK)
+        # at a stated height: to look for one that clears the ticks takes as long as to draw the rest
+        axes.set_title(title, fontsize=10.5, loc="left", color=INK, y=1.0)
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(labelsize=9)
     return figure, axes
@@ -142,7 +145,7 @@ def named(name: str, effects: tuple[Any, ...] = (), control: Control = "displace
 
 
 def logarithmic(axes: Any, which: str = "x") -> None:
-    """Logarithmic axes that print plain numbers; linear where nothing is above zero."""
+    """Logarithmic axes with a few ticks that print plain numbers; linear where nothing is above zero."""
     for name in ("x", "y") if which == "both" else (which,):
         if getattr(axes.dataLim, f"{name}1") <= 0:
             continue
@@ -153,28 +156,19 @@ def logarithmic(axes: Any, which: str = "x") -> None:
         subs = (1.0, 2.0, 5.0) if decades < 1.6 else (1.0, 3.0) if decades < 2.6 else (1.0,)
         axis.set_major_locator(LogLocator(subs=subs))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}".replace(",", "\u2009")))
-        axis.set_minor_formatter(NullFormatter())
+        axis.set_minor_locator(NullLocator())  # there are dozens of minor ticks, and each is placed several times
 
 
-def corner(
-    draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: Control = "displacement"
-) -> Figure | None:
+def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: Control = "displacement") -> Figure:
     """Every pair of parameters: the regions that hold 50 and 90 % of the draws; on the diagonal, each alone.
 
     Parameters
     ----------
     draws : mapping of name to (n,) array
+        Of two parameters or more; none is the same in all draws.
     effects : tuple of Effect
-
-    Returns
-    -------
-    Figure or None
-        None for fewer than two parameters.
     """
-    free = {name: values for name, values in draws.items() if np.ptp(values) > 0}
-    count = len(free)
-    if count < 2:
-        return None
+    count = len(draws)
     # One pair of axes, on which every cell is a unit square: a pair for each cell takes seconds to draw.
     left, below = 0.9, 0.8  # room for three lines
     width, height = 1.1 * count + left + 0.05, 1.05 * count + below + 0.05
@@ -183,12 +177,15 @@ def corner(
     axes.set_axis_off()
     axes.set_xlim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
     axes.set_ylim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
-    scaled = {name: _straight(values) for name, values in free.items()}
+    scaled = {name: _straight(values) for name, values in draws.items()}
     unit = [_across(values) for values, _ in scaled.values()]
+    cells = [(i, j) for i in range(count) for j in range(i)]
+    regions = [_regions(unit[j], unit[i], (j, count - 1 - i)) for i, j in cells]
+    for shaded, colour in zip(zip(*regions, strict=True), ("#b5c4d1", CHAIN), strict=True):
+        paths = [path for cell in shaded for path in cell]
+        axes.add_collection(PathCollection(paths, facecolor=colour, linewidth=0.0), autolim=False)
     for i, (name, (values, is_log)) in enumerate(scaled.items()):
         bottom = count - 1 - i
-        for j in range(i):
-            _regions(axes, unit[j], unit[i], (j, bottom))
         heights, edges = np.histogram(unit[i], np.linspace(0.0, 1.0, 31))
         stairs = bottom + 0.92 * _SIDE * heights / heights.max()
         axes.stairs(stairs, i + _SIDE * edges, baseline=bottom, fill=True, color=CHAIN, alpha=0.75)
@@ -265,17 +262,25 @@ def _ticks(axes: Any, places: Sequence[tuple[float, float]], step: tuple[float, 
     axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8, clip_on=False))
 
 
-def _regions(axes: Any, x: Array, y: Array, corner: tuple[float, float]) -> None:
-    """Shade the densest places that hold 50 and 90 % of the draws, smoothed over neighbours, in a cell."""
+def _regions(x: Array, y: Array, corner: tuple[float, float]) -> tuple[list[Path], list[Path]]:
+    """Outlines in a cell of the densest places, smoothed over neighbours: of 50 to 90 % of the draws, and of 50 %."""
     counts, xs, ys = np.histogram2d(x, y, bins=_CELLS, range=[(0.0, 1.0), (0.0, 1.0)])
     density = _SMOOTHING @ counts @ _SMOOTHING.T
     ranked = np.sort(density.ravel())[::-1]
     held = np.cumsum(ranked) / ranked.sum()
     half, most = (float(ranked[np.searchsorted(held, share)]) for share in (0.5, 0.9))
     if not 0 < most < half < ranked[0]:
-        return
+        return [], []
     places = [at + _SIDE * (edges[1:] + edges[:-1]) / 2 for at, edges in zip(corner, (xs, ys), strict=True)]
-    axes.contourf(*places, density.T, levels=[most, half, ranked[0]], colors=["#b5c4d1", CHAIN])
+    across, upward = places
+    contours = contour_generator(across, upward, density.T, fill_type=FillType.OuterCode)
+    return _outlines(contours, most, half), _outlines(contours, half, np.inf)
+
+
+def _outlines(contours: Any, low: float, high: float) -> list[Path]:
+    """Outlines of where a density lies between two values."""
+    points, codes = contours.filled(low, high)
+    return [Path(*outline) for outline in zip(points, codes, strict=True)]
 
 
 _MOST_TICKS = 4  # so that labels do not touch

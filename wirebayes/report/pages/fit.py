@@ -1,5 +1,6 @@
 """The page of ``wirebayes fit``: each fit's readings, what they determine and what they do not."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from wirebayes.report.blocks import (
     Text,
     before_the_answer,
     beside_the_answer,
-    drawn,
+    drawn_together,
     files_beside,
     number,
     sentence,
@@ -93,53 +94,69 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     sampled = [name for name in draws if name in prior and np.ptp(draws[name]) > 0]
     shrunk = {name: contraction(draws[name], prior[name]) for name in sampled}
     trusted = summary["converged"] and _passed(summary) is not False
+    pictures = _pictures(stored, {name: draws[name] for name in sampled}, summary, trusted)
     blocks: list[Block] = _cautions(summary)
-    if stored.likelihood == "chain":
-        alt = f"Readings of {sample.name} with the fitted curve through them, hold after hold."
-        blocks.append(_wide(through_the_readings(stored, sample.name), alt, _CURVE))
+    if "curve" in pictures:
+        blocks.append(Pictures([pictures["curve"]]))
     blocks.append(Text(_next(summary)))
     blocks.append(_parameters(draws, shrunk, sample))
     blocks.append(Columns([_measured(stored, summary.get("hold_ends")), *_known(draws, shrunk, sample, trusted)]))
-    blocks.append(_readings(stored))
-    pairs = figures.corner({name: draws[name] for name in sampled}, sample.model.effects, sample.protocol.control)
-    if pairs is not None:
-        blocks.append(_wide(pairs, f"Posterior of {sample.name}, every pair of parameters.", _PAIRS))
+    blocks.append(Pictures([pictures["measured"], pictures["residuals"]]))
+    if "pairs" in pictures:
+        blocks.append(Pictures([pictures["pairs"]]))
     determined = "What the data determine" if trusted else "What the data would determine if the model were right"
     sentences = [each["sentence"] for each in summary["identifiability"].values()]
     blocks.append(Columns([Points(determined, sentences)]))
     blocks.append(_derived(summary))
-    blocks.append(_ahead(summary, sample.name, trusted))
+    blocks.append(Pictures([pictures["ahead"]]))
     blocks.append(Text(_sampled(summary)))
     return Section(sample.name, blocks)
 
 
-def _wide(figure: Figure, alt: str, caption: str) -> Pictures:
-    """One picture as wide as the page."""
-    return Pictures([Picture(drawn(figure), alt, caption, wide=True)])
+def _pictures(stored: Stored, sampled: dict[str, Array], summary: SummaryJson, trusted: bool) -> dict[str, Picture]:
+    """All pictures of an experiment by name; no curve of holds by themselves, no pairs of a single parameter.
 
-
-def _readings(stored: Stored) -> Pictures:
-    """What was read, and what the model leaves of it."""
-    sample = stored.sample
+    Parameters
+    ----------
+    stored : Stored
+    sampled : dict of name to (n,) array
+        Draws of the parameters that vary.
+    summary : dict
+        The fit's ``summary.json``.
+    trusted : bool
+        Whether nothing speaks against the fit.
+    """
+    sample, name = stored.sample, stored.sample.name
     weights = sample.protocol.control == "force"
-    against = "Displacement of {} against weight." if weights else "Tension of {} against displacement."
-    measured = figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
-    left = f"Measured minus predicted readings of {sample.name}, hold after hold, inside the 90 % band."
-    return Pictures(
-        [
-            Picture(drawn(measured), against.format(sample.name), _GREW if weights else _READ),
-            Picture(drawn(_residuals(stored)), left, _LEFT),
-        ]
-    )
-
-
-def _ahead(summary: SummaryJson, name: str, trusted: bool) -> Pictures:
-    """How the creep goes on, with what speaks against it."""
+    against = f"Displacement of {name} against weight." if weights else f"Tension of {name} against displacement."
+    left = f"Measured minus predicted readings of {name}, hold after hold, inside the 90 % band."
+    later = f"Creep of {name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
     ahead = summary["extrapolation"]
-    alt = f"Creep of {name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
+    # those that take longest come first, so that no core waits for one that began last
+    figure_of: dict[str, Callable[[], Figure]] = {}
+    if stored.likelihood == "chain":
+        figure_of["curve"] = lambda: through_the_readings(stored, name)
+    if len(sampled) > 1:
+        figure_of["pairs"] = lambda: figures.corner(sampled, sample.model.effects, sample.protocol.control)
+    figure_of["residuals"] = lambda: _residuals(stored)
+    figure_of["ahead"] = lambda: figures.creep_ahead(ahead, name)
+    figure_of["measured"] = lambda: figures.measured(sample.protocol, sample.readings[..., 0], name)
+    source = dict(zip(figure_of, drawn_together(list(figure_of.values())), strict=True))
+    said = {
+        "curve": (f"Readings of {name} with the fitted curve through them, hold after hold.", _CURVE, True),
+        "measured": (against, _GREW if weights else _READ, False),
+        "residuals": (left, _LEFT, False),
+        "pairs": (f"Posterior of {name}, every pair of parameters.", _PAIRS, True),
+        "ahead": (later, _continued(summary, trusted), False),
+    }
+    return {each: Picture(source[each], *said[each]) for each in source}
+
+
+def _continued(summary: SummaryJson, trusted: bool) -> str:
+    """What the picture of the creep that goes on says, with what speaks against it."""
+    ahead = summary["extrapolation"]
     caption = ahead["sentence"] if trusted else "The model that this band continues does not describe the readings."
-    caption = f"{caption} {ahead['warning']}".strip()
-    return Pictures([Picture(drawn(figures.creep_ahead(ahead, name)), alt, caption)])
+    return f"{caption} {ahead['warning']}".strip()
 
 
 def _next(summary: SummaryJson) -> str:

@@ -94,7 +94,7 @@ def through_the_readings(stored: Stored, title: str = "") -> Figure:
     unit = READ_UNIT[stored.sample.protocol.control]
     above.set_ylabel(f"{READ[stored.sample.protocol.control]}, {unit}")
     below.set_ylabel(f"measured − model, {unit}")
-    above.set_title(title, loc="left", fontsize=10.5, color=INK)
+    above.set_title(title, loc="left", fontsize=10.5, color=INK, y=1.0)
     above.legend(frameon=False, fontsize=8.5, loc="best")
     for axes in (above, below):
         axes.spines[["top", "right"]].set_visible(False)

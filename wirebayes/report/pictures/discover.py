@@ -1,19 +1,21 @@
 """Pictures of a discovery: readings against the plain and the final model, and what the plain one leaves over where."""
 
 import textwrap
+from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from wirebayes.discovery.residual_patterns import COVARIATES
-from wirebayes.json_files.discovery import ExperimentFindings
+from wirebayes.json_files.discovery import Disagreement, ExperimentFindings
 from wirebayes.json_files.read_units import read, unit_read
 from wirebayes.model import likelihoods
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array, Floats
-from wirebayes.report.blocks import save
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.results.read_back import Stored
 from wirebayes.sentences import spoken
@@ -23,18 +25,30 @@ from wirebayes.wire.staircase import Linearised, linearise
 _MEASURED, _BAND, _HELD, _WORSE = "#1b1b1b", "#4c78a8", "#f2e6d0", "#c44e52"
 
 
-def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings, target: Path) -> None:
-    """Draw measured minus predicted readings for the plain and the final posterior of an experiment.
+def pictures(plain: Stored, final: Stored, verdict: ExperimentFindings) -> dict[str, Callable[[], Figure]]:
+    """What makes each picture of an experiment, by the name of its file below the run's folder.
 
     Parameters
     ----------
     plain, final : Stored
     verdict : dict
         The experiment's part of ``discovery.json``.
-    target : Path
-        The picture to write.
     """
-    control = plain.sample.protocol.control
+    name = plain.sample.name
+    figure_of: dict[str, Callable[[], Figure]] = {f"{name}.svg": partial(before_and_after, plain, final, verdict)}
+    return figure_of | {f"{name}/{file}": make for file, make in pictures_of_findings(plain, verdict).items()}
+
+
+def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings) -> Figure:
+    """Measured minus predicted readings for the plain and the final posterior of an experiment.
+
+    Parameters
+    ----------
+    plain, final : Stored
+    verdict : dict
+        The experiment's part of ``discovery.json``.
+    """
+    name, control = plain.sample.name, plain.sample.protocol.control
     shown = [("plain model", plain, _WORSE)]
     if verdict["verdict"] != "nothing-missing":
         shown.append((f"with {_added(verdict)}", final, _BAND))
@@ -44,12 +58,12 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings, 
     for (title, stored, colour), found in zip(shown, curves, strict=True):
         draw_curve(above, stored, found, colour, f"{title}, 90 % band")
     draw_readings(above, plain, curves[0])
-    above.set_title(f"{target.stem}: readings and curves", loc="left", fontsize=10)
+    above.set_title(f"{name}: readings and curves", loc="left", fontsize=10)
     above.legend(fontsize=8, frameon=False)
     for axis, (title, stored, _) in zip(axes, shown, strict=True):
         axis.sharey(axes[0])
         _residuals(axis, stored, verdict["held_out"]["holds"])
-        axis.set_title(f"{target.stem}: {title}", loc="left", fontsize=10)
+        axis.set_title(f"{name}: {title}", loc="left", fontsize=10)
         axis.set_ylabel(f"measured − predicted, {READ_UNIT[control]}")
     above.set_ylabel(f"{READ[control]}, {READ_UNIT[control]}")
     name_holds(axes[-1], plain)
@@ -57,7 +71,7 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings, 
         axis.spines[["top", "right"]].set_visible(False)
     handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
-    save(figure, target)
+    return figure
 
 
 def _added(verdict: ExperimentFindings) -> str:
@@ -103,8 +117,8 @@ def _sizes(heights: list[float], floor: float, unit: str) -> list[str]:
     return [f"{heights[0]:.3g} {unit}", *changes, f"{left:.2g} {unit}", f"{floor:.2g} {unit}"]
 
 
-def pictures_of_findings(stored: Stored, verdict: ExperimentFindings, folder: Path) -> None:
-    """Draw, for each pattern found, what the plain posterior leaves over along it: ``where-COVARIATE.svg``.
+def pictures_of_findings(stored: Stored, verdict: ExperimentFindings) -> dict[str, Callable[[], Figure]]:
+    """What makes a picture of each pattern found, by its file's name: what the plain posterior leaves over along it.
 
     None for a pattern over what does not vary within the experiment.
 
@@ -114,38 +128,45 @@ def pictures_of_findings(stored: Stored, verdict: ExperimentFindings, folder: Pa
         The plain posterior.
     verdict : dict
         The experiment's entry in ``discovery.json``.
-    folder : Path
-        Receives the pictures.
     """
-    sample, mask = stored.sample, stored.sample.protocol.mask
-    residual = left_over(stored)
-    level = residual.sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1)
+    sample = stored.sample
+    left = left_over(stored)
+    shown: dict[str, Callable[[], Figure]] = {}
     for finding in verdict["where"]:
-        x = np.broadcast_to(COVARIATES[finding["covariate"]](sample), mask.shape)[mask]
-        if finding["p"] > _SHOWN or np.ptp(x) == 0.0:
-            continue
-        # a pattern within holds is hidden by their levels
-        within = finding["covariate"] == "time in hold"
-        left = (residual - level if within else residual)[mask]
-        figure = Figure(figsize=_PANEL, layout="constrained")
-        axis = figure.subplots()
-        axis.plot(x, left, "o", color=_MEASURED, ms=3, alpha=0.6, label="a reading")
-        values = np.unique(x)
-        few = len(values) <= _GROUPS  # then a mean of each value
-        groups = (
-            [np.flatnonzero(x == v) for v in values] if few else np.array_split(np.argsort(x, kind="stable"), _GROUPS)
-        )
-        middles = [(x[g].mean(), left[g].mean()) for g in groups]
-        axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
-        axis.axhline(0.0, color="0.5", lw=0.6)
-        axis.set_xlabel(_LABELS[finding["covariate"]])
-        axis.set_ylabel(
-            f"measured − plain model ({READ_UNIT[sample.protocol.control]})"
-            + (",\nless its hold's mean" if within else "")
-        )
-        axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 60)), loc="left", fontsize=9)
-        axis.legend(fontsize=8, frameon=False)
-        save(figure, folder / f"where-{finding['covariate'].replace(' ', '-')}.svg")
+        along = np.broadcast_to(COVARIATES[finding["covariate"]](sample), left.shape)[sample.protocol.mask]
+        if finding["p"] <= _SHOWN and np.ptp(along) > 0.0:
+            file = f"where-{finding['covariate'].replace(' ', '-')}.svg"
+            shown[file] = partial(_along, sample, left, finding, along)
+    return shown
+
+
+def _along(sample: Sample, left: Floats, finding: Disagreement, x: Floats) -> Figure:
+    """What is left over, (H, R), along a covariate (m,) of all readings, with the mean of neighbours."""
+    mask = sample.protocol.mask
+    within = finding["covariate"] == "time in hold"
+    if within:  # a pattern within holds is hidden by their levels
+        left = left - left.sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1)
+    each = left[mask]
+    figure = Figure(figsize=_PANEL, layout="constrained")
+    axis = figure.subplots()
+    axis.plot(x, each, "o", color=_MEASURED, ms=3, alpha=0.6, label="a reading")
+    middles = [(x[group].mean(), each[group].mean()) for group in _neighbours(x)]
+    axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
+    axis.axhline(0.0, color="0.5", lw=0.6)
+    axis.set_xlabel(_LABELS[finding["covariate"]])
+    unit = READ_UNIT[sample.protocol.control]
+    axis.set_ylabel(f"measured − plain model ({unit})" + (",\nless its hold's mean" if within else ""))
+    axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 60)), loc="left", fontsize=9)
+    axis.legend(fontsize=8, frameon=False)
+    return figure
+
+
+def _neighbours(x: Floats) -> list[NDArray[np.int64]]:
+    """Rows whose mean is shown: those of each value where there are few, else of equally many neighbours."""
+    values = np.unique(x)
+    if len(values) <= _GROUPS:
+        return [np.flatnonzero(x == value) for value in values]
+    return np.array_split(np.argsort(x, kind="stable"), _GROUPS)
 
 
 def left_over(stored: Stored) -> Floats:
