@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from wirebayes.discovery import refit
+from wirebayes.discovery.profile import Profile
 from wirebayes.discovery.refit import occam
 from wirebayes.effects import named
 from wirebayes.inference.climb import Optimum
@@ -121,7 +122,7 @@ class Profiles:
         self.rounds += 1
         value = np.where(amplitudes < 0, amplitudes**2, amplitudes)
         value = np.where(near, value, -np.inf)
-        return refit._Profile(amplitudes, value, [ends_of(value, amplitudes[:, None], near)])
+        return Profile(amplitudes, value, [ends_of(value, amplitudes[:, None], near)])
 
     def tried(self) -> Any:
         grid = np.array([-20.0, -10.0, -5.0, -3.0, -2.0, -1.0, -0.5, 0.5, 1.0, 2.0, 3.0])
@@ -165,38 +166,6 @@ def test_an_amplitude_that_is_hardly_possible_pays_for_it(monkeypatch: pytest.Mo
     assert found.amplitude / 1e-3 == pytest.approx(9.0 * 4.0 / 5.0, abs=0.2)
     expected = 0.5 * 9.0**2 + np.log(np.sqrt(2 * np.pi)) + stats.norm(0.0, np.sqrt(5.0)).logpdf(9.0)
     assert found.log_bayes == pytest.approx(expected, abs=0.05)
-
-
-def width(value: list[float], grid: Any = (0.0, 1.0, 3.0, 4.0, 9.0)) -> Any:
-    top = refit._top(np.array(grid), np.array(value), int(np.argmax(value)), 7.0)
-    return top and top.sd
-
-
-def test_a_width_is_that_of_the_parabola_through_the_top_on_any_grid() -> None:
-    grid = np.array([0.0, 1.0, 3.0, 4.0, 9.0])
-    for top in (1.2, 2.9, 4.5):
-        assert width(list(-0.5 * ((grid - top) / 2.0) ** 2)) == pytest.approx(2.0)
-    # what lies farther out does not matter, but next to the top it must be known
-    assert width([-3.0, -1.0, 0.0, -0.5, -np.inf]) < 7.0
-    assert width([-3.0, -1.0, 0.0, -np.inf, -1.0]) is None
-    assert width([-3.0, -np.inf, 0.0, -1.0, -1.0]) is None
-    # at an end there is no parabola
-    assert width([0.0, -1.0, -2.0, -3.0, -4.0]) == width([-4.0, -3.0, -2.0, -1.0, 0.0]) is None
-    # a plateau has no curvature
-    assert width([0.0, 0.0, 0.0], (0.0, 1.0, 2.0)) is None and refit._top(np.arange(3.0), np.zeros(3), 1, 7.0) is None
-
-
-@pytest.mark.parametrize("top", [0.3, 1.5])
-@pytest.mark.parametrize("ends", [(0.0, np.inf), (0.0, 2.0), (-np.inf, np.inf)])
-def test_of_a_parabola_counts_what_lies_between_the_ends_of_the_prior(top: float, ends: tuple[float, float]) -> None:
-    """An amplitude that cannot be negative, with its top near none: half of a normal curve is not possible."""
-    grid = np.array([0.0, 0.25, 0.5, 1.0, 2.0])
-    value = 3.0 - 0.5 * ((grid - top) / 0.8) ** 2
-    found = refit._top(grid, value, int(np.argmax(value)), 1.0)
-    assert found is not None and found.amplitude == pytest.approx(top) and found.value == pytest.approx(3.0)
-    inside = stats.norm(top, 0.8).cdf(ends[1]) - stats.norm(top, 0.8).cdf(ends[0])
-    assert found.log_integral(*ends) == pytest.approx(3.0 + np.log(0.8 * np.sqrt(2.0 * np.pi) * inside))
-    assert np.isfinite(refit._Top(-50.0, 1.0, 0.0).log_integral(0.0, np.inf))
 
 
 def test_climbs_begin_on_the_line_between_what_is_known() -> None:
@@ -249,13 +218,6 @@ def test_a_top_within_is_tried_where_a_parabola_has_it(monkeypatch: pytest.Monke
     assert second == pytest.approx([7.0, 8.0, 9.0, 10.0])
 
 
-@pytest.mark.parametrize(("drop", "close"), [(1.19, True), (1.21, False)])
-def test_neighbours_within_a_nat_or_so_are_close_enough(drop: float, close: bool) -> None:
-    grid = np.array([0.0, 1.0, 2.0, 9.0])
-    assert refit._is_close(refit._Profile(grid, np.array([-0.5, 0.0, -drop, -50.0]), [])) == close
-    assert refit._is_close(refit._Profile(grid, np.array([0.0, -drop, -9.0, -50.0]), [])) == close
-
-
 def test_curvatures_are_exact_where_they_count(monkeypatch: pytest.MonkeyPatch) -> None:
     """Climbs know their expectation alone, here e² times too small: a nat too much of each value, exactly."""
     grid = np.array([0.0, 1.0, 2.0, 3.0])
@@ -269,7 +231,7 @@ def test_curvatures_are_exact_where_they_count(monkeypatch: pytest.MonkeyPatch) 
             assert ends.z[:, 0].tolist() == amplitude.tolist()
             return replace(ends, curvature=np.exp(2.0) * ends.curvature)
 
-    found = refit._exact(shared([Block()], 0.0), refit._Profile(grid, value, [rough]))
+    found = refit._exact(shared([Block()], 0.0), Profile(grid, value, [rough]))
     assert found.value == pytest.approx([-1.5, -1.0, -6.9, -6.1])
 
 
@@ -300,7 +262,7 @@ def test_around_the_best_lie_six_between_its_neighbours_or_beyond_an_end() -> No
     def around(best: int, end: float | None) -> np.ndarray:
         value = np.zeros(3)
         value[best] = 1e-3  # a parabola through these is so wide that hardly any of its amplitudes lie between
-        return refit._around(refit._Profile(grid, value, []), end, 0.1)
+        return refit._around(Profile(grid, value, []), end, 0.1)
 
     for end in (None, 0.5):
         assert around(1, end) == pytest.approx(np.linspace(1.0, 4.0, 8)[1:-1])
@@ -310,14 +272,14 @@ def test_around_the_best_lie_six_between_its_neighbours_or_beyond_an_end() -> No
 
 
 def test_around_the_only_amplitude_known_lie_six_within_a_unit_on_either_side() -> None:
-    alone = refit._Profile(np.array([2.0]), np.zeros(1), [])
+    alone = Profile(np.array([2.0]), np.zeros(1), [])
     assert refit._around(alone, None, 0.7) == pytest.approx(np.linspace(1.3, 2.7, 8)[1:-1])
     assert refit._around(alone, 0.5, 0.7) == pytest.approx(np.linspace(0.5, 2.7, 8)[1:-1])
 
 
-def profile_of(amplitude: list[float], value: list[float], ends: list[float]) -> refit._Profile:
+def profile_of(amplitude: list[float], value: list[float], ends: list[float]) -> Profile:
     place = ends_of(np.array(value), np.array(ends)[:, None], np.ones(len(ends), bool))
-    return refit._Profile(np.array(amplitude), np.array(value), [place])
+    return Profile(np.array(amplitude), np.array(value), [place])
 
 
 def test_a_profile_keeps_what_it_had_and_is_sorted() -> None:
@@ -348,26 +310,3 @@ def test_a_climb_that_did_not_converge_has_no_evidence() -> None:
     found = shared(blocks, -100.0).climbed(np.array([5.0, 6.0]), starts)
     assert found.value.tolist() == [1.0 + 10.0 - 100.0, -np.inf]
     assert [ends.z[:, 0].tolist() for ends in found.ends] == [[0.0, 2.0], [0.0, 1.0]]
-
-
-@pytest.mark.parametrize(("slope", "top"), [(3.0, 1.0), (-3.0, 0.0), (0.0, None)])
-def test_an_amplitude_at_its_end_is_integrated(slope: float, top: float | None) -> None:
-    """A share from 0 to 1 whose evidence grows or falls all the way: no parabola has its top there."""
-    grid = np.linspace(0.05, 1.0, 20)
-    profile = refit._Profile(grid, 7.0 + slope * grid, [])
-    assert top is None or abs(grid[profile.best] - top) < 0.06
-    log_bayes, sd = refit._integrated(profile, 0.0, 100.0)
-    exact = (np.exp(slope) - 1.0) / slope if slope else 1.0
-    assert log_bayes == pytest.approx(7.0 + np.log(exact), abs=0.01 if slope >= 0 else 0.02)
-    assert 0.2 < sd < 0.3
-
-
-@pytest.mark.parametrize("jitter", [0.0, 1e-3])
-def test_the_width_bears_what_climbs_leave_over(jitter: float) -> None:
-    """Amplitudes crowded about the top, a thousandth of a nat between climbs; what lies lower than a nat is skewed."""
-    grid = np.array([-4.0, -1.2, -0.5, -0.05, -0.02, 0.0, 0.03, 0.06, 0.6, 1.3, 5.0])
-    value = -0.5 * grid**2 + jitter * np.array([0, 0, 0, 1, -1, 1, -1, 1, 0, 0, 0])
-    value[[0, -1]] += 3.0
-    found = refit._top(grid, value, 5, 1.0)
-    assert found is not None and found.sd == pytest.approx(1.0, rel=0.03)
-    assert refit._top(grid[:6], value[:6], 5, 7.0) is None  # at the end of the grid there is no parabola

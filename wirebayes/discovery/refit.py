@@ -11,11 +11,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import ndtr
 
+from wirebayes.discovery.profile import Profile, integrated, is_close, top_of
 from wirebayes.discovery.sharing import alike
-from wirebayes.inference.climb import Optimum, together
+from wirebayes.inference.climb import Optimum
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
@@ -25,8 +24,6 @@ LARGEST = 40.0
 _FARTHER = np.array([1.3, 1.7, 2.3])  # times an end's distance from neutral, where the top lies at an end
 _OUTWARD = 6  # times that the grid may grow outwards so: 150-fold in all
 _ROUNDING = 1e-9  # of a reach, which a grid may end on
-_NEAR_TOP = 1.0  # nats below it that a parabola is fitted to; neighbours alone may differ in their last digits only
-_LEAST_INSIDE = 1e-3  # of a parabola; one farther outside the prior's ends is not the profile's
 # δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice. The scan's unit
 # may be too large where the parameters bend themselves to the effect, so that it begins below what could be seen.
 _DELTAS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
@@ -34,7 +31,6 @@ _SWEEPS = 3  # times that climbs may begin once more where their neighbour neare
 _NEWS = 0.1  # nats that such a climb must gain to be followed further
 _FAR = 12.0  # nats below the best amplitude, from which on no climb begins at an amplitude once more
 _CLOSER = 3  # times that amplitudes are tried closer to the best one
-_CLOSE = 1.2  # nats from the best amplitude to its neighbours: near enough for a parabola
 _COUNTS = 6.0  # nats below the best amplitude, up to which the curvature is computed exactly
 # of a top that is a parabola's, where it is tried: standard deviations
 _ABOUT_TOP = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
@@ -69,50 +65,6 @@ class Refit:
 def occam(one_sided: bool) -> float:
     """What the prior of an amplitude, uniform in δ up to `LARGEST`, adds to the log of its best likelihood ratio."""
     return float(0.5 * np.log(2 * np.pi) - np.log(LARGEST if one_sided else 2.0 * LARGEST))
-
-
-@dataclass(frozen=True)
-class _Profile:
-    """The evidence by amplitude, everything else refitted, amplitudes rising.
-
-    Attributes
-    ----------
-    amplitude : (a,) array
-    value : (a,) array
-        Log evidence against the blocks without the effect, with the amplitude's prior; -inf where no climb converged.
-    ends : sequence of Optimum
-        Where the climbs of each block ended, a row an amplitude.
-    """
-
-    amplitude: Array
-    value: Array
-    ends: Sequence[Optimum]
-
-    @property
-    def best(self) -> int:
-        return int(np.argmax(self.value))
-
-    def joined(self, other: "_Profile") -> "_Profile":
-        """Both as one; where an amplitude is in both, this one's."""
-        amplitude, order = np.unique(np.concatenate([self.amplitude, other.amplitude]), return_index=True)
-        ends = [together(pair).rows(order) for pair in zip(self.ends, other.ends, strict=True)]
-        return _Profile(amplitude, np.concatenate([self.value, other.value])[order], ends)
-
-    def with_rows(self, rows: NDArray[np.int64], other: "_Profile") -> "_Profile":
-        """With some rows replaced by those of another profile."""
-        number = np.arange(len(self.value))
-        number[rows] = len(number) + np.arange(len(rows))
-        ends = [together(pair).rows(number) for pair in zip(self.ends, other.ends, strict=True)]
-        return _Profile(self.amplitude, np.concatenate([self.value, other.value])[number], ends)
-
-    def rows(self, which: Any) -> "_Profile":
-        """Some rows, by number or mask."""
-        return _Profile(self.amplitude[which], self.value[which], [ends.rows(which) for ends in self.ends])
-
-    def known(self) -> "_Profile":
-        """Without the amplitudes at which no climb converged, where there are others."""
-        converged = np.isfinite(self.value)
-        return self.rows(converged) if converged.any() else self
 
 
 def refit(
@@ -205,7 +157,7 @@ class _Amplitude:
         """Three amplitudes that lie farther from neutral."""
         return np.clip(self.neutral + (from_ - self.neutral) * _FARTHER, self.low, self.high)
 
-    def climbed(self, amplitudes: Array, begin: Sequence[Array]) -> _Profile:
+    def climbed(self, amplitudes: Array, begin: Sequence[Array]) -> Profile:
         """The profile at amplitudes (a,): blocks climb from k starts an amplitude, (a k, d); the best end stays."""
         ends, rows = [], np.arange(len(amplitudes))
         for block, start in zip(self.pinned, begin, strict=True):
@@ -215,18 +167,18 @@ class _Amplitude:
             ends.append(found.rows(rows * k + np.argmax(value, axis=1)))
         return self.profile(amplitudes, ends)
 
-    def profile(self, amplitudes: Array, ends: Sequence[Optimum]) -> _Profile:
+    def profile(self, amplitudes: Array, ends: Sequence[Optimum]) -> Profile:
         """That of climbs that have ended, one an amplitude and block."""
         total = np.sum([np.where(end.converged, end.log_evidence, -np.inf) for end in ends], axis=0)
         if len(self.pinned) > 1 and self.pinned[0].common:
             total = total + _one_value_each(self.pinned, ends, amplitudes)
-        return _Profile(amplitudes, total + self.added(amplitudes), ends)
+        return Profile(amplitudes, total + self.added(amplitudes), ends)
 
 
-def _looked_closer(amplitude: _Amplitude, profile: _Profile) -> _Profile:
+def _looked_closer(amplitude: _Amplitude, profile: Profile) -> Profile:
     """The profile with amplitudes about its top, followed outwards where that lies at an end."""
     outward = closer = 0
-    while closer < _CLOSER and not (closer and _is_close(profile)):
+    while closer < _CLOSER and not (closer and is_close(profile)):
         at = float(profile.amplitude[profile.best])
         at_end = profile.best in (0, len(profile.amplitude) - 1)
         if at_end and amplitude.low < at < amplitude.high and at != amplitude.neutral and outward < _OUTWARD:
@@ -241,7 +193,7 @@ def _looked_closer(amplitude: _Amplitude, profile: _Profile) -> _Profile:
     return profile
 
 
-def _followed(amplitude: _Amplitude, profile: _Profile) -> _Profile:
+def _followed(amplitude: _Amplitude, profile: Profile) -> Profile:
     """The profile with climbs that begin where the next amplitude towards neutral has ended, where these are better.
 
     A climb from the fit without the effect may end nowhere, or in a lesser mode.
@@ -281,7 +233,7 @@ def within(prior: Any, neutral: float, reach: float) -> Callable[[Array], Array]
     return log_density
 
 
-def _exact(amplitude: _Amplitude, profile: _Profile) -> _Profile:
+def _exact(amplitude: _Amplitude, profile: Profile) -> Profile:
     """The profile with exact curvatures where it counts; until then their expectation has shown where the top is."""
     rows = np.flatnonzero(profile.value > profile.value.max() - _COUNTS)
     if not len(rows):
@@ -301,14 +253,7 @@ def _one_value_each(pinned: Sequence[Pinned], ends: Sequence[Optimum], amplitude
     return total
 
 
-def _is_close(profile: _Profile) -> bool:
-    """Whether the best amplitude's neighbours are so near it that nothing between them would be news."""
-    best = profile.best
-    beside = profile.value[max(best - 1, 0) : best + 2]
-    return bool(beside.min() > profile.value[best] - _CLOSE)
-
-
-def _around(profile: _Profile, end: float | None, per_delta: float) -> Array:
+def _around(profile: Profile, end: float | None, per_delta: float) -> Array:
     """Amplitudes about the top that the best and its neighbours suggest, no lower than `end` if there is one.
 
     An amplitude that is the only one with evidence has neighbours `per_delta` away.
@@ -328,12 +273,12 @@ def _around(profile: _Profile, end: float | None, per_delta: float) -> Array:
     return np.linspace(left, right, 8)[1:-1]
 
 
-def _summary(effect: Effect, which: Sequence[int], amplitude: _Amplitude, profile: _Profile) -> Refit:
+def _summary(effect: Effect, which: Sequence[int], amplitude: _Amplitude, profile: Profile) -> Refit:
     best = profile.best
     at = profile.amplitude[best : best + 1]
-    top = _top(profile.amplitude, profile.value, best, amplitude.per_delta)
+    top = top_of(profile, amplitude.per_delta)
     if top is None:
-        log_bayes, sd = _integrated(profile, amplitude.neutral, amplitude.per_delta)
+        log_bayes, sd = integrated(profile, amplitude.neutral, amplitude.per_delta)
     else:
         log_bayes, sd = top.log_integral(amplitude.low, amplitude.high), top.sd
     ends = [end.z[best : best + 1] for end in profile.ends]
@@ -348,56 +293,3 @@ def _between(grid: Array, ends: Array, best: int, finer: Array) -> Array:
     share = np.divide(finer - grid[best], apart, out=np.zeros(len(finer)), where=apart != 0)
     near = np.isfinite(ends[aside]).all(axis=1) & (share <= 1.0)
     return np.where(near[:, None], ends[best] + share[:, None] * (ends[aside] - ends[best]), ends[best])
-
-
-@dataclass(frozen=True)
-class _Top:
-    """The top of a profile as a parabola: where it is, its standard deviation, and the value there."""
-
-    amplitude: float
-    sd: float
-    value: float
-
-    def log_integral(self, low: float, high: float) -> float:
-        """Log of the integral between two ends."""
-        inside = ndtr((high - self.amplitude) / self.sd) - ndtr((low - self.amplitude) / self.sd)
-        return float(self.value + 0.5 * np.log(2.0 * np.pi) + np.log(self.sd) + np.log(max(inside, _LEAST_INSIDE)))
-
-
-def _top(grid: Array, value: Array, best: int, per_delta: float) -> _Top | None:
-    """The parabola through the neighbours of the best amplitude and whatever is near it.
-
-    None where there is no such parabola: the best lies at an end, as of an amplitude that cannot go further.
-    """
-    if 0 < best < len(grid) - 1:
-        near = (value > value[best] - _NEAR_TOP) & np.isfinite(value)
-        near[best - 1 : best + 2] = True
-        x, y = (grid[near] - grid[best]) / per_delta, value[near] - value[best]
-        if np.isfinite(y).all():
-            scale = np.abs(x).max()
-            bend, slope, height = np.polyfit(x / scale, y, 2)
-            if bend < 0:
-                summit = float(np.clip(-0.5 * slope / bend, (x / scale).min(), (x / scale).max()))
-                rise = height + slope * summit + bend * summit**2
-                sd = per_delta * scale / np.sqrt(-2.0 * bend)
-                return _Top(float(grid[best] + summit * scale * per_delta), float(sd), float(value[best] + rise))
-    return None
-
-
-def _integrated(profile: _Profile, neutral: float, per_delta: float) -> tuple[float, float]:
-    """Log of the profile's integral over the amplitudes tried and up to neutral, and their standard deviation."""
-    grid, value = profile.amplitude, profile.value
-    top = float(value[profile.best])
-    if not np.isfinite(top):
-        return -np.inf, per_delta
-    if not grid[0] <= neutral <= grid[-1]:  # between neutral and the least amplitude it hardly changes
-        first = 0 if neutral < grid[0] else len(grid)
-        nearest = value[0] if first == 0 else value[-1]
-        grid, value = np.insert(grid, first, neutral), np.insert(value, first, nearest)
-    share = np.exp(value - top)
-    whole = float(np.trapezoid(share, grid))
-    if not whole > 0.0:
-        return -np.inf, per_delta
-    mean = float(np.trapezoid(share * grid, grid)) / whole
-    variance = float(np.trapezoid(share * (grid - mean) ** 2, grid)) / whole
-    return top + float(np.log(whole)), float(np.sqrt(variance)) or per_delta
