@@ -80,3 +80,18 @@ def test_a_process_with_several_threads_is_not_copied():
     finally:
         end.set()
         other.join()
+
+
+@LINUX
+def test_a_worker_is_not_copied():
+    found = run("""
+        from concurrent.futures import ProcessPoolExecutor
+        from multiprocessing import get_context
+        def piece():
+            time.sleep(0.3)
+            return os.getpid()
+        def work():
+            return len(set(in_copies([piece] * 2)))
+        print(work(), ProcessPoolExecutor(1, get_context("fork")).submit(work).result())
+    """)
+    assert found == "2 1"

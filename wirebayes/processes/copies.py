@@ -24,7 +24,8 @@ def in_copies(pieces: Sequence[Callable[[], T]]) -> list[T]:
     """The results of some pieces of work, done on all cores where this process can be copied, in their order.
 
     A copy has only the thread that made it, and waits for ever for a lock that another one held: a process with several
-    threads does all pieces itself, and so does every process where systems other than Linux run.
+    threads does all pieces itself, and so does every process where systems other than Linux run. A worker does, too:
+    the other cores have work of their own.
 
     Parameters
     ----------
@@ -36,11 +37,11 @@ def in_copies(pieces: Sequence[Callable[[], T]]) -> list[T]:
     Exception
         What a piece raises.
     """
-    copies = min(cores(), len(pieces)) - 1
-    if copies < 1 or not _has_one_thread():
-        return [piece() for piece in pieces]
-    from multiprocessing import get_context
+    from multiprocessing import get_context, parent_process
 
+    copies = min(cores(), len(pieces)) - 1
+    if copies < 1 or parent_process() is not None or not _has_one_thread():
+        return [piece() for piece in pieces]
     context = get_context("fork")
     waiting = _queue(len(pieces))
     done: dict[int, T] = {}
