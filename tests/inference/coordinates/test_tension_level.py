@@ -1,5 +1,7 @@
 """One hold: wires that are read as one lie at one coordinate, whatever their preload, stiffness and setting error."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -7,12 +9,17 @@ from scipy.optimize import brentq
 from wirebayes.inference.coordinates.steps import Level
 from wirebayes.inference.coordinates.transform import Transformation
 from wirebayes.model.build import build
+from wirebayes.model.problem import with_readings
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 WIRE = Truth({"k1": 800.0, "preload": 0.0})
 LENGTH_MM, AT_MM, LATE_S = 1000.0, 3.0, (10.0, 30.0, 60.0, 120.0)
 ONE_HOLD = draw([Bench(displacements_mm=(AT_MM,))], WIRE, seed=8).problem
 READ_LATE = draw([Bench(displacements_mm=(AT_MM,), times_s=LATE_S)], WIRE, seed=8).problem
+PRELOAD_KNOWN = replace(
+    Bench(displacements_mm=(AT_MM,), times_s=LATE_S).experiment(), priors={"preload": {"fixed": 0.3}}
+)
+KNOWN = with_readings(build([PRELOAD_KNOWN]), [READ_LATE.samples[0].readings])
 NAMES = ("k1", "B", "U", "k2", "N", "preload")
 
 
@@ -64,11 +71,12 @@ def test_a_setting_error_moves_one_coordinate_alone():
     ("problem", "has_one"),
     [
         (ONE_HOLD, True),
+        (KNOWN, True),
         (draw([Bench(displacements_mm=(1.0, 2.0))], Truth(), seed=1).problem, False),
         (draw([Bench(name, displacements_mm=(1.0,)) for name in "ab"], seed=1).problem, False),
         (build([Bench(displacements_mm=(1.0,)).experiment()]), False),  # every reading zero
     ],
-    ids=["one hold", "two holds", "two tests", "slack"],
+    ids=["one hold", "one hold of a known preload", "two holds", "two tests", "slack"],
 )  # fmt: skip
 def test_only_a_test_of_one_hold_has_this_coordinate(problem, has_one):
     def has_it(for_draws):

@@ -11,6 +11,7 @@ from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.coordinates.transform import Transformation
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model.build import build
+from wirebayes.model.problem import with_readings
 from wirebayes.model.spec import ModelSpec
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 from wirebayes.wire.model import Model
@@ -30,6 +31,10 @@ PROBLEMS = {
     ).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
     "one hold": draw([Bench(displacements_mm=(1.0,))], Truth({"k1": 800.0}), seed=8).problem,
+    "one hold, its preload known": with_readings(
+        build([replace(Bench(displacements_mm=(1.0,)).experiment(), priors={"preload": {"fixed": 0.3}})]),
+        [draw([Bench(displacements_mm=(1.0,))], Truth({"k1": 800.0}), seed=8).problem.samples[0].readings],
+    ),
     "slack": build([Bench().experiment()]),  # every reading zero
     "hold": build(
         [Bench(displacements_mm=(1, 2, 3), times_s=(0.0, 10.0)).experiment()], spec=ModelSpec(likelihood="hold")

@@ -114,21 +114,24 @@ def displacement_level(problem: Problem) -> DisplacementLevel | None:
     Parameters
     ----------
     problem : Problem
-        Of one sample, whose k1 and preload are both open.
+        Of one sample, whose k1 is open.
 
     Returns
     -------
     DisplacementLevel or None
-        None unless the test is of one weight.
+        None unless the test is of one weight, and its preload open.
     """
     (sample,) = problem.samples
     protocol = sample.protocol
     if protocol.control != "force" or len(protocol.setting) != 1:
         return None
-    k1, preload = (problem.names.index(problem.column(name, sample)) for name in ("k1", "preload"))
+    k1, preload = (problem.column(name, sample) for name in ("k1", "preload"))
+    if preload not in problem.names:
+        return None
     last = float(sample.readings[..., 0][protocol.mask][-1])
     modified = sample.model.law == "modified"
-    return DisplacementLevel(k1, preload, float(protocol.setting[0]), protocol.length_mm, last, modified)
+    weight, (k1_at, preload_at) = float(protocol.setting[0]), map(problem.names.index, (k1, preload))
+    return DisplacementLevel(k1_at, preload_at, weight, protocol.length_mm, last, modified)
 
 
 _LEAST = 1e-3  # of the stretched length that is left without strain: below, the law has no wire

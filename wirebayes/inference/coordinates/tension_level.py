@@ -25,8 +25,10 @@ class TensionLevel:
 
     Attributes
     ----------
-    k1, preload : int
-        Columns.
+    k1 : int
+        Its column.
+    preload : int or float
+        Its column, or the number at which it is fixed, mm.
     at, length : float
         Displacement of the hold, and length of the wire, mm.
     first, begin_s, end_s : float
@@ -34,7 +36,7 @@ class TensionLevel:
     """
 
     k1: int
-    preload: int
+    preload: int | float
     at: float
     length: float
     first: float
@@ -43,7 +45,8 @@ class TensionLevel:
 
     def log_tension(self, theta: Array, log_k1: Array) -> Array:
         """(n,) log of the tension at the beginning, of natural parameters (n, d) but for log k1 (n,)."""
-        stretch = np.maximum(1.0 + theta[:, self.preload] / self.at, _LEAST)
+        preload = theta[:, self.preload] if isinstance(self.preload, int) else self.preload
+        stretch = np.maximum(1.0 + preload / self.at, _LEAST)
         return np.asarray(log_k1 + np.log(self.at / self.length) + np.log(stretch))
 
     def log_beyond(self, theta: Array, U: Array | float) -> Array:
@@ -82,7 +85,7 @@ def tension_level(problem: Problem, slack_edges: list[SlackEdge]) -> TensionLeve
     Parameters
     ----------
     problem : Problem
-        Of one sample, whose k1 and preload are both open.
+        Of one sample, whose k1 is open, and whose preload is open or fixed.
     slack_edges : list of SlackEdge
         Coordinates of preloads; one that depends on k1 leaves no place for these.
 
@@ -100,10 +103,11 @@ def tension_level(problem: Problem, slack_edges: list[SlackEdge]) -> TensionLeve
     read = sample.readings[..., 0][protocol.mask]
     if read[0] <= 0.0 or read[-1] <= 0.0:
         return None
-    k1, preload = (problem.names.index(problem.column(name, sample)) for name in ("k1", "preload"))
+    k1, column = (problem.column(name, sample) for name in ("k1", "preload"))
+    preload = problem.names.index(column) if column in problem.names else float(problem.prior.fixed[column])
     begin_s, end_s = float(protocol.time_s[0, 0]), float(protocol.duration_s[0])
     at, length = float(protocol.setting[0]), protocol.length_mm
-    return TensionLevel(k1, preload, at, length, float(read[0]), begin_s, end_s)
+    return TensionLevel(problem.names.index(k1), preload, at, length, float(read[0]), begin_s, end_s)
 
 
 _LEAST = 1e-3  # of the stretch without a preload: with less the wire is slack, and k1 is what it is

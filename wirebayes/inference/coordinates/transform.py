@@ -211,9 +211,9 @@ def _is_usual(problem: Problem, columns: Columns, ridges: Sequence[Ridge]) -> bo
     if len(ridges) != 1 or "B" not in ridges[0].shifted:
         return False
     k1, preload = (problem.column(name, problem.samples[0]) for name in ("k1", "preload"))
-    if k1 not in problem.names or preload not in problem.names:
+    if k1 not in problem.names or not columns.positive[problem.names.index(k1)]:
         return False
-    return bool(columns.positive[problem.names.index(k1)]) and columns.is_linear(problem.names.index(preload))
+    return preload in problem.prior.fixed or columns.is_linear(problem.names.index(preload))
 
 
 def _noises(problem: Problem, columns: Columns) -> tuple[Noises, ...]:
