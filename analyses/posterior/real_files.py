@@ -1,4 +1,4 @@
-"""What public recordings tell: a tendon's and an elastomer's by the posterior and by a plain least squares.
+"""What public recordings of a tendon and of an elastomer tell, by the posterior and by a plain least squares.
 
 ``python -m analyses.posterior.real_files --elastomer 1d5.csv``. Of the files of ``tests/data/bench``, two are public
 recordings. The tendon fascicle was held for three minutes, and is read twice: as `import` makes a hold of it, which
