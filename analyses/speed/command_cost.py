@@ -70,14 +70,16 @@ def main() -> None:
             name, *given = command.split()
             line = [name, str(DATA), "--experiment", wire, *given]
             times = np.array([[seconds(line, tree) for tree in trees] for _ in range(options.repeats)])
-            (new, by_clock), (old, _) = times.min(axis=0)
+            new, old = times.min(axis=0)
             ratios.append(old / new)
-            print(
-                f"{command:20} {wire:15} {new:6.2f} s of processor time, before {old:6.2f}, ratio {ratios[-1]:.2f}; "
-                f"{by_clock:.1f} s by the clock",
-                flush=True,
-            )
-        print(f"{command}: ratio {np.median(ratios):.2f} in the median, {min(ratios):.2f} at worst", flush=True)
+            print(f"{command:20} {wire:15} " + "; ".join(map(_in_words, ("processor", "clock"), new, old)), flush=True)
+        median, worst = np.median(ratios, axis=0), np.min(ratios, axis=0)
+        for kind, middle, least in zip(("processor", "clock"), median, worst, strict=True):
+            print(f"{command}: ratio by the {kind} {middle:.2f} in the median, {least:.2f} at worst", flush=True)
+
+
+def _in_words(kind: str, new: float, old: float) -> str:
+    return f"{kind} {new:.2f} s, before {old:.2f}, ratio {old / new:.2f}"
 
 
 if __name__ == "__main__":

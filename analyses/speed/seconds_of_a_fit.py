@@ -1,0 +1,91 @@
+"""What is each second of a `fit`, from the start of its process to its end?
+
+A fit of one of the paper's wires runs a few times, each in a process of its own that notes when each phase begins.
+The fastest run is shown: whatever else the machine does only adds to it.
+
+    python -m analyses.speed.seconds_of_a_fit --wire nylon-1.5m
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from wirebayes.io import paper
+
+DATA = paper.FOLDER / "experiments.toml"
+# Where a phase is spent: module, function, and what it does. The check runs beside the others, in another process.
+PHASES = (
+    ("wirebayes.results.jobs", "fitted", "modes and draws"),
+    ("wirebayes.results.jobs", "store", "posterior.nc and summary.json"),
+    ("wirebayes.discovery.model_check", "check_model", "the check, beside these"),
+    ("wirebayes.cli.answer", "write_report", "the page, matplotlib included"),
+)
+
+
+def watched(wire: str, folder: Path) -> None:
+    """Run a fit in this process and print when each phase began and ended, s since the epoch, as JSON."""
+    from wirebayes.processes.workers import load_early
+
+    load_early()
+    import wirebayes.cli.fit
+    import wirebayes.commands.fit  # noqa: F401
+
+    noted = {"imports": (time.time(), time.time())}
+    for module, function, phase in PHASES:
+        _note(noted, module, function, phase)
+    from wirebayes.cli import main
+
+    main(["fit", str(DATA), "--experiment", wire, "--output", str(folder), "--quiet"])
+    print(json.dumps(noted))
+
+
+def _note(noted: dict[str, tuple[float, float]], module: str, function: str, phase: str) -> None:
+    place = import_module(module)
+    original: Callable[..., Any] = getattr(place, function)
+
+    def timed(*given: Any, **named: Any) -> Any:
+        begin = time.time()
+        result = original(*given, **named)
+        noted[phase] = begin, time.time()
+        return result
+
+    setattr(place, function, timed)
+
+
+def run(wire: str) -> tuple[float, dict[str, tuple[float, float]]]:
+    """Seconds that a fit takes, and when each phase began and ended, s since its process was started."""
+    with TemporaryDirectory() as folder:
+        line = [sys.executable, "-m", __spec__.name, "--wire", wire, "--watched", f"{folder}/out"]
+        begin = time.time()
+        done = subprocess.run(line, check=True, capture_output=True, text=True)
+        end = time.time()
+    noted = json.loads(done.stdout.splitlines()[-1])
+    return end - begin, {phase: (a - begin, b - begin) for phase, (a, b) in noted.items()}
+
+
+def main() -> None:
+    """Print a line for each phase of the fastest run."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--wire", default="nylon-1.5m")
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--watched", type=Path, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.watched is not None:
+        watched(options.wire, options.watched)
+        return
+    whole, phases = min((run(options.wire) for _ in range(options.repeats)), key=lambda found: found[0])
+    print(f"{'imports':32} to {phases.pop('imports')[1]:.2f} s")
+    for phase, (begin, end) in phases.items():
+        print(f"{phase:32} {begin:.2f} to {end:.2f} s: {end - begin:.2f}")
+    print(f"{'whole':32} {whole:.2f} s")
+
+
+if __name__ == "__main__":
+    main()
