@@ -17,7 +17,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from tests.robot import cases
-from wirebayes.robot.export.mujoco_model import settle
 from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.motion import forward
 
@@ -52,7 +51,7 @@ def compare(robot, make, law, count, rng):
         k1 = c.wires.theta["k1"][0, i]
         lengths = c.zero_m[i], c.offset_m[i], begin[i], begin_R[i]
         if law == "hooke":
-            x, R, calm = settle(robot, np.full(robot.legs, k1), *lengths, softest_N_m=max(soft[i], 1e-2))
+            x, R, calm = cases.rest_in_mujoco(robot, np.full(robot.legs, k1), *lengths, softest_N_m=max(soft[i], 1e-2))
         if law == "modified" or not calm:  # a platform that still swings is no judge
             x, R, _ = cases.energy_minimum(robot, law, k1, *lengths)
             calm = law == "modified"

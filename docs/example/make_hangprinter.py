@@ -14,7 +14,6 @@ import numpy as np
 
 import wirebayes as wb
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
-from wirebayes.robot.mechanics.firmware import straight_of
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
 
@@ -70,7 +69,8 @@ def main() -> None:
     real = predict(true, prior, log, values)
     assert real.solved.all()
 
-    straight = 1e3 * straight_of(told, joint) + ENCODER_MM * rng.normal(size=joint.shape)
+    between = (joint - told.beyond_m + told.beyond_joint_m) / told.lines  # from exit to platform point
+    straight = 1e3 * between + ENCODER_MM * rng.normal(size=joint.shape)
     read = real.position_m[0] + 1e-3 * MARK_MM * rng.normal(size=(count, 3))
     tension = real.readings[0].reshape(count, told.legs)
     torque = np.maximum(tension + TORQUE_N * rng.normal(size=tension.shape), 0.0)

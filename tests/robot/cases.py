@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wirebayes.robot.export.mujoco_model import mjcf
 from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
@@ -143,3 +144,34 @@ def ball_joint(rng):
         wire_m=zeros, wire=("default",) * legs, given={}, home_m=home, home_rotation_rad=np.zeros(3), lower_m=home,
         upper_m=home, rule=replace(plain.rule, lowest_N=5.0, highest_N=400.0), drums=None, pulleys=None,
     )  # fmt: skip
+
+
+def rest_in_mujoco(robot, k1, zero_m, offset_m, start_m, start_rotation, softest_N_m, towards_m=None):
+    """Where MuJoCo's damped platform comes to rest, and whether it does; the stiffness only sets the damping."""
+    import mujoco
+
+    stiffest = float((k1 * robot.lines**2 / zero_m).sum()) * 4
+    fastest = np.sqrt(stiffest / robot.mass_kg)
+    damping = 2.0 * float(np.sqrt(softest_N_m * robot.mass_kg))
+    model = mujoco.MjModel.from_xml_string(
+        mjcf(robot, k1, zero_m, offset_m, damping, 0.3 / float(fastest), towards_m=towards_m)
+    )
+    data = mujoco.MjData(model)
+    data.qpos[:3] = start_m
+    home = rotation.matrix(robot.home_rotation_rad)
+    if robot.degrees == 6:
+        turn = rotation.vector((home.T @ start_rotation)[None])[0]
+        angle = float(np.linalg.norm(turn))
+        data.qpos[3:7] = [np.cos(angle / 2), *(0.5 * np.sinc(angle / (2 * np.pi)) * turn)]
+    calm = 0
+    for _ in range(0, 400_000, 50):
+        mujoco.mj_step(model, data, 50)
+        calm = calm + 1 if np.abs(data.qvel).max() < 1e-11 * fastest else 0
+        if calm == 3:
+            break
+    turned = np.eye(3)
+    if robot.degrees == 6:
+        flat = np.zeros(9)
+        mujoco.mju_quat2Mat(flat, data.qpos[3:7])
+        turned = home @ flat.reshape(3, 3)
+    return np.array(data.qpos[:3]), turned, calm == 3

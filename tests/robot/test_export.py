@@ -259,14 +259,13 @@ def test_the_mujoco_model_starts_balanced_at_its_home_pose(name, with_pulleys):
 
 def test_a_platform_settles_at_a_turned_home():
     pytest.importorskip("mujoco")
-    from wirebayes.robot.export.mujoco_model import settle
 
     turn = np.array([0.02, -0.03, 0.05])
     robot, line = replace(schema.read("linear-7"), home_rotation_rad=turn), _line("hooke", None, {}).centre()
     x, R, tau = _home(robot)
     commands = inverse.commands(robot, draws.for_robot(robot, line), x, R, tau)
     lengths = np.full(robot.legs, line.parameters["k1"][0]), commands.zero_m[0], commands.offset_m[0]
-    found, rotated, rested = settle(robot, *lengths, x[0] + 1e-3, np.eye(3), softest_N_m=10.0)
+    found, rotated, rested = cases.rest_in_mujoco(robot, *lengths, x[0] + 1e-3, np.eye(3), softest_N_m=10.0)
     assert rested
     np.testing.assert_allclose(found, x[0], atol=1e-6)
     np.testing.assert_allclose(rotated, R[0], atol=1e-6)

@@ -35,7 +35,6 @@ def test_inverse_then_forward_returns_to_the_pose(name, law):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_mujoco_settles_where_we_solve(name):
     pytest.importorskip("mujoco")
-    from wirebayes.robot.export.mujoco_model import settle
 
     robot = schema.read(name)
     rng = np.random.default_rng(12)
@@ -45,7 +44,7 @@ def test_mujoco_settles_where_we_solve(name):
         assert found.found.all()
         soft = _softest(robot, c, found)
         for i in range(len(found.status)):
-            x, R, rested = settle(
+            x, R, rested = cases.rest_in_mujoco(
                 robot, np.full(robot.legs, c.wires.theta["k1"][0, i]), c.zero_m[i], c.offset_m[i],
                 found.position_m[i] + 1e-3 * robot.size_m, found.rotation[i], soft[i],
             )  # fmt: skip

@@ -16,7 +16,7 @@ from wirebayes.robot.history.follow import clock_starts, follow
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.live import LiveEstimator
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
-from wirebayes.robot.mechanics import firmware, schema
+from wirebayes.robot.mechanics import schema
 from wirebayes.robot.motion import path
 
 TIMES = np.array([0, 60, 70, 400, 420, 900, 930, 2000, 2030, 3600.0])
@@ -267,7 +267,6 @@ def test_straight_lengths_of_drawn_robots_are_wires_and_taken_for_wires_are_refu
         straight = np.linalg.norm(arm, axis=1)
         wire = live.wire_m(straight)
         np.testing.assert_allclose(wire, lines * straight + robot.beyond_m)
-        np.testing.assert_allclose(firmware.straight_of(robot, wire), straight)
         if not robot.beyond_m.any():
             with pytest.raises(InputError, match=r"whole wire.*wire_m\(\)"):
                 live.step(0.0, straight)

@@ -89,7 +89,7 @@ def test_inverse_then_forward_returns_to_the_pose(name, law):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_mujocos_tendons_wrap_as_ours(name):
     mujoco = pytest.importorskip("mujoco")
-    from wirebayes.robot.export.mujoco_model import mjcf, settle
+    from wirebayes.robot.export.mujoco_model import mjcf
 
     robot, rng = _robot(name), np.random.default_rng(12)
     c = cases.commanded(robot, "hooke", 3, rng)
@@ -113,7 +113,7 @@ def test_mujocos_tendons_wrap_as_ours(name):
                                                 c.zero_m.T, c.offset_m.T)[0, :3, :3])[0]  # fmt: skip
     towards = c.position_m[0] + robot.platform_m @ c.rotation[0].T
     start = found.position_m[0] + 1e-3 * robot.size_m, found.rotation[0]
-    x, R, rested = settle(robot, *lengths, *start, soft, towards_m=towards)
+    x, R, rested = cases.rest_in_mujoco(robot, *lengths, *start, soft, towards_m=towards)
     assert rested
     assert np.abs(x - found.position_m[0]).max() < 1e-6
     assert robot.size_m * np.abs(R - found.rotation[0]).max() < 1e-6

@@ -13,7 +13,7 @@ from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.commands.import_robot import import_robot
 from wirebayes.errors import InputError
-from wirebayes.robot.mechanics import firmware, joint_columns, schema
+from wirebayes.robot.mechanics import joint_columns, schema
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
@@ -184,7 +184,6 @@ def test_tables_have_a_column_of_each_winch(tmp_path):
     straight = joint_columns.joint_columns(robot, ["straight_1_mm"])
     wire = joint_columns.joint_values(robot, straight, np.array([[1000.0, 2000.0, 3000.0, 2000.0]]))
     np.testing.assert_allclose(wire, [[1.0, 1.0, 2.0, 2.0, 3.0, 3.0, 4.0]])
-    np.testing.assert_allclose(firmware.straight_of(robot, np.array([1.0, 2.0, 3.0, 4.0])), [1.0, 2.0, 3.0, 2.0])
     turned = joint_columns.joint_columns(robot, ["motor_1_rad"])
     by_motor = joint_columns.joint_values(robot, turned, np.array([[12.0, 24.0, 36.0, 48.0]]))
     np.testing.assert_allclose(by_motor, 0.05 * np.array([[1, 1, 2, 2, 3, 3, 4]]))

@@ -1,4 +1,4 @@
-"""The same robot in another program: a MuJoCo model of laws (1) and (6), and its settled equilibrium.
+"""The same robot in another program: a MuJoCo model of laws (1) and (6).
 
 A spatial tendon with stiffness k1/ℓ and a spring length from 0 to ℓ pulls as Hooke's law does and goes slack. Several
 lines of one wire, and wire beyond the exit point, make one tendon of k1 m²/ℓ that rests at (ℓ - offset)/m.
@@ -8,14 +8,13 @@ so that it meets the rim at a tangent. The cylinder has no groove, a free one wo
 looks towards one pose. There lengths and forces are the robot's; beside it they differ by the square of the way.
 """
 
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
-from wirebayes.robot.mechanics.rotation import matrix, vector
+from wirebayes.robot.mechanics.rotation import matrix
 
 _STILL = "pulleys do not swivel: they look towards the home pose; lengths and forces are the robot's there"
 
@@ -133,61 +132,3 @@ def _wrapped(i: int) -> str:
 
 def _row(values: Floats) -> str:
     return " ".join(repr(float(v)) for v in values)
-
-
-def settle(
-    robot: Robot,
-    k1_N: Floats,
-    zero_m: Floats,
-    offset_m: Floats,
-    start_m: Floats,
-    start_rotation: Floats,
-    softest_N_m: float,
-    max_steps: int = 400_000,
-    towards_m: Floats | None = None,
-) -> tuple[Floats, Floats, bool]:
-    """Let MuJoCo's damped platform come to rest.
-
-    Parameters
-    ----------
-    robot : Robot
-    k1_N, zero_m, offset_m : (w,) arrays
-    start_m, start_rotation : (3,), (3, 3) arrays
-    softest_N_m : float
-        About the smallest stiffness on the way; it only sets the damping, hence the time to rest.
-    towards_m : (w, 3) array, optional
-        As in `mjcf`.
-
-    Returns
-    -------
-    position_m : (3,) array
-    rotation : (3, 3) array
-    rested : bool
-    """
-    import mujoco
-
-    stiffest = float((k1_N * robot.lines**2 / zero_m).sum()) * 4
-    mass = robot.mass_kg
-    damping = 2.0 * float(np.sqrt(softest_N_m * mass))
-    step = 0.3 / float(np.sqrt(stiffest / mass))
-    text = mjcf(robot, k1_N, zero_m, offset_m, damping, step, towards_m=towards_m)
-    model: Any = mujoco.MjModel.from_xml_string(text)
-    data: Any = mujoco.MjData(model)
-    data.qpos[:3] = start_m
-    home = matrix(robot.home_rotation_rad)
-    if robot.degrees == 6:
-        data.qpos[3:7] = _quaternion(vector((home.T @ start_rotation)[None])[0])
-    rested, calm = False, 0
-    for _ in range(0, max_steps, 50):
-        mujoco.mj_step(model, data, 50)
-        slow = np.abs(data.qvel).max() < 1e-11 * np.sqrt(stiffest / mass)
-        calm = calm + 1 if slow else 0
-        if calm >= 3:
-            rested = True
-            break
-    rotation = np.eye(3)
-    if robot.degrees == 6:
-        flat = np.zeros(9)
-        mujoco.mju_quat2Mat(flat, data.qpos[3:7])
-        rotation = home @ flat.reshape(3, 3)
-    return np.array(data.qpos[:3]), rotation, rested

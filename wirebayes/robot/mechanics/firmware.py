@@ -21,22 +21,6 @@ def wire_of(robot: Robot, straight_m: ArrayLike) -> Floats:
     robot : Robot
     straight_m : (..., j) array
     """
-    lines, beyond = _of_winches(robot)
+    lines = mean_of_each_winch(robot, robot.lines)
+    beyond = mean_of_each_winch(robot, robot.beyond_m - robot.beyond_joint_m)
     return np.asarray(lines * np.asarray(straight_m, float) + beyond)
-
-
-def straight_of(robot: Robot, wire_m: ArrayLike) -> Floats:
-    """Straight lengths, m, of joint values ``(..., j)``, m: the inverse of `wire_of`.
-
-    Parameters
-    ----------
-    robot : Robot
-    wire_m : (..., j) array
-    """
-    lines, beyond = _of_winches(robot)
-    return np.asarray((np.asarray(wire_m, float) - beyond) / lines)
-
-
-def _of_winches(robot: Robot) -> tuple[Floats, Floats]:
-    """Parallel parts of the wires of each winch, and what their lengths are beyond these, less the joint offsets."""
-    return mean_of_each_winch(robot, robot.lines), mean_of_each_winch(robot, robot.beyond_m - robot.beyond_joint_m)
