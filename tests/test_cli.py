@@ -5,14 +5,13 @@ import os
 import re
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 import typer
 
 from wirebayes import __version__
-from wirebayes.cli import COMMANDS, Command, _application, main
+from wirebayes.cli import COMMANDS, Command, _application, command_function, main
 from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 
@@ -132,7 +131,7 @@ def test_no_arguments_show_the_help(capsys):
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_shows_an_example_that_it_accepts(name, capsys):
     command = COMMANDS[name]
-    assert callable(getattr(import_module(command.module), command.function))
+    assert callable(command_function(name))
     assert main([name, "--help"]) == 0
     shown = capsys.readouterr().out
     assert f"  {command.example}\n" in shown
@@ -158,8 +157,10 @@ def test_an_input_error_is_its_text_and_exit_code_2(monkeypatch, capsys):
     def refuse() -> None:
         raise InputError("a.csv, line 3: found x, expected y")
 
-    monkeypatch.setitem(COMMANDS, "fit", Command("somewhere", "fit", "", ""))
-    monkeypatch.setattr("wirebayes.cli.import_module", lambda _: type("module", (), {"fit": staticmethod(refuse)}))
+    monkeypatch.setitem(COMMANDS, "fit", Command("somewhere", "", ""))
+    monkeypatch.setattr(
+        "wirebayes.cli.import_module", lambda _: type("module", (), {"fit_command": staticmethod(refuse)})
+    )
     assert main(["fit"]) == 2
     assert capsys.readouterr() == ("", "a.csv, line 3: found x, expected y\n")
 
@@ -168,8 +169,10 @@ def test_a_bug_is_not_dressed_up_as_bad_input(monkeypatch):
     def fail() -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setitem(COMMANDS, "fit", Command("somewhere", "fit", "", ""))
-    monkeypatch.setattr("wirebayes.cli.import_module", lambda _: type("module", (), {"fit": staticmethod(fail)}))
+    monkeypatch.setitem(COMMANDS, "fit", Command("somewhere", "", ""))
+    monkeypatch.setattr(
+        "wirebayes.cli.import_module", lambda _: type("module", (), {"fit_command": staticmethod(fail)})
+    )
     with pytest.raises(ZeroDivisionError):
         main(["fit"])
 

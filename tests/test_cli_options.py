@@ -14,7 +14,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import pytest
 
-from wirebayes.cli import COMMANDS
+from wirebayes.cli import command_function
 from wirebayes.commands.options import text_of
 from wirebayes.processes import workers
 
@@ -23,7 +23,7 @@ FUNCTIONS = {
     "import": "import_bench.import_bench",
     "check": "check.check",
     "fit": "fit.fit",
-    "compare": "compare.plan",
+    "compare": "compare.plan_comparison",
     "discover": "discover.discover",
     "batch": "batch.batch",
     "plan": "plan.plan",
@@ -50,9 +50,7 @@ class Called(Exception):
 
 
 def command_of(name: str) -> Callable[..., object]:
-    command = COMMANDS[name]
-    found: Callable[..., object] = getattr(import_module(command.module), command.function)
-    return found
+    return command_function(name)
 
 
 @cache  # the function itself, also while another one stands in its place

@@ -1,7 +1,6 @@
 """What the documentation shows is true: mistakes and their answers, the effect of one's own, the example."""
 
 import ast
-import importlib
 import importlib.util
 import json
 import re
@@ -16,7 +15,7 @@ import numpy as np
 import pytest
 
 from analyses.project import readmes
-from wirebayes.cli import COMMANDS, main
+from wirebayes.cli import COMMANDS, command_function, main
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.robot.mechanics import schema
 from wirebayes.strict.toml_keys import Keys
@@ -266,7 +265,7 @@ def test_the_page_on_robots_has_every_option(command):
     import typer
 
     app = typer.Typer(add_completion=False)
-    app.command()(getattr(importlib.import_module("wirebayes.cli.robot"), command))
+    app.command()(command_function(command))
     after = OPTIONS.split(f"\n``{command}``\n{'^' * (len(command) + 4)}\n")[1]
     listed = re.findall(r"\* - ``(--[a-z-]+)", after.split("^^^^")[0])
     options = [name for one in typer.main.get_command(app).params for name in one.opts if name.startswith("--")]

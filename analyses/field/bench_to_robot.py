@@ -46,7 +46,7 @@ from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.motion import claim, inverse
-from wirebayes.simulation.synthetic import Bench, Simulated, Truth, draw, write
+from wirebayes.simulation.synthetic import Bench, Simulated, Truth, draw, write_tests
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.model import Model
@@ -203,7 +203,7 @@ def figures(stored: Stored, simulated: Simulated, folder: Path) -> list[dict[str
 def at_tension(robot: Any, tension_N: float) -> Any:
     """The robot with the platform's mass that puts its wires at a mean tension where it is at home."""
     tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
-    return claim.scaled(robot, 1.0, robot.mass_kg * tension_N / float(np.mean(tau)))
+    return claim.scaled_robot(robot, 1.0, robot.mass_kg * tension_N / float(np.mean(tau)))
 
 
 def case(index: int) -> dict[str, Any]:
@@ -212,7 +212,7 @@ def case(index: int) -> dict[str, Any]:
     keys = tuple(e.key for e in truth.effects)
     with TemporaryDirectory() as place:
         folder = Path(place)
-        write(folder, [made], truth, seed)
+        write_tests(folder, [made], truth, seed)
         (whole,) = read_experiments(folder / "experiments.toml")
         training = whole.train(len(whole.holds) - LATER)
         rows = [[h.number, h.displacement_mm, t] for h in whole.holds[-LATER:] for t in h.time_s]

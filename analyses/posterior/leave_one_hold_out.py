@@ -9,7 +9,7 @@ import argparse
 
 import numpy as np
 
-from wirebayes.comparison.candidates import BASE, Candidate, candidates, effects_of, problem_of
+from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates, effects_of, problem_of
 from wirebayes.effects import catalogue
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.io.experiment_file import select
@@ -28,7 +28,7 @@ def main() -> None:
           "by fits without every hold, difference, largest difference of a hold, holds sampled")  # fmt: skip
     fast, exact = {}, {}
     known = catalogue()
-    for candidate in candidates(experiment, Candidate(BASE, "", ""), known, MODELS):
+    for candidate in candidates(experiment, ModelToCompare(BASE, "", ""), known, MODELS):
         problem = problem_of(candidate, experiment, effects_of(candidate, experiment, known, SEED))
         fitted = fit(problem, seed_of(SEED, "leave one hold out", candidate.name))
         quick, slow = (

@@ -28,7 +28,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.spec import ModelSpec
 from wirebayes.results.jobs import Job
-from wirebayes.simulation.synthetic import Bench, Truth, write
+from wirebayes.simulation.synthetic import Bench, Truth, write_tests
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import History
 
@@ -87,7 +87,7 @@ def case(kind: str, index: int, simulations: int) -> dict[str, Any]:
         effects = (hidden(made, rng),) if kind == "effect" else ()
         history: History = "additive" if kind == "additive" else "saturating"
         with TemporaryDirectory() as folder:
-            write(Path(folder), made, Truth(parameters(rig), effects, history=history), int(rng.integers(2**31)))
+            write_tests(Path(folder), made, Truth(parameters(rig), effects, history=history), int(rng.integers(2**31)))
             experiments = tuple(read_experiments(Path(folder) / "experiments.toml"))
         if stays_taut(experiments):
             break

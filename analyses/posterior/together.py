@@ -17,7 +17,7 @@ from wirebayes.model.build import build
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL
 from wirebayes.model.spec import ModelSpec
-from wirebayes.prediction.leave_one_hold_out import LeftOut, smoothed_leave_one_hold_out
+from wirebayes.prediction.leave_one_hold_out import LeftOutHolds, smoothed_leave_one_hold_out
 from wirebayes.results.identifiability import identifiability
 
 SEED = 0
@@ -28,9 +28,9 @@ def interval(values: np.ndarray) -> str:
     return f"{middle:9.4g} [{low:.4g}, {high:.4g}]"
 
 
-def joined(parts: Sequence[LeftOut]) -> LeftOut:
+def joined(parts: Sequence[LeftOutHolds]) -> LeftOutHolds:
     """Separate fits as one model of all holds."""
-    return LeftOut(
+    return LeftOutHolds(
         sum((p.sample for p in parts), ()), np.concatenate([p.hold for p in parts]),
         np.concatenate([p.elpd for p in parts]), np.concatenate([p.pareto_k for p in parts]),
         np.concatenate([p.refitted for p in parts]), all(p.converged for p in parts),

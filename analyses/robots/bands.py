@@ -45,7 +45,7 @@ DRAWS = 400
 def at_tension(robot: Robot, tension_N: float) -> Robot:
     """The robot with the platform's mass that gives its wires a mean tension at home."""
     tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
-    return claim.scaled(robot, 1.0, robot.mass_kg * tension_N / float(np.mean(tau)))
+    return claim.scaled_robot(robot, 1.0, robot.mass_kg * tension_N / float(np.mean(tau)))
 
 
 def true_drift_mm(robot: Robot, rig: Rig) -> list[float]:

@@ -17,7 +17,7 @@ import numpy as np
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
-from wirebayes.robot.self_calibration.estimate import calibrate, corrected
+from wirebayes.robot.self_calibration.estimate import corrected_joints, length_posterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
 
 TENSION_SD_N, REFERENCE_SD_M, SPREAD, LOWEST_N = 0.02, 5e-3, 0.05, 2.5
@@ -42,7 +42,7 @@ def plan(robot, line, rng):
     good = np.isfinite(tau).all(1)
     x, R, tau = x[good], R[good], tau[good]
     commands = inverse.commands(robot, mean, x, R, tau)
-    change = observability.sensitivity(robot, mean, x, R, commands.zero_m, commands.offset_m)[1]
+    change = observability.length_sensitivity(robot, mean, x, R, commands.zero_m, commands.offset_m)[1]
     pick = observability.choose_poses(change, POSES, TENSION_SD_N, REFERENCE_SD_M)
     home = robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
     first = inverse.commands(robot, mean, *home, inverse.tensions(robot, *home)).joint_m
@@ -86,8 +86,8 @@ def study(name, line, count, rng):
     real = predict(robot, prior, session, truth, longest_step=0.35)
     readings = np.maximum(real.readings + rng.normal(size=real.readings.shape), 0.0)
     print(f"  readings of slack wires: {(real.readings == 0).mean():.3f} of all")
-    results = {"creep model": (prior, calibrate(robot, prior, session, readings)),
-               "Hooke only": (hooke, calibrate(robot, hooke, session, readings))}  # fmt: skip
+    results = {"creep model": (prior, length_posterior(robot, prior, session, readings)),
+               "Hooke only": (hooke, length_posterior(robot, hooke, session, readings))}  # fmt: skip
     for label, (_, known) in results.items():
         low, high = known.interval(0.9)
         inside = ((low <= real.length_m) & (real.length_m <= high)).mean(1)
@@ -111,7 +111,7 @@ def study(name, line, count, rng):
         ahead = inverse.commands(robot, prior.wires(robot, centre)[0], x[None], R[None], tau, foreseen.creep.T)
         commands = {"before, Hooke": plain.joint_m, "before, creep foreseen": ahead.joint_m}
         for label, key in (("after, Hooke only", "Hooke only"), ("after, creep model", "creep model")):
-            commands[label] = corrected(robot, results[key][0], results[key][1], x, R)
+            commands[label] = corrected_joints(robot, results[key][0], results[key][1], x, R)
         for label, joints in commands.items():
             errors[label].append(pose_error(robot, prior, truth, real, joints, x, R))
     for label, values in errors.items():

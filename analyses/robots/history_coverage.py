@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from analyses.resumable import records
 from wirebayes.inference.fit import seed_of
-from wirebayes.robot.history.estimate import estimate
-from wirebayes.robot.history.follow import clock_starts, follow
+from wirebayes.robot.history.estimate import estimate_poses
+from wirebayes.robot.history.follow import clock_starts, follow_log
 from wirebayes.robot.history.history import History, roll_and_pitch
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import schema
@@ -72,7 +72,7 @@ def case(name: str, index: int, draws: int) -> dict[str, Any]:
     wires, error = truths.columns(truths.draws)
     assert moves.joint_m is not None
     starts = clock_starts(moves, np.ones((len(TIMES_S), robot.legs)))
-    true = follow(robot, wires, moves, moves.joint_m, start, starts, error)
+    true = follow_log(robot, wires, moves, moves.joint_m, start, starts, error)
     place, turn, tau = true.position_m[0], roll_and_pitch(true.rotation[0]), true.tension_N[0]
     out: dict[str, Any] = {"robot": name, "index": index, "draws": draws}
     out["sensors"] = kind = SENSORS[index // len(ROBOTS) % len(SENSORS)]
@@ -81,7 +81,7 @@ def case(name: str, index: int, draws: int) -> dict[str, Any]:
         if key == "readings":
             read = replace(moves, tension_N=tau + errors_of(kind, ERRORS.tension_N, tau.shape, rng),
                            tilt_rad=turn + errors_of(kind, ERRORS.tilt_rad, turn.shape, rng))  # fmt: skip
-        found = estimate(robot, known, read, start, ERRORS, np.random.default_rng(seed))
+        found = estimate_poses(robot, known, read, start, ERRORS, np.random.default_rng(seed))
         seen = found.track.position_m
         low, high = np.nanquantile(seen, [0.05, 0.95], axis=0, method="weibull")
         out[key] = {

@@ -13,7 +13,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.robot.history.estimate import estimate
+from wirebayes.robot.history.estimate import estimate_poses
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.live import LiveEstimator, LivePose
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
@@ -105,7 +105,7 @@ def hour(robot: Robot, wires: WireDraws, rate_Hz: float) -> None:
     commanded = joints(robot, wires, stops)
     start = robot.home_m, np.eye(3)
     history = History(times, commanded, None, None, np.zeros(len(times)), np.zeros((len(times), 3)))
-    batch = estimate(robot, wires, history, start, Uncertain(1e-3), np.random.default_rng(0)).track.position_m
+    batch = estimate_poses(robot, wires, history, start, Uncertain(1e-3), np.random.default_rng(0)).track.position_m
     live = LiveEstimator(robot, wires, Uncertain(1e-3), start, reads=False)
     seen: list[LivePose] = []
     for moment in np.arange(0.0, 3600.0 + 0.5 / rate_Hz, 1.0 / rate_Hz):

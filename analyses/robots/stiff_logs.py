@@ -26,7 +26,7 @@ def seconds(k1_N: float) -> tuple[float, float]:
     robot = schema.read(FIELD / "ua.toml")
     rows = np.loadtxt(FIELD / "ua-j2.csv", delimiter=",", skiprows=1)
     still, middle = np.zeros(len(rows)), np.tile(robot.centre_of_mass_m, (len(rows), 1))
-    fine, _ = follow.refined(robot, History(rows[:, 0], rows[:, 1:], None, None, still, middle))
+    fine, _ = follow.refined_joints(robot, History(rows[:, 0], rows[:, 1:], None, None, still, middle))
     assert fine.joint_m is not None
     given = next(iter(robot.given.values())).parameters
     theta = {name: np.full((1, DRAWS), value) for name, value in given.items()}
@@ -36,7 +36,7 @@ def seconds(k1_N: float) -> tuple[float, float]:
     spent = []
     for _ in range(REPEATS):
         begun = time.process_time()
-        track = follow.follow(robot, wires, fine, fine.joint_m, start, fine.times_s[:1])
+        track = follow.follow_log(robot, wires, fine, fine.joint_m, start, fine.times_s[:1])
         spent.append(time.process_time() - begun)
     return min(spent), float(track.held.mean())
 

@@ -238,9 +238,11 @@ def exact(size: int, seed: int) -> Iterator[dict[str, Any]]:
         readings = (one.holds.tension_N / log.tension_sd_N).ravel()
         with np.errstate(all="ignore"):
             if asked.stops == FEW:
-                found, _ = answer.answer(robot, one.told.prior, log, readings, seed, 0)
+                found, _ = answer.lengths_report(robot, one.told.prior, log, readings, seed, 0)
             else:
-                found = whole_answer.answer(robot, one.told.prior, errors, log, readings, seed, False, 0).content
+                found = whole_answer.calibration_report(
+                    robot, one.told.prior, errors, log, readings, seed, False, 0
+                ).content
             power = _power(one, errors, _unplaced(log) if asked.stops == FEW else log) if asked.anchor else 0.0
         yield {
             "kind": asked.kind, "mode": asked.mode, "anchor": asked.anchor, "encoder": asked.encoder, "power": power,
@@ -357,7 +359,9 @@ def sensors(size: int, seed: int) -> Iterator[dict[str, Any]]:
         begun = time.process_time()
         with np.errstate(all="ignore"):
             told = one.told
-            found = whole_answer.answer(robot, told.prior, told.errors, log, readings, seed, False, 0).content
+            found = whole_answer.calibration_report(
+                robot, told.prior, told.errors, log, readings, seed, False, 0
+            ).content
         said = found["sensors_at_fault"]
         yield {
             "kind": asked.kind, "bad": (np.flatnonzero(off) + 1).tolist(), "usable": bool(found["usable"]),

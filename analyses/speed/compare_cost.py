@@ -32,11 +32,11 @@ def cost_of(wire: int, model: str) -> dict[str, Any]:
 
 def known(wire: int) -> list[Any]:
     """The models of a wire's comparison."""
-    from wirebayes.comparison.candidates import BASE, Candidate, candidates
+    from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates
     from wirebayes.effects import catalogue
     from wirebayes.io.paper import experiments
 
-    return candidates(experiments()[wire], Candidate(BASE, "", ""), catalogue())
+    return candidates(experiments()[wire], ModelToCompare(BASE, "", ""), catalogue())
 
 
 def main() -> None:

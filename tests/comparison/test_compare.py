@@ -9,7 +9,7 @@ import pytest
 
 from wirebayes import cli
 from wirebayes.comparison import compare
-from wirebayes.comparison.candidates import BASE, Candidate, candidates, effects_of, problem_of
+from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates, effects_of, problem_of
 from wirebayes.comparison.compare import Task, judge, side_by_side, stacking
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.effects.rivals import RIVALS
@@ -21,11 +21,11 @@ from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import linearise, simulate
 
 QUICK = Policy(ensembles=2, walkers=64, ess=300.0, r_hat=1.1, most_steps=80)
-PLAIN = Candidate(BASE, "", "")
+PLAIN = ModelToCompare(BASE, "", "")
 TRUTH = {"k1": 700.0, "B": 0.25, "U": 0.7, "k2": 0.05, "N": 1.0, "preload": 0.3}
 
 
-def one(name: str) -> Candidate:
+def one(name: str) -> ModelToCompare:
     return next(c for c in candidates(experiments()[0], PLAIN, CATALOGUE) if c.name == name)
 
 
@@ -173,7 +173,7 @@ def test_a_model_that_fails_stays_with_its_reason(monkeypatch: pytest.MonkeyPatc
 def test_command_finds_that_a_creeping_wire_is_no_spring(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # with short chains: what is tested is the command, not the sampler
     monkeypatch.setattr(compare, "POLICY", QUICK)
-    monkeypatch.setattr(compare.run, "__defaults__", (QUICK, *compare.run.__defaults__[1:]))
+    monkeypatch.setattr(compare.judge_all, "__defaults__", (QUICK, *compare.judge_all.__defaults__[1:]))
     out = tmp_path / "out"
     words = ["compare", str(FOLDER / "experiments.toml"), "--experiment", "roc-line-1.71m", "--output", str(out),
              "--train-holds", "6", "--only", "hooke_without_creep", "--only", "hold_by_hold"]  # fmt: skip

@@ -12,16 +12,16 @@ import pytest
 
 from wirebayes.comparison import candidates as module
 from wirebayes.comparison import compare
-from wirebayes.comparison.candidates import BASE, Candidate
+from wirebayes.comparison.candidates import BASE, ModelToCompare
 from wirebayes.comparison.compare import Task, judge, side_by_side, stacking
 from wirebayes.effects import CATALOGUE, named
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
-from wirebayes.prediction.held_out import HeldOut, Scores
+from wirebayes.prediction.held_out import HeldOutPrediction, Scores
 
-PLAIN = Candidate(BASE, "", "")
+PLAIN = ModelToCompare(BASE, "", "")
 
 
 def row(name: str, elpd: list[float], **more: object) -> dict[str, object]:
@@ -291,7 +291,7 @@ def scored(elpd: list[float]) -> Scores:
 
 def test_held_out_holds_as_plain_values() -> None:
     fit = SimpleNamespace(problem=build([experiments()[1]], [named("superposition")]))
-    found = compare._held_out(HeldOut("wire", 8, scored([1.0, 2.5]), scored([4.0])), fit)  # type: ignore[arg-type]
+    found = compare._held_out(HeldOutPrediction("wire", 8, scored([1.0, 2.5]), scored([4.0])), fit)  # type: ignore[arg-type]
     assert found["trained_on"] == 8 and found["holds"].tolist() == [2, 3] and found["effects"] == ["superposition"]
     free, given = found["free"], found["given_first"]
     assert (free["elpd"], given["elpd"]) == (3.5, 4.0) and free["per_hold"].tolist() == [1.0, 2.5]
@@ -301,7 +301,7 @@ def test_held_out_holds_as_plain_values() -> None:
     assert readings["hold"].tolist() == [2, 2, 3] and readings["observed_N"].tolist() == [1.0, 2.0, 3.0]
     assert readings["mean_N"].tolist() == readings["time_s"].tolist() == [0.0, 1.0, 2.0]
     assert readings["sd_N"][0] == 0.5 and readings["quantiles_N"].shape == (7, 3) and readings["pit"][0] == 0.0
-    assert compare._held_out(HeldOut("wire", 8, None, scored([4.0])), fit)["free"] is None  # type: ignore[arg-type]
+    assert compare._held_out(HeldOutPrediction("wire", 8, None, scored([4.0])), fit)["free"] is None  # type: ignore[arg-type]
 
 
 def test_only_what_is_missing_is_judged_and_every_model_has_a_file(
@@ -328,7 +328,7 @@ def test_only_what_is_missing_is_judged_and_every_model_has_a_file(
     monkeypatch.setattr(compare, "judge", judge)
     monkeypatch.setattr(compare, "workers", alone)
     told: list[tuple[str, float, float]] = []
-    compare.run(tasks, tmp_path, 5, report=lambda *about: told.append(about))
+    compare.judge_all(tasks, tmp_path, 5, report=lambda *about: told.append(about))
     assert judged == [("grip_slip@3", 5, compare.POLICY), ("superposition", 5, compare.POLICY)]
     assert told == [("models", 1, 2), ("models", 2, 2)]
     assert done.read_text() == "known" and json.loads((tmp_path / tasks[2].file).read_text()) == {

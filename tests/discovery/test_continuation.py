@@ -24,7 +24,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.likelihoods import reading_variance
 from wirebayes.model.spec import PLAIN_SPEC
-from wirebayes.simulation.synthetic import Bench, Truth, write
+from wirebayes.simulation.synthetic import Bench, Truth, write_tests
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import simulate
 
@@ -34,7 +34,7 @@ STIFF = {"k1": 3000.0, "B": 0.02, "U": 0.8, "k2": 0.02, "N": 0.7, "preload": 0.1
 
 
 def block_of(folder: Path, truth: dict[str, float], effects: list[Effect], seed: int) -> LaplaceFit:
-    write(folder, [Bench()], Truth(STIFF | truth, effects), seed)
+    write_tests(folder, [Bench()], Truth(STIFF | truth, effects), seed)
     experiments = read_experiments(folder / "experiments.toml")
     return fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
 
@@ -288,7 +288,7 @@ def test_no_setting_error_of_several_steps_explains_a_clamp_transient(tmp_path: 
     bench = Bench(length_mm=1272.0, resolution_N=0.0, displacements_mm=tuple(range(1, 8)), times_s=times)
     wire = {"k1": 500.0, "B": 0.04, "U": 0.75, "k2": 0.008, "N": 0.5, "sensor_sd": 0.007, "setting_sd": 0.026}
     effect = named("clamp_transient")
-    write(tmp_path, [bench], Truth(wire | {"clamp_transient.a": -0.05, "clamp_transient.T": 31.0}, [effect]), 0)
+    write_tests(tmp_path, [bench], Truth(wire | {"clamp_transient.a": -0.05, "clamp_transient.T": 31.0}, [effect]), 0)
     experiments = read_experiments(tmp_path / "experiments.toml")
     block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
     assert block.parameters("simulated")["setting_sd"] < 0.5

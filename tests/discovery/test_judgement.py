@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wirebayes.discovery.judgement import Evidence, FamilyEvidence, judge
+from wirebayes.discovery.judgement import Evidence, FamilyEvidence, verdict_on
 
 ONE = FamilyEvidence({"a": 0.95}, 0.95, 10.0)
 OPEN = FamilyEvidence({"b": 0.6, "c": 0.35}, 0.95, 10.0)
@@ -44,7 +44,7 @@ def any_evidence(draw: st.DrawFn) -> Evidence:
 @given(any_evidence())
 def test_whatever_the_evidence_the_order_of_verdicts_holds(found: Evidence) -> None:
     """Above all: *unknown* is never said where a family is established, and nothing blocks it that earns nothing."""
-    judged = judge(found)
+    judged = verdict_on(found)
     sure = [f for f in found.families if f.inclusion >= 0.9 and f.gain is not None and f.gain > 4.0]
     counts = found.remainder > 0.5 and found.remainder_gain is not None and found.remainder_gain > 4.0
     assert (judged.verdict == "nothing-missing") == (found.p > 0.04 or (found.nothing > 0.5 and not sure))
@@ -88,11 +88,11 @@ def test_whatever_the_evidence_the_order_of_verdicts_holds(found: Evidence) -> N
     ],
 )
 def test_verdicts_turn_at_their_thresholds(changes: dict, verdict: str) -> None:
-    assert judge(replace(EVIDENCE, **changes)).verdict == verdict
+    assert verdict_on(replace(EVIDENCE, **changes)).verdict == verdict
 
 
 def test_a_family_is_undecided_where_no_member_holds_nine_tenths_of_it() -> None:
-    assert judge(replace(EVIDENCE, families=(ONE, OPEN))).undecided == ("b", "c")
+    assert verdict_on(replace(EVIDENCE, families=(ONE, OPEN))).undecided == ("b", "c")
     nearly = FamilyEvidence({"b": 0.9 * 0.95, "c": 0.1 * 0.95}, 0.95, 10.0)
-    assert nearly.name == "b" and judge(replace(EVIDENCE, families=(nearly,))).verdict == "named"
+    assert nearly.name == "b" and verdict_on(replace(EVIDENCE, families=(nearly,))).verdict == "named"
     assert FamilyEvidence({"b": 0.899 * 0.95, "c": 0.101 * 0.95}, 0.95, 10.0).name is None

@@ -21,7 +21,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.results.jobs import Job
-from wirebayes.simulation.synthetic import Bench, Truth, write
+from wirebayes.simulation.synthetic import Bench, Truth, write_tests
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
 BENCH = Bench(displacements_mm=tuple(range(1, 8)))
@@ -30,7 +30,7 @@ BENCH = Bench(displacements_mm=tuple(range(1, 8)))
 def simulated(folder: Path, truth: dict[str, float] | None = None, effects: tuple[str, ...] = ()) -> Experiment:
     """One test of seven holds, read back from its files."""
     folder.mkdir(exist_ok=True)
-    write(folder, [BENCH], Truth(WIRE | (truth or {}), [named(key) for key in effects]), seed=2)
+    write_tests(folder, [BENCH], Truth(WIRE | (truth or {}), [named(key) for key in effects]), seed=2)
     return read_experiments(folder / "experiments.toml")[0]
 
 

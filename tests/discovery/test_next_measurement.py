@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wirebayes.discovery import next_measurement as module
-from wirebayes.discovery.next_measurement import alternatives
+from wirebayes.discovery.next_measurement import other_measurements
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.scales import NATURAL
@@ -31,7 +31,7 @@ WHOLE = Protocol(
 
 
 def test_plans_are_what_their_words_say() -> None:
-    unload, longer, both, finer = alternatives(WHOLE, True)
+    unload, longer, both, finer = other_measurements(WHOLE, True)
     assert unload.setting.tolist() == both.setting.tolist() == [1.0, 2.0, 4.0, 2.0, 1.0]
     assert longer.setting.tolist() == [1.0, 2.0, 4.0]
     assert finer.setting.tolist() == [1.0, 1.5, 2.0, 3.0, 4.0]
@@ -41,7 +41,7 @@ def test_plans_are_what_their_words_say() -> None:
         assert plan.times_s[0] == 0.0 and plan.times_s[-1] == pytest.approx(200.0)
         assert np.ptp(np.diff(np.log(plan.times_s[1:]))) < 1e-9
     assert "from 4 to 1 mm, each held 40 s" in unload.words and "1 to 4 mm" in longer.words
-    assert "of every sample" in alternatives(WHOLE, False)[0].words
+    assert "of every sample" in other_measurements(WHOLE, False)[0].words
     made = finer.protocol
     assert made.length_mm == 1500.0 and made.mask.all() and made.time_s.tolist() == [TIMES.tolist()] * 5
     assert made.number.tolist() == [1, 2, 3, 4, 5] and made.duration_s.tolist() == [40.0] * 5
@@ -49,19 +49,19 @@ def test_plans_are_what_their_words_say() -> None:
 
 def test_plans_under_weights_speak_of_weights_and_hang_them() -> None:
     hung = replace(WHOLE, control="force")
-    unload, longer, *_ = alternatives(hung, True)
+    unload, longer, *_ = other_measurements(hung, True)
     assert "the same weights back from 4 to 1 N" in unload.words and "weights 1 to 4 N" in longer.words
     assert unload.protocol.control == "force" and unload.setting.tolist() == [1.0, 2.0, 4.0, 2.0, 1.0]
 
 
 def test_plans_hold_the_displacements_that_were_read_for_the_longest_series() -> None:
-    unload = alternatives(PROTOCOL, True)[0]
+    unload = other_measurements(PROTOCOL, True)[0]
     assert unload.setting.tolist() == [1.0, 2.0, 1.0]
     assert unload.times_s.tolist() == TIMES.tolist()
     one = PROTOCOL.__class__(1500.0, np.array([2.0]), TIMES[None], np.ones((1, 3), bool), np.array([40.0]), np.ones(1))
-    assert alternatives(one, True)[0].setting.tolist() == [2.0, 2.0]
-    assert alternatives(one, True)[3].setting.tolist() == [0.5, 1.0, 1.5, 2.0]
-    assert alternatives(one, True)[3].words == "go to 2 mm in four steps, each held 40 s"
+    assert other_measurements(one, True)[0].setting.tolist() == [2.0, 2.0]
+    assert other_measurements(one, True)[3].setting.tolist() == [0.5, 1.0, 1.5, 2.0]
+    assert other_measurements(one, True)[3].words == "go to 2 mm in four steps, each held 40 s"
 
 
 def test_another_length_is_twice_the_longest_with_steps_scaled_alike() -> None:

@@ -21,7 +21,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.processes import workers
-from wirebayes.simulation.synthetic import Bench, Truth, write
+from wirebayes.simulation.synthetic import Bench, Truth, write_tests
 from wirebayes.wire.effect import Effect
 
 WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
@@ -34,7 +34,7 @@ def made(
     folder: Path, benches: list[Bench], truth: dict[str, float], effects: list[Effect], seed: int = 2
 ) -> list[Experiment]:
     """Simulated tests, read back from their files."""
-    write(folder, benches, Truth(WIRE | truth, effects), seed)
+    write_tests(folder, benches, Truth(WIRE | truth, effects), seed)
     return read_experiments(folder / "experiments.toml")
 
 

@@ -16,7 +16,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.scales import scales_of
 from wirebayes.model.spec import PLAIN_SPEC
-from wirebayes.simulation.synthetic import Bench, Truth, write
+from wirebayes.simulation.synthetic import Bench, Truth, write_tests
 
 WIRE = {"U": 0.6, "B": 0.08, "k2": 0.02, "N": 0.7, "preload": 0.5, "sensor_sd": 0.01, "setting_sd": 0.01}
 
@@ -32,7 +32,9 @@ def test_each_material_knows_what_a_fit_of_all_at_once_knows(tmp_path: Path, nam
     steps = (1, 2, 3, 4, 5, 6, 5, 4, 3, 4, 5, 6)
     benches = [Bench(name=f"on-{m}", material=m, displacements_mm=steps) for m in ("soft", "stiff")]
     amplitude = named(name).columns()[0]
-    write(tmp_path, benches, Truth(WIRE | {"k1[soft]": 700.0, "k1[stiff]": 2500.0, amplitude: size}, [named(name)]), 0)
+    write_tests(
+        tmp_path, benches, Truth(WIRE | {"k1[soft]": 700.0, "k1[stiff]": 2500.0, amplitude: size}, [named(name)]), 0
+    )
     experiments = read_experiments(tmp_path / "experiments.toml")
     alone = [fit([e], name) for e in experiments]
     mean, sd = _known(fit(experiments, name), named(name))
@@ -74,7 +76,7 @@ def weighed_by_both(folder: Path, periods: tuple[float, float]) -> tuple[float, 
         screw = {"screw_error.a": 0.06, "screw_error.P": periods[at], "screw_error.phi": -0.4 + np.pi * at}
         truth = Truth(WIRE | {"k1": (700.0, 2500.0)[at]} | screw, [ScrewError(6.0, of_several=True)])
         (folder / material).mkdir()
-        write(folder / material, [bench], truth, at)
+        write_tests(folder / material, [bench], truth, at)
         experiments += read_experiments(folder / material / "experiments.toml")
     scales = scales_of(experiments)
     plain = [fitted([e], [], PLAIN_SPEC, np.random.default_rng(0), scales=scales) for e in experiments]

@@ -93,7 +93,7 @@ def test_an_event_of_another_test_and_a_comparison_of_lengths_do_not_act_on_one_
     slip = replace(named("grip_slip@4"), test=one.name)  # type: ignore[type-var]
     elsewhere, anywhere = replace(slip, test="another"), named("superposition")
     lengths = SimpleNamespace(compares_lengths=True)
-    assert shrinking.alone([slip, elsewhere, anywhere, lengths], one) == (slip, anywhere)  # type: ignore[list-item]
+    assert shrinking.acting_alone([slip, elsewhere, anywhere, lengths], one) == (slip, anywhere)  # type: ignore[list-item]
 
 
 def test_a_discrepancy_is_as_slow_as_the_holds_are_long() -> None:

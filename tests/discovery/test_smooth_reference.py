@@ -14,7 +14,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io import paper
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.spec import PLAIN_SPEC
-from wirebayes.simulation.synthetic import Bench, Truth, write
+from wirebayes.simulation.synthetic import Bench, Truth, write_tests
 
 WIRE = paper.experiments()[2]
 QUIET = {"k1": 800.0, "B": 0.1, "U": 1.2, "k2": 0.02, "N": 0.8, "sensor_sd": 0.01, "setting_sd": 0.003, "preload": 0.5}
@@ -43,7 +43,7 @@ def test_the_processes_are_products_of_one_over_holds_and_one_over_time() -> Non
 
 def test_displacements_count_by_the_range_of_all_holds_read_or_not(tmp_path: Path) -> None:
     """Few enough readings that no function is left out; the largest displacement belongs to a hold without one."""
-    write(tmp_path, [Bench(displacements_mm=(1, 2, 9, 3), times_s=(0, 60), unrecorded={3})], Truth(QUIET), seed=3)
+    write_tests(tmp_path, [Bench(displacements_mm=(1, 2, 9, 3), times_s=(0, 60), unrecorded={3})], Truth(QUIET), seed=3)
     protocol = read_experiments(tmp_path / "experiments.toml")[0].protocol()
     mask = protocol.mask
     assert mask.sum() <= smooth_reference.FUNCTIONS and protocol.setting.max() == 9.0
@@ -62,7 +62,7 @@ def test_displacements_count_by_the_range_of_all_holds_read_or_not(tmp_path: Pat
 def test_of_many_readings_the_covariance_of_some_gives_nearly_the_best_functions(tmp_path: Path) -> None:
     """Twice as many readings as are decomposed: no functions at all hold more of the variance, these nearly as much."""
     displacements, times = [0.2 * k for k in range(1, 41)], [4.0 * k for k in range(30)]
-    write(tmp_path, [Bench(displacements_mm=displacements, times_s=times)], Truth(QUIET), seed=3)
+    write_tests(tmp_path, [Bench(displacements_mm=displacements, times_s=times)], Truth(QUIET), seed=3)
     protocol = read_experiments(tmp_path / "experiments.toml")[0].protocol()
     mask = protocol.mask
     hold, reading = np.nonzero(mask)
@@ -88,7 +88,7 @@ def test_the_evidence_of_several_processes_is_the_mean_of_theirs() -> None:
 def disturbed(folder: Path, size_N: float) -> LaplaceFit:
     """The fit of a simulated test in which three holds began with a tension that was off."""
     folder.mkdir()
-    write(folder, [Bench(resolution_N=0.01)], Truth(QUIET), seed=3)
+    write_tests(folder, [Bench(resolution_N=0.01)], Truth(QUIET), seed=3)
     (clean,) = read_experiments(folder / "experiments.toml")
     holds = list(clean.holds)
     for j, share in ((5, 0.6), (6, 1.0), (7, 0.6)):

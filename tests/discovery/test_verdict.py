@@ -10,7 +10,7 @@ from wirebayes.discovery import alternatives, global_test, held_out, retest, ver
 from wirebayes.discovery import gains as gains_module
 from wirebayes.discovery.fitted_sets import Accepted, Explored, FittedSet
 from wirebayes.discovery.held_out import LeftOut
-from wirebayes.discovery.judgement import judge
+from wirebayes.discovery.judgement import verdict_on
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.retest import Retest
 from wirebayes.discovery.settings import Settings
@@ -60,7 +60,7 @@ def decided(
 
 def verdict_of(found: verdict.Decision, gain: float = 50.0) -> str:
     """The verdict where a smooth discrepancy gains so much beside what is established."""
-    return judge(evidence(found, 0.01, 0, gain)).verdict
+    return verdict_on(evidence(found, 0.01, 0, gain)).verdict
 
 
 def names(found: verdict.Decision) -> str:
@@ -222,7 +222,7 @@ def test_look_alikes_are_established_together_though_none_of_them_alone(monkeypa
     on_material = evidence(found, 0.01, 0)
     assert max(found.posterior.inclusion[n][0] for n in "ab") < 0.9
     assert on_material.families[0].members.keys() == {"a", "b"} and on_material.families[0].is_established
-    assert judge(on_material).verdict == "ambiguous" and judge(on_material).undecided == ("a", "b")
+    assert verdict_on(on_material).verdict == "ambiguous" and verdict_on(on_material).undecided == ("a", "b")
     assert [a.name for a in accepted_effects(found, on_material, 0)] == ["a"]
 
 
@@ -240,7 +240,9 @@ def test_of_a_set_only_established_families_are_accepted(monkeypatch: pytest.Mon
     found = decided(monkeypatch, explored({"a": 30.0, "ab": 31.0 + UNLIKELIER}), {}, {})
     assert names(found) == "ab"
     on_material = evidence(found, 0.01, 0)
-    assert [a.name for a in accepted_effects(found, on_material, 0)] == ["a"] and judge(on_material).verdict == "named"
+    assert [a.name for a in accepted_effects(found, on_material, 0)] == ["a"] and verdict_on(
+        on_material
+    ).verdict == "named"
 
 
 def test_too_few_holds_establish_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -110,7 +110,7 @@ def bench(path: Path) -> None:
 
 
 def session(path: Path) -> None:
-    session_file.read(path, schema.read("linear-7"), 1.0, 0.01)
+    session_file.read_session(path, schema.read("linear-7"), 1.0, 0.01)
 
 
 def robot(path: Path) -> None:

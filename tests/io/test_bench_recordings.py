@@ -11,7 +11,7 @@ from analyses.field.recordings import record as recorded
 from tests.io.bench_files import convert
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.plateaus import plateaus
-from wirebayes.io.bench.thinning import KEPT, MOST, thinned
+from wirebayes.io.bench.thinning import KEPT, MOST, kept_readings
 from wirebayes.io.bench.undecided import Choices
 from wirebayes.wire.staircase import simulate
 
@@ -245,7 +245,7 @@ def test_a_hold_that_is_short_beside_the_only_other_one_is_refused_where_it_ends
 
 @pytest.mark.parametrize("count", [1, 2, MOST, MOST + 1, 100, 5000])
 def test_thinned_readings_are_early_and_few(count):
-    kept = thinned(np.arange(count) * 0.1)
+    kept = kept_readings(np.arange(count) * 0.1)
     assert kept[0] == 0
     assert kept[-1] == count - 1
     assert (np.diff(kept) > 0).all()

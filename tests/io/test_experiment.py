@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from wirebayes.errors import InputError
 from wirebayes.io.experiment_file import read_experiments, select
-from wirebayes.io.readings import protocol_holds, protocol_table, readings_of, readings_table
+from wirebayes.io.readings import checked_readings, protocol_holds, protocol_table, readings_table
 from wirebayes.model.build import build
 
 PAPER = Path(__file__).parents[2] / "data" / "paper"
@@ -115,7 +115,7 @@ def test_harmless_spellings_of_a_csv_are_read_alike(experiment_file, tmp_path, c
 
 def test_columns_may_stand_in_any_order_and_slack_sensors_read_below_zero(tmp_path):
     (tmp_path / "a.csv").write_text("tension_N,time_s,displacement_mm,hold\n-0.02,0,-1,7\n")
-    (hold,) = readings_of(readings_table(tmp_path / "a.csv"), 1000.0)
+    (hold,) = checked_readings(readings_table(tmp_path / "a.csv"), 1000.0)
     assert (hold.number, hold.displacement_mm, hold.tension_N.tolist(), hold.duration_s) == (7, -1.0, [-0.02], 0.0)
 
 
@@ -299,10 +299,10 @@ def staircase(folder, times, tension=lambda hold, time: hold - 0.001 * time, hol
 def test_times_that_run_on_over_the_test_are_refused(tmp_path):
     absolute = staircase(tmp_path, lambda h: [100 * h + t for t in (0, 30, 60, 90)])
     with pytest.raises(InputError, match=r"line 6, column 3 \(time_s\): found 200, expected the time since hold 2"):
-        readings_of(readings_table(absolute), 1000.0)
+        checked_readings(readings_table(absolute), 1000.0)
     touching = staircase(tmp_path, lambda h: [90 * h + t for t in (0, 30, 60, 90)])
     with pytest.raises(InputError, match=r"found 180, expected the time since hold 2 began"):
-        readings_of(readings_table(touching), 1000.0)
+        checked_readings(readings_table(touching), 1000.0)
 
 
 @pytest.mark.parametrize(
@@ -316,7 +316,7 @@ def test_times_that_run_on_over_the_test_are_refused(tmp_path):
     ],
 )
 def test_odd_times_that_restart_are_read(tmp_path, times):
-    assert len(readings_of(readings_table(staircase(tmp_path, times)), 1000.0)) == 4
+    assert len(checked_readings(readings_table(staircase(tmp_path, times)), 1000.0)) == 4
 
 
 def test_a_chance_order_of_times_is_not_refused(tmp_path):
@@ -326,17 +326,18 @@ def test_a_chance_order_of_times_is_not_refused(tmp_path):
         times = np.sort(rng.uniform(0, 120, (3, 2)).round(3), axis=1)
         if (np.diff(times) > 0).all():
             assert (
-                len(readings_of(readings_table(staircase(tmp_path, lambda h, t=times: t[h - 1], holds=3)), 1000.0)) == 3
+                len(checked_readings(readings_table(staircase(tmp_path, lambda h, t=times: t[h - 1], holds=3)), 1000.0))
+                == 3
             )
 
 
 def test_tensions_with_the_sign_flipped_are_refused(tmp_path):
     flipped = staircase(tmp_path, lambda h: (0, 30, 60), lambda h, t: -h + 0.001 * t)
     with pytest.raises(InputError, match=r"line 11, column 4 \(tension_N\): found -4.000, expected a pull .*change"):
-        readings_of(readings_table(flipped), 1000.0)
+        checked_readings(readings_table(flipped), 1000.0)
     zeroed = staircase(tmp_path, lambda h: (0, 30, 60), lambda h, t: h - 4.2 - 0.001 * t)
     with pytest.raises(InputError, match=r"line 4, column 4 \(tension_N\): found -3.260, expected .* undo the zeroing"):
-        readings_of(readings_table(zeroed), 1000.0)
+        checked_readings(readings_table(zeroed), 1000.0)
     pressed = staircase(tmp_path, lambda h: (0, 30, 60), lambda h, t: -h + 0.001 * t)
     header, *rows = pressed.read_text().splitlines()
     place = header.split(",").index("displacement_mm")
@@ -344,7 +345,7 @@ def test_tensions_with_the_sign_flipped_are_refused(tmp_path):
     turned = [",".join([*row[:place], f"-{row[place]}", *row[place + 1 :]]) for row in cells]
     pressed.write_text("\n".join([header, *turned]) + "\n")
     with pytest.raises(InputError, match="counted positive: change the signs of displacement_mm and of tension_N"):
-        readings_of(readings_table(pressed), 1000.0)
+        checked_readings(readings_table(pressed), 1000.0)
 
 
 @pytest.mark.parametrize(
@@ -359,7 +360,7 @@ def test_tensions_with_the_sign_flipped_are_refused(tmp_path):
     ],
 )
 def test_small_slack_and_large_tensions_are_read(tmp_path, tension):
-    assert len(readings_of(readings_table(staircase(tmp_path, lambda h: (0, 30, 60), tension)), 1000.0)) == 4
+    assert len(checked_readings(readings_table(staircase(tmp_path, lambda h: (0, 30, 60), tension)), 1000.0)) == 4
 
 
 def test_priors_are_kept_as_written_the_experiments_own_over_the_files(experiment_file):
@@ -424,7 +425,7 @@ def test_whatever_a_csv_holds_it_is_read_or_refused_in_one_line(tmp_path, data):
     text = data.draw(st.sampled_from(["\n", "\r\n", "\r"])).join(",".join(row) for row in rows)
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
     try:
-        holds = readings_of(readings_table(path), 1000.0)
+        holds = checked_readings(readings_table(path), 1000.0)
     except InputError as error:
         assert str(error).startswith(str(path))
         assert "found" in str(error)
@@ -470,7 +471,7 @@ def test_no_bytes_crash_the_reader(tmp_path, raw):
     with pytest.raises(InputError):
         read_experiments(tmp_path / "x.toml")
     with pytest.raises(InputError):
-        readings_of(readings_table(tmp_path / "x.csv"), 1000.0)
+        checked_readings(readings_table(tmp_path / "x.csv"), 1000.0)
 
 
 VALID = "hold,displacement_mm,time_s,tension_N\n1,1,0,1\n1,1,60,0.9\n3,2.5,0,2\n3,2.5,30,1.9\n4,0.5,10,0.2"
@@ -510,13 +511,13 @@ def test_a_row_without_a_reading_says_when_its_hold_ended(experiment_file, tmp_p
 def test_a_hold_without_any_reading_is_an_unrecorded_one(tmp_path):
     header = "hold,displacement_mm,time_s,tension_N\n"
     (tmp_path / "a.csv").write_text(header + "1,1,0,1\n1,1,60,.9\n2,2,0,\n2,2,120,\n3,3,0,3\n")
-    holds = readings_of(readings_table(tmp_path / "a.csv"), 1000.0)
+    holds = checked_readings(readings_table(tmp_path / "a.csv"), 1000.0)
     assert [hold.number for hold in holds] == [1, None, 3]
     assert (holds[1].recorded, holds[1].setting, holds[1].duration_s) == (False, 2.0, 120.0)
     assert holds[2].start_s == 180.0
     (tmp_path / "a.csv").write_text(header + "1,1,0,\n1,1,60,\n")
     with pytest.raises(InputError, match=r"line 2, column 4 \(tension_N\): found no reading, expected at least one"):
-        readings_of(readings_table(tmp_path / "a.csv"), 1000.0)
+        checked_readings(readings_table(tmp_path / "a.csv"), 1000.0)
 
 
 WEIGHTS = "hold,displacement_mm,time_s,tension_N\n1,2.1,0,2\n1,2.2,60,2\n1,,90,2\n2,4.1,0,4\n2,4.3,60,4\n"

@@ -129,7 +129,7 @@ def test_a_wire_that_goes_slack_on_unloading_is_no_break(sound):
 
 
 def test_the_papers_wires_have_none():
-    assert [gross_events.of_experiment(e) for e in paper.experiments()] == [[], [], [], []]
+    assert [gross_events.gross_events_of(e) for e in paper.experiments()] == [[], [], [], []]
 
 
 def test_events_that_are_dropped_leave_a_sound_test(tmp_path, sound):
@@ -142,8 +142,8 @@ def test_events_that_are_dropped_leave_a_sound_test(tmp_path, sound):
         '[[experiment]]\nname = "a"\nmaterial = "m"\nlength_mm = 1000.0\nresolution_N = 0.01\nreadings = "a.csv"\n'
     )
     (experiment,) = read_experiments(tmp_path / "a.toml")
-    kept = gross_events.without(experiment, gross_events.of_experiment(experiment))
-    assert gross_events.of_experiment(kept) == []
+    kept = gross_events.without_gross_events(experiment, gross_events.gross_events_of(experiment))
+    assert gross_events.gross_events_of(kept) == []
     assert kept.holds[6].duration_s == 120.0
     assert kept.holds[6].time_s.size == 3
     # import writes the same test

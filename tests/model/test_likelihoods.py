@@ -166,7 +166,7 @@ def test_held_out_holds_are_given_those_before_them_alone():
     before = likelihoods.chain(line, y[..., None], LOADING.mask & ~out[:, None], *noise)
     first = np.arange(LOADING.mask.shape[1]) == 0
     for rows in (LOADING.mask & out[:, None], LOADING.mask & out[:, None] & first):
-        found = likelihoods.held_out(line, before, y[..., None], rows, *noise)[:, 0]
+        found = likelihoods.held_out_density(line, before, y[..., None], rows, *noise)[:, 0]
         seen = rows[LOADING.mask]
         for j, value in zip((4, 5), found, strict=True):
             both = ~np.isin(hold, [4, 5]) | (seen & (hold == j))
@@ -282,7 +282,7 @@ def test_the_jacobian_is_the_derivative_of_every_reading_by_every_setting_error(
     """Against a complex step through all that follows."""
     model = Model(effects=(named(key),) if key else (), tension_ref_N=2.0)
     theta = PLAIN | ERRORS | STRONG
-    found = likelihoods.jacobian(linearise(LOADING, columns(theta), model))
+    found = likelihoods.setting_jacobian(linearise(LOADING, columns(theta), model))
     expected = jacobian(LOADING, theta, model)[1]
     assert found.shape == (6, 4, 6, 1)
     assert found[LOADING.mask][..., 0] == pytest.approx(expected[LOADING.mask], rel=1e-9, abs=1e-9)

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from wirebayes.errors import InputError
-from wirebayes.model.prior import Power, Prior, from_table, possible, wire_defaults
+from wirebayes.model.prior import PowerScaled, Prior, from_table, possible, wire_defaults
 from wirebayes.model.scales import Scales
 from wirebayes.numeric.distributions import Normal, TruncatedNormal, log_density_of
 
@@ -60,7 +60,7 @@ def test_a_setting_error_is_at_most_half_a_step():
 def test_a_power_makes_what_is_known_of_a_parameter_of_its_unit():
     """Creep at 4 N is log-normal, whatever U; B in mm N^-U is not."""
     free = {"B": stats.lognorm(0.5, scale=2.0), "U": stats.norm(1.0, 0.3)}
-    prior = Prior(free, {}, frozenset(), {"B": Power("U", np.log(4.0))})
+    prior = Prior(free, {}, frozenset(), {"B": PowerScaled("U", np.log(4.0))})
     theta = prior.rvs(4000, np.random.default_rng(0))
     creep = theta[:, 0] * 4.0 ** theta[:, 1]
     assert stats.kstest(creep, free["B"].cdf).pvalue > 1e-5

@@ -7,7 +7,7 @@ import pytest
 
 from wirebayes.io import paper
 from wirebayes.model.spec import ModelSpec
-from wirebayes.paper.least_squares import VARIANTS, adjusted, at, identify, leading, residuals, rms
+from wirebayes.paper.least_squares import VARIANTS, adjusted, at, identify, leading, rms, tension_residuals
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
 
@@ -25,7 +25,7 @@ TABLE_4 = paper.published()["table_4"]
     ],
 )
 def test_table_4_reproduces_the_tables_hold_by_hold(name, expected_N, within_N):
-    found = residuals(WIRES[name], at(TABLE_4[name]), ModelSpec(likelihood="hold"))
+    found = tension_residuals(WIRES[name], at(TABLE_4[name]), ModelSpec(likelihood="hold"))
     assert rms(found) == pytest.approx(expected_N, abs=within_N)
     recorded = WIRES[name].recorded_holds
     assert np.isfinite(found).sum() == sum(len(hold.time_s) - 1 for hold in recorded)
@@ -42,7 +42,7 @@ def test_hold_by_hold_is_the_papers_formula_written_out(name):
         for t, measured in zip(hold.time_s[1:], hold.tension_N[1:], strict=True):
             zero = wire.length_mm + p["B"] * first ** p["U"] * (1.0 - np.exp(-p["k2"] * t ** p["N"]))
             squares.append((measured - p["k1"] * (stretched / zero - 1.0)) ** 2)
-    found = rms(residuals(wire, at(p), ModelSpec(likelihood="hold")))
+    found = rms(tension_residuals(wire, at(p), ModelSpec(likelihood="hold")))
     assert found == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-9)
 
 
@@ -53,7 +53,7 @@ def test_refitted_is_never_worse_than_published_on_the_first_five_holds(name, va
     published = identify(first, variant, np.random.default_rng(0), TABLE_4[name])
     refitted = identify(first, variant, np.random.default_rng(0))
     assert refitted.rms_N <= published.rms_N
-    assert refitted.rms_N == pytest.approx(rms(residuals(first, at(refitted.parameters), variant)), rel=1e-12)
+    assert refitted.rms_N == pytest.approx(rms(tension_residuals(first, at(refitted.parameters), variant)), rel=1e-12)
     assert set(published.parameters) == set(adjusted(variant))
     for parameter, value in TABLE_4[name].items():
         assert published.parameters[parameter] == value

@@ -12,8 +12,8 @@ from wirebayes.cli import main
 from wirebayes.io import paper
 from wirebayes.model.spec import ModelSpec
 from wirebayes.paper import verdicts
-from wirebayes.paper.held_out import HeldOut, published_course
-from wirebayes.paper.least_squares import at, residuals
+from wirebayes.paper.held_out import Forecast, published_course
+from wirebayes.paper.least_squares import at, tension_residuals
 from wirebayes.paper.pictures import stiffest_step
 from wirebayes.processes import workers
 from wirebayes.results import jobs
@@ -44,7 +44,7 @@ def test_the_product_of_stiffness_and_amount_has_a_verdict_of_its_own():
     prior = {name: np.exp(rng.normal(size=5000)) for name in ("k1", "B", "U", "k2", "N")}
     draws = prior | {"B": 2.0 / prior["k1"] * np.exp(0.01 * rng.normal(size=5000))}
     published = {"k1": 1.0, "B": 2.0, "U": 1.0, "k2": 1.0, "N": 1.0}
-    words = {row["parameter"]: row["verdict"] for row in verdicts.rows("wire", "hold", draws, prior, published)}
+    words = {row["parameter"]: row["verdict"] for row in verdicts.verdict_rows("wire", "hold", draws, prior, published)}
     assert words["k1"] == words["B"] == "not determined"
     assert words["k1*B"] == "inside"
 
@@ -64,14 +64,14 @@ def test_the_papers_curve_passes_where_its_residuals_say(name):
     wire = WIRES[name]
     hold = wire.recorded_holds[-1]
     curve = published_course(TABLE_4[name], wire, hold.time_s)
-    left = residuals(wire, at(TABLE_4[name]), ModelSpec(likelihood="hold"))[-1, 1:, 0]
+    left = tension_residuals(wire, at(TABLE_4[name]), ModelSpec(likelihood="hold"))[-1, 1:, 0]
     assert curve[0] == pytest.approx(hold.tension_N[0], abs=1e-9)
     np.testing.assert_allclose(hold.tension_N[1:] - curve[1:], left, atol=1e-9)
 
 
 def test_coverage_and_rms_of_a_forecast():
     drawn = np.linspace(-1.0, 1.0, 2001)[None].repeat(4, axis=0)  # 90 % band: -0.9 to 0.9 around 0
-    seen = HeldOut(np.array([1, 1, 2, 2]), np.zeros(4), np.array([0.0, 0.89, 0.91, -2.0]), drawn)
+    seen = Forecast(np.array([1, 1, 2, 2]), np.zeros(4), np.array([0.0, 0.89, 0.91, -2.0]), drawn)
     assert seen.coverage == 0.5
     assert seen.rms_N == pytest.approx(np.sqrt((0.89**2 + 0.91**2 + 4.0) / 4))
 

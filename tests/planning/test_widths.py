@@ -14,7 +14,7 @@ from wirebayes.model.problem import with_readings
 from wirebayes.model.replicate import readings
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.planning import widths
-from wirebayes.planning.widths import at_centre, expected_widths, typical_tension
+from wirebayes.planning.widths import at_centre, expected_widths, middle_tension
 from wirebayes.simulation.synthetic import Bench
 
 CENTRE = {
@@ -87,7 +87,7 @@ def test_more_readings_and_longer_holds_teach_more():
 def test_creep_is_stated_for_one_tension_and_length():
     bench = Bench("a", displacements_mm=(1, 2, 3, 4))
     test = at_centre(bench.experiment(), guess(5), PLAIN_SPEC)
-    assert typical_tension(test) == pytest.approx(np.median([h.tension_N[0] for h in test.recorded_holds]))
+    assert middle_tension(test) == pytest.approx(np.median([h.tension_N[0] for h in test.recorded_holds]))
     own, twice = planned(bench), planned(bench, length_mm=2000.0)
     ratio = twice.widths["creep_1h_mm"]["sd"] / own.widths["creep_1h_mm"]["sd"]
     assert ratio == pytest.approx(2.0)

@@ -17,11 +17,11 @@ from wirebayes.model.problem import Problem
 from wirebayes.prediction import leave_one_hold_out as module
 from wirebayes.prediction.leave_one_hold_out import (
     REFIT,
-    LeftOut,
+    LeftOutHolds,
+    evenly_thinned,
     log_mean,
     smoothed_leave_one_hold_out,
     standard_error,
-    thinned,
 )
 from wirebayes.prediction.left_out_density import without_hold
 
@@ -137,9 +137,9 @@ def test_where_the_model_cannot_be_computed_a_hold_has_no_density(monkeypatch: p
 
 def test_thinned_rows_reach_from_the_first_to_the_last() -> None:
     rows = np.arange(9001.0)[:, None]
-    few = thinned(rows, 10)
+    few = evenly_thinned(rows, 10)
     assert few[:, 0].tolist() == [round(9000 * i / 9) for i in range(10)]
-    assert len(thinned(rows)) == 4000 and thinned(rows[:7]).tolist() == rows[:7].tolist()
+    assert len(evenly_thinned(rows)) == 4000 and evenly_thinned(rows[:7]).tolist() == rows[:7].tolist()
 
 
 def test_one_hold_has_no_standard_error() -> None:
@@ -205,7 +205,7 @@ def test_the_draws_that_a_bridge_stands_on_say_how_well_it_is_known(centre: floa
 
 def test_the_total_and_its_standard_error() -> None:
     none = np.zeros(4)
-    one = LeftOut(("a",) * 4, np.arange(1, 5), np.array([3.0, 2.0, 5.0, 2.0]), none, none > 0)
+    one = LeftOutHolds(("a",) * 4, np.arange(1, 5), np.array([3.0, 2.0, 5.0, 2.0]), none, none > 0)
     assert one.total == 12.0 and one.se == pytest.approx(2 * np.std([3, 2, 5, 2], ddof=1)) and one.converged
 
 

@@ -21,7 +21,7 @@ from wirebayes.model.scales import NATURAL, Units
 from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction import left_out_density as module
 from wirebayes.prediction.leave_one_hold_out import log_mean, smoothed_leave_one_hold_out
-from wirebayes.prediction.left_out_density import joined, log_densities, without_hold
+from wirebayes.prediction.left_out_density import joined_densities, log_densities, without_hold
 
 
 @pytest.mark.parametrize("likelihood", ["chain", "hold"])
@@ -33,7 +33,7 @@ def test_the_densities_are_those_of_problems_without_a_hold(likelihood: str) -> 
     holds = [(0, 0), (0, 5), (1, 3)]
     likelihoods = [p.log_likelihood(theta) for p in (problem, *(without_hold(problem, s, j) for s, j in holds))]
     prior = target.log_prior(theta) + target.coordinates.log_jacobian(theta, target.coordinates.to_sampled(theta))
-    found, expected = joined(target, holds)(target.coordinates.to_sampled(theta)), prior + likelihoods
+    found, expected = joined_densities(target, holds)(target.coordinates.to_sampled(theta)), prior + likelihoods
     good = np.isfinite(expected).all(axis=0)
     assert good.sum() > 100
     np.testing.assert_allclose(found[good], expected.T[good], rtol=1e-7, atol=1e-6)
@@ -52,7 +52,7 @@ def test_where_a_density_cannot_be_computed_it_is_zero() -> None:
 
     problem = SimpleNamespace(without_each_hold=parts)
     target = SimpleNamespace(problem=problem, coordinates=coordinates, log_prior=lambda theta: -theta[:, 0])
-    found = joined(target, [(0, 1), (0, 0)])(np.arange(float(n))[:, None])  # type: ignore[arg-type]
+    found = joined_densities(target, [(0, 1), (0, 0)])(np.arange(float(n))[:, None])  # type: ignore[arg-type]
     expected = np.column_stack([np.full(n, 3.0), 3.0 - np.arange(n), np.full(n, 3.5)])
     expected[7, 0] = expected[9, 2] = expected[2100, 2] = -np.inf
     assert np.array_equal(found, expected)

@@ -19,7 +19,7 @@ from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
 from wirebayes.results.read_back import load
 from wirebayes.results.store import save
-from wirebayes.robot.mechanics.draws import warnings
+from wirebayes.robot.mechanics.draws import wire_warnings
 
 QUICK = Policy(ensembles=2, walkers=64, ess=300.0, r_hat=1.1, most_steps=80)
 TRAINED = 8
@@ -222,7 +222,7 @@ def test_what_speaks_against_the_fit_is_said_again(
     line = wire_draws(load(folder), 10)
     assert len(line.doubts) == 2
     use = np.ones(7), 1.0, np.full(7, 1e-3 * line.length_mm)
-    assert warnings(read_robot("linear-7"), line, *use)[:2] == [*line.doubts]
+    assert wire_warnings(read_robot("linear-7"), line, *use)[:2] == [*line.doubts]
     written = tmp_path / "export"
     assert cli.main(["export", "hangprinter-4", "--wires", str(folder), "--output", str(written)]) == 0
     assert "warning: the fit of roc-line-1.71m has not converged" in capsys.readouterr().err

@@ -64,4 +64,4 @@ def test_the_last_hold_of_a_test_may_end_with_its_last_reading():
     ("share", "words"), [(0.49, "k2 would move by less than 0.5"), (0.51, "k2 would be lower by 0.00300 s⁻ᴺ (0.5")]
 )
 def test_a_small_shift_is_said_to_be_small(share, words):
-    assert words in hold_ends.sentence({"k2": {"shift": -0.003, "sd_share": share, "unit": "s^-N"}})
+    assert words in hold_ends.hold_ends_sentence({"k2": {"shift": -0.003, "sd_share": share, "unit": "s^-N"}})

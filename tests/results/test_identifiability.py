@@ -16,11 +16,11 @@ from wirebayes.results.identifiability import (
     SENSITIVE,
     Extrapolation,
     _weighted_quantiles,
+    distance_per_doubling,
     extrapolation,
     identifiability,
-    in_words,
     log_priors,
-    sensitivity,
+    parameter_in_words,
 )
 
 
@@ -65,10 +65,10 @@ def test_a_sum_alone_is_a_ridge() -> None:
 
 def test_sensitivity_is_zero_for_a_flat_component_and_grows_with_its_part() -> None:
     values = np.random.default_rng(1).normal(size=4000)
-    assert sensitivity(values, np.zeros(4000)) == 0.0
-    assert sensitivity(values, 1e-7 * values) == 0.0  # readings of a sensor too coarse to say anything
-    assert 0.0 < sensitivity(values, 1e-6 * values) < 1e-5
-    small, large = (sensitivity(values, -0.5 * part * values**2) for part in (0.01, 0.5))
+    assert distance_per_doubling(values, np.zeros(4000)) == 0.0
+    assert distance_per_doubling(values, 1e-7 * values) == 0.0  # readings of a sensor too coarse to say anything
+    assert 0.0 < distance_per_doubling(values, 1e-6 * values) < 1e-5
+    small, large = (distance_per_doubling(values, -0.5 * part * values**2) for part in (0.01, 0.5))
     assert small < 0.02 < large
 
 
@@ -104,7 +104,7 @@ def test_extrapolation_of_draws_that_do_not_creep_says_so() -> None:
 
 
 def sentence(contraction: float, sensitivity: float) -> str:
-    return in_words("k1", {
+    return parameter_in_words("k1", {
         "contraction": contraction, "prior_range_90": 100.0, "posterior_range_90": 1.5, "range_is_factor": True,
         "prior_sensitivity": sensitivity, "likelihood_sensitivity": 1.0, "ridges": {},
     })  # fmt: skip
@@ -211,7 +211,7 @@ def test_sensitivity_is_the_distance_over_powers_a_tenth_apart(monkeypatch: pyte
     component = np.array([0.1, -0.2, 0.3])
     monkeypatch.setattr(module, "power_scaled", weights)
     monkeypatch.setattr(module, "power_sensitivity", distance)
-    assert sensitivity(np.array([1.0, 2.0, 4.0]), component) == 0.25
+    assert distance_per_doubling(np.array([1.0, 2.0, 4.0]), component) == 0.25
     assert asked == pytest.approx([1.0 / 1.1, 1.1])
 
 
@@ -265,7 +265,7 @@ def test_an_extrapolation_as_plain_values_has_the_figures_under_their_names() ->
 
 
 def test_a_ridge_names_all_who_are_on_it_but_itself() -> None:
-    words = in_words("k1", {
+    words = parameter_in_words("k1", {
         "contraction": 0.95, "prior_range_90": 20.0, "posterior_range_90": 1.5, "range_is_factor": False,
         "prior_sensitivity": 0.0, "likelihood_sensitivity": 1.0, "ridges": {"B": -0.95, "U": 0.991},
     })  # fmt: skip

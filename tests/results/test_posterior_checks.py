@@ -63,11 +63,13 @@ def test_a_stiffness_outside_its_prior_is_named(simulated):
     far = posterior_checks.FAR_OUT * logs.std()
     for away, warned in ((-1.02, True), (-0.98, False), (0.0, False), (0.98, False), (1.02, True)):
         k1 = float(np.exp(np.median(logs) + away * far))
-        assert ("prior of its own" in posterior_checks.stiffness(draws(simulated.problem, k1=k1), prior)) == warned
+        assert (
+            "prior of its own" in posterior_checks.unlikely_stiffness(draws(simulated.problem, k1=k1), prior)
+        ) == warned
     rope = prior | {"k1": prior["k1"] * 1e5}  # as a prior in the file says
     stiff = 1e5 * float(np.median(prior["k1"]))
-    assert "prior of its own" in posterior_checks.stiffness(draws(simulated.problem, k1=stiff), prior)
-    assert posterior_checks.stiffness(draws(simulated.problem, k1=stiff), rope) == ""
+    assert "prior of its own" in posterior_checks.unlikely_stiffness(draws(simulated.problem, k1=stiff), prior)
+    assert posterior_checks.unlikely_stiffness(draws(simulated.problem, k1=stiff), rope) == ""
 
 
 def test_a_posterior_that_is_the_prior_is_named(simulated):
@@ -88,7 +90,9 @@ def test_readings_without_noise_have_a_floor_and_say_so(simulated):
     assert problem.samples[0].resolution == pytest.approx(FINEST * np.max(bare.problem.samples[0].readings))
     assert build([with_tensions(Bench().experiment(), sample.readings[..., 0])]).samples[0].resolution == 0.01
     quiet = fit(problem, 1, policy=HASTY)
-    assert any("carry no noise" in notice.text for notice in posterior_checks.warnings(quiet, problem.samples[0]))
+    assert any(
+        "carry no noise" in notice.text for notice in posterior_checks.posterior_warnings(quiet, problem.samples[0])
+    )
 
 
 def with_tensions(experiment, tension):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wirebayes.model.prior import Power, Prior
+from wirebayes.model.prior import PowerScaled, Prior
 from wirebayes.results.prior_influence import leaning
 
 RNG = np.random.default_rng(0)
@@ -36,5 +36,5 @@ def test_what_is_known_of_a_parameter_of_another_s_unit_is_its_product() -> None
     U = RNG.normal(1.0, 0.7, 20000)
     theta = np.column_stack([np.exp(0.05 * RNG.normal(size=20000) - U * np.log(4.0)), U])
     free = {"B": stats.lognorm(1.0), "U": stats.uniform(-9.0, 20.0)}
-    prior = Prior(free, {}, frozenset({"B"}), {"B": Power("U", float(np.log(4.0)))})
+    prior = Prior(free, {}, frozenset({"B"}), {"B": PowerScaled("U", float(np.log(4.0)))})
     assert leaning(prior, theta, prior.names) == []

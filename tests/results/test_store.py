@@ -14,7 +14,7 @@ from wirebayes.model.build import build
 from wirebayes.results import jobs, read_back, store
 from wirebayes.results.jobs import Job
 from wirebayes.results.summary import CREEP_TIMES_S
-from wirebayes.simulation.synthetic import Bench, Truth, draw, write
+from wirebayes.simulation.synthetic import Bench, Truth, draw, write_tests
 from wirebayes.wire.staircase import simulate
 
 HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=4)
@@ -79,7 +79,7 @@ def test_a_sample_twice_as_long_moved_twice_as_far_reads_the_same():
 
 
 def test_samples_fitted_at_once_are_stored_apart_and_again_where_one_is_missing(tmp_path):
-    write(tmp_path, BENCHES, Truth(), 3)
+    write_tests(tmp_path, BENCHES, Truth(), 3)
     experiments = tuple(read_experiments(tmp_path / "experiments.toml"))
     job = Job("short/final", experiments, apart=("short/final", "long/final"))
     jobs.run([job], tmp_path, 0, policy=HASTY)
@@ -93,7 +93,7 @@ def test_samples_fitted_at_once_are_stored_apart_and_again_where_one_is_missing(
 
 def test_the_reference_temperature_is_stored_for_each_sample(tmp_path):
     """Later holds need it: their warming counts from a temperature that their protocol does not repeat."""
-    write(tmp_path, BENCHES, Truth(), 3)
+    write_tests(tmp_path, BENCHES, Truth(), 3)
     table = (tmp_path / "long.csv").read_text().splitlines()
     logged = [table[0] + ",temperature_C", *(f"{row},{21.5 + 0.1 * i}" for i, row in enumerate(table[1:]))]
     (tmp_path / "long.csv").write_text("\n".join(logged) + "\n")

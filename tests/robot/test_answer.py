@@ -4,8 +4,8 @@ import pytest
 from wirebayes.json_files.plain import plain
 from wirebayes.report.pictures import robot as pictures
 from wirebayes.robot.mechanics import draws, schema
-from wirebayes.robot.pose.answer import answer
-from wirebayes.robot.pose.request import PoseRequest, band
+from wirebayes.robot.pose.answer import pose_report
+from wirebayes.robot.pose.request import PoseRequest, band_over_draws
 
 TIMES = np.array([0.0, 60.0])
 
@@ -20,7 +20,7 @@ def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):
     # law (3) pulls with k1 at most: 3 N a wire cannot hold a platform that asks for five
     robot = schema.read("cogiro-desk")
     request = PoseRequest(robot.home_m, np.eye(3), TIMES)
-    found = answer(robot, _line(40, 3.0, "modified"), request)
+    found = pose_report(robot, _line(40, 3.0, "modified"), request)
     content = found.content
     assert not content["feasible"]
     assert "cannot pull" in content["sentence"]
@@ -35,12 +35,12 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
     weak, strong = _line(20, 3.0, "modified"), _line(20, 800.0, "modified")
     both = {k: np.concatenate([weak.parameters[k], strong.parameters[k]]) for k in strong.parameters}
     request = PoseRequest(robot.home_m, np.eye(3), TIMES)
-    found = answer(robot, draws.WireDraws(both, 1000.0, "modified"), request)
+    found = pose_report(robot, draws.WireDraws(both, 1000.0, "modified"), request)
     content = found.content
     assert content["feasible_draws"] == 0.5
     assert content["forward"]["solved"] == 0.5
     assert [entry["solved"] for entry in content["drift"]] == [0.5, 0.5]
-    alone = answer(robot, strong, request).content
+    alone = pose_report(robot, strong, request).content
     wanted = alone["drift"][0]["distance_mm"]["mean"]
     np.testing.assert_allclose(content["drift"][0]["distance_mm"]["mean"], wanted, rtol=1e-9)
     pictures.save_pose(tmp_path, robot, request, found)
@@ -49,7 +49,7 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
 
 def test_one_draw_is_enough():
     robot = schema.read("hangprinter-4")
-    content = answer(robot, _line(1, 5000.0), PoseRequest(robot.home_m, np.eye(3), TIMES)).content
+    content = pose_report(robot, _line(1, 5000.0), PoseRequest(robot.home_m, np.eye(3), TIMES)).content
     assert content["forward"]["solved"] == 1.0
     assert "sentence" in content["variance_shares"]
 
@@ -64,14 +64,14 @@ def test_given_wires_have_no_uncertainty_and_keep_their_leg():
     assert wires.theta["k1"].shape == (6, 20)
     np.testing.assert_array_equal(wires.theta["k1"][0], 5e4)
     np.testing.assert_array_equal(wires.theta["k1"][1], wires.theta["k1"][5])
-    content = answer(mixed, _line(20, 800.0), PoseRequest(mixed.home_m, np.eye(3), TIMES)).content
+    content = pose_report(mixed, _line(20, 800.0), PoseRequest(mixed.home_m, np.eye(3), TIMES)).content
     assert content["forward"]["largest_round_trip_error_m"] < 1e-9
 
 
 def test_bands_leave_lost_draws_out():
     values = np.array([[1.0, 2.0], [np.nan, 2.0], [3.0, 4.0]])
-    np.testing.assert_allclose(band(values)["mean"], [2.0, 3.0])
-    assert band(np.empty((0, 2)))["mean"] is None
+    np.testing.assert_allclose(band_over_draws(values)["mean"], [2.0, 3.0])
+    assert band_over_draws(np.empty((0, 2)))["mean"] is None
 
 
 @pytest.mark.parametrize(("name", "leg"), [("linear-6", 3.0), ("hangprinter-4", 4.0 * (2.29983 - 0.3))])
@@ -85,7 +85,7 @@ def test_creep_grows_with_the_length_as_the_joint_fit_says(name, leg):
     elongation = line.parameters["B"] * (leg / 1.0) ** exponent  # of the leg's own wire at 1 N, mm
     tested = wires.theta["B"][-1] / wires.length_mm[-1] * 1e3 * leg
     np.testing.assert_allclose(tested, elongation, rtol=1e-5)
-    content = answer(robot, scaled, PoseRequest(robot.home_m, np.eye(3), TIMES)).content
+    content = pose_report(robot, scaled, PoseRequest(robot.home_m, np.eye(3), TIMES)).content
     assert content["variance_shares"]["shared_draw"][draws.LENGTH_EXPONENT] > 0.1
     assert any("exponent" in notice["text"] for notice in content["warnings"]) or name == "linear-6"
 
@@ -94,7 +94,7 @@ def test_what_a_fit_could_not_name_is_said_to_be_missing():
     from wirebayes.effects.unknown import Discrepancy
 
     line = draws.WireDraws(_line(3, 800.0).parameters, 1000.0, effects=(Discrepancy(5, 0.1, 120.0),))
-    message = draws.warnings(schema.read("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
+    message = draws.wire_warnings(schema.read("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
     assert len(message) == 1
     assert "could not name" in message[0].text and message[0].kind == "left-out"
 
@@ -104,7 +104,7 @@ def test_tilt_is_measured_against_the_commanded_normal_and_against_the_vertical(
 
     robot = schema.read("cogiro-desk")
     leaning = matrix(np.array([0.05, 0.0, 0.3]))
-    drift = answer(robot, _line(40, 800.0), PoseRequest(robot.home_m, leaning, TIMES)).content["drift"][0]
+    drift = pose_report(robot, _line(40, 800.0), PoseRequest(robot.home_m, leaning, TIMES)).content["drift"][0]
     away = np.degrees(np.arccos(leaning[2, 2]))
     assert drift["tilt_deg"]["q95"][0] < 1e-6
     assert 0 < drift["tilt_deg"]["q50"][1] < 0.5

@@ -19,7 +19,7 @@ from wirebayes.errors import InputError
 from wirebayes.json_files.plain import plain
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history import commanded, corrections
-from wirebayes.robot.history.estimate import estimate
+from wirebayes.robot.history.estimate import estimate_poses
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.live import LiveEstimator
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
@@ -28,7 +28,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion.creep import fresh
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated, from_dict, to_dict
-from wirebayes.robot.self_calibration.estimate import calibrate
+from wirebayes.robot.self_calibration.estimate import length_posterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 HOLD_S, SOON_S = 40.0, 1e-3
@@ -55,7 +55,7 @@ def case():
         places, level, whole.joint_m[:-2:2], np.full(len(places), HOLD_S), np.ones(len(places), bool), 0.01
     )
     prior = LengthPrior(line, ERRORS.reference_m, ERRORS.spread)
-    known = calibrate(robot, prior, session, reads.ravel()[None] / 0.01)
+    known = length_posterior(robot, prior, session, reads.ravel()[None] / 0.01)
     assert known.converged.all()
     start = calibrated(robot, prior, session, known)
     after = History(times[-2:], whole.joint_m[-2:], None, None, np.zeros(2), np.zeros((2, 3)))
@@ -78,7 +78,9 @@ class Case:
     def estimated(self, errors):
         """Positions ``(n, 2, 3)``."""
         begin = (self.robot.home_m, np.eye(3))
-        return estimate(self.robot, self.line, self.after, begin, errors, np.random.default_rng(0)).track.position_m
+        return estimate_poses(
+            self.robot, self.line, self.after, begin, errors, np.random.default_rng(0)
+        ).track.position_m
 
 
 def test_a_history_goes_on_with_the_lengths_and_the_creep_of_the_session(case, monkeypatch):
@@ -100,11 +102,11 @@ def test_joint_values_of_a_trajectory_allow_for_the_calibration(case):
     goal = robot.home_m + 0.1 * robot.span_m * np.array([1.0, -0.5, 0.3])
     asked = replace(after, joint_m=None, position_m=np.stack([goal, goal]), rotation=np.tile(np.eye(3), (2, 1, 1)))
     errors = replace(ERRORS, calibrated=case.start)
-    found, joint = commanded.drift(robot, case.line, asked, errors, np.random.default_rng(0))
+    found, joint = commanded.drift_along(robot, case.line, asked, errors, np.random.default_rng(0))
     np.testing.assert_allclose(found.track.position_m[:, 0], np.tile(goal, (case.line.count, 1)), atol=1e-7)
     assert np.linalg.norm(case.led_by(joint.mean(0))[0] - goal) < 0.3 * np.linalg.norm(case.position_m[0] - goal)
     to = corrections.target(robot, asked, found)
-    left = corrections.left(robot, asked, found, to, joint.mean(0), np.arange(1))
+    left = corrections.error_left(robot, asked, found, to, joint.mean(0), np.arange(1))
     assert 1e-4 < np.median(left) < 1e-3  # what the calibration left unknown
 
 

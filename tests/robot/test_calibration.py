@@ -7,9 +7,9 @@ from tests.robot import cases
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
-from wirebayes.robot.self_calibration.estimate import calibrate, corrected
+from wirebayes.robot.self_calibration.estimate import corrected_joints, length_posterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
-from wirebayes.robot.self_calibration.start import start
+from wirebayes.robot.self_calibration.start import starting_references
 
 
 def _line(n=300, seed=1):
@@ -40,7 +40,7 @@ def test_sensitivity_is_the_derivative_of_the_equilibrium():
     wires = draws.for_robot(robot, _line().centre())
     zero, offset = inverse.lengths(robot, session.joint_m)
     at = forward.solve(robot, wires, zero, offset, session.position_m, session.rotation)
-    motion, change = observability.sensitivity(robot, wires, at.position_m, at.rotation, zero, offset)
+    motion, change = observability.length_sensitivity(robot, wires, at.position_m, at.rotation, zero, offset)
     h = 1e-6
     for i in range(robot.legs):
         step = h * np.eye(robot.legs)[i]
@@ -65,7 +65,7 @@ def test_exact_readings_bring_back_the_lengths(rolling):
     truth = mean[None].copy()
     truth[:, : robot.legs] = 5e-3 * rng.normal(size=(1, robot.legs))
     real = predict(robot, prior, session, truth)
-    known = calibrate(robot, prior, session, real.readings)
+    known = length_posterior(robot, prior, session, real.readings)
     assert known.converged.all()
     np.testing.assert_allclose(known.length_m, real.length_m, atol=5e-6)
     np.testing.assert_allclose(known.position_m, real.position_m[:, -1], atol=5e-6)
@@ -83,9 +83,9 @@ def test_slack_wires_do_not_mislead_the_calibration():
     real = predict(robot, prior, session, truth)
     slack = (real.readings == 0).any(1)
     assert slack.any()
-    guess = start(robot, prior, session, real.readings)
+    guess = starting_references(robot, prior, session, real.readings)
     assert np.abs(guess - truth[:, : robot.legs]).mean() < 0.25 * np.abs(truth[:, : robot.legs]).mean()
-    known = calibrate(robot, prior, session, real.readings[slack][:1])
+    known = length_posterior(robot, prior, session, real.readings[slack][:1])
     assert known.converged.all()
     # without noise only the prior's pull remains, a fraction of the standard error
     assert (np.abs(known.length_m - real.length_m[slack][:1]) < known.length_sd_m).all()
@@ -106,7 +106,7 @@ def test_biases_of_the_sensors_are_estimated_where_a_prior_allows_them(moving):
     off = (real.readings - still.readings).reshape(6, -1, robot.legs) * session.tension_sd_N
     np.testing.assert_allclose(off, bias[:, None] * session.bias_sign, atol=1e-9)
     readings = real.readings + rng.normal(size=real.readings.shape)
-    known = calibrate(robot, prior, session, readings)
+    known = length_posterior(robot, prior, session, readings)
     estimated = known.unknowns[:, -robot.legs :]
     sd = np.sqrt(np.einsum("mdd->md", known.covariance))[:, -robot.legs :]
     assert known.converged.all()
@@ -114,7 +114,7 @@ def test_biases_of_the_sensors_are_estimated_where_a_prior_allows_them(moving):
     assert sd.mean() < 0.15  # half of what was known before
     low, high = known.interval(0.9)
     assert ((low <= real.length_m) & (real.length_m <= high)).mean() > 0.75
-    blind = calibrate(robot, replace(prior, bias_sd_N=0.0), session, readings)
+    blind = length_posterior(robot, replace(prior, bias_sd_N=0.0), session, readings)
     assert np.median(blind.misfit) > 10 * np.median(known.misfit)
     wrong = np.abs(blind.length_m - real.length_m).mean()
     assert wrong > 1.5 * np.abs(known.length_m - real.length_m).mean()
@@ -147,14 +147,14 @@ def test_intervals_cover_and_hooke_alone_does_not():
     readings = np.maximum(real.readings + rng.normal(size=real.readings.shape), 0)
     covered, error = {}, {}
     for creeps in (True, False):
-        known = calibrate(robot, replace(prior, creeps=creeps), session, readings)
+        known = length_posterior(robot, replace(prior, creeps=creeps), session, readings)
         low, high = known.interval(0.9)
         covered[creeps] = ((low <= real.length_m) & (real.length_m <= high)).mean()
         error[creeps] = np.abs(known.length_m - real.length_m).mean()
         if creeps:
             assert known.converged.all()
             x = robot.home_m + 0.05
-            joint = corrected(robot, prior, known, x, np.eye(3))
+            joint = corrected_joints(robot, prior, known, x, np.eye(3))
             wires, reference = prior.wires(robot, truth)
             bare, offset = inverse.lengths(robot, joint)
             there = forward.solve(robot, wires, (bare + reference) * (1 + real.creep), offset, x, np.eye(3))
@@ -174,7 +174,7 @@ def test_an_inclinometer_helps():
         session = _session(robot, line, 5, np.random.default_rng(6), tilt)
         mean, _ = prior.moments(robot.legs)
         real = predict(robot, prior, session, mean[None])
-        known = calibrate(robot, prior, session, real.readings)
+        known = length_posterior(robot, prior, session, real.readings)
         sd.append(known.length_sd_m.mean())
     assert sd[1] < 0.95 * sd[0]
 
@@ -200,7 +200,7 @@ def test_chosen_poses_say_more_than_the_first_ones():
     R = rotation.matrix(0.1 * rng.normal(size=x.shape))
     tau = inverse.tensions(robot, x, R)
     commands = inverse.commands(robot, wires, x, R, tau)
-    change = observability.sensitivity(robot, wires, x, R, commands.zero_m, commands.offset_m)[1]
+    change = observability.length_sensitivity(robot, wires, x, R, commands.zero_m, commands.offset_m)[1]
     pick = observability.choose_poses(change, 6, 0.02, 5e-3)
     chosen, first = (observability.observe(change[i], 0.02, 5e-3).sd_m.mean() for i in (pick, list(range(6))))
     assert chosen < 0.8 * first

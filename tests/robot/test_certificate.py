@@ -64,7 +64,7 @@ def test_a_proof_grows_with_the_robot(many):
     robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
     known = np.full(robot.legs, k1)
     small = certify(robot, "hooke", (known, known), (zero, zero), offset, x, R)
-    big = claim.scaled(robot, many, robot.mass_kg)
+    big = claim.scaled_robot(robot, many, robot.mass_kg)
     large = certify(big, "hooke", (known, known), (many * zero, many * zero), many * offset, many * x, R)
     assert large.proved and large.unique_m == pytest.approx(many * small.unique_m, rel=1e-6)
     np.testing.assert_allclose(large.radius_m, many * small.radius_m, rtol=1e-6)

@@ -276,7 +276,7 @@ def test_the_documented_session_is_one():
     from wirebayes.robot.mechanics import schema
     from wirebayes.robot.self_calibration import session_file
 
-    session, readings = session_file.read(DOCS / "linear-7-session.csv", schema.read("linear-7"), 0.02, 1e-3)
+    session, readings = session_file.read_session(DOCS / "linear-7-session.csv", schema.read("linear-7"), 0.02, 1e-3)
     assert session.read.tolist() == [False] + [True] * 8
     assert len(readings) == 8 * 7
 

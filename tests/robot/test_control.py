@@ -90,7 +90,7 @@ def test_poses_out_of_reach_are_left_out_of_the_workspace():
 
 def test_a_smaller_and_lighter_robot_is_the_same_robot():
     robot = schema.read("linear-6")
-    half = claim.scaled(robot, 0.5, 0.6)
+    half = claim.scaled_robot(robot, 0.5, 0.6)
     tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
     small = inverse.tensions(half, half.home_m[None], np.eye(3)[None])
     np.testing.assert_allclose(small, 0.5 * tau, rtol=1e-9)
@@ -102,7 +102,7 @@ def test_the_largest_mass_is_where_the_claim_stops_to_hold():
     assert 1e-3 < mass < 1.0
 
     def holds(kilograms):
-        other = claim.scaled(robot, 1.0, kilograms)
+        other = claim.scaled_robot(robot, 1.0, kilograms)
         wires = draws.for_robot(other, line, 0.05, np.random.default_rng(1))
         out = claim.over_workspace(other, wires, claim.grid(other, (3, 3, 2)))
         return np.mean(out.holds() >= 0.95) >= 0.95

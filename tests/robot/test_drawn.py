@@ -8,7 +8,7 @@ import pytest
 from wirebayes.robot.mechanics import draws
 from wirebayes.robot.motion import drift, equilibria, forward, inverse
 from wirebayes.robot.pose import stability
-from wirebayes.robot.pose.answer import answer
+from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.robot.proof import proofs
 
@@ -118,7 +118,7 @@ def test_falls_are_found_at_their_time_and_reported(kind, seed):
     report = stability.summary(course)
     assert report["fall_probability"] == 1.0
     assert report["fall_time_s"]["first"] == ours
-    warnings = stability.warnings(course, 0.0)
+    warnings = stability.stability_warnings(course, 0.0)
     assert "falls in 100 % of the draws" in warnings[0].text
 
 
@@ -225,7 +225,7 @@ def _crept(d):
 
 def test_a_pose_of_seven_wires_is_among_its_own_equilibria_and_named():
     d = drawn.draw("body-7", np.random.default_rng(0), 20, 0.02)
-    content = answer(d.robot, d.line, PoseRequest(d.position_m, d.rotation, np.array([0.0, 1.0]))).content
+    content = pose_report(d.robot, d.line, PoseRequest(d.position_m, d.rotation, np.array([0.0, 1.0]))).content
     own = [p for p in content["equilibria"]["poses"] if p["commanded"]]
     assert len(own) == 1
     assert own[0]["stable"] == content["equilibria"]["commanded_stable"]

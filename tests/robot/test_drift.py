@@ -220,12 +220,12 @@ def test_shared_draws_sink_and_specimens_tilt():
     for spread in (0.0, 0.05):
         wires = draws.for_robot(robot, line, spread, rng)
         course = drift.from_command(robot, wires, robot.home_m, np.eye(3), np.array([60.0]))
-        shift, _ = drift.moved(course, robot.home_m, np.eye(3))
+        shift, _ = drift.distance_moved(course, robot.home_m, np.eye(3))
         tilt[spread], sd[spread] = np.median(rotation.tilt(course.rotation)), np.linalg.norm(shift, axis=-1).std()
     certain = replace(line, parameters={k: np.full(400, v.mean()) for k, v in line.parameters.items()})
     wires = draws.for_robot(robot, certain, 0.05, rng)
     alone = drift.from_command(robot, wires, robot.home_m, np.eye(3), np.array([60.0]))
-    only_specimens = np.linalg.norm(drift.moved(alone, robot.home_m, np.eye(3))[0], axis=-1).std()
+    only_specimens = np.linalg.norm(drift.distance_moved(alone, robot.home_m, np.eye(3))[0], axis=-1).std()
     assert tilt[0.05] > 3 * tilt[0.0]
     assert only_specimens < 0.6 * sd[0.0]
 
@@ -236,7 +236,7 @@ def test_rotation_angle_keeps_small_and_large_angles():
     angle = np.array([1e-9, 1e-3, 1.0, 3.0])
     R = matrix(angle[:, None] * np.array([0.6, 0.0, 0.8]))[:, None]
     course = Course(np.zeros(1), np.zeros((4, 1, 3)), R, np.zeros((4, 1, 6)), np.zeros((4, 1), int), fresh(6, 4))
-    np.testing.assert_allclose(drift.moved(course, np.zeros(3), np.eye(3))[1][:, 0], angle, rtol=1e-9)
+    np.testing.assert_allclose(drift.distance_moved(course, np.zeros(3), np.eye(3))[1][:, 0], angle, rtol=1e-9)
 
 
 def test_bench_quantities_never_enter():
@@ -250,6 +250,6 @@ def test_bench_quantities_never_enter():
 
 def test_uses_outside_the_tested_range_cause_warnings():
     line = replace(_line(), tension_range_N=(1.0, 5.0), time_range_s=(0.0, 120.0))
-    message = draws.warnings(schema.read("linear-6"), line, np.array([0.5, 3.0]), 3600.0, np.array([3.0]))
+    message = draws.wire_warnings(schema.read("linear-6"), line, np.array([0.5, 3.0]), 3600.0, np.array([3.0]))
     assert len(message) == 3
-    assert draws.warnings(schema.read("linear-6"), line, np.array([1.5, 3.0]), 100.0, np.array([1.1])) == []
+    assert draws.wire_warnings(schema.read("linear-6"), line, np.array([1.5, 3.0]), 100.0, np.array([1.1])) == []

@@ -15,7 +15,7 @@ from wirebayes.robot.history import table
 from wirebayes.robot.mechanics import draws, drums, schema
 from wirebayes.robot.mechanics.description import Drums
 from wirebayes.robot.motion import claim, forward, inverse
-from wirebayes.robot.pose.answer import answer
+from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.robot.self_calibration import session_file
 from wirebayes.strict.table import csv_table
@@ -85,12 +85,12 @@ def test_motor_angles_lead_to_the_pose_and_back():
     paid = drums.paid_out(robot.drums, angle)[1]
     assert (np.abs(3 * paid - robot.drums.radius_m) < 4e-3).all()
     short = replace(robot, drums=replace(robot.drums, wire_m=np.array([1.0, 12.0, 12.0, 12.0])))
-    content = answer(short, line, PoseRequest(x[0], R[0], np.array([0.0, 60.0]))).content
+    content = pose_report(short, line, PoseRequest(x[0], R[0], np.array([0.0, 60.0]))).content
     np.testing.assert_allclose(content["inverse"]["motor_angle_rad"]["mean"][1:], angle.mean(0)[1:])
     np.testing.assert_allclose(content["inverse"]["wire_per_motor_angle_m_rad"]["mean"][1:], paid.mean(0)[1:])
     text = "wire 1 is longer here than its drum's wire_length_m, 1 m"
     assert {"kind": "geometry", "text": text} in content["warnings"]
-    big = claim.scaled(robot, 2.0, robot.mass_kg)
+    big = claim.scaled_robot(robot, 2.0, robot.mass_kg)
     np.testing.assert_allclose(drums.motor_angle(big.drums, 2 * commands.joint_m), angle)
 
 
@@ -105,12 +105,12 @@ def test_a_session_may_give_motor_angles(tmp_path):
             rows = csv.writer(file)
             rows.writerow(session_file.columns(robot, ["motor_1_rad"] if motors else []).required)
             rows.writerow([1, *robot.home_m, 0, 0, 0, 60, *map(float, values), *[2.0] * 8])
-        sessions.append(session_file.read(tmp_path / name, robot, 0.02, 1e-3)[0])
+        sessions.append(session_file.read_session(tmp_path / name, robot, 0.02, 1e-3)[0])
     assert "joint_3_m" in session_file.columns(robot, ["motor_4_rad"]).required
     assert "motor_4_rad" in session_file.columns(robot, ["motor_4_rad"]).required
     np.testing.assert_allclose(sessions[1].joint_m, sessions[0].joint_m, atol=1e-13)
     with pytest.raises(InputError, match="expected a header of hold,.*joint_1_m"):
-        session_file.read(tmp_path / "b", schema.read("cogiro-desk"), 0.02, 1e-3)
+        session_file.read_session(tmp_path / "b", schema.read("cogiro-desk"), 0.02, 1e-3)
 
 
 def test_tables_may_give_the_straight_lengths_that_firmware_counts():
@@ -124,16 +124,16 @@ def test_tables_may_give_the_straight_lengths_that_firmware_counts():
     def session(names, rows):
         cells = [[i + 1, *pose, *map(float, row), *tension] for i, row in enumerate(rows)]
         text = "\n".join([",".join(names), *(",".join(map(str, c)) for c in cells)])
-        return session_file.parse(csv_table(Path("session.csv"), text), robot, 0.02, 1e-3)[0].joint_m
+        return session_file.parse_session(csv_table(Path("session.csv"), text), robot, 0.02, 1e-3)[0].joint_m
 
     def log(names, rows):
         cells = [[60.0 * i, *map(float, row)] for i, row in enumerate(rows)]
         text = "\n".join([",".join(names), *(",".join(map(str, c)) for c in cells)])
-        return table.parse(csv_table(Path("log.csv"), text), robot, table.measured).joint_m
+        return table.parse_log(csv_table(Path("log.csv"), text), robot, table.measured_columns).joint_m
 
     for read, names in (
         (session, session_file.columns(robot, given).required),
-        (log, table.measured(robot, given).required),
+        (log, table.measured_columns(robot, given).required),
     ):
         assert "straight_4_mm" in names
         np.testing.assert_allclose(read(names, straight), wire, rtol=1e-12)

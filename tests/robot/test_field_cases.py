@@ -14,7 +14,7 @@ from wirebayes.cli import main
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion import hanging, inverse
-from wirebayes.robot.pose.orientation import orientation
+from wirebayes.robot.pose.orientation import balanced_orientation
 
 FIELD = Path(__file__).parent / "field"
 ANCHORS = FIELD / "calibrate-wrong-anchors"
@@ -152,7 +152,7 @@ def test_robots_of_few_wires_hang_as_an_energy_minimiser_has_them(file, position
     robot = schema.read(FIELD / "under-actuated" / file)
     x = np.array(robot.home_m if position is None else position)
     asked = np.array([np.nan, np.nan, turn[2]]) if robot.legs == 4 else np.full(3, np.nan)
-    found = orientation(robot, x, asked)
+    found = balanced_orientation(robot, x, asked)
     R = found.rotation
     assert not found.sentence and not found.refused
     np.testing.assert_allclose(vector(R[None])[0], turn, atol=1e-4)  # theirs is rounded to five digits, the turn too

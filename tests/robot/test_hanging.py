@@ -9,7 +9,7 @@ from analyses.robots.hanging import compared, drawn
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.motion import hanging, inverse
-from wirebayes.robot.pose.orientation import orientation
+from wirebayes.robot.pose.orientation import balanced_orientation
 
 FREE = np.nan
 
@@ -53,7 +53,7 @@ def test_of_a_family_the_rule_of_the_tensions_chooses(four):
 
 
 def test_a_component_that_is_asked_for_is_had_and_the_others_are_said(four):
-    found = orientation(four, four.home_m, np.array([FREE, FREE, -0.00057]))
+    found = balanced_orientation(four, four.home_m, np.array([FREE, FREE, -0.00057]))
     vector = turning.vector(found.rotation[None])[0]
     np.testing.assert_allclose(vector, [0.16327, -0.28544, -0.00057], atol=2e-5)
     assert found.found["commanded_components"] == ["rz"] and found.found["free_components"] == ["rx", "ry"]
@@ -61,16 +61,16 @@ def test_a_component_that_is_asked_for_is_had_and_the_others_are_said(four):
 
 
 def test_more_components_than_the_wires_command_are_refused_by_name(four):
-    found = orientation(four, four.home_m, np.array([0.0, FREE, -0.00057]))
+    found = balanced_orientation(four, four.home_m, np.array([0.0, FREE, -0.00057]))
     assert len(found.found["commanded_components"]) == 1 and len(found.found["refused_components"]) == 1
     assert found.found["refused_components"][0] in found.refused
 
 
 def test_tensions_beyond_the_bounds_hold_nothing(four):
     weak = replace(four, rule=replace(four.rule, highest_N=4.0))
-    assert not orientation(weak, weak.home_m, None).found
+    assert not balanced_orientation(weak, weak.home_m, None).found
     strong = replace(four, rule=replace(four.rule, highest_N=5.2))
-    assert orientation(strong, strong.home_m, None).found
+    assert balanced_orientation(strong, strong.home_m, None).found
 
 
 def test_two_wires_command_two_directions_and_name_the_nearest_position(four):
@@ -79,16 +79,16 @@ def test_two_wires_command_two_directions_and_name_the_nearest_position(four):
         platform_m=np.array([[-0.06, 0.0, 0.03], [0.06, 0.0, 0.03]]), centre_of_mass_m=np.array([0.0, 0.0, -0.02]),
         actuator=("drum",) * 2, ratio=np.zeros(2), wire_m=np.zeros(2), wire=("default",) * 2, mass_kg=0.7,
     )  # fmt: skip
-    found = orientation(pair, np.array([0.4, 0.0, 1.2]), None)
+    found = balanced_orientation(pair, np.array([0.4, 0.0, 1.2]), None)
     np.testing.assert_allclose(turning.vector(found.rotation[None])[0], [0.0, 0.25961, 0.0], atol=1e-5)
     assert found.found["position_directions"] == 2 and found.found["commanded_degrees"] == 2
-    beside = orientation(pair, np.array([0.4, 0.1, 1.2]), None)
+    beside = balanced_orientation(pair, np.array([0.4, 0.1, 1.2]), None)
     assert beside.found is None and "nearest position" in beside.sentence
 
 
 def test_a_robot_with_wires_enough_keeps_its_home_orientation():
     robot = schema.read("linear-7")
-    found = orientation(robot, robot.home_m, None)
+    found = balanced_orientation(robot, robot.home_m, None)
     assert found.found is None
     np.testing.assert_array_equal(found.rotation, turning.matrix(robot.home_rotation_rad))
 

@@ -14,13 +14,13 @@ from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.errors import InputError
 from wirebayes.robot.history import commanded, conditioning, corrections, table
-from wirebayes.robot.history.answer import answer
-from wirebayes.robot.history.conditioning import Readings, predicted
-from wirebayes.robot.history.estimate import estimate
-from wirebayes.robot.history.follow import Track, clock_starts, follow, uncreeping
+from wirebayes.robot.history.answer import history_report
+from wirebayes.robot.history.conditioning import LogReadings, predicted_readings
+from wirebayes.robot.history.estimate import estimate_poses
+from wirebayes.robot.history.follow import Track, clock_starts, follow_log, uncreeping
 from wirebayes.robot.history.history import History, roll_and_pitch, with_payload
 from wirebayes.robot.history.readings import Information, Sensors
-from wirebayes.robot.history.unknowns import Uncertain, Unknowns, even_normals, unknowns
+from wirebayes.robot.history.unknowns import LogUnknowns, Uncertain, even_normals, unknowns
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.mechanics.description import Drums
 from wirebayes.robot.motion import inverse
@@ -116,7 +116,7 @@ def test_a_history_is_followed_as_a_simulation_of_its_own_has_it(name):
     own, reference = rng.standard_normal((2, 3 * legs)), rng.standard_normal((2, legs))
     wires, error = known.columns(np.concatenate([reference, known.draws[:, legs : -3 * legs], own], 1))
     starts = clock_starts(history, np.ones((6, robot.legs)))
-    track = follow(robot, wires, history, history.joint_m, (robot.home_m, np.eye(3)), starts, error)
+    track = follow_log(robot, wires, history, history.joint_m, (robot.home_m, np.eye(3)), starts, error)
     assert track.hold.tolist() == [0, 0, 1, 1, 2, 2]
     for j in range(2):
         x, R, tau = _simulated(robot, _theta(wires, j), history, error[j])
@@ -131,7 +131,7 @@ def test_bands_cover_the_truth_and_readings_narrow_them():
     history = _joint_values_for(robot, TIMES, _places(robot), HOLDS)
     errors, start = Uncertain(1e-3, 0.05, 0.02, 5e-4), (robot.home_m, np.eye(3))
     line = _line(80)
-    blind = estimate(robot, line, history, start, errors, np.random.default_rng(2))
+    blind = estimate_poses(robot, line, history, start, errors, np.random.default_rng(2))
     truths = unknowns(robot, _line(2, seed=9), errors, np.random.default_rng(3))
     wires, error = truths.columns(truths.draws)
     rng = np.random.default_rng(4)
@@ -142,7 +142,7 @@ def test_bands_cover_the_truth_and_readings_narrow_them():
             history, tension_N=tau + 0.02 * rng.standard_normal(tau.shape),
             tilt_rad=roll_and_pitch(R) + 5e-4 * rng.standard_normal((len(x), 2)),
         )  # fmt: skip
-        found = estimate(robot, line, read, start, errors, np.random.default_rng(5))
+        found = estimate_poses(robot, line, read, start, errors, np.random.default_rng(5))
         assert found.converged
         assert found.misfit < 2
         for kept, track in ((deviations, found.track), (blinds, blind.track)):
@@ -157,15 +157,17 @@ def test_bands_cover_the_truth_and_readings_narrow_them():
 def test_corrected_joint_values_bring_the_platform_back():
     robot = schema.read("linear-7")
     history = _joint_values_for(robot, TIMES, _places(robot))
-    found = estimate(robot, _line(40), history, (robot.home_m, np.eye(3)), Uncertain(1e-3), np.random.default_rng(0))
+    found = estimate_poses(
+        robot, _line(40), history, (robot.home_m, np.eye(3)), Uncertain(1e-3), np.random.default_rng(0)
+    )
     to = corrections.target(robot, history, found)
     np.testing.assert_allclose(to.position_m, _places(robot), atol=2e-4)  # nothing creeps there: about what was told
     joint = corrections.wanted(robot, history, found, to)
     rows = np.arange(len(TIMES))
     away = np.linalg.norm(found.track.position_m - to.position_m, axis=-1)
     assert away[:, -1].min() > 5e-4
-    assert corrections.left(robot, history, found, to, joint, rows).max() < 1e-7
-    mean = corrections.left(robot, history, found, to, joint.mean(0), rows)
+    assert corrections.error_left(robot, history, found, to, joint, rows).max() < 1e-7
+    mean = corrections.error_left(robot, history, found, to, joint.mean(0), rows)
     assert np.median(mean[:, -1]) < 0.4 * np.median(away[:, -1])
 
 
@@ -176,7 +178,7 @@ def test_clocks_start_with_a_change_of_load_and_not_with_small_corrections():
     places = [robot.home_m, up, robot.home_m, lift, lift, lift]
     history = _joint_values_for(robot, TIMES, places, payload=[0, 0, 0, 0, 0, 1.0])
     plain = uncreeping(draws.for_robot(robot, _line(1)))
-    track = follow(robot, plain, history, history.joint_m, (robot.home_m, np.eye(3)), np.zeros(1))
+    track = follow_log(robot, plain, history, history.joint_m, (robot.home_m, np.eye(3)), np.zeros(1))
     starts = clock_starts(history, track.tension_N[0])
     assert starts[0] == 0
     assert starts[-1] == TIMES[-1]  # with the payload
@@ -211,7 +213,7 @@ def test_an_even_motion_of_the_joints_needs_no_rows_between(name):
     )  # fmt: skip
     start, ends = (robot.home_m, np.eye(3)), {}
     for kind, history in (("few", few), ("many", many)):
-        found = estimate(robot, _line(2), history, start, Uncertain(), np.random.default_rng(0))
+        found = estimate_poses(robot, _line(2), history, start, Uncertain(), np.random.default_rng(0))
         assert found.plain.position_m.shape[1] == len(history.times_s)
         rows = np.searchsorted(history.times_s, [110, 400])
         ends[kind] = found, (found.track.position_m - found.plain.position_m)[:, rows]
@@ -231,7 +233,7 @@ def test_commanded_poses_need_no_rows_between():
         history = _joint_values_for(robot, columns[0], np.stack(columns[1:], 1))
         history = replace(history, joint_m=None, position_m=np.stack(columns[1:], 1),
                           rotation=np.tile(np.eye(3), (len(columns[0]), 1, 1)))  # fmt: skip
-        found, joint = commanded.drift(robot, _line(3), history, Uncertain(), np.random.default_rng(0))
+        found, joint = commanded.drift_along(robot, _line(3), history, Uncertain(), np.random.default_rng(0))
         assert joint.shape == (3, len(columns[0]), 8)
         drifts[name] = found.track.position_m[:, -1] - robot.home_m
         assert np.abs(found.track.position_m[:, 0] - robot.home_m).max() < 1e-9
@@ -312,7 +314,7 @@ def test_draws_given_readings_are_those_of_a_curved_posterior(tension, read, lea
     rng, n = np.random.default_rng(0), 4000
 
     def known():
-        return Unknowns(None, None, np.zeros(2), np.eye(2), rng.standard_normal((n, 2)))
+        return LogUnknowns(None, None, np.zeros(2), np.eye(2), rng.standard_normal((n, 2)))
 
     def way(white, name, without):
         tau = tension(*white.T) * (0.0 if without.any() else 1.0)
@@ -320,12 +322,12 @@ def test_draws_given_readings_are_those_of_a_curved_posterior(tension, read, lea
         return Track(np.zeros((*columns, 3)), np.tile(np.eye(3), (*columns, 1, 1)), tau[..., None],
                      np.zeros((*columns, 1)), np.zeros(2, np.int64))  # fmt: skip
 
-    given = Readings(values, np.ones(2), of)
+    given = LogReadings(values, np.ones(2), of)
     loose = conditioning.slack_wires(given, 1)
     assert loose.tolist() == [tension is _hinged]
     mode = conditioning.find_mode(known(), given, way, loose)
     assert mode.converged
-    found = conditioning.draw(known, given, mode, way, rng)
+    found = conditioning.draw_posterior(known, given, mode, way, rng)
     grid = np.linspace(-4, 4, 81)
     z = np.stack(np.meshgrid(grid, grid, grid, indexing="ij"))
     left = np.array(read) - tension(z[0], z[1]) - of.offset[0] * z[2][..., None]
@@ -361,11 +363,11 @@ def test_readings_that_too_few_draws_agree_with_are_not_used(monkeypatch):
     history = _joint_values_for(robot, TIMES[:2], _places(robot)[:2])
     read = replace(history, tension_N=np.array([[1.14, 1.07, 1.1, 5.28]] * 2))
     arguments = ((robot.home_m, np.eye(3)), Uncertain(1e-3))
-    blind = estimate(robot, _line(12), history, *arguments, np.random.default_rng(0))
-    used = estimate(robot, _line(12), read, *arguments, np.random.default_rng(0))
-    monkeypatch.setattr("wirebayes.robot.history.estimate.draw",
-                        lambda *given: replace(conditioning.draw(*given), effective=5.0))  # fmt: skip
-    unused = estimate(robot, _line(12), read, *arguments, np.random.default_rng(0))
+    blind = estimate_poses(robot, _line(12), history, *arguments, np.random.default_rng(0))
+    used = estimate_poses(robot, _line(12), read, *arguments, np.random.default_rng(0))
+    monkeypatch.setattr("wirebayes.robot.history.estimate.draw_posterior",
+                        lambda *given: replace(conditioning.draw_posterior(*given), effective=5.0))  # fmt: skip
+    unused = estimate_poses(robot, _line(12), read, *arguments, np.random.default_rng(0))
     assert used.used
     assert not unused.used
     np.testing.assert_array_equal(unused.track.position_m, blind.track.position_m)
@@ -383,7 +385,7 @@ def _standing_still(places=None):
 
 def _answered(robot, history):
     with np.errstate(all="ignore"):
-        return answer(robot, _line(12), history, Uncertain(), (robot.home_m, np.eye(3)), 0)
+        return history_report(robot, _line(12), history, Uncertain(), (robot.home_m, np.eye(3)), 0)
 
 
 def test_a_row_that_some_or_all_draws_lose_takes_no_other_row_with_it(monkeypatch):
@@ -391,12 +393,12 @@ def test_a_row_that_some_or_all_draws_lose_takes_no_other_row_with_it(monkeypatc
     whole = _answered(robot, history).content
 
     def falling(*given):
-        found = estimate(*given)
+        found = estimate_poses(*given)
         for values in (found.track.position_m, found.track.rotation, found.track.tension_N):
             values[:5, 1], values[:, 2] = np.nan, np.nan
         return found
 
-    monkeypatch.setattr("wirebayes.robot.history.answer.estimate", falling)
+    monkeypatch.setattr("wirebayes.robot.history.answer.estimate_poses", falling)
     found = _answered(robot, history)
     content = found.content
     assert content["drift"][0]["held"].tolist() == [1.0, pytest.approx(7 / 12), 0.0]
@@ -476,7 +478,7 @@ HEAD = "time_s,joint_1_m,joint_2_m,joint_3_m,joint_4_m"
 def test_a_mistake_in_a_history_is_named_by_line_and_column(text, message):
     robot = schema.read("hangprinter-4")
     with pytest.raises(InputError) as caught:
-        table.parse(csv_table(Path("log.csv"), text), robot, table.measured)
+        table.parse_log(csv_table(Path("log.csv"), text), robot, table.measured_columns)
     assert str(caught.value).startswith((f"log.csv, {message}", f"log.csv: {message}"))
     assert "\n" not in str(caught.value)
 
@@ -487,9 +489,11 @@ def test_motor_angles_may_be_negative_but_not_the_lengths_they_pay_out():
     robot = replace(robot, drums=Drums(zeros + 0.05, zeros, zeros + np.inf, zeros, zeros, zeros - 1.0))
     head = ",".join(["time_s", *(f"motor_{i}_rad" for i in range(1, 5))])
     good = f"{head}\n0,-125,-136,-124,-160\n9,-125,-136,-124,-160\n"
-    assert table.parse(csv_table(Path("log.csv"), good), robot, table.measured).joint_m[0, 3] == pytest.approx(8.0)
+    assert table.parse_log(csv_table(Path("log.csv"), good), robot, table.measured_columns).joint_m[
+        0, 3
+    ] == pytest.approx(8.0)
     with pytest.raises(InputError) as caught:
-        table.parse(csv_table(Path("log.csv"), good.replace("9,-125", "9,125")), robot, table.measured)
+        table.parse_log(csv_table(Path("log.csv"), good.replace("9,-125", "9,125")), robot, table.measured_columns)
     wrong = "line 3, column 2 (motor_1_rad): found '125', which pays out -6.25 m, expected a length above 0"
     assert str(caught.value) == f"log.csv, {wrong}"
 
@@ -498,7 +502,10 @@ def test_a_linear_actuator_may_stand_at_zero_or_below():
     robot = schema.read("linear-7")
     text = ",".join(["time_s", *(f"joint_{i}_m" for i in range(1, 8))])
     text += "\n0,-0.1,0,0.1,0.1,0.1,0.1,0.1\n9,-0.1,0,0.1,0.1,0.1,0.1,0.1\n"
-    assert table.parse(csv_table(Path("log.csv"), text), robot, table.measured).joint_m[0, :2].tolist() == [-0.1, 0.0]
+    assert table.parse_log(csv_table(Path("log.csv"), text), robot, table.measured_columns).joint_m[0, :2].tolist() == [
+        -0.1,
+        0.0,
+    ]
 
 
 def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  # noqa: F811
@@ -555,7 +562,7 @@ def test_readings_are_predicted_in_the_order_of_the_sensors():
     robot = schema.read("linear-7")
     history = _joint_values_for(robot, TIMES[:2], _places(robot)[:2])
     wires = draws.for_robot(robot, _line(2))
-    track = follow(robot, wires, history, history.joint_m, (robot.home_m, np.eye(3)), np.zeros(1))
-    h = predicted(track)
+    track = follow_log(robot, wires, history, history.joint_m, (robot.home_m, np.eye(3)), np.zeros(1))
+    h = predicted_readings(track)
     assert h.shape == (2, 2, 9)
     np.testing.assert_array_equal(h[..., :7], track.tension_N)

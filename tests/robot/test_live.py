@@ -11,8 +11,8 @@ import wirebayes as wb
 from tests.robot import drawn
 from tests.robot.test_history import _joint_values_for, _line, _places
 from wirebayes.errors import InputError
-from wirebayes.robot.history.estimate import estimate
-from wirebayes.robot.history.follow import clock_starts, follow
+from wirebayes.robot.history.estimate import estimate_poses
+from wirebayes.robot.history.follow import clock_starts, follow_log
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.live import LiveEstimator
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
@@ -46,7 +46,7 @@ def _run(live, history, **more):
 def test_an_hour_agrees_with_the_batch(name):
     robot = schema.read(name)
     history, start, line = _history(robot), (robot.home_m, np.eye(3)), _line(32)
-    batch = estimate(robot, line, history, start, Uncertain(1e-3), np.random.default_rng(0)).track.position_m
+    batch = estimate_poses(robot, line, history, start, Uncertain(1e-3), np.random.default_rng(0)).track.position_m
     now = _run(LiveEstimator(robot, line, Uncertain(1e-3), start, reads=False), history)
     low, high = np.quantile(batch, [0.05, 0.95], axis=0)
     band = high - low
@@ -61,13 +61,13 @@ def test_with_readings_it_agrees_with_the_batch_in_the_end():
     robot = schema.read("hangprinter-4")
     history, start, line, errors = _history(robot), (robot.home_m, np.eye(3)), _line(64), Uncertain(1e-3, 0.05, 0.05)
     true = unknowns(robot, _line(1, seed=3), errors, np.random.default_rng(7))
-    plain = follow(robot, true.plain, history, history.joint_m, start, TIMES[:1]).tension_N[0]
+    plain = follow_log(robot, true.plain, history, history.joint_m, start, TIMES[:1]).tension_N[0]
     wires, error = true.columns(true.draws)
-    truth = follow(robot, wires, history, history.joint_m, start, clock_starts(history, plain), error)
+    truth = follow_log(robot, wires, history, history.joint_m, start, clock_starts(history, plain), error)
     rng = np.random.default_rng(8)
     tension = truth.tension_N[0] + 0.05 * rng.standard_normal(plain.shape)
     read = replace(history, tension_N=tension)
-    batch = estimate(robot, line, read, start, errors, np.random.default_rng(0)).track.position_m[:, -1]
+    batch = estimate_poses(robot, line, read, start, errors, np.random.default_rng(0)).track.position_m[:, -1]
     batch = batch[np.isfinite(batch).all(1)]
     last = _run(LiveEstimator(robot, line, errors, start), history, tension_N=tension)[-1]
     blind = _run(LiveEstimator(robot, line, errors, start, reads=False), history)[-1]
@@ -132,7 +132,7 @@ def test_a_payload_that_is_set_starts_the_clocks_and_lowers_the_platform():
     assert live._since == 1.0
     loaded = History(np.array([0.0, 1.0]), np.stack([joint, joint]), None, None, np.full(2, 0.5 * robot.mass_kg),
                      np.tile(robot.centre_of_mass_m, (2, 1)))  # fmt: skip
-    batch = estimate(robot, _line(4), loaded, (robot.home_m, np.eye(3)), Uncertain(), np.random.default_rng(0))
+    batch = estimate_poses(robot, _line(4), loaded, (robot.home_m, np.eye(3)), Uncertain(), np.random.default_rng(0))
     np.testing.assert_allclose(after.position_m, batch.track.position_m[:, 0].mean(0), atol=2e-4)
 
 

@@ -13,7 +13,7 @@ from wirebayes.robot.motion import claim, control, drift, forward
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.course import Course, Falls
 from wirebayes.robot.pose import answer, controllers, stability
-from wirebayes.robot.pose.request import PoseRequest, band
+from wirebayes.robot.pose.request import PoseRequest, band_over_draws
 
 NEVER, NAN = np.inf, np.nan
 TIMES = np.array([0.0, 10.0, 30.0, 60.0])
@@ -55,11 +55,11 @@ def test_falls_are_shares_of_the_draws_that_began() -> None:
 
 
 def test_warnings_say_who_falls_when_and_what_catches_it() -> None:
-    found = stability.warnings(course(FIVE), 0.05)[:3]
+    found = stability.stability_warnings(course(FIVE), 0.05)[:3]
     assert [notice.kind for notice in found] == ["fall", "fall", "slack"]
     began, fall, slack = (notice.text for notice in found)
     assert began.startswith("20 % of the draws cannot begin at the pose (specimens differing by 5 %): no stable")
-    assert "not stable" in stability.warnings(course(FIVE), 0.0, stable=False)[0].text
+    assert "not stable" in stability.stability_warnings(course(FIVE), 0.0, stable=False)[0].text
     assert "falls in 50 % of the draws within 60 s" in fall and "first after 5 s, in the median after 17.5 s" in fall
     assert fall.endswith("wire 2 giving way; it drops 20 mm")
     assert slack.endswith("wire 1 in 25 % of the draws, first after 20 s; wire 2 in 25 % of the draws, first after 4 s")
@@ -87,7 +87,7 @@ def test_a_platform_that_holds_is_warned_of_when_it_comes_near_to_a_fall(
     tension: float, stiffness: float, words: list[str]
 ) -> None:
     """Below a fifth of a wire's tension, or three tenths of the stiffness."""
-    assert [notice.text for notice in stability.warnings(holding(tension, stiffness), 0.0)] == words
+    assert [notice.text for notice in stability.stability_warnings(holding(tension, stiffness), 0.0)] == words
     found = stability.summary(holding(tension, stiffness))
     assert found["caught_probability"] is None and found["fall_time_s"] is None and found["fall_probability"] == 0.0
 
@@ -96,7 +96,7 @@ def test_where_no_draw_begins_there_is_nothing_more_to_say() -> None:
     none = Falls(*(getattr(FIVE, name)[4:] for name in Falls.__dataclass_fields__))
     for lost in (course(none), course(None)):
         assert stability.summary(lost) == {"began": 0.0}
-        assert len(stability.warnings(lost, 0.0)) == 1
+        assert len(stability.stability_warnings(lost, 0.0)) == 1
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_the_claim_over_a_workspace_counts_points_and_draws() -> None:
     space = claim.WorkspaceDrift(
         np.zeros((3, 3)), d, 0.5 * TILT_RAD * np.ones((3, 3)), np.array([[2.0, 7.0]] * 3), 0.8, 0.9
     )
-    found = claim.summary(space)
+    found = claim.claim_summary(space)
     assert space.holds() == pytest.approx([2 / 3] * 3)
     assert found["probability"] == pytest.approx(2 / 3) and found["probability_everywhere"] == pytest.approx(1 / 3)
     assert found["q50_drift_mm"] == pytest.approx(0.15) and found["q95_drift_mm"] == pytest.approx(0.6, rel=0.01)
@@ -166,7 +166,7 @@ def test_the_claim_over_a_workspace_counts_points_and_draws() -> None:
 
 
 def test_a_band_is_the_mean_the_spread_and_nine_in_ten_of_the_draws() -> None:
-    found = band(np.append(np.arange(101.0), NAN))
+    found = band_over_draws(np.append(np.arange(101.0), NAN))
     assert (found["mean"], found["q05"], found["q50"], found["q95"]) == (50.0, 5.0, 50.0, 95.0)
     assert found["sd"] == pytest.approx(np.sqrt((101**2 - 1) / 12))
 
@@ -275,7 +275,7 @@ def test_a_robot_that_may_fall_says_who_is_to_blame_in_every_way() -> None:
         "the platform falls in 75 % of the draws within 60 s (specimens alike), first after 20 s, in the median after "
         "40 s, wire 3 giving way; nothing catches it nearby"
     )
-    assert stability.warnings(course(fallen), 0.0) == [
+    assert stability.stability_warnings(course(fallen), 0.0) == [
         Notice("fall", falls),
         Notice("slack", "wire 3 may keep only 10 % of its tension within 60 s (specimens alike)"),
     ]
@@ -289,7 +289,7 @@ def test_wires_that_only_slacken_are_named_and_the_nearest_is_not_named_again() 
         np.full(n, NEVER), np.full(n, -1), np.zeros(n), slack, np.tile([0.9, 0.1, 0.8], (n, 1)), np.full(n, 0.2)
     )
     who = "within 60 s (specimens differing by 5 %)"
-    assert stability.warnings(course(loose), 0.05) == [
+    assert stability.stability_warnings(course(loose), 0.05) == [
         Notice("slack", f"wires go slack {who}: wire 2 in 25 % of the draws, first after 7.5 s"),
         Notice("fall", f"the stiffness against the softest motion may fall to 20 % {who}"),
     ]
@@ -302,7 +302,7 @@ def test_a_platform_that_always_falls_has_no_margin_left() -> None:
     )
     found = stability.summary(course(gone))
     assert found["fall_probability"] == 1.0 and found["least_tension_share"]["mean"] is None
-    assert found["stiffness_share"]["mean"] is None and len(stability.warnings(course(gone), 0.0)) == 1
+    assert found["stiffness_share"]["mean"] is None and len(stability.stability_warnings(course(gone), 0.0)) == 1
 
 
 def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -415,13 +415,13 @@ def test_a_drift_is_told_in_millimetres_and_degrees_of_the_draws_that_are_found(
 def test_a_pose_that_no_tensions_hold_is_answered_with_the_reason(hung: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     robot, line, request = hung
     far = PoseRequest(np.array([50.0, 0.0, 1.0]), np.eye(3), request.times_s)
-    found = answer.answer(robot, line, far)
+    found = answer.pose_report(robot, line, far)
     assert found.content["feasible"] is False and found.courses == {} and found.maps == ()
     assert found.content["sentence"] == "No tensions within the bounds hold the platform at this pose."
     assert found.content["pose"]["position_m"] is far.position_m and "inverse" not in found.content
     assert found.content["tension_distribution"]["lowest_N"] == robot.rule.lowest_N
     monkeypatch.setattr(answer.statics.Geometry, "clear", property(lambda shape: np.array([False])))
-    inside = answer.answer(robot, line, far).content["sentence"]
+    inside = answer.pose_report(robot, line, far).content["sentence"]
     assert (
         inside == "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
     )
@@ -450,8 +450,8 @@ def test_what_leaves_the_tests_is_said_of_the_whole_request(monkeypatch: pytest.
         asked.append(joint.tolist())
         return [0]
 
-    monkeypatch.setattr(answer.draws, "warnings", tested)
-    monkeypatch.setattr(answer.sag, "warnings", sagging)
+    monkeypatch.setattr(answer.draws, "wire_warnings", tested)
+    monkeypatch.setattr(answer.sag, "sag_warnings", sagging)
     monkeypatch.setattr(answer.drums, "emptied", emptied)
     request = PoseRequest(np.zeros(3), np.eye(3), np.array([0.0, 10.0, 90.0]))
     commands: Any = SimpleNamespace(

@@ -103,7 +103,7 @@ def test_a_proof_counts_only_about_the_equilibrium_that_is_followed(hung: Any) -
 
 def test_the_mean_wire_is_proved_alone_where_it_is(hung: Any) -> None:
     robot, wires, _ = hung
-    found = proofs.alone(robot, wires, robot.home_m, np.eye(3))
+    found = proofs.only_equilibrium(robot, wires, robot.home_m, np.eye(3))
     bare, offset = commanded(robot, wires)
     k1 = np.broadcast_to(control.known(wires).theta["k1"][:, 0], 4)
     proof = proofs.certify(robot, wires.law, (k1, k1), (bare, bare), offset, robot.home_m, np.eye(3))
@@ -123,11 +123,11 @@ def test_without_interval_arithmetic_or_with_effects_on_the_strain_no_proof_is_t
     with monkeypatch.context() as patch:
         patch.setattr(proofs, "certify", missing)
         patch.setattr(proofs._Way, "proved", missing)
-        found = proofs.alone(robot, wires, *given)
+        found = proofs.only_equilibrium(robot, wires, *given)
         assert found["proved"] is None and "python-flint is not installed" in found["sentence"]
         assert proofs.enclosed(robot, wires, course, *given) == {}
     bent: Any = SimpleNamespace(at=lambda place: ["effect"] if place == "strain" else [])
-    found = proofs.alone(robot, bent, *given)
+    found = proofs.only_equilibrium(robot, bent, *given)
     assert found["proved"] is None and "without further effects" in found["sentence"]
     assert proofs.enclosed(robot, bent, course, *given) == {}
 

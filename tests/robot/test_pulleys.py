@@ -13,12 +13,12 @@ from wirebayes.robot.mechanics import draws, pulleys, rotation, schema, statics
 from wirebayes.robot.mechanics.description import Pulleys
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, drift, forward, inverse
-from wirebayes.robot.pose.answer import answer
+from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.robot.proof import proofs
 from wirebayes.robot.proof.ball_arithmetic import Balance
 from wirebayes.robot.proof.certificate import certify
-from wirebayes.robot.proof.reach import apart, reach
+from wirebayes.robot.proof.reach import each_on_its_own, reach
 
 ROBOTS = HANGING
 
@@ -54,7 +54,7 @@ def test_the_wire_leaves_where_a_tangent_is_found():
     axis = rng.normal(size=(40, 3))
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     line = rng.normal(size=(40, 3)) + 0.5
-    way = pulleys.run(Pulleys(radius, axis), line.T[:, :, None])
+    way = pulleys.wire_run(Pulleys(radius, axis), line.T[:, :, None])
     assert way.clear.all()
     for i in range(40):
         length, tangent = _constructed(radius[i], axis[i], line[i])
@@ -145,7 +145,7 @@ def test_a_platform_inside_a_pulley_is_not_held():
     assert np.isnan(inverse.tensions(inside, along[None], np.eye(3)[None])).all()
     request = PoseRequest(at, np.eye(3), np.array([0.0, 60.0]))
     line = draws.WireDraws({k: np.ones(3) for k in draws.CORE} | {"k1": np.full(3, 3000.0)}, 1000.0)
-    assert "inside a pulley" in answer(inside, line, request).content["sentence"]
+    assert "inside a pulley" in pose_report(inside, line, request).content["sentence"]
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -167,7 +167,7 @@ def test_proofs_know_pulleys(name):
     wrong = certify(point, "hooke", (k1, k1), (zero, zero), offset, x, R, how_alone=False)
     assert not wrong.proved or np.any(wrong.radius_m > 1e-6)
     half_k1, half_zero = 1e-4 * k1, 1e-5 * zero
-    got = reach(robot, "hooke", k1, zero, apart(half_k1, half_zero), offset, x, R)
+    got = reach(robot, "hooke", k1, zero, each_on_its_own(half_k1, half_zero), offset, x, R)
     assert got.proved
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (2, 300, robot.legs))
     wires = Wires("hooke", "saturating", {"k1": (k1 + half_k1 * signs[0]).T}, np.full((robot.legs, 1), 1000.0))
@@ -194,7 +194,7 @@ def test_drift_and_maps_run_over_pulleys():
     tension = wires.theta["k1"].T * np.maximum(stretched / zero - 1, 0)
     np.testing.assert_allclose(tension, course.tension_N[:, 1], rtol=1e-6)
     assert claim.over_workspace(robot, wires, claim.grid(robot, (2, 2, 1))).found == 1.0
-    big = claim.scaled(robot, 2.0, robot.mass_kg)
+    big = claim.scaled_robot(robot, 2.0, robot.mass_kg)
     np.testing.assert_allclose(big.pulleys.radius_m, 2 * robot.pulleys.radius_m)
     if pytest.importorskip("flint"):
-        assert proofs.alone(robot, wires, robot.home_m, np.eye(3))["proved"]
+        assert proofs.only_equilibrium(robot, wires, robot.home_m, np.eye(3))["proved"]

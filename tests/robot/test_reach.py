@@ -11,7 +11,7 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import claim, forward
 from wirebayes.robot.proof import reach as module
 from wirebayes.robot.proof.ball_arithmetic import Balance
-from wirebayes.robot.proof.reach import apart, reach
+from wirebayes.robot.proof.reach import each_on_its_own, reach
 
 
 def _case(name, law, make=cases.commanded, seed=0):
@@ -36,7 +36,7 @@ def _poses(robot, law, k1, zero, offset, x, R):
 def test_wires_that_vary_each_on_its_own_are_enclosed_tightly(name, law):
     robot, k1, zero, offset, x, R = _case(name, law)
     half_k1, half_zero = 1e-4 * k1, 1e-5 * zero
-    got = reach(robot, law, k1, zero, apart(half_k1, half_zero), offset, x, R)
+    got = reach(robot, law, k1, zero, each_on_its_own(half_k1, half_zero), offset, x, R)
     assert got.proved
     rng = np.random.default_rng(1)
     corners = np.array(list(product((-1, 1), repeat=robot.legs)))
@@ -55,7 +55,7 @@ def test_wires_that_vary_each_on_its_own_are_enclosed_tightly(name, law):
 def test_wires_that_change_together_reach_less_far_than_each_on_its_own():
     robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
     half = 3e-5 * zero
-    own = reach(robot, "hooke", k1, zero, apart(0 * k1, half), offset, x, R)
+    own = reach(robot, "hooke", k1, zero, each_on_its_own(0 * k1, half), offset, x, R)
     together = reach(robot, "hooke", k1, zero, (np.zeros((7, 1)), half[:, None]), offset, x, R)
     assert own.proved and together.proved
     share = np.linspace(-1, 1, 21)[:, None]
@@ -69,7 +69,7 @@ def test_a_wire_that_may_go_slack_is_enclosed_or_refused():
     for seed in range(6):
         robot, k1, zero, offset, x, R = _case("hangprinter-4", "hooke", cases.disturbed, seed)
         half = 1e-4 * zero
-        got = reach(robot, "hooke", k1, zero, apart(0 * k1, half), offset, x, R)
+        got = reach(robot, "hooke", k1, zero, each_on_its_own(0 * k1, half), offset, x, R)
         if not got.proved:
             continue
         proofs += 1
@@ -81,13 +81,13 @@ def test_a_wire_that_may_go_slack_is_enclosed_or_refused():
 
 def test_too_much_is_refused():
     robot, k1, zero, offset, x, R = _case("cogiro-desk", "hooke")
-    wide = reach(robot, "hooke", k1, zero, apart(0.5 * k1, 0.01 * zero), offset, x, R)
+    wide = reach(robot, "hooke", k1, zero, each_on_its_own(0.5 * k1, 0.01 * zero), offset, x, R)
     assert not wide.proved
     assert wide.line_m.shape == (6, 16) and np.isnan(wide.line_m).all()
     assert wide.radius_m.shape == wide.beside_m.shape == (6,) and np.isnan([wide.radius_m, wide.beside_m]).all()
-    assert not reach(robot, "hooke", k1, zero, apart(2.0 * k1, 0 * zero), offset, x, R).proved
+    assert not reach(robot, "hooke", k1, zero, each_on_its_own(2.0 * k1, 0 * zero), offset, x, R).proved
     # far from equilibrium there is nothing to prove
-    away = reach(robot, "hooke", k1, zero, apart(1e-6 * k1, 1e-7 * zero), offset, x + [0, 0, 0.01], R)
+    away = reach(robot, "hooke", k1, zero, each_on_its_own(1e-6 * k1, 1e-7 * zero), offset, x + [0, 0, 0.01], R)
     assert not away.proved or np.all(np.abs(away.centre_m - x) <= away.radius_m[:3])
 
 
@@ -96,9 +96,9 @@ def test_too_much_is_refused():
 def test_what_is_proved_grows_with_the_robot(many, share):
     """Lengths times a power of two, which rounds nothing: so is the box."""
     robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
-    small = reach(robot, "hooke", k1, zero, apart(share * k1, share * zero), offset, x, R)
-    big, zero = claim.scaled(robot, many, robot.mass_kg), many * zero
-    large = reach(big, "hooke", k1, zero, apart(share * k1, share * zero), many * offset, many * x, R)
+    small = reach(robot, "hooke", k1, zero, each_on_its_own(share * k1, share * zero), offset, x, R)
+    big, zero = claim.scaled_robot(robot, many, robot.mass_kg), many * zero
+    large = reach(big, "hooke", k1, zero, each_on_its_own(share * k1, share * zero), many * offset, many * x, R)
     assert small.proved and large.proved
     np.testing.assert_allclose(large.radius_m, many * small.radius_m, rtol=1e-6)
     np.testing.assert_allclose(large.beside_m, many * small.beside_m, rtol=1e-6)
@@ -106,7 +106,7 @@ def test_what_is_proved_grows_with_the_robot(many, share):
 
 def test_a_direction_that_is_balanced_to_the_last_bit_is_proved_too():
     robot, k1, zero, offset, x, R = cases.in_a_plane()
-    got = reach(robot, "hooke", k1, zero, apart(0 * k1, 1e-5 * zero), offset, x, R)
+    got = reach(robot, "hooke", k1, zero, each_on_its_own(0 * k1, 1e-5 * zero), offset, x, R)
     assert got.proved
     signs = np.array(list(product((-1, 1), repeat=4)))
     found = _poses(robot, "hooke", np.tile(k1, (16, 1)), zero * (1 + 1e-5 * signs), offset, x, R)
@@ -122,7 +122,7 @@ def test_what_is_left_beside_the_line_is_bounded(name, law):
     robot, k1, zero, offset, x, R = _case(name, law)
     w = robot.legs
     half = np.concatenate([1e-3 * k1, 1e-4 * zero])
-    got = reach(robot, law, k1, zero, apart(half[:w], half[w:]), offset, x, R)
+    got = reach(robot, law, k1, zero, each_on_its_own(half[:w], half[w:]), offset, x, R)
     assert got.proved
 
     def poses(share):
@@ -208,7 +208,7 @@ def test_a_turn_counts_by_twice_the_tangent_of_its_half(angle):
 
 
 def test_wires_that_vary_apart_have_a_parameter_each_for_stiffness_and_length():
-    G, H = apart(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
+    G, H = each_on_its_own(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
     assert G.tolist() == [[1.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0]]
     assert H.tolist() == [[0.0, 0.0, 3.0, 0.0], [0.0, 0.0, 0.0, 4.0]]
 
@@ -232,13 +232,13 @@ def test_wires_that_might_have_no_stiffness_or_no_length_are_refused_at_once(sti
     monkeypatch.setattr(module, "Balance", none)
     half_k1, half_zero = 0.1 * k1, 0.1 * zero
     half_k1[2], half_zero[1] = stiff * k1[2], long * zero[1]
-    got = reach(robot, "hooke", k1, zero, apart(half_k1, half_zero), offset, x, R)
+    got = reach(robot, "hooke", k1, zero, each_on_its_own(half_k1, half_zero), offset, x, R)
     assert not got.proved and got.centre_m is x and got.rotation is R and got.line_m.shape == (3, 8)
 
 
 def test_a_platform_free_to_move_has_no_proof():
     robot, k1, zero, offset, x, R = _case("hangprinter-4", "hooke")
-    got = reach(robot, "hooke", k1, zero + 5.0, apart(1e-6 * k1, 1e-6 * zero), offset, x, R)
+    got = reach(robot, "hooke", k1, zero + 5.0, each_on_its_own(1e-6 * k1, 1e-6 * zero), offset, x, R)
     assert not got.proved and np.isnan(got.radius_m).all()
 
 
@@ -248,7 +248,7 @@ def test_the_linear_answer_is_the_slope_of_the_pose():
     w = robot.legs
     half = np.concatenate([1e-5 * k1, 1e-6 * zero])
     middle = Balance(robot, "hooke", (k1, k1), (zero, zero), offset, x, R)
-    line = module._linear_answer(middle, np.linalg.inv(middle.middle_slope()), apart(half[:w], half[w:]))
+    line = module._linear_answer(middle, np.linalg.inv(middle.middle_slope()), each_on_its_own(half[:w], half[w:]))
     values = np.concatenate([k1, zero]) + np.vstack([np.diag(half), -np.diag(half)])
     found = _poses(robot, "hooke", values[:, :w], values[:, w:], offset, x, R)
     turn = robot.size_m * rotation.vector(found.rotation @ R.T)
@@ -307,7 +307,7 @@ def test_a_box_that_does_not_hold_its_image_is_given_up(factor, images, monkeypa
 def test_all_poses_of_a_box_are_those_on_the_line_and_beside_it(monkeypatch):
     """Rounded outwards; what lies beside the line is a part of them."""
     robot, k1, zero, offset, x, R = _case("hangprinter-4", "hooke")
-    generators = apart(1e-6 * k1, 1e-7 * zero)
+    generators = each_on_its_own(1e-6 * k1, 1e-7 * zero)
     middle = Balance(robot, "hooke", (k1, k1), (zero, zero), offset, x, R)
     wide = Balance(robot, "hooke", module._bounds(k1, generators[0]), module._bounds(zero, generators[1]), offset, x, R)
     C = np.linalg.inv(middle.middle_slope())

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import chi2
 
 from wirebayes.robot.self_calibration import answer, sensors
-from wirebayes.robot.self_calibration.sensors import named, to_json, weighed
+from wirebayes.robot.self_calibration.sensors import sensor_notices, sensors_json, weighed
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 
 PRIOR_N = 100.0
@@ -70,18 +70,18 @@ def test_one_of_two_bad_sensors_is_named_where_it_explains_four_fifths(other_N, 
 
 def test_the_answer_says_which_and_by_how_much():
     found = weighed(*_estimate(np.array([0, 0, 0, 15.0]), np.diag([1.0, 1, 1, 4])), PRIOR_N)
-    (notice,) = named(found)
+    (notice,) = sensor_notices(found)
     assert "wire 4 (reads 15 +- 0.5 N too much)" in notice.text
-    said = to_json(found)
+    said = sensors_json(found)
     assert said["wires"] == [4]
     np.testing.assert_allclose(said["bias_N"]["mean"], [15.0])
-    assert named(None) == [] and to_json(None) is None
+    assert sensor_notices(None) == [] and sensors_json(None) is None
 
 
 def test_several_bad_sensors_are_said_without_a_name():
     found = weighed(*_estimate(np.array([20.0, 20.0, 0, 0]), np.eye(4)), PRIOR_N)
-    assert [notice.text[:24] for notice in named(found)] == ["several tension sensors "]
-    assert to_json(found)["wires"] == []
+    assert [notice.text[:24] for notice in sensor_notices(found)] == ["several tension sensors "]
+    assert sensors_json(found)["wires"] == []
 
 
 @pytest.mark.parametrize(("read", "looked_at"), [(1, 0), (2, 1)])
@@ -116,7 +116,7 @@ def test_with_exact_geometry_a_sensor_is_named_from_the_same_level_and_holds_on(
         unknowns = np.concatenate([np.full(5, 7.0), bias])
         return SimpleNamespace(unknowns=unknowns[None], covariance=whole[None], converged=np.array([True]))
 
-    monkeypatch.setattr(answer, "calibrate", calibrated)
+    monkeypatch.setattr(answer, "length_posterior", calibrated)
     monkeypatch.setattr(answer, "replace", lambda prior, **changed: SimpleNamespace(**{**vars(prior), **changed}))
     session = SimpleNamespace(read=np.arange(3) < read, tension_sd_N=0.5)
     readings = np.full(4 * read + 3, PRIOR_N / 0.5)

@@ -91,7 +91,7 @@ def test_the_tested_ranges_are_each_lines_own():
     robot = _mixed(schema.read("linear-6"), (1, 4))
     stiff = replace(_line(2), name=THICK, tension_range_N=(0.0, 1.0))
     line = replace(_line(2), others={THICK: stiff}, tension_range_N=(0.0, 9.0))
-    message = draws.warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
+    message = draws.wire_warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
     assert message == [Notice("extrapolation", "wire thick: tensions 5 to 5 N leave the tested range 0 to 1 N")]
 
 
@@ -100,9 +100,9 @@ def test_only_lines_that_legs_hang_on_warn():
     robot = replace(_mixed(schema.read("linear-6"), range(6)), given={THICK: one})
     line = replace(_line(2), tension_range_N=(0.0, 9.0), time_range_s=(0.0, 30.0))
     tau = np.array([[20.0, 5.0, 5.0, 5.0, 5.0, 5.0]])
-    assert draws.warnings(robot, line, tau, 60.0, np.ones((1, 6))) == []
+    assert draws.wire_warnings(robot, line, tau, 60.0, np.ones((1, 6))) == []
     robot = replace(robot, wire=(THICK, *robot.wire[1:-1], "default"))
-    assert draws.warnings(robot, line, tau, 60.0, np.ones((1, 6))) == [
+    assert draws.wire_warnings(robot, line, tau, 60.0, np.ones((1, 6))) == [
         Notice("extrapolation", "60 s is longer than the longest tested hold, 30 s")
     ]
 
@@ -224,5 +224,7 @@ def test_sag_is_that_of_a_level_cable():
     np.testing.assert_allclose(extra, 2 * a * np.sinh(2.0 / a) - 4.0, rtol=1e-3)
     hung = sag.sag(robot, np.array([0.0, 0.0, -3.0]), np.eye(3), np.full(6, 20.0))
     np.testing.assert_allclose(hung[2], 0.0)
-    assert len(sag.warnings(robot, np.array([4.0, 0.0, 1.0]), np.eye(3), np.full(6, 20.0))) == 1
-    assert sag.warnings(replace(robot, mass_kg_m=None), np.array([4.0, 0.0, 1.0]), np.eye(3), np.full(6, 20.0)) == []
+    assert len(sag.sag_warnings(robot, np.array([4.0, 0.0, 1.0]), np.eye(3), np.full(6, 20.0))) == 1
+    assert (
+        sag.sag_warnings(replace(robot, mass_kg_m=None), np.array([4.0, 0.0, 1.0]), np.eye(3), np.full(6, 20.0)) == []
+    )

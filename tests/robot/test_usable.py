@@ -12,7 +12,7 @@ from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import answer, session_file
-from wirebayes.robot.self_calibration.estimate import calibrate
+from wirebayes.robot.self_calibration.estimate import length_posterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
 from wirebayes.robot.self_calibration.trust import joint_test
 from wirebayes.strict.table import csv_table
@@ -46,7 +46,7 @@ def _read(robot, prior, session, rng):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_session_with_nothing_wrong_is_usable(seed):
     robot, prior, session, rng = _session(seed)
-    known = calibrate(robot, prior, session, _read(robot, prior, session, rng))
+    known = length_posterior(robot, prior, session, _read(robot, prior, session, rng))
     assert answer.usable(known)
 
 
@@ -54,13 +54,13 @@ def test_a_session_with_nothing_wrong_is_usable(seed):
 def test_wrong_anchors_held_exact_are_not(seed):
     robot, prior, session, rng = _session(seed, sd=0.002)
     other = replace(robot, exit_m=robot.exit_m + 0.01 * robot.span_m * rng.standard_normal(robot.exit_m.shape))
-    known = calibrate(robot, prior, session, _read(other, prior, session, rng))
+    known = length_posterior(robot, prior, session, _read(other, prior, session, rng))
     assert not answer.usable(known)
 
 
 def test_the_verdict_turns_at_its_threshold():
     robot, prior, session, rng = _session(0)
-    known = calibrate(robot, prior, session, _read(robot, prior, session, rng))
+    known = length_posterior(robot, prior, session, _read(robot, prior, session, rng))
     for p, good in ((0.0101, True), (0.0099, False), (np.nan, False)):
         one = replace(known, p_joint=np.array([p]))
         assert answer.usable(one) is good
@@ -106,4 +106,4 @@ def test_millimetres_and_straight_lengths_are_refused_with_their_place(tmp_path)
                 [",".join(session_file.columns(robot).required), *(",".join(map(str, r)) for r in changed)]
             )
             with pytest.raises(InputError, match=rf"line 2, column \d+ \(joint_\d_m\): found .*, expected .*{reason}"):
-                session_file.parse(csv_table(Path("session.csv"), text), robot, 0.02, 1e-3)
+                session_file.parse_session(csv_table(Path("session.csv"), text), robot, 0.02, 1e-3)

@@ -10,7 +10,7 @@ import pytest
 from wirebayes.cli import main
 from wirebayes.effects import named
 from wirebayes.io.experiment_file import read_experiments
-from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, write
+from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, write_tests
 
 TRUE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 1.0, "preload": 0.3, "sensor_sd": 0.005, "setting_sd": 0.01}
 
@@ -30,7 +30,7 @@ def by_hand(truth, displacements, times):
 
 def test_the_files_hold_what_was_asked_and_the_truth_explains_them(tmp_path):
     path, times = [1.0, 2.5, 4.0, 2.0], [0.0, 20.0, 200.0]
-    write(tmp_path, [Bench("a", "line", 1000.0, 0.01, path, times, frozenset({2}))], Truth(TRUE), seed=5)
+    write_tests(tmp_path, [Bench("a", "line", 1000.0, 0.01, path, times, frozenset({2}))], Truth(TRUE), seed=5)
     (experiment,) = read_experiments(tmp_path / "experiments.toml")
     truth = json.loads((tmp_path / "truth.json").read_text())["experiments"]["a"]
     expected = by_hand(truth, path, times)
@@ -130,7 +130,7 @@ def test_an_effect_of_ones_own_is_written_into_the_readings(tmp_path):
 
 
 def test_the_experiment_file_is_plain_toml(tmp_path):
-    write(tmp_path, [Bench("a"), Bench("b", resolution_N=0.0)], seed=0)
+    write_tests(tmp_path, [Bench("a"), Bench("b", resolution_N=0.0)], seed=0)
     tables = tomllib.loads((tmp_path / "experiments.toml").read_text())["experiment"]
     assert [t["name"] for t in tables] == ["a", "b"]
     assert "resolution_N" not in tables[1]

@@ -10,7 +10,7 @@ from wirebayes.effects import CATALOGUE, named
 from wirebayes.effects.rivals import AtOnce, Logarithmic, NotInTime, PowerLaw, TwoModes
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import schema
-from wirebayes.robot.mechanics.draws import WireDraws, for_robot, warnings
+from wirebayes.robot.mechanics.draws import WireDraws, for_robot, wire_warnings
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.wire.effect import Amplitude, Effect
 from wirebayes.wire.fresh import FreshSample
@@ -238,7 +238,7 @@ def test_a_robots_wire_under_a_constant_tension_is_a_fresh_sample(key, follow):
     for time, values in zip(TIMES[1:], expected, strict=True):
         strain = np.broadcast_to(creep.advance(time, load).strain(wires), (6, 3))
         np.testing.assert_allclose(strain, np.tile(values / 1000.0, (6, 1)), rtol=1e-12, atol=1e-15)
-    found = warnings(LINEAR, given, load, 60.0, np.ones((3, 6)))
+    found = wire_warnings(LINEAR, given, load, 60.0, np.ones((3, 6)))
     assert not [notice for notice in found if "left out" in notice.text]
 
 
@@ -257,7 +257,7 @@ def test_a_parameter_that_depends_on_the_length_is_that_of_the_robots_wires():
         wires, plain = for_robot(robot, given), for_robot(robot, line("plain"))
         longer = robot.wire_m[:, None] ** given.parameters["length_dependence.p"]  # tested at 1 m
         np.testing.assert_allclose(wires.theta[which], plain.theta[which] * longer, rtol=1e-12)
-        assert not warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((3, 6)))
+        assert not wire_warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((3, 6)))
 
 
 def test_a_material_effect_of_the_bench_alone_is_said_to_be_left_out():
@@ -268,7 +268,7 @@ def test_a_material_effect_of_the_bench_alone_is_said_to_be_left_out():
 
     given = WireDraws({name: np.array([PLAIN[name]]) for name in ("k1", "B", "U", "k2", "N")}, 1000.0,
                       effects=(Settling(), named("thermal_expansion")))  # fmt: skip
-    found = warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((1, 6)))
+    found = wire_warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((1, 6)))
     lines = [notice.text for notice in found if notice.kind == "left-out"]
     assert any("settling has no place in the robot" in text for text in lines)
     assert any("knows no temperature: the effect thermal_expansion" in text for text in lines)

@@ -14,7 +14,7 @@ _PATIENCE_S = 5.0  # for a process to tidy up after SIGTERM, before it is killed
 
 
 @dataclass
-class Job:
+class AppJob:
     """A step of one test.
 
     Attributes
@@ -40,7 +40,7 @@ class Job:
     def start(self, folder: Path, options: dict[str, Any]) -> None:
         """Begin with a test in its folder."""
         receive, send = Pipe(duplex=False)
-        self._process = start_apart(work.do, send, folder, self.step, options)
+        self._process = start_apart(work.do_step, send, folder, self.step, options)
         send.close()
         Thread(target=self._listen, args=(receive,), daemon=True).start()
 
@@ -77,13 +77,13 @@ class Jobs:
     """The newest job of each test; one at a time."""
 
     def __init__(self) -> None:
-        self._of: dict[str, Job] = {}
+        self._of: dict[str, AppJob] = {}
 
-    def of(self, test: Test) -> Job | None:
+    def of(self, test: Test) -> AppJob | None:
         """The job of a test, running or ended."""
         return self._of.get(test.name)
 
-    def start(self, test: Test, step: str, options: dict[str, Any]) -> Job | None:
+    def start(self, test: Test, step: str, options: dict[str, Any]) -> AppJob | None:
         """Begin a step; None where another one of the test is still running.
 
         Parameters
@@ -93,7 +93,7 @@ class Jobs:
         before = self.of(test)
         if before is not None and before.state == "running":
             return None
-        self._of[test.name] = job = Job(step)
+        self._of[test.name] = job = AppJob(step)
         job.start(test.folder, options)
         return job
 

@@ -8,7 +8,7 @@ from urllib.parse import quote
 from nicegui import app, ui
 
 from wirebayes.app.folders import READ, Shelf, Test
-from wirebayes.app.jobs import Job, Jobs
+from wirebayes.app.jobs import AppJob, Jobs
 from wirebayes.robot.mechanics.shipped import shipped
 
 LARGEST_FILE = 200_000_000  # bytes: an hour of readings at 1 kHz has some 100 million
@@ -65,7 +65,7 @@ def home(shelf: Shelf, jobs: Jobs) -> None:
                 _line_of_earlier(test, jobs.of(test))
 
 
-def _line_of_earlier(test: Test, job: Job | None) -> None:
+def _line_of_earlier(test: Test, job: AppJob | None) -> None:
     done = [TITLES.get(step, step.replace("pose-", "drift of ")) for step in test.steps()]
     running = f"; {BUSY.get(job.step, 'moving a robot').lower()} now" if job and job.state == "running" else ""
     when = datetime.fromtimestamp(test.folder.stat().st_mtime).strftime("%Y-%m-%d %H:%M")
@@ -188,7 +188,7 @@ class _TestPage:
                 for step in ("check", "fit", "discover"):
                     ui.button(step.capitalize(), on_click=lambda step=step: self.start(step))
 
-    def progress(self, job: Job) -> None:
+    def progress(self, job: AppJob) -> None:
         """A bar for each part of the work that has begun."""
         for name, share in list(job.progress.items()):
             if name not in self.bars:
@@ -281,7 +281,7 @@ def _option(line: str) -> str:
     return line if line.startswith("--") else f"--map {line}"
 
 
-def _end_of(job: Job) -> str:
+def _end_of(job: AppJob) -> str:
     if job.state == "stopped":
         return "Stopped. What was finished is kept; press the button again to go on."
     return str(job.value) if job.state == "refused" else f"This is a bug of wirebayes: {job.value}"

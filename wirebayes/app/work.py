@@ -15,7 +15,7 @@ from wirebayes.io.run_folder import write_json
 Progress = Callable[[str, float, float], None]
 
 
-def do(send: Connection, folder: Path, step: str, options: dict[str, Any]) -> None:
+def do_step(send: Connection, folder: Path, step: str, options: dict[str, Any]) -> None:
     """Do a step and say how it goes: ``progress``, and at the end ``done``, ``undecided``, ``refused`` or ``broken``.
 
     Parameters

@@ -25,7 +25,6 @@ class Command(NamedTuple):
     """Where a command's function lives, and what ``--help`` says of it without loading it."""
 
     module: str
-    function: str
     summary: str
     example: str
 
@@ -33,109 +32,91 @@ class Command(NamedTuple):
 COMMANDS = {
     "reproduce": Command(
         "wirebayes.cli.reproduce",
-        "reproduce",
         "Reproduce the paper from its own tables, with posteriors.",
         "wirebayes reproduce --output out/reproduce",
     ),
     "import": Command(
         "wirebayes.cli.import_bench",
-        "import_bench",
         "Turn files of test benches (CSV, xlsx) into experiment files.",
         'wirebayes import raw.csv --output wire --length-mm 1200 --map "Kraft [N]=tension"',
     ),
     "init": Command(
         "wirebayes.cli.new_experiment",
-        "new_experiment",
         "Write a commented experiment file and a small CSV to replace.",
         "wirebayes init wire",
     ),
     "check": Command(
         "wirebayes.cli.check",
-        "check",
         "Report what was understood of an experiment file and what such a test can determine.",
         "wirebayes check data/paper/experiments.toml --experiment nylon-1.5m",
     ),
     "fit": Command(
         "wirebayes.cli.fit",
-        "fit",
         "Estimate the posterior of a wire's parameters.",
         "wirebayes fit data/paper/experiments.toml --experiment roc-line-1m --output out/fit",
     ),
     "compare": Command(
         "wirebayes.cli.compare",
-        "compare",
         "Compare laws, histories, likelihoods and effects on readings that the fits have not seen.",
         "wirebayes compare data/paper/experiments.toml --experiment nylon-1.5m --output out/compare",
     ),
     "discover": Command(
         "wirebayes.cli.discover",
-        "discover",
         "Find which physical effect the model is missing.",
         "wirebayes discover data/paper/experiments.toml --output out/discover",
     ),
     "batch": Command(
         "wirebayes.cli.batch",
-        "batch",
         "Fit many experiments and find what each model is missing, in one table.",
         "wirebayes batch lot-1.toml lot-2.toml --output out/batch",
     ),
     "plan": Command(
         "wirebayes.cli.plan",
-        "plan",
         "Predict what a test would teach before it is done.",
         "wirebayes plan plan.toml --budget-min 60 --output out/plan",
     ),
     "predict": Command(
         "wirebayes.cli.predict",
-        "predict",
         "Predict readings of holds not measured yet.",
         "wirebayes predict out/fit protocol.csv --output predicted.csv",
     ),
     "effects": Command(
         "wirebayes.cli.effects",
-        "effects",
         "List the effects that a model may be missing.",
         "wirebayes effects strain_stiffening",
     ),
     "simulate": Command(
         "wirebayes.cli.simulate",
-        "simulate",
         "Write synthetic tests with known truth.",
         "wirebayes simulate --output out/simulated --seed 1",
     ),
     "import-robot": Command(
         "wirebayes.cli.import_robot",
-        "import_robot",
         "Turn a robot of CASPR or WireX into a robot file.",
         "wirebayes import-robot CoGiRo_bodies.xml CoGiRo_cables.xml --output cogiro.toml",
     ),
     "pose": Command(
         "wirebayes.cli.robot",
-        "pose",
         "Predict the pose of a robot on creeping wires: kinematics, drift and their uncertainty.",
         "wirebayes pose linear-7 --wires out/fit/roc-line-1m --output out/pose",
     ),
     "calibrate": Command(
         "wirebayes.cli.robot",
-        "calibrate",
         "Estimate the zero-tension lengths of a robot's wires from readings at several poses.",
         "wirebayes calibrate linear-7 session.csv --wires out/fit/roc-line-1m --output out/calibrate",
     ),
     "export": Command(
         "wirebayes.cli.robot",
-        "export",
         "Export a robot with its wires: firmware settings, creep table, MuJoCo model.",
         "wirebayes export hangprinter-4 --wires out/fit/roc-line-1m --output out/export",
     ),
     "app": Command(
         "wirebayes.cli.app",
-        "app",
         "Do the same in a browser on this machine: drop a file, see the answer.",
         "wirebayes app --port 8137",
     ),
     "report": Command(
         "wirebayes.cli.report",
-        "report",
         "Write one self-contained page from a folder of results.",
         "wirebayes report out/reproduce",
     ),
@@ -237,6 +218,12 @@ def _typed(arguments: Sequence[str]) -> Sequence[str]:
     return os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", "")).split()[1:]
 
 
+def command_function(name: str) -> Callable[..., object]:
+    """The function of a command: ``import_robot_command`` of ``import-robot``."""
+    function: Callable[..., object] = getattr(import_module(COMMANDS[name].module), f"{name.replace('-', '_')}_command")
+    return function
+
+
 def _application(called: str | None) -> "typer.Typer":
     """The whole command line, with only the called command's module loaded."""
     import typer
@@ -260,7 +247,7 @@ def _application(called: str | None) -> "typer.Typer":
     for name, command in COMMANDS.items():
         function: Callable[..., object] = _unloaded
         if name == called:
-            function = getattr(import_module(command.module), command.function)
+            function = command_function(name)
         # \b keeps the example on its own line, unwrapped
         application.command(name, short_help=command.summary, epilog=f"\b\nExample:\n  {command.example}")(function)
     return application

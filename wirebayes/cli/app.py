@@ -10,7 +10,7 @@ from wirebayes.cli.options import Seed
 from wirebayes.errors import InputError
 
 
-def app(
+def app_command(
     port: Annotated[
         int | None,
         typer.Option("--port", metavar="N", help="Of the loopback address; 0 for any that is free. Default: 8137."),

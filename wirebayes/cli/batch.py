@@ -23,7 +23,7 @@ from wirebayes.cli.options import (
 Files = Annotated[list[Path], typer.Argument(metavar="FILE.toml...", help="Experiment files.")]
 
 
-def batch(
+def batch_command(
     files: Files,
     output: Output = None,
     seed: Seed = 0,

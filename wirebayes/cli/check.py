@@ -9,7 +9,7 @@ import typer
 from wirebayes.cli.options import AsJson, DropBreaks, ExperimentFile, ExperimentName, OwnEffects, Quiet, Seed
 
 
-def check(
+def check_command(
     file: ExperimentFile,
     output: Annotated[
         Path | None,

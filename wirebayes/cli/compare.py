@@ -25,7 +25,7 @@ Only = Annotated[
 ]
 
 
-def compare(
+def compare_command(
     file: ExperimentFile,
     output: Output = None,
     seed: Seed = 0,
@@ -49,10 +49,10 @@ def compare(
     load_early()
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
-    from wirebayes.commands.compare import carry_out, plan
+    from wirebayes.commands.compare import carry_out, plan_comparison
     from wirebayes.views.result import Given
 
-    planned = plan(
+    planned = plan_comparison(
         file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
         likelihood=likelihood, only=only or (), own_effects=own_effects, seed=seed,
     )  # fmt: skip

@@ -19,7 +19,7 @@ from wirebayes.cli.options import (
 )
 
 
-def discover(
+def discover_command(
     file: ExperimentFile,
     output: Output = None,
     seed: Seed = 0,

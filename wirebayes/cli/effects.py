@@ -9,7 +9,7 @@ from wirebayes.cli.options import OwnEffects
 Name = Annotated[str | None, typer.Argument(metavar="[NAME]", help="Describe this effect only.")]
 
 
-def effects(name: Name = None, own_effects: OwnEffects = None) -> None:
+def effects_command(name: Name = None, own_effects: OwnEffects = None) -> None:
     """List the effects that a model may be missing; with NAME, describe one in full."""
     from wirebayes.commands.list_effects import list_effects
     from wirebayes.effects import catalogue, named

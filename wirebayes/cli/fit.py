@@ -22,7 +22,7 @@ from wirebayes.cli.options import (
 )
 
 
-def fit(
+def fit_command(
     file: ExperimentFile,
     output: Output = None,
     seed: Seed = 0,

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from wirebayes.io.bench.undecided import Undecided
 
 
-def import_bench(
+def import_command(
     raw: Annotated[
         list[Path],
         typer.Argument(metavar="RAW…", help="Files of a bench: text with columns or xlsx; one experiment each."),

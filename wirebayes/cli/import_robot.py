@@ -8,7 +8,7 @@ import typer
 from wirebayes.cli.options import Quiet
 
 
-def import_robot(
+def import_robot_command(
     files: Annotated[
         list[Path],
         typer.Argument(

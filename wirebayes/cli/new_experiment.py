@@ -8,7 +8,7 @@ import typer
 from wirebayes.cli.options import Quiet
 
 
-def new_experiment(
+def init_command(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the files; created if absent.")],
     quiet: Quiet = False,
 ) -> None:

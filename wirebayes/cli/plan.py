@@ -23,7 +23,7 @@ Source = Annotated[
 ]
 
 
-def plan(
+def plan_command(
     source: Source,
     output: Output = None,
     seed: Seed = 0,

@@ -32,7 +32,7 @@ OwnEffects = Annotated[
 ]
 
 
-def predict(
+def predict_command(
     folder: Folder,
     protocol: ProtocolFile,
     output: Table = None,

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 
-def report(
+def report_command(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="A folder written by another command.")],
 ) -> None:
     """Write one self-contained page from a folder of results: DIR/report.html."""

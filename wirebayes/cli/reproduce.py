@@ -6,7 +6,7 @@ from pathlib import Path
 from wirebayes.cli.options import Output, Seed
 
 
-def reproduce(output: Output = None, seed: Seed = 0) -> None:
+def reproduce_command(output: Output = None, seed: Seed = 0) -> None:
     """Reproduce the paper from its own tables, with posteriors: DIR/report.html, its tables and pictures."""
     from wirebayes.processes.workers import load_early
 

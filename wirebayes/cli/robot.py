@@ -24,7 +24,7 @@ TensionError = Annotated[
 Spread = Annotated[float, typer.Option("--specimen-spread", help="Relative difference between wires of one line.")]
 
 
-def pose(
+def pose_command(
     robot: RobotFile,
     wires: Wires,
     output: Output = None,
@@ -108,7 +108,7 @@ def pose(
     conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
 
 
-def calibrate(
+def calibrate_command(
     robot: RobotFile,
     readings: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="Poses, joints and tensions, in order.")],
     wires: Wires,
@@ -174,7 +174,7 @@ def calibrate(
     conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
 
 
-def export(
+def export_command(
     robot: RobotFile,
     wires: Wires,
     output: Output = None,

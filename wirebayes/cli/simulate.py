@@ -8,7 +8,7 @@ import typer
 from wirebayes.cli.options import ElasticLawOption, HistoryOption, Output, OwnEffects, Seed
 
 
-def simulate(
+def simulate_command(
     output: Output = None,
     seed: Seed = 0,
     tests: Annotated[
@@ -63,12 +63,12 @@ def simulate(
 ) -> None:
     """Write synthetic tests: DIR/experiments.toml, a CSV for each test, and DIR/truth.json."""
     from wirebayes.commands.simulate_tests import simulate_tests
-    from wirebayes.simulation.synthetic import number
+    from wirebayes.simulation.synthetic import finite_number
 
     chosen = {}
     for text in parameter or ():
         name, _, value = text.partition("=")
-        chosen[name] = number(f"--parameter {text}", value)
+        chosen[name] = finite_number(f"--parameter {text}", value)
     simulate_tests(
         tests=tests, lengths=lengths, displacements=displacements, weights=weights, unload=unload, times=times,
         unrecorded=unrecorded or (), temperature=temperature, resolution=resolution, parameters=chosen,

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes._version import __version__
-from wirebayes.commands.one_experiment import QUANTITIES, Done, Task, do, first_columns, packed
-from wirebayes.commands.options import Progress, check_seed, check_train_holds, model_spec, path_of, silent, words
+from wirebayes.commands.one_experiment import QUANTITIES, BatchTask, Done, do, first_columns, packed
+from wirebayes.commands.options import Progress, check_seed, check_train_holds, model_spec, names_given, path_of, silent
 from wirebayes.discovery.search import catalogue_without
 from wirebayes.discovery.settings import SIMULATIONS
 from wirebayes.effects import catalogue, source_of
@@ -117,10 +117,10 @@ def batch(
     """
     spec = model_spec(elastic_law, history)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
-    own, left_out = path_of(own_effects), words(without)
+    own, left_out = path_of(own_effects), names_given(without)
     catalogue_without(left_out, catalogue(own))
     read, unreadable = _read(sources, train_holds, keep_going)
-    task = Task(
+    task = BatchTask(
         discover, check, spec, seed, policy or DEFAULT, left_out, own, simulations or SIMULATIONS,
         posteriors,
     )  # fmt: skip
@@ -191,7 +191,7 @@ def _distinct(read: list[tuple[Experiment, str]]) -> list[tuple[Experiment, str]
 
 
 def _compute(
-    read: Sequence[tuple[Experiment, str]], task: Task, folder: Path, configuration: Mapping[str, Any],
+    read: Sequence[tuple[Experiment, str]], task: BatchTask, folder: Path, configuration: Mapping[str, Any],
     scheduler: str | None, progress: Progress,
 ) -> None:  # fmt: skip
     """Do whatever has no row yet; a process that dies takes no result with it."""
@@ -236,7 +236,7 @@ def _scratch(folder: Path, scheduler: str | None) -> Iterator[Path | None]:
         shutil.rmtree(path, ignore_errors=True)
 
 
-def _results(pool: Executor, todo: Sequence[tuple[Experiment, str]], task: Task) -> Iterator[tuple[str, Done]]:
+def _results(pool: Executor, todo: Sequence[tuple[Experiment, str]], task: BatchTask) -> Iterator[tuple[str, Done]]:
     """Name and result of each experiment as they end."""
     work = (((e, file), packed(e, file, task)) for e, file in todo)
     for (experiment, file), future in as_finished(pool, do, work):

@@ -13,7 +13,7 @@ from wirebayes.commands.wires import (
     RobotLike,
     Wires,
     configuration,
-    content,
+    content_hash,
     draws_for,
     hash_of,
     posterior_of,
@@ -29,7 +29,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration import session_file, whole_answer
-from wirebayes.robot.self_calibration.answer import answer
+from wirebayes.robot.self_calibration.answer import lengths_report
 from wirebayes.robot.self_calibration.calibrated import Calibrated, from_dict, to_dict
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
@@ -146,11 +146,11 @@ def calibrate(
     if not 0 <= bias < math.inf:
         raise InputError(f"--tension-bias: found {bias:g}, expected a number of at least 0")
     if isinstance(readings, str | os.PathLike):
-        session, values = session_file.read(Path(readings), machine, tension_sd, tilt_sd, bias > 0)
-        read = content(Path(readings))
+        session, values = session_file.read_session(Path(readings), machine, tension_sd, tilt_sd, bias > 0)
+        read = content_hash(Path(readings))
     else:
         table = columns_table(readings, Path("readings"), session_file.may_be_empty)
-        session, values = session_file.parse(table, machine, tension_sd, tilt_sd, bias > 0)
+        session, values = session_file.parse_session(table, machine, tension_sd, tilt_sd, bias > 0)
         read = hash_of({"readings": [table.header, *table.rows]})
     line = draws_for(machine, wires, draws, experiment, own)
     options = {
@@ -170,10 +170,12 @@ def calibrate(
             calibrated = machine
             with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
                 if errors is None:
-                    found, known = answer(machine, prior, session, values, seed, next_poses)
+                    found, known = lengths_report(machine, prior, session, values, seed, next_poses)
                 else:
                     requests = pose_sd is None
-                    whole = whole_answer.answer(machine, prior, errors, session, values, seed, requests, next_poses)
+                    whole = whole_answer.calibration_report(
+                        machine, prior, errors, session, values, seed, requests, next_poses
+                    )
                     found, known = whole.content, whole.known
                     path = run.directory / ROBOT
                     calibrated = _write_robot(path, robot, whole.robot) if found["usable"] else whole.robot
@@ -224,7 +226,7 @@ def _write_robot(path: Path, given: RobotLike, calibrated: Robot) -> Robot:
     """Write the robot's file with its calibrated points, and read what it says; a robot without a file has none."""
     if isinstance(given, Robot):
         return calibrated
-    text = with_points(schema.text_of(Path(given)), calibrated)
+    text = with_points(schema.robot_text(Path(given)), calibrated)
     path.write_text(text, encoding="utf-8")
     return schema.parse(text, str(path))
 
@@ -285,5 +287,5 @@ def calibrated_of(
 def _belongs_to(robot: Robot, wires: Wires, experiment: str | None) -> BelongsTo:
     """What tells a robot and the posterior of its wires from others."""
     posterior = posterior_of(wires, experiment)
-    kept = posterior if isinstance(posterior, str) else content(posterior)
+    kept = posterior if isinstance(posterior, str) else content_hash(posterior)
     return {"robot": hash_of(asdict(robot)), "wires": kept}

@@ -13,12 +13,12 @@ from wirebayes.commands.options import (
     check_train_holds,
     experiments_of,
     model_spec,
+    names_given,
     path_of,
     silent,
-    words,
 )
-from wirebayes.comparison.candidates import BASE, Candidate, candidates, problem_of
-from wirebayes.comparison.compare import POLICY, Task, run, side_by_side
+from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates, problem_of
+from wirebayes.comparison.compare import POLICY, Task, judge_all, side_by_side
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import Policy
@@ -93,7 +93,7 @@ def compare(
     >>> sorted(row["name"] for row in comparison.summary()["experiments"]["wire"]["models"])
     ['exponential', 'plain']
     """
-    planned = plan(
+    planned = plan_comparison(
         source, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
         likelihood=likelihood, only=only, own_effects=own_effects, seed=seed, policy=policy,
     )  # fmt: skip
@@ -101,7 +101,7 @@ def compare(
 
 
 @dataclass(frozen=True)
-class Plan:
+class ComparisonPlan:
     """A comparison whose every part was checked, and of which nothing is computed yet.
 
     Attributes
@@ -128,7 +128,7 @@ class Plan:
         return tuple(notice.of(one.name) for one in self.experiments for notice in of_experiment(one))
 
 
-def plan(
+def plan_comparison(
     source: Source,
     *,
     experiment: str | None,
@@ -140,7 +140,7 @@ def plan(
     own_effects: PathLike | None,
     seed: int,
     policy: Policy | None = None,
-) -> Plan:
+) -> ComparisonPlan:
     """Check what `compare` is given.
 
     Parameters
@@ -161,9 +161,9 @@ def plan(
     """
     spec = model_spec(elastic_law, history, likelihood)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
-    own, names = path_of(own_effects), words(only)
+    own, names = path_of(own_effects), names_given(only)
     experiments = experiments_of(source, experiment)
-    base = Candidate(BASE, "", "The plain model.", spec)
+    base = ModelToCompare(BASE, "", "The plain model.", spec)
     tasks = []
     for one in experiments:
         _check_holds(one, train_holds)
@@ -184,7 +184,7 @@ def plan(
     }
     if policy is not None:
         configuration["policy"] = vars(policy)
-    return Plan(tasks, experiments, configuration, seed, policy or POLICY, own)
+    return ComparisonPlan(tasks, experiments, configuration, seed, policy or POLICY, own)
 
 
 def _check_holds(experiment: Experiment, train_holds: int | None) -> None:
@@ -198,8 +198,8 @@ def _check_holds(experiment: Experiment, train_holds: int | None) -> None:
 
 
 def _chosen(
-    experiment: Experiment, base: Candidate, known: Mapping[str, type[Effect]], names: Sequence[str]
-) -> list[Candidate]:
+    experiment: Experiment, base: ModelToCompare, known: Mapping[str, type[Effect]], names: Sequence[str]
+) -> list[ModelToCompare]:
     """The models to compare; every name that is given must be one of them."""
     chosen = candidates(experiment, base, known, names or None)
     missing = set(names) - {candidate.name for candidate in chosen}
@@ -209,7 +209,7 @@ def _chosen(
     return chosen
 
 
-def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) -> Comparison:
+def carry_out(plan: ComparisonPlan, output: PathLike | None, progress: Progress | None) -> Comparison:
     """Fit and judge all models of a plan.
 
     Parameters
@@ -229,7 +229,7 @@ def carry_out(plan: Plan, output: PathLike | None, progress: Progress | None) ->
         if opened.state == "done":
             return Comparison(place, plan.own_effects, computed=False)
         with computing():
-            run(plan.tasks, place.path, plan.seed, plan.policy, report=progress or silent)
+            judge_all(plan.tasks, place.path, plan.seed, plan.policy, report=progress or silent)
         from wirebayes.report.pictures import compare as pictures  # matplotlib only where it is needed
 
         content: ComparisonJson = {"version": 1, "seed": plan.seed, "experiments": {}, "warnings": []}

@@ -12,9 +12,9 @@ from wirebayes.commands.options import (
     check_train_holds,
     experiments_of,
     model_spec,
+    names_given,
     path_of,
     silent,
-    words,
 )
 from wirebayes.discovery.investigation import Investigation, JointModel, alternative_models, final_models
 from wirebayes.discovery.search import catalogue_without, investigate
@@ -22,7 +22,7 @@ from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.run_folder import open_run, read_json, write_json
-from wirebayes.json_files.discovery import Interval
+from wirebayes.json_files.discovery import IntervalJson
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.model.spec import ModelSpec
 from wirebayes.notice import from_json, named, to_json
@@ -101,7 +101,7 @@ def discover(
     """
     spec = model_spec(elastic_law, history)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
-    own, left_out = path_of(own_effects), words(without)
+    own, left_out = path_of(own_effects), names_given(without)
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     if train_holds is not None:
         experiments = [e.first(train_holds) for e in experiments]
@@ -220,7 +220,7 @@ def _parameters(found: Investigation, output: Path) -> None:
         }
 
 
-def _interval(entry: Parameter | None) -> Interval | None:
+def _interval(entry: Parameter | None) -> IntervalJson | None:
     """A parameter of a model, None where the model has no such parameter."""
     return None if entry is None else {"mean": entry["mean"], "q05": entry["q05"], "q95": entry["q95"]}
 

@@ -13,9 +13,9 @@ from wirebayes.commands.options import (
     check_train_holds,
     experiments_of,
     model_spec,
+    names_given,
     path_of,
     silent,
-    words,
 )
 from wirebayes.discovery.model_check import checked_meanwhile, write_checks
 from wirebayes.effects import catalogue, named, source_of
@@ -112,7 +112,7 @@ def fit(
     """
     spec = model_spec(elastic_law, history, likelihood)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
-    own, keys = path_of(own_effects), words(effects)
+    own, keys = path_of(own_effects), names_given(effects)
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     file = experiments[0].source
     if train_holds is not None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import get_args
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import above_zero, check_choice, without_breaks, words
+from wirebayes.commands.options import above_zero, check_choice, names_given, without_breaks
 from wirebayes.errors import InputError
 from wirebayes.io import data_checks, gross_events
 from wirebayes.io.bench.about import About, default_name
@@ -111,7 +111,7 @@ def import_bench(
     paths = [Path(raw)] if not isinstance(raw, Sequence) or isinstance(raw, str) else [Path(path) for path in raw]
     names = _names(paths, name)
     zero, area = (None if value is None else float(value) for value in (zero_mm, area_mm2))
-    choices = Choices(words(mapping), decimal, time_since, sheet, zero, control, specimens)
+    choices = Choices(names_given(mapping), decimal, time_since, sheet, zero, control, specimens)
     samples = [About(own, material, float(length_mm), area, name_is_stated=name is not None) for own in names]
     tests, choices = _read_all(paths, samples, choices, ask)
     if drop_breaks:
@@ -189,7 +189,7 @@ def _decided(
 
 def _without_breaks(test: Converted) -> Converted:
     """A test without the readings of its gross events: their rows say that the hold went on, and no more."""
-    events = gross_events.of_experiment(test.experiment)
+    events = gross_events.gross_events_of(test.experiment)
     kept = without_breaks(test.experiment)
     dropped = {int(i) for event in events for i in event.readings}
     read = test.header.index(READ[test.experiment.control])

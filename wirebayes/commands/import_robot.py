@@ -16,7 +16,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import inverse
 from wirebayes.strict.files import PathLike
-from wirebayes.strict.xml_file import Element, read
+from wirebayes.strict.xml_file import Element, read_xml
 
 _PARTS = {"bodies_system": "bodies", "links": "bodies", "cables": "cables", "models": "models"}
 
@@ -106,10 +106,10 @@ def _read(paths: list[Path], cable_set: str | None, pulleys: bool) -> ImportedRo
     if settings:
         if len(paths) > 1 or cable_set is not None:
             raise InputError(f"{settings[0]}: found files or a cable set beside it, expected these settings alone")
-        return firmware.robot(settings[0])
+        return firmware.robot_of_firmware(settings[0])
     parts: dict[str, Element] = {}
     for path in paths:
-        root = read(path)
+        root = read_xml(path)
         if root.tag not in _PARTS:
             raise root.fail("this root", "<bodies_system> or <cables> of CASPR, or <models> of WireX")
         if _PARTS[root.tag] in parts:
@@ -118,14 +118,14 @@ def _read(paths: list[Path], cable_set: str | None, pulleys: bool) -> ImportedRo
     if "models" in parts:
         if len(parts) > 1 or cable_set is not None:
             raise parts["models"].fail("files or a cable set of CASPR beside it", "the file of WireX alone")
-        return wirex.robot(parts["models"], pulleys)
+        return wirex.robot_of_wirex(parts["models"], pulleys)
     for here, other in (("bodies", "cables"), ("cables", "bodies")):
         if other not in parts:
             beside = _beside(Path(parts[here].file), here, other)
-            parts[other] = read(beside)
+            parts[other] = read_xml(beside)
             if _PARTS.get(parts[other].tag) != other:
                 raise parts[other].fail("this root", f"the {other} of CASPR")
-    found = caspr.robot(parts["bodies"], parts["cables"], cable_set)
+    found = caspr.robot_of_caspr(parts["bodies"], parts["cables"], cable_set)
     return found if pulleys else _without_pulleys(found)
 
 

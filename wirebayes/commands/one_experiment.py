@@ -24,7 +24,7 @@ from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.spec import ModelSpec
 from wirebayes.processes.workers import one_thread_each
-from wirebayes.results.jobs import Job, fitted, store
+from wirebayes.results.jobs import Job, fit_job, store
 from wirebayes.views.posterior import POSTERIOR, SUMMARY
 
 QUANTITIES = ("mean", "sd", "q05", "q50", "q95")
@@ -32,7 +32,7 @@ _ALONE = Lock()  # a worker with several threads still draws one picture at a ti
 
 
 @dataclass(frozen=True)
-class Task:
+class BatchTask:
     """What is to be done with each experiment.
 
     Attributes
@@ -75,7 +75,7 @@ class Done:
     files: dict[str, bytes]
 
 
-def packed(experiment: Experiment, file: str, task: Task) -> bytes:
+def packed(experiment: Experiment, file: str, task: BatchTask) -> bytes:
     """A piece of work for `do`.
 
     Parameters
@@ -125,7 +125,7 @@ def first_columns(experiment: Experiment, file: str) -> Row:
     }  # fmt: skip
 
 
-def _fitted(experiment: Experiment, task: Task, folder: Path) -> FitColumns:
+def _fitted(experiment: Experiment, task: BatchTask, folder: Path) -> FitColumns:
     about = {"data_file": experiment.source.name, "version": __version__, "data_sha256": _hash(experiment)}
     job = Job(experiment.name, (experiment,), (), task.own_effects, task.spec, about)
     _fit_and_store(job, folder, task, draws=task.posteriors)
@@ -136,14 +136,14 @@ def _fitted(experiment: Experiment, task: Task, folder: Path) -> FitColumns:
     return _columns(summary, check and check["p"], check and check["passed"])
 
 
-def _fit_and_store(job: Job, folder: Path, task: Task, *, draws: bool) -> None:
+def _fit_and_store(job: Job, folder: Path, task: BatchTask, *, draws: bool) -> None:
     """Fit and store; nothing would go on from a checkpoint in a folder that is gone afterwards."""
     for place in job.folders:
         (folder / place).mkdir(parents=True)
-    store(job, fitted(job, task.seed, task.policy), folder, task.seed, task.policy, draws=draws)
+    store(job, fit_job(job, task.seed, task.policy), folder, task.seed, task.policy, draws=draws)
 
 
-def _discovered(experiment: Experiment, task: Task, folder: Path) -> DiscoveryColumns:
+def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> DiscoveryColumns:
     kinds = catalogue_without(task.without, catalogue(task.own_effects))
     found = investigate([experiment], Settings(task.spec, kinds, task.simulations), task.seed)
     for job in jobs_of(found, task.spec, task.own_effects):

@@ -40,7 +40,7 @@ def path_of(value: PathLike | None) -> Path | None:
     return None if value is None else Path(value)
 
 
-def words(value: str | Iterable[str] | None) -> tuple[str, ...]:
+def names_given(value: str | Iterable[str] | None) -> tuple[str, ...]:
     """Names, of which one may stand alone."""
     return (value,) if isinstance(value, str) else tuple(value or ())
 
@@ -72,7 +72,7 @@ def without_breaks(experiment: Experiment) -> Experiment:
     InputError
         There are too few others.
     """
-    kept = gross_events.without(experiment, gross_events.of_experiment(experiment))
+    kept = gross_events.without_gross_events(experiment, gross_events.gross_events_of(experiment))
     if not enough(kept.holds):
         found = f"{holds_and_readings(kept.holds)} beside breaks, limits and dropouts"
         raise InputError(f"{experiment.source}, experiment {experiment.name}: found {found}, expected {ENOUGH}")

@@ -11,8 +11,8 @@ import numpy as np
 from wirebayes._version import __version__
 from wirebayes.commands.options import Progress, above_zero, check_seed, model_spec, path_of, silent
 from wirebayes.commands.predict import find_posterior
-from wirebayes.commands.wires import RobotLike, content, hash_of, robot_of
-from wirebayes.discovery.next_measurement import alternatives
+from wirebayes.commands.wires import RobotLike, content_hash, hash_of, robot_of
+from wirebayes.discovery.next_measurement import other_measurements
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
@@ -33,7 +33,7 @@ from wirebayes.numeric.frozen import frozen
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
 from wirebayes.planning.ranking import Judged, ranked, too_long
 from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
-from wirebayes.planning.widths import HOUR_S, at_centre, expected_widths, typical_tension
+from wirebayes.planning.widths import HOUR_S, at_centre, expected_widths, middle_tension
 from wirebayes.processes.workers import computing
 from wirebayes.results import read_back
 from wirebayes.robot.mechanics import draws as robot_draws
@@ -160,7 +160,7 @@ def plan(
                 report("protocols", done, len(request.tests))
                 guess = request.guess.at(test.length_mm)
                 test = at_centre(test, guess, spec)
-                tension = typical_tension(test) if tension is None else tension
+                tension = middle_tension(test) if tension is None else tension
                 one = np.random.default_rng(seed_of(seed, "plan", test.name))
                 try:
                     expected = expected_widths(
@@ -187,7 +187,7 @@ def _identity(robot: RobotLike | None) -> str | None:
     """What decides a robot's part in the results: a hash of its content."""
     if robot is None:
         return None
-    return hash_of(asdict(robot)) if isinstance(robot, Robot) else content(Path(robot))
+    return hash_of(asdict(robot)) if isinstance(robot, Robot) else content_hash(Path(robot))
 
 
 def _request(
@@ -268,7 +268,7 @@ def _like(measured: Experiment) -> list[tuple[Experiment, str]]:
     """The same test again, and what else could be done with such a sample."""
     out = [(replace(measured, name=REPEAT), "repeat the test")]
     short = ("unload", "dense", "unload-dense", "half-steps")
-    for name, other in zip(short, alternatives(measured.protocol(), alone=True), strict=True):
+    for name, other in zip(short, other_measurements(measured.protocol(), alone=True), strict=True):
         bench = Bench(name, measured.material, measured.length_mm, times_s=tuple(other.times_s.tolist())).setting(
             measured.control, tuple(other.setting.tolist()), measured.resolution
         )

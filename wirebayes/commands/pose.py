@@ -26,7 +26,7 @@ from wirebayes.commands.wires import (
     RobotLike,
     Wires,
     configuration,
-    content,
+    content_hash,
     draws_for,
     folder_of,
     posterior_of,
@@ -38,9 +38,9 @@ from wirebayes.json_files.plain import plain
 from wirebayes.processes.workers import computing
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
-from wirebayes.robot.pose.answer import Answer, answer
+from wirebayes.robot.pose.answer import Answer, pose_report
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
-from wirebayes.robot.pose.orientation import orientation
+from wirebayes.robot.pose.orientation import balanced_orientation
 from wirebayes.robot.pose.request import PoseRequest
 from wirebayes.strict.files import PathLike
 from wirebayes.views.calibration import Calibration
@@ -192,7 +192,7 @@ def pose(
         return pose_from_joints(asked, joints, errors, begun({**carried, **at}))
     slices = _slices(machine, map_heights, map_rotations)
     other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
-    fitted_otherwise = None if other_fit is None else content(folder_of(other_fit, experiment) / POSTERIOR)
+    fitted_otherwise = None if other_fit is None else content_hash(folder_of(other_fit, experiment) / POSTERIOR)
     options = at | {
         "--times": text_of(times),
         "--tolerance": tolerance,
@@ -203,7 +203,7 @@ def pose(
     }
     if slices is not LEVEL:
         options["--map-heights, --map-rotation"] = plain(asdict(slices))
-    there = orientation(machine, asked.position_m, asked.rotation_rad)
+    there = balanced_orientation(machine, asked.position_m, asked.rotation_rad)
     request = PoseRequest(
         there.position_m,
         there.rotation,
@@ -232,7 +232,7 @@ def pose_at(asked: AskedPose, request: PoseRequest, other: WireDraws | None, beg
     with open_run(begun.place.path, begun.decides) as run, computing():
         if run.state == "done":
             return Pose(begun.place, asked.own_effects, computed=False)
-        _write(run.directory, asked.robot, request, answer(asked.robot, asked.line, request, other))
+        _write(run.directory, asked.robot, request, pose_report(asked.robot, asked.line, request, other))
         run.finish()
     return Pose(begun.place, asked.own_effects)
 

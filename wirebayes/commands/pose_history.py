@@ -10,12 +10,12 @@ import numpy as np
 from wirebayes.commands.asked_pose import OFF_PLANE, AskedPose
 from wirebayes.commands.calibrate import calibrated_of
 from wirebayes.commands.options import Progress, above_zero
-from wirebayes.commands.wires import Wires, content, hash_of
+from wirebayes.commands.wires import Wires, content_hash, hash_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.processes.workers import computing
 from wirebayes.robot.history import table
-from wirebayes.robot.history.answer import answer
+from wirebayes.robot.history.answer import history_report
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics import plane
@@ -155,17 +155,17 @@ def pose_along(asked: AskedPose, trajectory: Any, errors: Uncertain, begun: Begu
     return _followed(asked, "--trajectory", trajectory, errors, begun)
 
 
-_COLUMNS = {"--joints": table.measured, "--trajectory": table.commanded}
+_COLUMNS = {"--joints": table.measured_columns, "--trajectory": table.commanded_columns}
 
 
 def _followed(asked: AskedPose, option: str, given: Any, errors: Uncertain, begun: Begun) -> Pose:
     robot, columns = asked.robot, _COLUMNS[option]
     if isinstance(given, str | os.PathLike):
-        history = table.read(Path(given), robot, columns)
-        read = content(Path(given))
+        history = table.read_log(Path(given), robot, columns)
+        read = content_hash(Path(given))
     else:
-        cells = columns_table(given, Path(option[2:]), table.may_be_empty)
-        history = table.parse(cells, robot, columns)
+        cells = columns_table(given, Path(option[2:]), table.may_be_unread)
+        history = table.parse_log(cells, robot, columns)
         read = hash_of({option: [cells.header, *cells.rows]})
     _refuse_off_plane(robot, option, history)
     lasting = {  # in a fixed order, as in `wires.configuration`
@@ -182,7 +182,7 @@ def _followed(asked: AskedPose, option: str, given: Any, errors: Uncertain, begu
         if opened.state == "done":
             return Pose(begun.place, asked.own_effects, computed=False)
         with computing(), np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
-            found = answer(robot, asked.line, history, errors, asked.start, asked.seed, begun.progress)
+            found = history_report(robot, asked.line, history, errors, asked.start, asked.seed, begun.progress)
         write_json(opened.directory / "pose.json", found.content)
         for name, (header, rows) in found.tables.items():
             write_csv(opened.directory / name, header, rows)

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import get_args
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import Numbers, check_choice, check_seed, check_whole, path_of, text_of, words
+from wirebayes.commands.options import Numbers, check_choice, check_seed, check_whole, names_given, path_of, text_of
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import check_run, open_run
-from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, number, write
+from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, finite_number, write_tests
 from wirebayes.strict.files import PathLike
 from wirebayes.views.result import ResultFolder
 from wirebayes.views.simulated_tests import SimulatedTests
@@ -96,7 +96,9 @@ def simulate_tests(
     check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
     check_choice("history", history, get_args(History))
     own, seed = path_of(own_effects), check_seed(seed)
-    chosen = {name: number(f"--parameter {name}={value}", str(value)) for name, value in (parameters or {}).items()}
+    chosen = {
+        name: finite_number(f"--parameter {name}={value}", str(value)) for name, value in (parameters or {}).items()
+    }
     found, amplitudes = _effects(effects, own)
     chosen |= amplitudes
     tests = check_whole("--tests", tests, 1)
@@ -129,7 +131,7 @@ def simulate_tests(
         draw(benches, truth, seed)  # whatever is wrong with the truth is said before a folder is made
     with open_run(place.path, configuration) as run:
         if run.state != "done":
-            write(place.path, benches, truth, seed)
+            write_tests(place.path, benches, truth, seed)
             run.finish()
     return SimulatedTests(place, own, computed=run.state != "done")
 
@@ -141,7 +143,9 @@ def _effects(
     found: dict[str, Effect] = {}
     given: dict[str, float] = {}
     known = catalogue(own)
-    listed = [f"{key}={value}" for key, value in effects.items()] if isinstance(effects, Mapping) else words(effects)
+    listed = (
+        [f"{key}={value}" for key, value in effects.items()] if isinstance(effects, Mapping) else names_given(effects)
+    )
     for text in listed:
         effect, amplitudes = effect_option(text, known)
         found[effect.key] = effect
@@ -183,4 +187,4 @@ def _name(tests: int, lengths: Sequence[float], test: int, length: float) -> str
 
 
 def _numbers(option: str, values: Numbers) -> list[float]:
-    return [number(option, word) for word in text_of(values).split(",")]
+    return [finite_number(option, word) for word in text_of(values).split(",")]

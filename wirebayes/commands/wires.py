@@ -75,8 +75,8 @@ def posterior_of(wires: Wires, experiment: str | None = None) -> Path | str:
 def _content_of(line: Specimens, experiment: str | None) -> str:
     """What tells the posteriors of a line from others."""
     if _is_sample(line):
-        return hash_of({str(i): content(folder_of(one, experiment) / POSTERIOR) for i, one in enumerate(line)})
-    return content(folder_of(line, experiment) / POSTERIOR)
+        return hash_of({str(i): content_hash(folder_of(one, experiment) / POSTERIOR) for i, one in enumerate(line)})
+    return content_hash(folder_of(line, experiment) / POSTERIOR)
 
 
 def _is_sample(wires: Wires) -> TypeGuard[Sequence[Line]]:
@@ -348,8 +348,8 @@ def configuration(
     return {
         "command": command,
         "version": __version__,
-        "robot": hash_of(asdict(robot)) if isinstance(robot, Robot) else content(Path(robot)),
-        "wires": posterior if isinstance(posterior, str) else content(posterior),
+        "robot": hash_of(asdict(robot)) if isinstance(robot, Robot) else content_hash(Path(robot)),
+        "wires": posterior if isinstance(posterior, str) else content_hash(posterior),
         "own_effects": source_of(own_effects),
         "draws": draws,
         "seed": seed,
@@ -357,7 +357,7 @@ def configuration(
     }
 
 
-def content(path: Path) -> str:
+def content_hash(path: Path) -> str:
     """The hash of a file, or the name where there is none."""
     return sha256(path.read_bytes()).hexdigest() if path.is_file() else str(path)
 

@@ -26,7 +26,7 @@ _NO_CREEP = {"B": 0.0, "U": 1.0, **_NO_TIME_LAW}  # an amount of zero; what the 
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ModelToCompare:
     """One model of a comparison.
 
     Attributes
@@ -54,8 +54,8 @@ class Candidate:
 
 
 def candidates(
-    experiment: Experiment, base: Candidate, known: Mapping[str, type[Effect]], only: Sequence[str] | None = None
-) -> list[Candidate]:
+    experiment: Experiment, base: ModelToCompare, known: Mapping[str, type[Effect]], only: Sequence[str] | None = None
+) -> list[ModelToCompare]:
     """The base and everything that may be set beside it for this experiment.
 
     Parameters
@@ -75,14 +75,14 @@ def candidates(
     return [base, *(candidate for candidate in beside if only is None or candidate.name in only)]
 
 
-def _beside(base: Candidate, name: str, question: str, sentence: str, **changes: Any) -> Candidate:
+def _beside(base: ModelToCompare, name: str, question: str, sentence: str, **changes: Any) -> ModelToCompare:
     return replace(base, name=name, question=question, sentence=sentence, **changes)
 
 
-def _other_creep(base: Candidate) -> list[Candidate]:
+def _other_creep(base: ModelToCompare) -> list[ModelToCompare]:
     """No creep, and other laws of how it comes by time."""
 
-    def rival(name: str, fixed: dict[str, float]) -> Candidate:
+    def rival(name: str, fixed: dict[str, float]) -> ModelToCompare:
         return _beside(base, name, TIME, RIVALS[name].sentence, effects=(name,), fixed=fixed)
 
     at_once = RIVALS["at_once"].sentence
@@ -96,7 +96,7 @@ def _other_creep(base: Candidate) -> list[Candidate]:
     ]
 
 
-def _other_model(base: Candidate) -> list[Candidate]:
+def _other_model(base: ModelToCompare) -> list[ModelToCompare]:
     """The other elastic law, history and likelihood."""
     out = []
     if base.spec.law == "hooke":
@@ -132,7 +132,9 @@ def _other_model(base: Candidate) -> list[Candidate]:
     return out
 
 
-def _with_effects(experiment: Experiment, base: Candidate, known: Mapping[str, type[Effect]]) -> list[Candidate]:
+def _with_effects(
+    experiment: Experiment, base: ModelToCompare, known: Mapping[str, type[Effect]]
+) -> list[ModelToCompare]:
     """The model with each effect that the test may show."""
     protocol = experiment.protocol()
     out = []
@@ -145,7 +147,7 @@ def _with_effects(experiment: Experiment, base: Candidate, known: Mapping[str, t
 
 
 def effects_of(
-    candidate: Candidate, training: Experiment, known: Mapping[str, type[Effect]], seed: int
+    candidate: ModelToCompare, training: Experiment, known: Mapping[str, type[Effect]], seed: int
 ) -> list[Effect]:
     """The candidate's effects; an event is put at the training hold where it has the most evidence (Laplace).
 
@@ -174,7 +176,7 @@ def effects_of(
     return out
 
 
-def _most_evident(candidate: Candidate, training: Experiment, variants: Sequence[Effect], seed: int) -> Effect:
+def _most_evident(candidate: ModelToCompare, training: Experiment, variants: Sequence[Effect], seed: int) -> Effect:
     evidence = []
     for variant in variants:
         problem = problem_of(candidate, training, [variant])
@@ -184,7 +186,7 @@ def _most_evident(candidate: Candidate, training: Experiment, variants: Sequence
     return variants[int(np.argmax(evidence))]
 
 
-def problem_of(candidate: Candidate, training: Experiment, effects: Sequence[Effect]) -> Problem:
+def problem_of(candidate: ModelToCompare, training: Experiment, effects: Sequence[Effect]) -> Problem:
     """The candidate's posterior of an experiment.
 
     Parameters

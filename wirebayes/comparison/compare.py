@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.comparison.candidates import Candidate, effects_of, problem_of
+from wirebayes.comparison.candidates import ModelToCompare, effects_of, problem_of
 from wirebayes.effects import catalogue
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
@@ -22,7 +22,7 @@ from wirebayes.json_files.comparison import (
     Difference,
     Differences,
     HeldOutHolds,
-    Judgement,
+    JudgementJson,
     LeaveOneHoldOut,
     ModelJson,
     PredictionScores,
@@ -30,7 +30,7 @@ from wirebayes.json_files.comparison import (
 from wirebayes.json_files.read_units import in_unit
 from wirebayes.notice import Notice, from_json, named, to_json
 from wirebayes.numeric.typing import Floats
-from wirebayes.prediction.held_out import HeldOut, Scores, held_out, two_thirds
+from wirebayes.prediction.held_out import HeldOutPrediction, Scores, held_out, two_thirds
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error
 from wirebayes.processes.workers import workers
 from wirebayes.wire.control import READ_UNIT
@@ -57,7 +57,7 @@ class Task:
     """
 
     experiment: Experiment
-    candidate: Candidate
+    candidate: ModelToCompare
     train_holds: int | None = None
     own_effects: Path | None = None
 
@@ -101,7 +101,7 @@ def judge(task: Task, seed: int, policy: Policy = POLICY) -> ModelJson:
     return content
 
 
-def _scores(task: Task, seed: int, policy: Policy) -> Judgement:
+def _scores(task: Task, seed: int, policy: Policy) -> JudgementJson:
     candidate, known = task.candidate, catalogue(task.own_effects)
     whole = task.experiment if candidate.unrecorded else task.experiment.without_unrecorded()
     recorded = len(whole.recorded_holds)
@@ -118,7 +118,7 @@ def _scores(task: Task, seed: int, policy: Policy) -> Judgement:
     own = seed_of(seed, task.experiment.name, candidate.name, "without")
     left = smoothed_leave_one_hold_out(full, own)
     early = full if task.train_holds else sampled(first)
-    content: Judgement = {
+    content: JudgementJson = {
         "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],
         "parameters": len(full.problem.names),
         "converged": full.converged and early.converged and left.converged,
@@ -139,7 +139,7 @@ def _keys(known: Mapping[str, Any], fitted: Posterior) -> list[str]:
     return [e.key for e in fitted.problem.samples[0].model.effects if e.name in known]
 
 
-def _held_out(result: HeldOut, trained: Posterior) -> HeldOutHolds:
+def _held_out(result: HeldOutPrediction, trained: Posterior) -> HeldOutHolds:
     return {
         "trained_on": result.trained,
         "holds": np.unique(result.given.hold),
@@ -163,7 +163,7 @@ def scores_dict(scores: Scores) -> PredictionScores:
     }  # fmt: skip
 
 
-def run(
+def judge_all(
     tasks: Sequence[Task],
     directory: Path,
     seed: int,

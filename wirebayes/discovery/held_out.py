@@ -110,7 +110,7 @@ def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng
     mask = sample.protocol.mask.copy()
     mask[last] = False
     carried = likelihoods.chain(line, sample.readings, mask, *noise)
-    log_p = likelihoods.held_out(line, carried, sample.readings, sample.protocol.mask & ~mask, *noise)
+    log_p = likelihoods.held_out_density(line, carried, sample.readings, sample.protocol.mask & ~mask, *noise)
     elpd = logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf), axis=1) - np.log(log_p.shape[1])
     error, floor, inside = [], [], []
     for j in last:

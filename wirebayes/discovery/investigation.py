@@ -63,7 +63,7 @@ def _sampled(block: LaplaceFit, remains: bool) -> list[JointModel]:
         return [JointModel(block.experiments, block.effects, block.best)]
     out = []
     for e in block.experiments:
-        own = shrinking.alone(block.effects, e)
+        own = shrinking.acting_alone(block.effects, e)
         smooth = (shrinking.discrepancy(e, shrinking.left_over(block, e.name)),) if remains else ()
         out.append(JointModel((e,), (*own, *smooth), block.parameters(e.name)))
     return out

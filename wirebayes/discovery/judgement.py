@@ -90,7 +90,7 @@ class Judgement:
     undecided: Family = ()
 
 
-def judge(found: Evidence) -> Judgement:
+def verdict_on(found: Evidence) -> Judgement:
     """The verdict; *unknown* is never said where a family is established.
 
     Parameters

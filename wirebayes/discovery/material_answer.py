@@ -9,7 +9,7 @@ from wirebayes.discovery import shrinking
 from wirebayes.discovery.fitted_sets import Accepted, Explored
 from wirebayes.discovery.global_test import Gate
 from wirebayes.discovery.held_out import LeftOut
-from wirebayes.discovery.judgement import Evidence, Judgement, judge
+from wirebayes.discovery.judgement import Evidence, Judgement, verdict_on
 from wirebayes.discovery.model_space import smallest_set
 from wirebayes.discovery.naming import Named
 from wirebayes.discovery.settings import REMAINS
@@ -106,7 +106,7 @@ def answer_material(
         base = stages[-1] if before.established else plain
         gain = shrinking.discrepancy_gain(base, left_out, rng, parallel_map)
     found = replace(before, remainder_gain=gain)
-    judgement = judge(found)
+    judgement = verdict_on(found)
     if judgement.verdict in ("nothing-missing", "unknown"):
         accepted, stages = [], []
     # beside the effects where some are accepted, else what the plain model leaves over

@@ -53,7 +53,7 @@ class MeasurementPlan:
 _SETTINGS = {"displacement": "displacements", "force": "weights"}
 
 
-def alternatives(p: Protocol, alone: bool, units: Units = NATURAL, settings: str = "") -> list[MeasurementPlan]:
+def other_measurements(p: Protocol, alone: bool, units: Units = NATURAL, settings: str = "") -> list[MeasurementPlan]:
     """What could be done with a sample instead.
 
     Parameters
@@ -184,7 +184,7 @@ def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tup
     planned = [_another_length(problem)]
     alone = len(problem.samples) == 1
     settings = " and ".join(sorted({_SETTINGS[s.protocol.control] for s in problem.samples}))
-    each = [alternatives(s.protocol, alone, problem.units, settings) for s in problem.samples]
+    each = [other_measurements(s.protocol, alone, problem.units, settings) for s in problem.samples]
     for plans in zip(*each, strict=True):
         protocols = [plan.protocol for plan in plans]
         empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]

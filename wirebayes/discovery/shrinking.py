@@ -12,13 +12,13 @@ from wirebayes.discovery.settings import KEEP_ELPD, LEAST_HOLDS
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
-from wirebayes.json_files.discovery import HeldOut, LeaveOneHoldOutGain, Scores, Step
+from wirebayes.json_files.discovery import HeldOutJson, LeaveOneHoldOutGain, ScoresJson, StepJson
 from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
 
-_NOTHING: Scores = {"rmse_N": None, "elpd": None, "coverage_90": None}
-_NOT_HELD_OUT: HeldOut = {
+_NOTHING: ScoresJson = {"rmse_N": None, "elpd": None, "coverage_90": None}
+_NOT_HELD_OUT: HeldOutJson = {
     "holds": [], "plain": _NOTHING, "final": {**_NOTHING, "elpd_difference_se": None}, "gap_closed": None,
     "shrinks": False,
 }  # fmt: skip
@@ -36,8 +36,8 @@ class Shrinking:
         The same scores of the plain model and of each accepted effect in turn.
     """
 
-    held_out: HeldOut
-    steps: list[Step]
+    held_out: HeldOutJson
+    steps: list[StepJson]
 
 
 def shrinking(
@@ -93,7 +93,7 @@ def shrinking(
     out = []
     for i, before in enumerate(by_step[0]):
         report = _compared(before, final[i], flexible[i], gain)
-        steps: list[Step] = [{"model": m, **_score(part[i])} for m, part in zip(models, by_step, strict=True)]
+        steps: list[StepJson] = [{"model": m, **_score(part[i])} for m, part in zip(models, by_step, strict=True)]
         out.append(Shrinking(report, steps))
     return out
 
@@ -200,7 +200,7 @@ def discrepancy_gain(
 
 def _compared(
     plain: held_out.HeldOut, final: held_out.HeldOut, flexible: held_out.HeldOut | None, gain: _Gain | None
-) -> HeldOut:
+) -> HeldOutJson:
     """What the report says of the held-out holds of one experiment."""
     d = final.elpd - plain.elpd
     spread = float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None
@@ -230,14 +230,14 @@ def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: np.random.G
     -------
     tuple of Effect
     """
-    own = alone(block.effects, experiment)
+    own = acting_alone(block.effects, experiment)
     # two experiments of one name differ in how many of its holds they have
     same = block.names == (experiment.name,) and len(block.experiments[0].holds) == len(experiment.holds)
     fit = block if same and own == block.effects else fitted([experiment], own, block.spec, rng, scales=block.scales)
     return (*own, discrepancy(experiment, left_over(fit, experiment.name)))
 
 
-def alone(effects: Sequence[Effect], experiment: Experiment) -> tuple[Effect, ...]:
+def acting_alone(effects: Sequence[Effect], experiment: Experiment) -> tuple[Effect, ...]:
     """The effects that act on an experiment and need no other one to show."""
     here = experiment.name, experiment.control
     return tuple(e for e in effects if not e.compares_lengths and e.acts_on(*here))
@@ -257,5 +257,5 @@ def left_over(block: LaplaceFit, name: str) -> float:
     return left * block.target.problem.read_unit(sample)
 
 
-def _score(held: held_out.HeldOut) -> Scores:
+def _score(held: held_out.HeldOut) -> ScoresJson:
     return {"rmse_N": held.rmse_N, "elpd": float(held.elpd.sum()), "coverage_90": held.inside}

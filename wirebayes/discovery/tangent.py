@@ -184,7 +184,7 @@ def points_of(target: LogPosterior, around: Around, readings: Sequence[Array] | 
         moved = moved.reshape(*moved.shape[:2], 1 + around.columns, n)
         slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
         scaled = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
-        jac = np.moveaxis(likelihoods.jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
+        jac = np.moveaxis(likelihoods.setting_jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
         floor = np.broadcast_to(sample.resolution**2 / 12.0, sd.shape) / sd**2
         yield Point(line.reading, slopes, sd, ((y - line.reading)[mask] / sd).T, scaled, jac, floor)
 

@@ -37,7 +37,7 @@ ONE_HOLD = (
 
 
 @dataclass(frozen=True)
-class Readings:
+class CheckedTest:
     """One test as the checks see it.
 
     Attributes
@@ -103,10 +103,10 @@ def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Noti
     """
     events = gross_events.of_readings(protocol, values, resolution)
     gross = [Notice(event.kind, event.text) for event in events]
-    protocol, values = gross_events.left(protocol, values, events)
+    protocol, values = gross_events.readings_left(protocol, values, events)
     if not protocol.mask.any():
         return gross
-    readings = Readings(protocol, values, resolution)
+    readings = CheckedTest(protocol, values, resolution)
     found = (check(readings) for check in CHECKS[protocol.control])
     return [*gross, *(Notice("data", sentence) for sentence in found if sentence)]
 
@@ -130,7 +130,7 @@ def one_hold(protocol: Protocol, stated: Set[str]) -> list[Notice]:
     return [Notice("prior", ONE_HOLD)]
 
 
-def run_on_times(readings: Readings) -> str:
+def run_on_times(readings: CheckedTest) -> str:
     """Time of the test in place of time in the hold, where there are too few readings to be certain."""
     p = readings.protocol
     if times_run_on([row[mask] for row, mask in zip(p.time_s, p.mask, strict=True)]) >= RUN_ON:
@@ -141,7 +141,7 @@ def run_on_times(readings: Readings) -> str:
     )
 
 
-def negative_tension(readings: Readings) -> str:
+def negative_tension(readings: CheckedTest) -> str:
     """Tensions below zero by more than a sensor's noise and offset."""
     lowest = np.array([row.min() for row in readings.each])
     worst = int(lowest.argmin())
@@ -161,7 +161,7 @@ def falls(setting: Floats, readings: Floats) -> bool:
     return bool(changes and np.corrcoef(setting, readings)[0, 1] < FALLS)
 
 
-def response(readings: Readings) -> str:
+def unresponsive_tension(readings: CheckedTest) -> str:
     """Tension that does not follow the displacement, or follows it the wrong way."""
     means, place = readings.means, readings.setting
     if np.ptp(place) == 0 and len(place) > 1:
@@ -183,7 +183,7 @@ def response(readings: Readings) -> str:
     return ""
 
 
-def elongation(readings: Readings) -> str:
+def elongation(readings: CheckedTest) -> str:
     """Displacements that do not follow the weights, or follow them the wrong way."""
     means, weights = readings.means, readings.setting
     if np.ptp(weights) == 0 and len(weights) > 1:
@@ -198,7 +198,7 @@ def elongation(readings: Readings) -> str:
     return ""
 
 
-def strain_scale(readings: Readings) -> str:
+def strain_scale(readings: CheckedTest) -> str:
     """Displacements so small or large beside the length that one of the two is in another unit."""
     place = readings.means if readings.protocol.control == "force" else readings.setting
     strain = np.ptp(place) / readings.protocol.length_mm
@@ -211,7 +211,7 @@ def strain_scale(readings: Readings) -> str:
     )
 
 
-def outlier(readings: Readings) -> str:
+def outlier(readings: CheckedTest) -> str:
     """One reading far from its neighbours, in a test whose other readings are close to theirs.
 
     Creep runs one way within a hold, so a reading counts by what it stands above both neighbours, or below both. A
@@ -243,7 +243,7 @@ def outlier(readings: Readings) -> str:
     )
 
 
-def rising(readings: Readings) -> str:
+def rising(readings: CheckedTest) -> str:
     """Tension that rises within holds on loading, where creep lets it fall."""
     place, each, noise = readings.setting, readings.each, readings.noise
     # a hold that begins below the end of the one before has creep to give back
@@ -265,7 +265,7 @@ def rising(readings: Readings) -> str:
     )
 
 
-def off_grid(readings: Readings) -> str:
+def off_grid(readings: CheckedTest) -> str:
     """Readings finer than the resolution they are said to have."""
     changes = np.concatenate([np.abs(np.diff(row)) for row in readings.each])
     if not readings.resolution or len(changes) < 3:
@@ -280,7 +280,7 @@ def off_grid(readings: Readings) -> str:
     )
 
 
-def repeated(readings: Readings) -> str:
+def repeated(readings: CheckedTest) -> str:
     """The same readings at two displacements, as rows that were copied and not changed leave them."""
     known: dict[tuple[float, ...], int] = {}
     for j, row in enumerate(readings.each):
@@ -294,7 +294,16 @@ def repeated(readings: Readings) -> str:
     return ""
 
 
-CHECKS: dict[Control, tuple[Callable[[Readings], str], ...]] = {
-    "displacement": (run_on_times, negative_tension, response, strain_scale, outlier, rising, off_grid, repeated),
+CHECKS: dict[Control, tuple[Callable[[CheckedTest], str], ...]] = {
+    "displacement": (
+        run_on_times,
+        negative_tension,
+        unresponsive_tension,
+        strain_scale,
+        outlier,
+        rising,
+        off_grid,
+        repeated,
+    ),
     "force": (run_on_times, elongation, strain_scale, outlier, off_grid, repeated),
 }

@@ -10,7 +10,7 @@ from typing import Any
 from wirebayes.errors import InputError, shown
 from wirebayes.io import mistaken_table
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings, in_sequence
-from wirebayes.io.readings import SET, STRETCH, Hold, readings_of, readings_table
+from wirebayes.io.readings import SET, STRETCH, Hold, checked_readings, readings_table
 from wirebayes.numeric.frozen import frozen
 from wirebayes.strict.files import read_text
 from wirebayes.strict.hint import hint
@@ -136,7 +136,7 @@ def experiment_of(keys: Keys, readings: Callable[[], Table]) -> Experiment:
     priors = keys.priors()
     preload = _preload(keys, priors, length)
     table = readings()
-    recorded = readings_of(table, length, control)
+    recorded = checked_readings(table, length, control)
     if not enough(recorded):
         raise keys.complain("readings", f"{holds_and_readings(recorded)} in {table.path.name}", ENOUGH)
     holds = _with_unrecorded(keys, recorded, length, control)

@@ -116,12 +116,12 @@ def of_readings(protocol: Protocol, readings: Floats, resolution: float) -> list
     return sorted(found, key=lambda event: int(event.readings[0]))
 
 
-def of_experiment(experiment: Experiment) -> list[Event]:
+def gross_events_of(experiment: Experiment) -> list[Event]:
     """The gross events of one test."""
     return of_readings(experiment.protocol(), experiment.readings(), experiment.resolution)
 
 
-def left(protocol: Protocol, readings: Floats, events: Sequence[Event]) -> tuple[Protocol, Floats]:
+def readings_left(protocol: Protocol, readings: Floats, events: Sequence[Event]) -> tuple[Protocol, Floats]:
     """Protocol and readings without those of some events; holds keep their durations.
 
     Parameters
@@ -145,7 +145,7 @@ def left(protocol: Protocol, readings: Floats, events: Sequence[Event]) -> tuple
     return replace(protocol, time_s=moved(protocol.time_s), mask=mask, warming_K=warming), moved(readings)
 
 
-def without(experiment: Experiment, events: Sequence[Event]) -> Experiment:
+def without_gross_events(experiment: Experiment, events: Sequence[Event]) -> Experiment:
     """The experiment without the readings of some events.
 
     Holds keep their durations; one that keeps no reading is unrecorded. Nothing is kept after a last reading.

@@ -29,7 +29,7 @@ def complaint(path: Path, wrong: InputError) -> InputError:
         That of the reader, unless the file is a table of readings: then with the experiment file beside it that reads
         it, or the command that makes one.
     """
-    if not is_table(path):
+    if not is_table_file(path):
         return wrong
     found = f"{path}: found a table of readings"
     reader = _reader(path)
@@ -39,7 +39,7 @@ def complaint(path: Path, wrong: InputError) -> InputError:
     return InputError(f"{found}, expected an experiment file, which this makes of it: {command}")
 
 
-def is_table(path: Path) -> bool:
+def is_table_file(path: Path) -> bool:
     """Whether a file is a workbook, or a text with rows of numbers."""
     beginning = read_bytes(path)[:_BEGINNING]
     if beginning.startswith(_WORKBOOKS):

@@ -80,7 +80,7 @@ def readings_table(path: Path) -> Table:
     return read_table(path, REQUIRED, OPTIONAL)
 
 
-def readings_of(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
+def checked_readings(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
     """Check a table of readings.
 
     Parameters
@@ -151,7 +151,7 @@ def protocol_holds(table: Table, length_mm: float, control: Control = "displacem
     Raises
     ------
     InputError
-        As `readings_of`, and where a value stands at a later time of its hold.
+        As `checked_readings`, and where a value stands at a later time of its hold.
     """
     column = READ[control]
     values = [np.nan] * len(table.rows)

@@ -70,7 +70,7 @@ class PoseNow(TypedDict):
     rotation_vector_rad: Numbers
 
 
-class Observability(TypedDict):
+class ObservabilityJson(TypedDict):
     """How many combinations of lengths the poses determine, and which one worst."""
 
     rank: int
@@ -82,7 +82,7 @@ class Observability(TypedDict):
 class Observed(TypedDict):
     """What the poses can determine, and which to read next."""
 
-    observability: Observability
+    observability: ObservabilityJson
     next_positions_m: Array | list[list[float]]
 
 

@@ -17,7 +17,7 @@ class LeaveOneHoldOut(TypedDict):
     refitted: Integers
 
 
-class Readings(TypedDict):
+class ReadingsJson(TypedDict):
     """Of held-out holds, a row a reading; for pictures."""
 
     hold: Integers
@@ -38,7 +38,7 @@ class PredictionScores(TypedDict):
     elpd_together: float
     coverage: dict[str, float]
     pit_p: float
-    readings: NotRequired[Readings]  # in the model's own file only
+    readings: NotRequired[ReadingsJson]  # in the model's own file only
     pit_band: NotRequired[Numbers]
 
 
@@ -52,7 +52,7 @@ class HeldOutHolds(TypedDict):
     effects: list[str]
 
 
-class Judgement(TypedDict):
+class JudgementJson(TypedDict):
     """What fits of one model came to."""
 
     effects: list[str]

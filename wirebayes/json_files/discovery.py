@@ -45,7 +45,7 @@ class FamilyReport(TypedDict):
     sentence: str
 
 
-class Interval(TypedDict):
+class IntervalJson(TypedDict):
     """A parameter in one model."""
 
     mean: float
@@ -57,8 +57,8 @@ class ParameterReport(TypedDict):
     """A parameter before and after; None where a model does not have it."""
 
     unit: str
-    plain: Interval | None
-    final: Interval | None
+    plain: IntervalJson | None
+    final: IntervalJson | None
 
 
 class Disagreement(TypedDict):
@@ -121,7 +121,7 @@ class GrossError(TypedDict):
     log_bayes: float
 
 
-class Scores(TypedDict):
+class ScoresJson(TypedDict):
     """How one model predicts the held-out holds; None where no holds were held out."""
 
     rmse_N: float | None
@@ -129,13 +129,13 @@ class Scores(TypedDict):
     coverage_90: float | None
 
 
-class Step(Scores):
+class StepJson(ScoresJson):
     """The plain model, or the model with one accepted effect more than the step before."""
 
     model: str
 
 
-class FinalScores(Scores):
+class FinalScores(ScoresJson):
     """With the standard error of the elpd's difference from the plain model; None for a single hold."""
 
     elpd_difference_se: float | None
@@ -149,13 +149,13 @@ class LeaveOneHoldOutGain(TypedDict):
     flexible_elpd_difference: float
 
 
-class HeldOut(TypedDict):
+class HeldOutJson(TypedDict):
     """The last holds predicted from the first; `floor_N` is the rms error that sensor noise alone would leave."""
 
     holds: list[int]
-    plain: Scores
+    plain: ScoresJson
     final: FinalScores
-    flexible: NotRequired[Scores | None]
+    flexible: NotRequired[ScoresJson | None]
     floor_N: NotRequired[float]
     gap_closed: float | None
     leave_one_hold_out: NotRequired[LeaveOneHoldOutGain | None]
@@ -165,8 +165,8 @@ class HeldOut(TypedDict):
 class HeldOutReport(Warned):
     """How models predict an experiment's holds that they did not see."""
 
-    steps: list[Step]
-    held_out: HeldOut
+    steps: list[StepJson]
+    held_out: HeldOutJson
     residual_rms_N: float
     gross_errors: list[GrossError]
 

@@ -98,7 +98,7 @@ class OnPlane(TypedDict):
     sentence: str
 
 
-class Equilibria(TypedDict):
+class EquilibriaJson(TypedDict):
     """All that were found from many starts."""
 
     stable_found: int
@@ -122,7 +122,7 @@ class EnclosedBand(TypedDict, total=False):
     band: ProvedBand
 
 
-class Certificate(EnclosedBand):
+class CertificateJson(EnclosedBand):
     """What interval arithmetic proves; `proved` is None where nothing was tried, for the reason in `sentence`."""
 
     proved: bool | None
@@ -312,8 +312,8 @@ class PoseJson(RobotOnWires):
     feasible_draws: NotRequired[float]
     inverse: NotRequired[InverseKinematics]
     forward: NotRequired[ForwardKinematics]
-    equilibria: NotRequired[Equilibria]
-    certificate: NotRequired[Certificate]
+    equilibria: NotRequired[EquilibriaJson]
+    certificate: NotRequired[CertificateJson]
     drift: NotRequired[list[Drift]]
     stability: NotRequired[list[Stability]]
     claim: NotRequired[Claim]

@@ -53,7 +53,7 @@ class Corrections(TypedDict):
     left_mm: Band
 
 
-class Clock(TypedDict):
+class ClockJson(TypedDict):
     """How far poses move if the wires' clocks run on instead of starting anew."""
 
     largest_mm: float
@@ -75,4 +75,4 @@ class PoseHistoryJson(RobotOnWires):
     position_m: NotRequired[Band]
     rotation_vector_rad: NotRequired[Band | None]
     corrections: NotRequired[Corrections]
-    clock: NotRequired[Clock]
+    clock: NotRequired[ClockJson]

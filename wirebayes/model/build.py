@@ -8,7 +8,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.column_units import unit_of_column
-from wirebayes.model.prior import Power, Prior, from_table, possible, wire_defaults
+from wirebayes.model.prior import PowerScaled, Prior, from_table, possible, wire_defaults
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL, SAMPLE, Sample
 from wirebayes.model.scales import Scales, Units, scales_of
@@ -121,7 +121,7 @@ def default_prior(
     return Prior(free, fixed, frozenset(_POSITIVE & free.keys()), powers)
 
 
-def _default_powers(names: Sequence[str], fixed: Mapping[str, float], units: Units) -> dict[str, Power]:
+def _default_powers(names: Sequence[str], fixed: Mapping[str, float], units: Units) -> dict[str, PowerScaled]:
     """Of the defaults of B and k2, which speak of the creep at the typical tension and of the hazard after a hold."""
     logs = {"B": ("U", float(np.log(units.tension_N))), "k2": ("N", float(np.log(units.time_s)))}
     out = {}
@@ -130,7 +130,7 @@ def _default_powers(names: Sequence[str], fixed: Mapping[str, float], units: Uni
         if base in logs:
             exponent, log_base = logs[base]
             column = f"{exponent}{bracket}{mark}"
-            out[name] = Power(fixed.get(column, column), log_base)
+            out[name] = PowerScaled(fixed.get(column, column), log_base)
     return out
 
 

@@ -132,7 +132,7 @@ def _observed(n: int, readings: Array, mask: Array, variance: Array, setting_sd:
     return np.asarray(readings, float), np.ascontiguousarray(mask).view(np.uint8), *noise
 
 
-def held_out(
+def held_out_density(
     line: Linearised, filtered: Filtered, readings: Array, mask: Array, variance: Array, setting_sd: Array
 ) -> Array:
     """Log probability of each held-out hold's readings given what the holds before it say that are not held out.
@@ -294,7 +294,7 @@ def seen(
     return np.moveaxis(gram, -1, 0), along.T
 
 
-def jacobian(line: Linearised) -> Array:
+def setting_jacobian(line: Linearised) -> Array:
     """(H, R, H, n) derivative of every reading by every setting error, N/mm; quadratic in the holds."""
     holds, width, n = line.reading.shape
     out = np.zeros((holds, width, holds, n))

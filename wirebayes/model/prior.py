@@ -54,7 +54,7 @@ from wirebayes.wire.protocol import Control
 ABOVE_ZERO, NOT_BELOW_ZERO = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")  # as stiffness, creep and errors are
 
 
-class Power(NamedTuple):
+class PowerScaled(NamedTuple):
     """A parameter whose unit depends on another one: its distribution is that of ``value * exp(log_base * exponent)``.
 
     ``B`` in mm N^-U is the creep at 1 N. What is known is the creep at the test's typical tension, B times that tension
@@ -84,7 +84,7 @@ class Prior:
     distributions: dict[str, Any]
     fixed: dict[str, float]
     logarithmic: frozenset[str]
-    powers: dict[str, Power] = field(default_factory=dict)
+    powers: dict[str, PowerScaled] = field(default_factory=dict)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.column_units import sample_in, unit_of_column, units_ratio
-from wirebayes.model.prior import Power, Prior
+from wirebayes.model.prior import PowerScaled, Prior
 from wirebayes.model.sample import LENGTH_EXPONENT, Likelihood, Sample, at_length
 from wirebayes.model.scales import NATURAL, Scales, Units
 from wirebayes.numeric.distributions import scaled
@@ -190,7 +190,7 @@ class Problem:
                 out[:, self.names.index(name)] *= np.exp(-log_ratio * value)
         return out
 
-    def _exponents(self, units: Units) -> dict[str, Power]:
+    def _exponents(self, units: Units) -> dict[str, PowerScaled]:
         """For B and k2 of every material the exponent, and the logarithm of the ratio of the units raised to it."""
         # a difference of logarithms, so that what was added in one unit goes to the last bit in the other
         logs = {
@@ -203,7 +203,7 @@ class Problem:
             if base in logs:
                 exponent, log_ratio = logs[base]
                 column = f"{exponent}{bracket}{mark}"
-                out[name] = Power(self.prior.fixed.get(column, column), float(log_ratio))
+                out[name] = PowerScaled(self.prior.fixed.get(column, column), float(log_ratio))
         return out
 
     def _prior_in(self, units: Units) -> Prior:
@@ -218,7 +218,7 @@ class Problem:
         for name, (exponent, log_ratio) in self._exponents(units).items():
             log_base = prior.powers[name].log_base if name in prior.powers else 0.0
             if log_base + log_ratio != 0.0:
-                powers[name] = Power(exponent, log_base + log_ratio)
+                powers[name] = PowerScaled(exponent, log_base + log_ratio)
             if name in fixed and isinstance(exponent, float):
                 fixed[name] *= float(np.exp(-log_ratio * exponent))
         return replace(prior, distributions=distributions, fixed=fixed, powers=powers)

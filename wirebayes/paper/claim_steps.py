@@ -17,7 +17,7 @@ STEPS = ("table_4_elongation", "table_4_strain", "chain_strain", "chain_workspac
 _GRID = (3, 3, 2)  # poses along each axis, as in `section_4`, so that the figures compare
 
 
-def rows(
+def claim_step_rows(
     robot_name: str,
     table_4: Mapping[str, Mapping[str, float]],
     lengths_mm: Mapping[str, float],

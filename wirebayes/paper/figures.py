@@ -18,7 +18,7 @@ def intervals(rows: Sequence[Mapping[str, Any]], title: str) -> Figure:
     Parameters
     ----------
     rows : sequence of mapping
-        Of `wirebayes.paper.verdicts.rows`, both likelihoods.
+        Of `wirebayes.paper.verdicts.verdict_rows`, both likelihoods.
     """
     figure, axes = panel("multiple of the published value", "", title)
     names = list(dict.fromkeys(row["parameter"] for row in rows))
@@ -77,7 +77,7 @@ def drifts(rows: Sequence[Mapping[str, Any]], limit_mm: float, title: str) -> Fi
     Parameters
     ----------
     rows : sequence of mapping
-        Of `wirebayes.paper.section_4.rows`, one robot's.
+        Of `wirebayes.paper.section_4.drift_rows`, one robot's.
     limit_mm : float
         What the paper claims.
     """

@@ -17,7 +17,7 @@ _DRAWS = 2000  # a 5 % quantile is then one between 4 % and 6 %
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class Forecast:
     """Predicted and measured readings of the holds that were not trained on.
 
     Attributes
@@ -51,7 +51,7 @@ class HeldOut:
         return float(np.mean((self.measured_N >= low) & (self.measured_N <= high)))
 
 
-def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -> HeldOut:
+def forecast_held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -> Forecast:
     """Predict what `stored`, trained on the first holds of an experiment, has not seen.
 
     As a chain the training readings fix the creep carried in, the displacements say the rest; hold by hold each hold
@@ -74,7 +74,7 @@ def held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -
     if alone:
         wanted[:, 0] = False
     number = np.broadcast_to(protocol.number[:, None], wanted.shape)
-    return HeldOut(number[wanted], protocol.time_s[wanted], measured[wanted], drawn[wanted])
+    return Forecast(number[wanted], protocol.time_s[wanted], measured[wanted], drawn[wanted])
 
 
 def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng: np.random.Generator) -> Array:

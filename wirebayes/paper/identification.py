@@ -8,13 +8,13 @@ import numpy as np
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.spec import ModelSpec
-from wirebayes.paper.least_squares import VARIANTS, Identified, at, identify, leading, residuals, rms
+from wirebayes.paper.least_squares import VARIANTS, LeastSquaresFit, at, identify, leading, rms, tension_residuals
 from wirebayes.processes.workers import ParallelMap
 
 Row = dict[str, Any]
 
 
-def rows(
+def identification_rows(
     experiments: Sequence[Experiment],
     published: Mapping[str, Mapping[str, float]],
     training_holds: int,
@@ -53,8 +53,8 @@ def _wire(task: tuple[Experiment, dict[str, float], int, int]) -> list[Row]:
     return out
 
 
-def _row(experiment: Experiment, variant: ModelSpec, source: str, found: Identified, cut: int) -> Row:
-    left = residuals(experiment, at(found.parameters), variant)
+def _row(experiment: Experiment, variant: ModelSpec, source: str, found: LeastSquaresFit, cut: int) -> Row:
+    left = tension_residuals(experiment, at(found.parameters), variant)
     return {
         "experiment": experiment.name,
         "likelihood": variant.likelihood,

@@ -44,7 +44,7 @@ def adjusted(variant: ModelSpec) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Identified:
+class LeastSquaresFit:
     """Parameters of least squares.
 
     Attributes
@@ -62,7 +62,7 @@ class Identified:
     not_held_back: tuple[str, ...] = ()
 
 
-def residuals(experiment: Experiment, theta: Mapping[str, Array], variant: ModelSpec) -> Array:
+def tension_residuals(experiment: Experiment, theta: Mapping[str, Array], variant: ModelSpec) -> Array:
     """Measured minus predicted tension.
 
     Parameters
@@ -101,7 +101,7 @@ def at(parameters: Mapping[str, float]) -> dict[str, Array]:
 
 def identify(
     experiment: Experiment, variant: ModelSpec, rng: np.random.Generator, known: Mapping[str, float] | None = None
-) -> Identified:
+) -> LeastSquaresFit:
     """Least squares over all readings of an experiment.
 
     Parameters
@@ -114,8 +114,8 @@ def identify(
     known = dict(known or {})
     names = [name for name in adjusted(variant) if name not in known]
     if not names:
-        only = residuals(experiment, at(known), variant)
-        return Identified(known, rms(only))
+        only = tension_residuals(experiment, at(known), variant)
+        return LeastSquaresFit(known, rms(only))
     prior = default_prior(experiment.length_mm, scales_of([experiment]), {})
     logarithmic = np.array([name != "preload" for name in names])
     columns = [prior.names.index(name) for name in names]
@@ -134,7 +134,7 @@ def identify(
 
     def misfit(z: Array) -> Array:
         """(m, n) residuals of (n, d) points; a reading that cannot be predicted counts in full."""
-        values = residuals(experiment, natural(z), variant)[predicted]
+        values = tension_residuals(experiment, natural(z), variant)[predicted]
         return np.where(np.isfinite(values), values, measured[:, None])
 
     draws = prior.rvs(_DRAWS, rng)[:, columns]
@@ -143,7 +143,7 @@ def identify(
     ordered = {name: found[name] for name in adjusted(variant)}
     loose = np.maximum(0.01 * (high - low), cost * _per_unit_misfit(misfit, end))
     edge = np.minimum(end - low, high - end) < loose
-    return Identified(ordered, cost, tuple(name for name, on in zip(names, edge, strict=True) if on))
+    return LeastSquaresFit(ordered, cost, tuple(name for name, on in zip(names, edge, strict=True) if on))
 
 
 def _predicted(experiment: Experiment, variant: ModelSpec) -> NDArray[np.bool_]:

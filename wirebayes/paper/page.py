@@ -6,7 +6,7 @@ from typing import Any
 
 from wirebayes.io.run_folder import read_json
 from wirebayes.paper import page_tables as paper_tables
-from wirebayes.paper.page_summary import answer, in_a_minute, of_table_4, unbroken
+from wirebayes.paper.page_summary import creep_of_each_wire, in_a_minute, of_table_4, unbroken
 from wirebayes.paper.page_tables import LEAST_COVERAGE, Rows
 from wirebayes.report.blocks import Block, Page, Picture, Pictures, Section, Text, embedded, files_beside
 from wirebayes.report.glossary import meaning
@@ -36,7 +36,7 @@ def page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections.append(meaning(_TERMS))
     return Page(
         "Four wires that creep",
-        answer(tables["creep"]) if tables.get("creep") else _ABOUT,
+        creep_of_each_wire(tables["creep"]) if tables.get("creep") else _ABOUT,
         [section for section in sections if section.blocks],
         f"Seed {configuration.get('seed')}. The tables beside this page (CSV and JSON) hold every number shown; each "
         "fit has a folder with posterior.nc, which opens with ArviZ.",
@@ -71,7 +71,7 @@ def _measured(tables: Tables, gallery: Gallery) -> Section:
         "are absent from the print and taken as held for two minutes. The data's README lists every correction and "
         "doubt."
     )
-    return Section("What was measured", [paper_tables.measured(tables["measured"]), doubts], folded=True)
+    return Section("What was measured", [paper_tables.test_table(tables["measured"]), doubts], folded=True)
 
 
 def _table_4(tables: Tables, gallery: Gallery) -> Section:
@@ -138,7 +138,7 @@ def _known(tables: Tables, gallery: Gallery) -> Section:
         "Inside or outside: whether the 90 % interval holds the published value. Not determined: on a logarithmic "
         "scale the interval has not shrunk to a third of its width before the test."
     )
-    table = paper_tables.posterior(tables["posterior"], caption)
+    table = paper_tables.interval_table(tables["posterior"], caption)
     return Section("What the readings say about each published value", [words, *gallery("known"), table], folded=True)
 
 
@@ -193,7 +193,9 @@ def _held_out(tables: Tables, gallery: Gallery) -> Section:
         f"{100 * LEAST_COVERAGE:.0f} % of the readings lie in it; 90 % should."
     )
     return Section(
-        "Where the model fails", [*blocks, *gallery("unused-chain"), paper_tables.held_out(rows, caption)], folded=True
+        "Where the model fails",
+        [*blocks, *gallery("unused-chain"), paper_tables.forecast_table(rows, caption)],
+        folded=True,
     )
 
 
@@ -218,7 +220,7 @@ def _robot(tables: Tables, gallery: Gallery) -> Section:
     blocks: list[Block] = [words]
     if "robot_claim" in tables:
         blocks += [Text(_claim(tables["robot_claim"])), paper_tables.robot_claim(tables["robot_claim"])]
-    blocks.append(paper_tables.robot(tables["robot"]))
+    blocks.append(paper_tables.drift_claim(tables["robot"]))
     if "robot_mass" in tables:
         blocks.append(paper_tables.robot_mass(tables["robot_mass"]))
     return Section(

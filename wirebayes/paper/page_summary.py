@@ -12,7 +12,7 @@ def in_a_minute(tables: dict[str, Rows]) -> Columns:
     return Columns([_measured(tables["measured"]), _known(tables), _open(tables)])
 
 
-def answer(rows: Rows) -> str:
+def creep_of_each_wire(rows: Rows) -> str:
     """The creep of each wire in a sentence, as one history."""
     first = [row for row in rows if row["likelihood"] == "chain" and row["time_s"] == TWO_MINUTES_S]
     creep = [

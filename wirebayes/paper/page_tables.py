@@ -11,7 +11,7 @@ LEAST_COVERAGE = 0.75  # of readings in a band that promises 0.9
 _TIMES = {120.0: "2 min", 3600.0: "1 h", 86400.0: "1 day"}  # as people say them
 
 
-def measured(rows: Rows) -> Table:
+def test_table(rows: Rows) -> Table:
     """What each test consisted of."""
     header = ["sample", "material", "length, mm", "holds", "not recorded", "readings", "tension, N", "median loss, %"]
     lines = []
@@ -46,7 +46,7 @@ def table_4(rows: Rows, likelihood: str, history: str, law: str, caption: str) -
     return Table(header, lines, caption)
 
 
-def posterior(rows: Rows, caption: str) -> Table:
+def interval_table(rows: Rows, caption: str) -> Table:
     """Intervals and verdicts of both likelihoods beside every published value."""
     header = ["sample", "parameter", "published"]
     for likelihood in LIKELIHOOD.values():
@@ -62,7 +62,7 @@ def posterior(rows: Rows, caption: str) -> Table:
     return Table(header, lines, caption, VERDICTS)
 
 
-def held_out(rows: Rows, caption: str) -> Table:
+def forecast_table(rows: Rows, caption: str) -> Table:
     """How the forecasts of the unused holds did."""
     header = ["sample", "interpretation of the model", "unused readings", "rms, N", "median width of band, N"]
     lines = []
@@ -89,7 +89,7 @@ def creep(rows: Rows, caption: str) -> Table:
     return Table(header, lines, caption)
 
 
-def robot(rows: Rows) -> Table:
+def drift_claim(rows: Rows) -> Table:
     """The paper's claim on the drift of a robot."""
     header = ["wire", "robot", "specimens differ by", "loaded before", "drift, mm", "90 %", "tilt, degrees", "90 %"]
     lines = []

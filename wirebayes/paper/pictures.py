@@ -14,8 +14,8 @@ from wirebayes.model.replicate import readings as replicate
 from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.typing import Array
 from wirebayes.paper import figures as paper_figures
-from wirebayes.paper.held_out import HeldOut, last_hold_course, published_course, some
-from wirebayes.paper.least_squares import at, residuals
+from wirebayes.paper.held_out import Forecast, last_hold_course, published_course, some
+from wirebayes.paper.least_squares import at, tension_residuals
 from wirebayes.report import figures
 from wirebayes.report.blocks import number, svg
 from wirebayes.results.read_back import Stored
@@ -84,7 +84,7 @@ class Gallery:
         caption = f"The paper's curve misses these readings by {number(float(np.sqrt(np.mean(missed**2))), 2)} N (rms)."
         self.add("figures-1-to-4", e.name, figure, alt, caption)
 
-    def unused_holds(self, e: Experiment, published: dict[str, float], seen: Mapping[str, HeldOut]) -> None:
+    def unused_holds(self, e: Experiment, published: dict[str, float], seen: Mapping[str, Forecast]) -> None:
         """All unused holds, hold by hold and as one chain.
 
         Parameters
@@ -167,9 +167,9 @@ class Gallery:
         self.add("prior", e.name, figure, alt)
 
 
-def _published_at(e: Experiment, published: Mapping[str, float], out: HeldOut) -> Array:
+def _published_at(e: Experiment, published: Mapping[str, float], out: Forecast) -> Array:
     """The paper's prediction of the unused readings, hold by hold."""
-    left = residuals(e, at(published), ModelSpec(likelihood="hold"))[..., 0]
+    left = tension_residuals(e, at(published), ModelSpec(likelihood="hold"))[..., 0]
     wanted = np.isfinite(left) & np.isin(e.protocol().number, out.hold)[:, None]
     return np.asarray((e.tension() - left)[wanted])
 

@@ -18,7 +18,7 @@ from wirebayes.model.sample import Likelihood
 from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.typing import Array
 from wirebayes.paper import claim_steps, identification, pictures, section_4, verdicts
-from wirebayes.paper.held_out import HeldOut, held_out
+from wirebayes.paper.held_out import Forecast, forecast_held_out
 from wirebayes.processes.workers import workers
 from wirebayes.report.page import write as write_page
 from wirebayes.results.jobs import Job
@@ -61,7 +61,7 @@ def reproduce(
     """
     experiments, published = paper.experiments(), paper.published()
     training = int(published["identification"]["training_holds"])
-    with open_run(directory, configuration(experiments, seed, policy)) as run:
+    with open_run(directory, paper_configuration(experiments, seed, policy)) as run:
         if run.state != "done":
             jobs = fits(experiments, training)
             run_jobs(jobs, directory, seed, policy=policy, report=report)
@@ -71,7 +71,7 @@ def reproduce(
     return _not_converged(directory, fits(experiments, training))
 
 
-def configuration(experiments: Sequence[Experiment], seed: int, policy: Policy) -> dict[str, Any]:
+def paper_configuration(experiments: Sequence[Experiment], seed: int, policy: Policy) -> dict[str, Any]:
     """Everything that decides the results.
 
     Parameters
@@ -116,7 +116,11 @@ def _tables_and_pictures(
 ) -> None:
     table_4 = published["table_4"]
     with workers(len(experiments)) as parallel_map:
-        write_table(directory, "least_squares", identification.rows(experiments, table_4, training, seed, parallel_map))
+        write_table(
+            directory,
+            "least_squares",
+            identification.identification_rows(experiments, table_4, training, seed, parallel_map),
+        )
     report("tables and pictures", 1, 3)
     drawn = pictures.Gallery(directory)
     tables: dict[str, list[Row]] = {"posterior": [], "creep": [], "held_out": [], "sampling": []}
@@ -124,7 +128,9 @@ def _tables_and_pictures(
     for e in experiments:
         full, first = _stored(directory / e.name, training)
         seen = {
-            likelihood: held_out(stored, e, np.random.default_rng(seed_of(seed, "held out", e.name, likelihood)))
+            likelihood: forecast_held_out(
+                stored, e, np.random.default_rng(seed_of(seed, "held out", e.name, likelihood))
+            )
             for likelihood, stored in first.items()
         }
         own = _rows(directory, e, full, seen, table_4[e.name], training, seed)
@@ -138,9 +144,9 @@ def _tables_and_pictures(
     report("tables and pictures", 2, 3)
     lengths = {e.name: e.length_mm for e in experiments}
     lines = {name: section_4.as_line(chain) for name, chain in chains.items()}
-    robot = section_4.rows(chains, seed)
+    robot = section_4.drift_rows(chains, seed)
     write_table(directory, "robot", robot)
-    write_table(directory, "robot_claim", claim_steps.rows(section_4.MAPPED, table_4, lengths, lines))
+    write_table(directory, "robot_claim", claim_steps.claim_step_rows(section_4.MAPPED, table_4, lengths, lines))
     write_table(directory, "robot_mass", section_4.needed(chains))
     _draw_robot(drawn, robot, chains, published["pose_claim"]["centre_moves_less_than_mm"])
     drawn.finish()
@@ -148,7 +154,7 @@ def _tables_and_pictures(
 
 
 def _draw_robot(drawn: pictures.Gallery, rows: list[Row], chains: Mapping[str, Stored], limit_mm: float) -> None:
-    section_4.draw(drawn, rows, limit_mm)
+    section_4.draw_gallery(drawn, rows, limit_mm)
     section_4.draw_poses(drawn, chains, limit_mm)
     section_4.draw_maps(drawn, chains)
 
@@ -163,7 +169,7 @@ def _rows(
     directory: Path,
     e: Experiment,
     full: Mapping[str, Stored],
-    seen: Mapping[str, HeldOut],
+    seen: Mapping[str, Forecast],
     published: Mapping[str, float],
     training: int,
     seed: int,
@@ -174,7 +180,7 @@ def _rows(
         draws = full[likelihood].draws
         tension = round(full[likelihood].sample.model.tension_ref_N, 3)
         prior = _prior_draws(e, likelihood, seed)
-        out["posterior"] += verdicts.rows(e.name, likelihood, draws, prior, published)
+        out["posterior"] += verdicts.verdict_rows(e.name, likelihood, draws, prior, published)
         out["creep"] += verdicts.creep_rows(e.name, likelihood, draws, published, tension, e.length_mm)
         out["held_out"].append(_forecast_row(e.name, likelihood, seen[likelihood]))
         for suffix in ("", f"-first-{training}"):
@@ -188,7 +194,7 @@ def _draw(
     published: dict[str, float],
     full: dict[str, Stored],
     first: dict[str, Stored],
-    seen: dict[str, HeldOut],
+    seen: dict[str, Forecast],
     rows: list[Row],
     seed: int,
 ) -> None:
@@ -222,7 +228,7 @@ def _measured_row(e: Experiment) -> Row:
     }
 
 
-def _forecast_row(name: str, likelihood: str, seen: HeldOut) -> Row:
+def _forecast_row(name: str, likelihood: str, seen: Forecast) -> Row:
     return {
         "experiment": name,
         "likelihood": likelihood,

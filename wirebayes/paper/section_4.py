@@ -36,7 +36,7 @@ _TIMES_S = np.array([1.0, 3.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 36
 _MAP, _SIZES, _FEW = (7, 7, 3), (0.5, 1.0, 2.0), 40
 
 
-def rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
+def drift_rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
     """Drift and tilt of a vertical platform after a minute, over posterior and workspace, for each wire and robot.
 
     Parameters
@@ -121,7 +121,7 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
     gallery.add("robot", "budget", figure, alt, f"Of the drift after {_TIMES_S[-1]:g} s.")
 
 
-def draw(gallery: Gallery, claims: Sequence[Row], limit_mm: float) -> None:
+def draw_gallery(gallery: Gallery, claims: Sequence[Row], limit_mm: float) -> None:
     """One picture a robot.
 
     Parameters

@@ -40,7 +40,7 @@ def verdict(published: float, low: float, high: float, shrunk: float) -> Verdict
     return "inside" if low <= published <= high else "outside"
 
 
-def rows(
+def verdict_rows(
     experiment: str,
     likelihood: str,
     draws: Mapping[str, Array],

@@ -90,7 +90,7 @@ def at_centre(test: Experiment, guess: Guess, spec: ModelSpec) -> Experiment:
     return replace(test, holds=tuple(holds))
 
 
-def typical_tension(test: Experiment) -> float:
+def middle_tension(test: Experiment) -> float:
     """The middle one of the tensions with which the holds of a test begin, N."""
     return float(np.median([np.ravel(hold.tension_N)[0] for hold in test.recorded_holds]))
 
@@ -116,7 +116,7 @@ def expected_widths(
     rng : numpy Generator
     tension_N, length_mm : float, optional
         For which creep is stated, so that tests of several lengths can be compared (creep is a strain of the whole
-        wire); this test's `typical_tension` and length when left out.
+        wire); this test's `middle_tension` and length when left out.
     kept_draws : int
         Of how many tests posterior draws are kept.
 
@@ -134,7 +134,7 @@ def expected_widths(
     y = y[..., usable]
     found, good = _climbed(target, truth[usable], y)
     longest = float(sample.protocol.duration_s.max())
-    tension = typical_tension(test) if tension_N is None else tension_N
+    tension = middle_tension(test) if tension_N is None else tension_N
     length = test.length_mm if length_mm is None else length_mm
     quantities = partial(_quantities, problem, tension_N=tension, longest_s=longest, length_mm=length)
     widths, volumes, draws = list[dict[str, Array]](), list[Array](), list[dict[str, Array]]()

@@ -14,7 +14,7 @@ from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.numeric.typing import Array
-from wirebayes.prediction.leave_one_hold_out import thinned
+from wirebayes.prediction.leave_one_hold_out import evenly_thinned
 from wirebayes.prediction.predictive import PredictionRequest, given_first, predict
 from wirebayes.wire.staircase import linearise
 
@@ -76,7 +76,7 @@ class Scores:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutPrediction:
     """The holds after the training ones, predicted.
 
     Attributes
@@ -96,7 +96,7 @@ class HeldOut:
     given: Scores
 
 
-def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator, sample: int = 0) -> HeldOut:
+def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator, sample: int = 0) -> HeldOutPrediction:
     """Predict the holds of an experiment that a fit of its first holds has not seen.
 
     Parameters
@@ -111,7 +111,7 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
     """
     problem, here = fitted.problem, fitted.problem.samples[sample]
     whole, trained = experiment.protocol(), len(here.protocol.number)
-    theta = thinned(fitted.flat)
+    theta = evenly_thinned(fitted.flat)
     requested = whole.recorded.copy()
     requested[:trained] = False
     if not requested.any():
@@ -134,7 +134,7 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
         elpd_given = _hold_scores(fitted, experiment, sample, requested)
     later = whole.mask & requested[:, None]
     later[:, 0] = False
-    return HeldOut(
+    return HeldOutPrediction(
         experiment.name, past, free, _scores(drawn, later, whole.number, whole.time_s, tension, elpd_given, np.nan)
     )
 
@@ -201,14 +201,14 @@ def _chain_scores(
     later = protocol.mask & requested[:, None]
     firsts = later & (np.arange(protocol.mask.shape[1]) == 0)
     parts: list[tuple[Array, Array, Array]] = []
-    theta = thinned(fitted.flat)
+    theta = evenly_thinned(fitted.flat)
     for start in range(0, len(theta), _CHUNK):
         own = fitted.problem.parameters(theta[start : start + _CHUNK], here)
         line = linearise(protocol, own, here.model)
         noise = likelihoods.reading_variance(own["sensor_sd"], here.resolution), own["setting_sd"]
         with np.errstate(all="ignore"):
             before = likelihoods.chain(line, read, protocol.mask & ~requested[:, None], *noise)
-            holds, first = (likelihoods.held_out(line, before, read, rows, *noise) for rows in (later, firsts))
+            holds, first = (likelihoods.held_out_density(line, before, read, rows, *noise) for rows in (later, firsts))
             together = likelihoods.chain(line, read, protocol.mask, *noise).log_likelihood[requested].sum(axis=0)
         parts.append((holds, first, together))
     whole_hold, first_reading, every = (_log_mean(np.concatenate(v, axis=-1)) for v in zip(*parts, strict=True))
@@ -217,7 +217,7 @@ def _chain_scores(
 
 def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, requested: NDArray[np.bool_]) -> Array:
     problem, here = fitted.problem, fitted.problem.samples[sample]
-    own = problem.parameters(thinned(fitted.flat), here)
+    own = problem.parameters(evenly_thinned(fitted.flat), here)
     own = own | {"preload": 0.0 * own["B"]}
     variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution)
     log_p = single_holds.hold_by_hold(

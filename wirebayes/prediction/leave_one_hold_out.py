@@ -33,7 +33,7 @@ _DRAWS = 4000  # the error of a hold's elpd by their number is then some hundred
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class LeftOutHolds:
     """Each recorded hold predicted from all the others.
 
     Attributes
@@ -77,7 +77,7 @@ def smoothed_leave_one_hold_out(
     policy: Policy = REFIT,
     exact: bool = False,
     progress: Callable[[float], None] = lambda share: None,
-) -> LeftOut:
+) -> LeftOutHolds:
     """Leave out each recorded hold in turn, by Pareto-smoothed importance sampling, and by sampling where it fails.
 
     For converged draws of a posterior, whose weights' tail says whether they can be trusted and where sampling without
@@ -97,7 +97,7 @@ def smoothed_leave_one_hold_out(
     progress : function of a share between 0 and 1
     """
     problem = fitted.problem
-    theta = thinned(fitted.flat)
+    theta = evenly_thinned(fitted.flat)
     conditional = problem.leave_one_hold_out(theta)
     where = [(s, int(j)) for s, sample in enumerate(problem.samples) for j in np.flatnonzero(sample.protocol.recorded)]
     elpd, k = np.zeros(len(where)), np.zeros(len(where))
@@ -117,17 +117,17 @@ def smoothed_leave_one_hold_out(
         progress(done / alone.sum())
         s, j = where[i]
         without = fit(without_hold(problem, s, j), seed_of(seed, "without", str(s), str(j)), policy=policy, rough=theta)
-        bridge, shared = log_mean(problem.leave_one_hold_out(thinned(without.flat))[s][j], conditional[s][j])
+        bridge, shared = log_mean(problem.leave_one_hold_out(evenly_thinned(without.flat))[s][j], conditional[s][j])
         if exact or shared >= _SHARED:  # else what importance sampling says, settled or not, is nearer
             elpd[i] = bridge
         converged &= without.converged and shared >= _SHARED
     progress(1.0)
     names = tuple(problem.samples[s].name for s, _ in where)
     numbers = np.array([problem.samples[s].protocol.number[j] for s, j in where])
-    return LeftOut(names, numbers, elpd, k, refitted, converged)
+    return LeftOutHolds(names, numbers, elpd, k, refitted, converged)
 
 
-def thinned(theta: Floats, draws: int = _DRAWS) -> Floats:
+def evenly_thinned(theta: Floats, draws: int = _DRAWS) -> Floats:
     """At most so many rows, evenly spread."""
     rows = np.linspace(0, len(theta) - 1, min(draws, len(theta))).round().astype(int)
     kept: Floats = theta[rows]

@@ -50,7 +50,7 @@ def log_densities(
     problem = problem.in_units(problem.own_units)
     target = LogPosterior(problem)
     z = target.coordinates.to_sampled(draws)
-    pool = importance.from_draws(joined(target, holds), z, target.coordinates.order, rng, _ESS)
+    pool = importance.from_draws(joined_densities(target, holds), z, target.coordinates.order, rng, _ESS)
     elpd, settled = -pool.log_ratio[1:], pool.settled[0] & pool.settled[1:]
     _bear_witness(target, holds, pool, settled, doubtful, rng)
     log_whole, known = float(pool.log_integral[0]), bool(pool.settled[0])
@@ -131,7 +131,7 @@ def without_holds(problem: Problem, holds: Holds) -> list[Array]:
     return out
 
 
-def joined(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:
+def joined_densities(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:
     """Log posterior densities (n, 1 + m), with all readings and without those of each hold, of sampled points (n, d).
 
     Parameters

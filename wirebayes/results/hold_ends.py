@@ -60,7 +60,7 @@ def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
         shift = float(after[i] - before[i])
         share = abs(shift) / max(float(spread[i]), np.finfo(float).tiny)
         moved[name] = {"shift": shift, "sd_share": share, "unit": _unit(name, problem)}
-    return {"covered": COVERED, "moved": moved, "sentence": sentence(moved)}
+    return {"covered": COVERED, "moved": moved, "sentence": hold_ends_sentence(moved)}
 
 
 def _is_told(column: str) -> bool:
@@ -72,7 +72,7 @@ def _unit(column: str, problem: Problem) -> str:
     return UNITS.get(column.split("[")[0]) or unit_of_column(column, problem.samples)
 
 
-def sentence(moved: dict[str, MovedByHoldEnds]) -> str:
+def hold_ends_sentence(moved: dict[str, MovedByHoldEnds]) -> str:
     """What the assumption may cost, in words.
 
     Parameters

@@ -61,11 +61,11 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
             "prior_range_90": float(before[1] / before[0] if positive[i] else before[1] - before[0]),
             "posterior_range_90": float(after[1] / after[0] if positive[i] else after[1] - after[0]),
             "range_is_factor": bool(positive[i]),
-            "prior_sensitivity": sensitivity(z[:, i], own_prior[:, i]),
-            "likelihood_sensitivity": sensitivity(z[:, i], likelihood),
+            "prior_sensitivity": distance_per_doubling(z[:, i], own_prior[:, i]),
+            "likelihood_sensitivity": distance_per_doubling(z[:, i], likelihood),
             "ridges": {names[j]: float(correlation[i, j]) for j in along},
         }
-        out[name] = {**figures, "sentence": in_words(name, figures)}
+        out[name] = {**figures, "sentence": parameter_in_words(name, figures)}
     return out
 
 
@@ -74,7 +74,7 @@ def _thinned(flat: Array) -> Array:
     return np.asarray(flat[np.linspace(0, len(flat) - 1, min(_DRAWS, len(flat))).round().astype(int)])
 
 
-def in_words(name: str, figures: IdentifiabilityFigures) -> str:
+def parameter_in_words(name: str, figures: IdentifiabilityFigures) -> str:
     """A sentence about one parameter."""
     sign = "×" if figures["range_is_factor"] else ""
     after, before = figures["posterior_range_90"], figures["prior_range_90"]
@@ -91,7 +91,7 @@ def in_words(name: str, figures: IdentifiabilityFigures) -> str:
     return f"{name}: {verdict}; {ranges}{along}."
 
 
-def sensitivity(values: Array, log_component: Array) -> float:
+def distance_per_doubling(values: Array, log_component: Array) -> float:
     """Distance the distribution of (n,) `values` moves for each doubling of a component's power."""
     if np.ptp(log_component) < _NOTHING:
         return 0.0

@@ -107,11 +107,11 @@ def one(
     for place in job.folders:
         (directory / place).mkdir(parents=True, exist_ok=True)
     checkpoint = directory / job.folder / ".checkpoint"
-    store(job, fitted(job, seed, policy, checkpoint, progress), directory, seed, policy)
+    store(job, fit_job(job, seed, policy, checkpoint, progress), directory, seed, policy)
     checkpoint.unlink(missing_ok=True)
 
 
-def fitted(
+def fit_job(
     job: Job,
     seed: int,
     policy: Policy,

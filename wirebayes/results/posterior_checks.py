@@ -29,7 +29,7 @@ _DECADES_TIMES_N = float(np.log10(_NINE_TENTHS / _TENTH))
 LEAST_SHRINKAGE = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
 
 
-def warnings(fit: Fit, sample: Sample) -> list[Notice]:
+def posterior_warnings(fit: Fit, sample: Sample) -> list[Notice]:
     """What is suspicious about the readings of one sample and about what was fitted to them.
 
     Parameters
@@ -78,7 +78,7 @@ def of_posterior(own: Mapping[str, Floats], prior: Mapping[str, Floats], sample:
     found = [
         ("data", loose_steps(own, sample)),
         ("data", noise(own, sample)),
-        ("prior", stiffness(own, prior)),
+        ("prior", unlikely_stiffness(own, prior)),
         ("prior", endless(own, prior)),
         ("prior", unchanged_prior(own, prior)),
     ]
@@ -121,7 +121,7 @@ def noise(own: Mapping[str, Floats], sample: Sample) -> str:
     return ""
 
 
-def stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
+def unlikely_stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
     """A stiffness that the prior all but excludes."""
     if "k1" not in own:
         return ""

@@ -25,7 +25,7 @@ from wirebayes.results import netcdf
 from wirebayes.results.content import READING, SETTING
 from wirebayes.results.netcdf import Group
 from wirebayes.results.parameters import by_length
-from wirebayes.results.stored_check import check
+from wirebayes.results.stored_check import check_stored
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Control, Protocol
 
@@ -175,7 +175,7 @@ def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path 
     protocol, readings = _measured(constant, observed, names[at], float(lengths[at]), reference_C, control)
     resolutions = json.loads(about["resolutions"])
     sample = Sample(names[at], about["material"], protocol, readings[..., None], float(resolutions[at]), model)
-    check(draws, sample, about["likelihood"])
+    check_stored(draws, sample, about["likelihood"])
     return Stored(draws, sample, about["likelihood"], exponent)
 
 

@@ -13,7 +13,7 @@ from wirebayes.wire.laws import ElasticLaw, History
 _LARGEST = 1e30  # no parameter, time or tension comes near, and its square does not overflow
 
 
-def check(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
+def check_stored(draws: Mapping[str, Array], sample: Sample, likelihood: str) -> None:
     """Raise a `ValueError` that says what is wrong with a posterior that was read back.
 
     Parameters

@@ -58,9 +58,11 @@ def _warnings(fit: Fit, sample: Sample | None) -> list[NoticeJson]:
     """That the fit has not converged, and what is suspicious, with the experiment's name where there are several."""
     found = [] if fit.chains.converged else [Notice("not-converged", fit.chains.why)]
     if sample is not None:
-        found += posterior_checks.warnings(fit, sample)
+        found += posterior_checks.posterior_warnings(fit, sample)
     else:
-        found += [notice.of(s.name) for s in fit.problem.samples for notice in posterior_checks.warnings(fit, s)]
+        found += [
+            notice.of(s.name) for s in fit.problem.samples for notice in posterior_checks.posterior_warnings(fit, s)
+        ]
     return to_json(found)
 
 

@@ -217,7 +217,7 @@ def _columns(problem: Problem, name: str, value: float) -> list[int]:
     return columns
 
 
-def write(folder: Path, benches: Sequence[Bench], truth: Truth = Truth(), seed: int = 0) -> Simulated:
+def write_tests(folder: Path, benches: Sequence[Bench], truth: Truth = Truth(), seed: int = 0) -> Simulated:
     """Write ``experiments.toml``, a CSV a test, and ``truth.json`` into an existing folder.
 
     Parameters
@@ -254,10 +254,10 @@ def effect_option(text: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> t
     own = [amplitude.name for amplitude in effect.amplitudes]
     if parameter not in own:
         raise InputError(f"--effect {text}: {effect.name} has no amplitude {parameter!r}; it has {', '.join(own)}")
-    return effect, {f"{effect.name}.{parameter}": number(f"--effect {text}", value)}
+    return effect, {f"{effect.name}.{parameter}": finite_number(f"--effect {text}", value)}
 
 
-def number(key: str, text: str) -> float:
+def finite_number(key: str, text: str) -> float:
     """A finite number, or an `InputError` that names `key`."""
     try:
         value = float(text)

@@ -83,7 +83,7 @@ def _number(element: Element, word: str, where: str) -> float:
     return value
 
 
-def read(path: Path) -> Element:
+def read_xml(path: Path) -> Element:
     """The root element of a file.
 
     Raises

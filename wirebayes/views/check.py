@@ -10,7 +10,7 @@ from wirebayes.sentences import counted, unit_text
 if TYPE_CHECKING:
     pass
 
-from wirebayes.views.result import NOTHING, Given, Result, figure, html_table, interval
+from wirebayes.views.result import NOTHING, Given, Result, figure, html_table, short_interval
 
 CHECKED = "check.json"
 
@@ -44,7 +44,7 @@ class Check(Result[CheckJson]):
 
     def _repr_html_(self) -> str:
         rows = [
-            [name, parameter, unit_text(p["unit"]), figure(p["q50"]), interval(p), p["determined_by"]]
+            [name, parameter, unit_text(p["unit"]), figure(p["q50"]), short_interval(p), p["determined_by"]]
             for name, test in self.summary()["experiments"].items()
             for parameter, p in test["parameters"].items()
         ]

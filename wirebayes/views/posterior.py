@@ -20,7 +20,16 @@ from wirebayes.strict.files import PathLike
 if TYPE_CHECKING:
     import xarray as xr
 
-from wirebayes.views.result import NOTHING, Given, Result, ResultFolder, copy_results, figure, html_table, interval
+from wirebayes.views.result import (
+    NOTHING,
+    Given,
+    Result,
+    ResultFolder,
+    copy_results,
+    figure,
+    html_table,
+    short_interval,
+)
 
 POSTERIOR, SUMMARY = "posterior.nc", "summary.json"
 
@@ -167,7 +176,7 @@ class Posterior(Result[SummaryJson]):
 
     def _repr_html_(self) -> str:
         rows = [
-            [name, unit_text(p["unit"]), figure(p["mean"]), figure(p["sd"]), interval(p)]
+            [name, unit_text(p["unit"]), figure(p["mean"]), figure(p["sd"]), short_interval(p)]
             for name, p in self.summary()["parameters"].items()
         ]
         header = ["parameter", "unit", "mean", "sd", "90 % interval"]

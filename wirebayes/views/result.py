@@ -190,7 +190,7 @@ def figure(value: float | None) -> str:
     return "-" if value is None else f"{value:.{_FIGURES}g}"
 
 
-def interval(quantity: Quantiles) -> str:
+def short_interval(quantity: Quantiles) -> str:
     """The 90 % interval of a quantity in a short form."""
     return f"{figure(quantity['q05'])} to {figure(quantity['q95'])}"
 

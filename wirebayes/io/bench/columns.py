@@ -15,9 +15,9 @@ from wirebayes.io.bench.header import (
     may_be,
     name_and_unit,
 )
-from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, unit_of
+from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, quantity_unit
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.bench.two_clocks import best, clock_of, parting
+from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.io.bench.words import last_named
 from wirebayes.sentences import listed
@@ -126,7 +126,7 @@ def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
         row = parting(clocks[0], clock)
         if row is not None:
             raise _several(table, likely, "time", f", which tell different times from line {table.rows[row].line} on")
-    return columns[best(clocks)]
+    return columns[best_clock(clocks)]
 
 
 def ignored(table: RawTable, mapping: Sequence[str]) -> set[int]:
@@ -171,9 +171,9 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
     moments = role == "time" and has_moments(table, index)
     _, from_header = name_and_unit(header, role)
     row_text = table.units[index]
-    from_row = unit_of(row_text, role) if row_text else None
+    from_row = quantity_unit(row_text, role) if row_text else None
     if stated:
-        unit = unit_of(stated, role)
+        unit = quantity_unit(stated, role)
         if unit is None:
             raise InputError(f"--map: found the unit {stated!r} for {header}, expected one of {role}{_units(role)}")
         return Column(role, index, header, unit)
@@ -223,7 +223,7 @@ def _several(table: RawTable, likely: Sequence[int], role: Role, how: str = "") 
 
 def _option(table: RawTable, unread: Sequence[int], role: Role) -> str:
     """What to write for a missing quantity: the column in a unit of it, if there is one; it is the user who decides."""
-    likely = [i for i in unread if unit_of(table.units[i], role) or name_and_unit(table.header[i], role)[1]]
+    likely = [i for i in unread if quantity_unit(table.units[i], role) or name_and_unit(table.header[i], role)[1]]
     if len(likely) == 1:
         return f'--map "{table.header[likely[0]]}={role}"'
     return f'--map "HEADER={role} [{UNITS[role]}]"'

@@ -13,7 +13,7 @@ from wirebayes.sentences import counted
 WHERE_MISSING = "; where a reading is missing, delete its row"
 
 
-def complete(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, list[str]]:
+def complete_rows(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, list[str]]:
     """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows."""
     indices = [column.index for column in columns.values()]
     rows, below = _without_what_is_below(table, indices)

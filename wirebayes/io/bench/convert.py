@@ -21,11 +21,11 @@ from wirebayes.io.bench.quantities import UNITS
 from wirebayes.io.bench.recorded import Cut
 from wirebayes.io.bench.resolution import evident_step
 from wirebayes.io.bench.sheet import Sheet
-from wirebayes.io.bench.specimens import side_by_side
+from wirebayes.io.bench.specimens import specimen_tables
 from wirebayes.io.bench.table import RawTable, find_table
 from wirebayes.io.bench.table_numbers import READS, Recorded, recorded_in
-from wirebayes.io.bench.thinning import MOST, thinned
-from wirebayes.io.bench.turned import turned
+from wirebayes.io.bench.thinning import MOST, kept_readings
+from wirebayes.io.bench.turned import row_for_each_reading
 from wirebayes.io.bench.undecided import Choices
 from wirebayes.io.bench.words import known_words
 from wirebayes.io.experiment import Experiment
@@ -96,8 +96,8 @@ def convert(path: Path, about: About, choices: Choices) -> list[Converted]:
     InputError
         With file, line and column; `Undecided` where the file can be read in several ways.
     """
-    table = turned(find_table(_sheet(path, choices)))
-    tables = side_by_side(table, choices.mapping, choices.specimens)
+    table = row_for_each_reading(find_table(_sheet(path, choices)))
+    tables = specimen_tables(table, choices.mapping, choices.specimens)
     if len(tables) == 1:
         return [_convert(each, about, replace(choices, mapping=said)) for each, said in tables]
     names = _names_of([each.specimen for each, _ in tables], about)
@@ -206,7 +206,7 @@ def _sheet(path: Path, choices: Choices) -> Sheet:
 
 
 def _thin(holds: Cut) -> tuple[Cut, list[str]]:
-    kept = [thinned(times) for times in holds.time_s]
+    kept = [kept_readings(times) for times in holds.time_s]
     before, after = sum(map(len, holds.rows)), sum(map(len, kept))
     if before == after:
         return holds, []

@@ -2,9 +2,9 @@
 
 import re
 
-from wirebayes.io.bench.quantities import ROLES, Role, Unit, is_foreign, unit_of
+from wirebayes.io.bench.quantities import ROLES, Role, Unit, is_foreign, quantity_unit
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.bench.words import LETTERS, RIG_WORDS, SAMPLE_WORDS, last_named, plain, speaks_of, words_in
+from wirebayes.io.bench.words import LETTERS, RIG_WORDS, SAMPLE_WORDS, last_named, plain_letters, speaks_of, words_in
 
 NO_UNIT = ("", "-", "–", "1")  # what stands in a row of units where there is none
 UNIT_IN_BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
@@ -22,7 +22,7 @@ def is_of_sample(table: RawTable, index: int, role: Role) -> bool:
     role : str
         The quantity.
     """
-    unit = unit_of(table.units[index], role) or name_and_unit(table.header[index], role)[1]
+    unit = quantity_unit(table.units[index], role) or name_and_unit(table.header[index], role)[1]
     return unit is not None and unit.of_sample
 
 
@@ -45,14 +45,14 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
     A time may begin with its unit in full: hours at load.
     """
     bracket = UNIT_IN_BRACKETS.match(header)
-    if bracket and unit_of(bracket[2], role):
-        return bracket[1], unit_of(bracket[2], role)
+    if bracket and quantity_unit(bracket[2], role):
+        return bracket[1], quantity_unit(bracket[2], role)
     for pattern in _TAILS:
         tail = re.match(pattern, header)
-        if tail and unit_of(tail[2], role):
-            return tail[1], unit_of(tail[2], role)
+        if tail and quantity_unit(tail[2], role):
+            return tail[1], quantity_unit(tail[2], role)
     first = _UNIT_FIRST.match(header) if role == "time" else None
-    return header, unit_of(first[1], role) if first else None
+    return header, quantity_unit(first[1], role) if first else None
 
 
 def is_of(table: RawTable, index: int, role: Role) -> bool:
@@ -79,7 +79,7 @@ def may_be(table: RawTable, index: int, role: Role) -> bool:
     row_unit = table.units[index]
     units: dict[Role, Unit] = {}
     for other in ROLES:
-        found = (unit_of(row_unit, other) if row_unit else None) or name_and_unit(header, other)[1]
+        found = (quantity_unit(row_unit, other) if row_unit else None) or name_and_unit(header, other)[1]
         if found:
             units[other] = found
     if not units and _has_foreign_unit(header, row_unit):
@@ -93,7 +93,7 @@ def may_be(table: RawTable, index: int, role: Role) -> bool:
         return last_named(header) == role
     if role in units and units[role].of_sample and words_in(name) & set(SAMPLE_WORDS[role]):
         return True
-    return speaks_of(name, role) or (role in units and plain(name) in LETTERS.get(role, ()))
+    return speaks_of(name, role) or (role in units and plain_letters(name) in LETTERS.get(role, ()))
 
 
 def is_of_rig(table: RawTable, index: int, role: Role) -> bool:
@@ -107,7 +107,7 @@ def is_of_rig(table: RawTable, index: int, role: Role) -> bool:
         The quantity.
     """
     name, unit = name_and_unit(table.header[index], role)
-    unit = unit_of(table.units[index], role) or unit
+    unit = quantity_unit(table.units[index], role) or unit
     return unit is not None and bool(set(words_in(name)) & set(RIG_WORDS.get(role, ())))
 
 

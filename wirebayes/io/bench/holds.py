@@ -27,7 +27,7 @@ from wirebayes.io.bench.recorded import (
     restarts,
     wanders,
 )
-from wirebayes.io.bench.resets import joined
+from wirebayes.io.bench.resets import joined_at_resets
 from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
 from wirebayes.numeric.typing import Floats
@@ -50,7 +50,7 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
     _check_order(readings)
     if readings.of_day and time_since == "hold":
         raise InputError(f"--time-since hold: found moments of a day in {readings.time_name}, which restart nowhere")
-    readings, resets = joined(readings)
+    readings, resets = joined_at_resets(readings)
     x = readings.setting
     if readings.hold is not None:
         groups = groups_between(changes(readings.hold))

@@ -81,7 +81,7 @@ class Unit:
         return np.array([float(f"{value * self.factor + self.offset:.12g}") for value in values])
 
 
-def unit_of(text: str, role: Role) -> Unit | None:
+def quantity_unit(text: str, role: Role) -> Unit | None:
     """A unit of a quantity, or None where the text is none.
 
     A minus before it changes the sign. Where a force is needed, a mass stands for its weight (kg, g, lb) and a stress

@@ -8,7 +8,7 @@ from wirebayes.io.bench.plateaus import EDGE, SAME_LEVEL, noise_of
 from wirebayes.io.bench.recorded import Readings, is_continuous, restarts, wanders
 
 
-def joined(readings: Readings) -> tuple[Readings, list[str]]:
+def joined_at_resets(readings: Readings) -> tuple[Readings, list[str]]:
     """A continuous recording whose logger was reset, as one piece: where time starts again and the setting goes on.
 
     Raises

@@ -53,7 +53,7 @@ class _Marked:
         return [i for i, other in enumerate(self.mark) if other == mark]
 
 
-def side_by_side(
+def specimen_tables(
     table: RawTable, mapping: Sequence[str], stated: Specimens | None
 ) -> list[tuple[RawTable, tuple[str, ...]]]:
     """The table of each specimen, and what a user says of its columns.

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench.quantities import ROLES, unit_of
+from wirebayes.io.bench.quantities import ROLES, quantity_unit
 from wirebayes.io.bench.sheet import Row, Sheet, is_value
 
 _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
@@ -169,4 +169,4 @@ def _are_units(row: Row) -> bool:
     """Whether most cells are units, in brackets or not, or stand for none."""
     cells = [cell.strip("[]() ") for cell in row.filled]
     named = [cell for cell in cells if cell not in ("", "-", "–", "1", "#")]
-    return 2 * sum(any(unit_of(cell, role) for role in ROLES) for cell in named) > len(named)
+    return 2 * sum(any(quantity_unit(cell, role) for role in ROLES) for cell in named) > len(named)

@@ -12,7 +12,7 @@ from wirebayes.errors import InputError, shown
 from wirebayes.io.bench import clock
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.columns import Column, understand
-from wirebayes.io.bench.complete_rows import WHERE_MISSING, complete
+from wirebayes.io.bench.complete_rows import WHERE_MISSING, complete_rows
 from wirebayes.io.bench.numerals import decimal_sign, plain_number
 from wirebayes.io.bench.quantities import UNITS, Role
 from wirebayes.io.bench.recorded import Readings
@@ -104,7 +104,7 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     """
     columns = _of_sample(table, understand(table, choices.mapping), about)
     not_read = next((row.line for row in table.rows if not row.cell(columns["displacement"].index)), None)
-    table, notes = complete(table, columns)
+    table, notes = complete_rows(table, columns)
     not_read = not_read if not_read in {row.line for row in table.rows} else None  # below the readings
     decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
     notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes]

@@ -7,7 +7,7 @@ MOST = 60  # readings of a hold that are all kept: nobody writes down more by ha
 KEPT = MOST  # of longer ones: twenty or so a decade of time
 
 
-def thinned(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
+def kept_readings(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
     """Which readings of a hold are kept.
 
     Parameters

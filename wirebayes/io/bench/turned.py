@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass, replace
 
 from wirebayes.io.bench.header import is_of, name_and_unit
-from wirebayes.io.bench.quantities import Role, unit_of
+from wirebayes.io.bench.quantities import Role, quantity_unit
 from wirebayes.io.bench.sheet import Row, is_number
 from wirebayes.io.bench.table import RawTable
 
@@ -42,7 +42,7 @@ class _Across:
     cells: str
 
 
-def turned(table: RawTable) -> RawTable:
+def row_for_each_reading(table: RawTable) -> RawTable:
     """The table with a row for each reading; itself where it has one already.
 
     Parameters
@@ -79,7 +79,7 @@ def _across(table: RawTable) -> _Across | None:
     found: dict[tuple[Role, str, str], dict[int, str]] = {}
     for i, name in enumerate(table.header):
         measure = _MEASURE.fullmatch(name)
-        role = None if measure is None else next((r for r in _ALONG if unit_of(measure["unit"], r)), None)
+        role = None if measure is None else next((r for r in _ALONG if quantity_unit(measure["unit"], r)), None)
         if measure is None or role is None:
             continue
         left = _EMPTY.sub("", f"{measure['before']} {measure['after']}")
@@ -99,7 +99,7 @@ def _name_of_cells(table: RawTable, across: _Across, read: Role) -> tuple[str, s
     above = {table.above[i] for i in across.values if i < len(table.above)} - {""}
     of_quantity = (text for text in (across.cells, *above) if name_and_unit(text, read)[1])
     name = next(of_quantity, read)
-    return name, stated if unit_of(stated, read) else ""
+    return name, stated if quantity_unit(stated, read) else ""
 
 
 def _by_row(table: RawTable, across: _Across, column: int) -> list[Row]:

@@ -65,6 +65,6 @@ def parting(first: Clock, second: Clock) -> int | None:
     return int(rows[0]) if len(rows) else None
 
 
-def best(clocks: Sequence[Clock]) -> int:
+def best_clock(clocks: Sequence[Clock]) -> int:
     """Which of several clocks that agree is read: one that never starts again, then the one of the finest step."""
     return min(range(len(clocks)), key=lambda i: (clocks[i].restarts, clocks[i].tick_s))

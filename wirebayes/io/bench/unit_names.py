@@ -7,7 +7,7 @@ it does not: a column of millimetres may be a diameter.
 from dataclasses import replace
 
 from wirebayes.io.bench.header import NO_UNIT
-from wirebayes.io.bench.quantities import ROLES, Role, unit_of
+from wirebayes.io.bench.quantities import ROLES, Role, quantity_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.words import speaks_of_a_quantity
 
@@ -52,5 +52,5 @@ def _quantities(names: tuple[str, ...], units: tuple[str, ...]) -> tuple[str, ..
 
 def _quantity(unit: str) -> Role | None:
     """The only quantity that has a unit."""
-    of = [role for role in ROLES if unit_of(unit, role)]
+    of = [role for role in ROLES if quantity_unit(unit, role)]
     return of[0] if len(of) == 1 else None

@@ -10,7 +10,7 @@ from wirebayes.io.bench.columns import Column, ignored
 from wirebayes.io.bench.header import is_copy
 from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.bench.words import plain
+from wirebayes.io.bench.words import plain_letters
 from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import listed
 
@@ -96,5 +96,5 @@ def _check_one_specimen(table: RawTable, index: int, x: Floats, time: Floats) ->
 
 def speaks_of_specimens(text: str) -> bool:
     """Whether a text holds a word for a specimen."""
-    words = re.findall(r"[^\W\d_]+", plain(text))
+    words = re.findall(r"[^\W\d_]+", plain_letters(text))
     return any(w == known or (len(known) >= _PREFIX and w.startswith(known)) for w in words for known in _SPECIMEN)

@@ -68,7 +68,7 @@ def speaks_of_a_quantity(word: str) -> bool:
     """Whether a word, or a letter, is the name of a quantity."""
     letters = {letter for known in LETTERS.values() for letter in known}
     of_rig = {name for names in RIG_WORDS.values() for name in names}
-    return plain(word) in letters | of_rig or any(speaks_of(word, role) for role in ROLES)
+    return plain_letters(word) in letters | of_rig or any(speaks_of(word, role) for role in ROLES)
 
 
 def known_words(text: str) -> int:
@@ -78,12 +78,12 @@ def known_words(text: str) -> int:
 
 def words_in(text: str) -> set[str]:
     """The words of a text, in small letters without accents."""
-    return set(re.findall(r"[^\W\d_]+", plain(text)))
+    return set(re.findall(r"[^\W\d_]+", plain_letters(text)))
 
 
 def last_named(header: str) -> Role | None:
     """Of a header that speaks of several quantities the one named last, as languages put it: step time, load time."""
-    words = re.findall(r"[^\W\d_]+", plain(header))
+    words = re.findall(r"[^\W\d_]+", plain_letters(header))
     for word in reversed(words):
         for role in ROLES:
             if _is_word(word, role):
@@ -107,7 +107,7 @@ def _is_word(word: str, role: Role) -> bool:
     )
 
 
-def plain(text: str) -> str:
+def plain_letters(text: str) -> str:
     """Small letters without accents."""
     apart = unicodedata.normalize("NFKD", text.casefold().replace("ß", "ss"))
     joined = "".join(c for c in apart if not unicodedata.combining(c) or c == "\u3099")

@@ -56,7 +56,7 @@ class _Settings:
         self.line[name] = line
 
 
-def robot(path: Path) -> ImportedRobot:
+def robot_of_firmware(path: Path) -> ImportedRobot:
     """A robot from the settings of a Hangprinter.
 
     Parameters

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.json_files.pose_history import Clock, DriftOverTime, PoseHistoryJson
+from wirebayes.json_files.pose_history import ClockJson, DriftOverTime, PoseHistoryJson
 from wirebayes.json_files.values import Band, Statistic
 from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.corrections import Target
-from wirebayes.robot.history.estimate import Estimate, Progress, estimate
-from wirebayes.robot.history.follow import RESTART, Track, follow
+from wirebayes.robot.history.estimate import Estimate, Progress, estimate_poses
+from wirebayes.robot.history.follow import RESTART, Track, follow_log
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, sag, winches
@@ -29,7 +29,7 @@ from wirebayes.robot.motion import inverse
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.motion.creep import fresh
 from wirebayes.robot.pose.answer import unheld
-from wirebayes.robot.pose.request import band
+from wirebayes.robot.pose.request import band_over_draws
 
 _SHOWN = 200  # times in pose.json and in pictures; the tables have every row
 _CLOCK_DRAWS = 12  # draws that show how much it matters when the wires' clocks start
@@ -63,7 +63,7 @@ class HistoryAnswer:
     to: Target | None = None
 
 
-def answer(
+def history_report(
     robot: Robot,
     line: WireDraws,
     history: History,
@@ -93,24 +93,24 @@ def answer(
         start = history.position_m[0], history.rotation[0]
     alike = replace(errors, reference_m=0.0, spread=0.0)  # one way of starting the clocks is compared with another
     if history.joint_m is not None:
-        found = estimate(robot, line, history, start, errors, rng, progress)
+        found = estimate_poses(robot, line, history, start, errors, rng, progress)
         joint = history.joint_m
 
         def again(few: WireDraws, restart: float) -> Track:
             known = unknowns(robot, few, alike, np.random.default_rng(seed))  # the same draws both times
             starts = found.starts_s if np.isfinite(restart) else found.starts_s[:1]
             wires, error = known.columns(known.draws)
-            return follow(robot, wires, history, joint, start, starts, error, carried=known.carried(known.draws))
+            return follow_log(robot, wires, history, joint, start, starts, error, carried=known.carried(known.draws))
     else:
         try:
-            found, joint = commanded.drift(robot, line, history, errors, rng, progress)
+            found, joint = commanded.drift_along(robot, line, history, errors, rng, progress)
         except commanded.Unheld as unheld:
             sentence = f"No{str(unheld)[2:]}."
             return HistoryAnswer(_without_answer(content, sentence), {}, rows)
 
         def again(few: WireDraws, restart: float) -> Track:
             drawn = np.random.default_rng(seed)  # the same draws both times
-            return commanded.drift(robot, few, history, alike, drawn, restart=restart)[0].track
+            return commanded.drift_along(robot, few, history, alike, drawn, restart=restart)[0].track
 
     if not found.track.held[:, 0].any():
         sentence = "No draw of the wires holds the platform at the first row; see --position for where it starts."
@@ -127,7 +127,7 @@ def answer(
         "corrections": {
             "times_s": course.times_s,
             "change_mm": _bands(1e3 * winches.of_each_winch(robot, change)[:, rows]),
-            "left_mm": _bands(1e3 * corrections.left(robot, history, found, to, best, rows)),
+            "left_mm": _bands(1e3 * corrections.error_left(robot, history, found, to, best, rows)),
         },
         "clock": _clock(line, again),
     }
@@ -157,7 +157,7 @@ def _requested(robot: Robot, line: WireDraws, history: History, errors: Uncertai
         "version": 1,
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
-        "wires": draws.summary(robot, line),
+        "wires": draws.wires_summary(robot, line),
         "feasible": True,
         "warnings": [],
         "history": {
@@ -202,7 +202,7 @@ def _moved(course: Course, to: Target, rows: NDArray[np.intp]) -> tuple[Floats, 
     angle, tilt = np.empty(shift.shape[:2]), np.empty(shift.shape[:2])
     for i, k in enumerate(rows):
         one = replace(course, position_m=course.position_m[:, [i]], rotation=course.rotation[:, [i]])
-        angle[:, i] = drifting.moved(one, to.position_m[k], to.rotation[k])[1][:, 0]
+        angle[:, i] = drifting.distance_moved(one, to.position_m[k], to.rotation[k])[1][:, 0]
         tilt[:, i] = turning.tilt(course.rotation[:, i], to.rotation[k])
     return shift, angle, tilt
 
@@ -225,7 +225,7 @@ def _drift(course: Course, to: Target, rows: NDArray[np.intp], spread: float) ->
 
 def _bands(values: Floats) -> Band:
     """Bands at each time of ``(n, r, ...)`` over the draws whose platform still hangs then."""
-    each = [band(values[:, i]) for i in range(values.shape[1])]
+    each = [band_over_draws(values[:, i]) for i in range(values.shape[1])]
     empty = np.full(values.shape[2:], np.nan)
 
     def over_time(key: Statistic) -> Floats:
@@ -241,7 +241,7 @@ def _turn(rotation: Floats) -> Floats:
     return np.where(held[..., 0], turning.vector(np.where(held, rotation, np.eye(3))), np.nan)
 
 
-def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> Clock:
+def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> ClockJson:
     """How far poses move if the wires' clocks start once and run on: no test of holds shows which they do."""
     few = line.part(np.unique(np.linspace(0, line.count - 1, _CLOCK_DRAWS).round().astype(int)))
     anew, once = run(few, RESTART), run(few, np.inf)
@@ -309,9 +309,9 @@ def _warnings(
     holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
     longest = float(np.diff(history.times_s[holds]).max())
     lengths = inverse.lengths(robot, joint_m)[0]
-    out += draws.warnings(robot, line, found.track.tension_N, longest, lengths)
+    out += draws.wire_warnings(robot, line, found.track.tension_N, longest, lengths)
     plain = found.plain
-    return out + sag.warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
+    return out + sag.sag_warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
 
 
 def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:

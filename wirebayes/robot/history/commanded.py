@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.estimate import Estimate, Progress
-from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow
+from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow_log
 from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics.description import Robot
@@ -19,7 +19,7 @@ from wirebayes.robot.motion import inverse
 _STRAIGHT = 0.02  # of the robot's span: over so short a way, even joint values make an even motion
 
 
-def drift(
+def drift_along(
     robot: Robot,
     line: WireDraws,
     history: History,
@@ -56,7 +56,7 @@ def drift(
     Unheld
         No tensions within the bounds hold the platform at some row.
     """
-    fine, kept = refined(robot, history)
+    fine, kept = refined_poses(robot, history)
     fine = balanced(robot, fine)
     known = unknowns(robot, line, replace(errors, reference_m=0.0), rng)
     wires, error = known.columns(known.draws)
@@ -75,7 +75,7 @@ def drift(
     ])  # fmt: skip
     rows, starts = len(fine.times_s), clock_starts(fine, tau, restart)
     start = fine.position_m[0], fine.rotation[0]
-    track = follow(robot, wires, fine, joint, start, starts, error,
+    track = follow_log(robot, wires, fine, joint, start, starts, error,
                    lambda k: progress("poses", k + 1, rows), carried)  # fmt: skip
     plain = Track(fine.position_m[None], fine.rotation[None], tau[None], np.zeros((1, *tau.shape)), track.hold)
     return Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error, starts), np.swapaxes(joint[kept], 0, 1)
@@ -101,7 +101,7 @@ def wanted_tensions(robot: Robot, history: History) -> Floats:
     return out
 
 
-def refined(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
+def refined_poses(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
     """The history with rows between distant poses, and where its own rows are among them."""
     x, R = history.position_m, history.rotation
     assert x is not None and R is not None

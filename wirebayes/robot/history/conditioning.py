@@ -21,7 +21,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.follow import Track
 from wirebayes.robot.history.history import roll_and_pitch
 from wirebayes.robot.history.readings import Information, Sensors
-from wirebayes.robot.history.unknowns import Unknowns, slopes
+from wirebayes.robot.history.unknowns import LogUnknowns, slopes
 
 Way = Callable[[Floats, str, NDArray[np.bool_]], Track]  # of white unknowns (n, d), a name for the progress, no wires
 _MOST = 12  # passes to the mode; four or five are usual
@@ -33,7 +33,7 @@ _ENOUGH = 0.5  # effective share of the draws from which on another batch is not
 
 
 @dataclass(frozen=True)
-class Readings:
+class LogReadings:
     """What was read.
 
     Attributes
@@ -52,7 +52,7 @@ class Readings:
     def residual(self, track: Track, white: Floats) -> Floats:
         """What unknowns with the sensors' offsets, ``(n, d + m)``, leave of the readings, ``(n, t, m)``."""
         offset = white[:, None, white.shape[1] - len(self.of.offset) :] * self.of.offset
-        return np.asarray(self.values - predicted(track) - offset)
+        return np.asarray(self.values - predicted_readings(track) - offset)
 
     def cost(self, residual: Floats, white: Floats) -> Floats:
         """Twice the negative log of the posterior density, ``(n,)``; infinite where a platform fell that was read."""
@@ -105,19 +105,19 @@ class Draws:
     effective: float
 
 
-def predicted(track: Track) -> Floats:
+def predicted_readings(track: Track) -> Floats:
     """What the sensors of every column should read, ``(n, t, w + 2)``."""
     return np.concatenate([track.tension_N, roll_and_pitch(track.rotation)], -1)
 
 
-def slack_wires(read: Readings, legs: int) -> NDArray[np.bool_]:
+def slack_wires(read: LogReadings, legs: int) -> NDArray[np.bool_]:
     """Wires ``(w,)`` that all readings say are slack, as far as a sensor can tell."""
     tension = read.values[:, :legs]
     loose = ~(tension > _SLACK * read.of.sd[:legs]) & np.isfinite(tension).any(0)
     return np.asarray(loose.all(0))
 
 
-def find_mode(known: Unknowns, read: Readings, way: Way, without: NDArray[np.bool_]) -> Mode | None:
+def find_mode(known: LogUnknowns, read: LogReadings, way: Way, without: NDArray[np.bool_]) -> Mode | None:
     """The mode by Gauss-Newton; None where mean wires do not hold the platform.
 
     Parameters
@@ -132,7 +132,7 @@ def find_mode(known: Unknowns, read: Readings, way: Way, without: NDArray[np.boo
     z, last, cost, best = np.zeros(d + m), np.zeros(d + m), np.inf, None
     for number in range(_MOST):
         track = way(known.differences(z[:d]), f"mode, pass {number + 1}", without)
-        h = predicted(track)
+        h = predicted_readings(track)
         residual = (read.values - h[0] - read.of.offset * z[d:])[None]
         new = float(read.cost(residual, z[None])[0]) if track.held[0].all() else np.inf
         if not new <= cost:  # no better, or not in balance: go half as far
@@ -149,7 +149,9 @@ def find_mode(known: Unknowns, read: Readings, way: Way, without: NDArray[np.boo
     return best
 
 
-def draw(known: Callable[[], Unknowns], read: Readings, mode: Mode, way: Way, rng: np.random.Generator) -> Draws:
+def draw_posterior(
+    known: Callable[[], LogUnknowns], read: LogReadings, mode: Mode, way: Way, rng: np.random.Generator
+) -> Draws:
     """Draws of the posterior: moved from draws of the prior, weighted, and drawn again by their weights.
 
     Parameters
@@ -188,7 +190,7 @@ def _shares(logs: Floats) -> tuple[Floats, float]:
 
 
 def _moved(
-    prior: Floats, read: Readings, mode: Mode, way: Way, rng: np.random.Generator
+    prior: Floats, read: LogReadings, mode: Mode, way: Way, rng: np.random.Generator
 ) -> tuple[Floats, Track, Floats]:
     """Draws ``(n, d + m)`` that fit readings of their own, their way, and the logarithms of their weights."""
     (n, d), m, every = prior.shape, len(read.of.offset), np.zeros(1, bool)

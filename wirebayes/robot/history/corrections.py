@@ -76,7 +76,7 @@ def wanted(robot: Robot, history: History, found: Estimate, to: Target) -> Float
     return out
 
 
-def left(robot: Robot, history: History, found: Estimate, to: Target, joint_m: Floats, rows: Floats) -> Floats:
+def error_left(robot: Robot, history: History, found: Estimate, to: Target, joint_m: Floats, rows: Floats) -> Floats:
     """Distance from the target that corrected joint values leave.
 
     Parameters

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.history.conditioning import Readings, draw, find_mode, slack_wires
-from wirebayes.robot.history.follow import Track, clock_starts, follow, refined
+from wirebayes.robot.history.conditioning import LogReadings, draw_posterior, find_mode, slack_wires
+from wirebayes.robot.history.follow import Track, clock_starts, follow_log, refined_joints
 from wirebayes.robot.history.history import History
-from wirebayes.robot.history.readings import sensors, weight
-from wirebayes.robot.history.unknowns import Uncertain, Unknowns, unknowns
+from wirebayes.robot.history.readings import reading_weight, sensors
+from wirebayes.robot.history.unknowns import LogUnknowns, Uncertain, unknowns
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
@@ -58,7 +58,7 @@ class Estimate:
     used: bool = True
 
 
-def estimate(
+def estimate_poses(
     robot: Robot,
     line: WireDraws,
     history: History,
@@ -92,12 +92,12 @@ def estimate(
     way = _Way(known, history, start, *plain_track(known, history, start, progress), progress)
     if not history.read:
         return way.followed(known.draws)
-    read = Readings(readings(history, robot.legs), weights(history.times_s), sensors(robot, errors))
+    read = LogReadings(log_readings(history, robot.legs), weights(history.times_s), sensors(robot, errors))
     loose = slack_wires(read, robot.legs)
     mode = find_mode(known, read, way.white, loose) or find_mode(known, read, way.white, np.zeros_like(loose))
     if mode is None:  # not even the mean wires hang in balance
         return replace(way.followed(known.draws), converged=False, effective=0.0, used=False)
-    out = draw(lambda: unknowns(robot, line, errors, rng), read, mode, way.white, rng)
+    out = draw_posterior(lambda: unknowns(robot, line, errors, rng), read, mode, way.white, rng)
     left = _mean(read.residual(out.track, np.zeros_like(out.white)))
     used = out.effective >= min(_TOO_FEW, 0.5 * line.count)
     if used:
@@ -115,7 +115,7 @@ def _mean(left: Floats) -> Floats:
     return np.asarray(np.where(good, left, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan))
 
 
-def readings(history: History, legs: int) -> Floats:
+def log_readings(history: History, legs: int) -> Floats:
     """All readings ``(t, w + 2)``: tensions, roll and pitch; NaN where nothing was read."""
     out = np.full((len(history.times_s), legs + 2), np.nan)
     if history.tension_N is not None:
@@ -127,11 +127,11 @@ def readings(history: History, legs: int) -> Floats:
 
 def weights(times_s: Floats) -> Floats:
     """How many readings the sensors of each row count as, ``(t,)``."""
-    return np.array([weight(None)] + [weight(float(since)) for since in np.diff(times_s)])
+    return np.array([reading_weight(None)] + [reading_weight(float(since)) for since in np.diff(times_s)])
 
 
 def plain_track(
-    known: Unknowns, history: History, start: tuple[Floats, Floats], progress: Progress
+    known: LogUnknowns, history: History, start: tuple[Floats, Floats], progress: Progress
 ) -> tuple[Track, Floats]:
     """The mean wire, which never creeps, under measured joint values; and when it makes the wires' clocks start.
 
@@ -155,10 +155,10 @@ def plain_track(
     starts_s : (s,) array
         As of `clock_starts`.
     """
-    fine, kept = refined(known.robot, history)
+    fine, kept = refined_joints(known.robot, history)
     assert fine.joint_m is not None
     rows = len(fine.times_s)
-    track = follow(known.robot, known.plain, fine, fine.joint_m, start, fine.times_s[:1],
+    track = follow_log(known.robot, known.plain, fine, fine.joint_m, start, fine.times_s[:1],
                    progress=lambda row: progress("without creep", row + 1, rows))  # fmt: skip
     return track.at_rows(kept), clock_starts(fine, track.tension_N[0])
 
@@ -167,7 +167,7 @@ def plain_track(
 class _Way:
     """What every pass over one history shares."""
 
-    known: Unknowns
+    known: LogUnknowns
     history: History
     start: tuple[Floats, Floats]
     plain: Track
@@ -193,7 +193,7 @@ class _Way:
         """
         history, rows = self.history, len(self.history.times_s)
         assert history.joint_m is not None
-        return follow(self.known.robot, wires, history, history.joint_m, self.start, self.starts_s, error_m,
+        return follow_log(self.known.robot, wires, history, history.joint_m, self.start, self.starts_s, error_m,
                       lambda row: self.progress(name, row + 1, rows), carried)  # fmt: skip
 
     def white(self, white: Floats, name: str, without: NDArray[np.bool_]) -> Track:

@@ -68,7 +68,7 @@ class Track:
         return out
 
 
-def follow(
+def follow_log(
     robot: Robot,
     wires: Wires,
     history: History,
@@ -135,8 +135,8 @@ def clock_starts(history: History, tension_N: Floats, share: float = RESTART) ->
     """Times at which the wires' clocks start: the history's own holds, or where a command or a load changes tensions.
 
     A hold begins when a wire's tension has changed by a share of the mean tension since the one before. Between rows
-    tensions are taken to change evenly, as they do where rows are as near as those of `refined`: along a long even
-    motion of the joints they do not, least of all in a redundant robot.
+    tensions are taken to change evenly, as they do where rows are as near as those of `refined_joints`: along a long
+    even motion of the joints they do not, least of all in a redundant robot.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def clock_starts(history: History, tension_N: Floats, share: float = RESTART) ->
     return np.array(out)
 
 
-def refined(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
+def refined_joints(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
     """A history of joint values with rows between distant ones, and where its own rows are among them."""
     assert history.joint_m is not None
     wire = np.where(robot.is_linear, robot.ratio, 1.0) / robot.lines  # paid out in each line, by the joint value

@@ -16,7 +16,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
 from wirebayes.robot.history.live_input import checked_number, checked_reading, checked_vector, refuse_bad
-from wirebayes.robot.history.readings import Information, sensors, weight
+from wirebayes.robot.history.readings import Information, reading_weight, sensors
 from wirebayes.robot.history.unknowns import Uncertain, slopes, unknowns
 from wirebayes.robot.mechanics import firmware
 from wirebayes.robot.mechanics.description import Robot
@@ -315,7 +315,7 @@ class LiveEstimator:
             hard = self._live & ~(length < _LONG * robot.size_m)
             if hard.any():
                 step[hard] = np.nan
-            self._x, self._R = mixed.moved(robot, (self._x, self._R), step)
+            self._x, self._R = mixed.after_step(robot, (self._x, self._R), step)
             if hard.any():
                 self._carefully(np.flatnonzero(hard), zero, offset)
             if not (length[self._live & ~hard] > _AGAIN * robot.size_m).any():
@@ -335,7 +335,7 @@ class LiveEstimator:
         """What the sensors say, added to what they said before."""
         n, of = self._n, self._of
         h = np.concatenate([self._tension, roll_and_pitch(self._R)], 1)[:-1]
-        counts = weight(None if self._last == -np.inf else time_s - self._last)
+        counts = reading_weight(None if self._last == -np.inf else time_s - self._last)
         noise = of.noise * self._rng.standard_normal((n, len(y))) / np.sqrt(counts)
         left = np.where(self._live[:n, None], y - h[:n] - of.offset * self._offset + noise, np.nan)
         self._information.add(of, slopes(h[n:]), left, counts)

@@ -57,7 +57,7 @@ def sensors(robot: Robot, errors: Uncertain) -> Sensors:
     return Sensors(error, np.array([robot.tension_bias_N] * legs + [0.0] * 2))
 
 
-def weight(since_s: float | None) -> float:
+def reading_weight(since_s: float | None) -> float:
     """How many readings one counts as, `since_s` after the one before (None: there is none)."""
     return 1.0 if since_s is None else min(1.0, since_s / TOGETHER_S)
 
@@ -105,7 +105,7 @@ class Information:
         residual : (n, m) array
             What each draw left of the readings; NaN where nothing was read.
         counts : float
-            From `weight`.
+            From `reading_weight`.
         """
         there = np.isfinite(residual).any(0) & np.isfinite(slope).all(0)
         if not there.any():

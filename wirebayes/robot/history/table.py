@@ -21,7 +21,7 @@ PAYLOAD, CENTRE = "payload_kg", ("payload_x_m", "payload_y_m", "payload_z_m")
 TILT = ("roll_deg", "pitch_deg")
 
 
-def measured(robot: Robot, given: Sequence[str] = ()) -> Header:
+def measured_columns(robot: Robot, given: Sequence[str] = ()) -> Header:
     """Of a table of measured joint values, in the units of a header that is given (`joint_columns`)."""
     turn = TURN if robot.degrees == 6 else ()
     tilt = (TILT,) if robot.degrees == 6 else ()
@@ -29,7 +29,7 @@ def measured(robot: Robot, given: Sequence[str] = ()) -> Header:
     return Header(("time_s", *joint_columns(robot, given)), groups)
 
 
-def commanded(robot: Robot, given: Sequence[str] = ()) -> Header:
+def commanded_columns(robot: Robot, given: Sequence[str] = ()) -> Header:
     """Of a table of commanded poses."""
     turn = (TURN,) if robot.degrees == 6 else ()
     return Header(("time_s", *POSITION), (("hold",), *turn, (PAYLOAD,), CENTRE))
@@ -39,7 +39,7 @@ def _tensions(robot: Robot) -> tuple[str, ...]:
     return tuple(f"tension_{i}_N" for i in range(1, robot.legs + 1))
 
 
-def read(path: Path, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], Header]) -> History:
+def read_log(path: Path, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], Header]) -> History:
     """A history from a file.
 
     Parameters
@@ -48,7 +48,7 @@ def read(path: Path, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], 
     robot : Robot
         Says how many joint values and tensions a row has.
     columns_of : callable
-        `measured` or `commanded`: which columns the file may and must have.
+        `measured_columns` or `commanded_columns`: which columns the file may and must have.
 
     Returns
     -------
@@ -60,10 +60,10 @@ def read(path: Path, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], 
         Naming line and column, what was found and what was expected.
     """
     text = read_text(path, f"a header of {columns_of(robot, ())}")
-    return parse(csv_table(path, text), robot, columns_of)
+    return parse_log(csv_table(path, text), robot, columns_of)
 
 
-def parse(table: Table, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], Header]) -> History:
+def parse_log(table: Table, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], Header]) -> History:
     """A history from a table whose header is not checked yet.
 
     Parameters
@@ -71,7 +71,7 @@ def parse(table: Table, robot: Robot, columns_of: Callable[[Robot, Sequence[str]
     table : Table
     robot : Robot
     columns_of : callable
-        `measured` or `commanded`.
+        `measured_columns` or `commanded_columns`.
 
     Returns
     -------
@@ -100,14 +100,14 @@ def parse(table: Table, robot: Robot, columns_of: Callable[[Robot, Sequence[str]
     return history
 
 
-def may_be_empty(name: str) -> bool:
+def may_be_unread(name: str) -> bool:
     """Whether a cell of a column says nothing where it is empty: a sensor that was not read."""
     return name.startswith("tension_") or name in TILT
 
 
 def _allowed(name: str) -> Numbers:
     """What the cells of a column may hold."""
-    empty = may_be_empty(name)
+    empty = may_be_unread(name)
     if name in TILT:
         return Numbers("an angle from -180 to 180 degrees", -180.0, 180.0, empty=empty)
     if name == "hold":

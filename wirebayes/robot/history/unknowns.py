@@ -45,7 +45,7 @@ class Uncertain:
 
 
 @dataclass(frozen=True)
-class Unknowns:
+class LogUnknowns:
     """Unknowns in units of their prior ("white"): reference lengths, the line's parameters, each specimen's own.
 
     Attributes
@@ -97,7 +97,7 @@ def slopes(values: Floats) -> Floats:
     return np.asarray((values[1:] - values[0]) / _STEP)
 
 
-def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Generator) -> Unknowns:
+def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Generator) -> LogUnknowns:
     """The unknowns of a robot whose wires are cut from one line.
 
     Parameters
@@ -111,7 +111,7 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Ge
     known = errors.calibrated
     if known is not None:
         draws = even_normals(line.count, len(known.mean), rng)
-        return Unknowns(robot, known.prior, known.mean, _root(known.covariance), draws, known)
+        return LogUnknowns(robot, known.prior, known.mean, _root(known.covariance), draws, known)
     prior = LengthPrior(line, max(errors.reference_m, _EXACT_M), errors.spread)
     mean, cov = prior.moments(robot.legs)
     root = np.asarray(np.linalg.cholesky(cov), np.float64)
@@ -120,7 +120,7 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Ge
     own, reference = drawn[:, legs:] * prior.own_sd, drawn[:, :legs] * prior.reference_sd_m
     values = np.concatenate([reference, prior.fitted.T, own], 1)
     white = solve_triangular(root, (values - mean).T, lower=True).T
-    return Unknowns(robot, prior, mean, root, np.asarray(white))
+    return LogUnknowns(robot, prior, mean, root, np.asarray(white))
 
 
 def even_normals(n: int, m: int, rng: np.random.Generator) -> Floats:

@@ -191,7 +191,7 @@ def typical_spread(line: WireDraws, stated: float) -> float:
 
 
 def specimens_in_words(wires: WiresUsed) -> list[str]:
-    """A sentence for each line whose spread was estimated, of `summary`'s content.
+    """A sentence for each line whose spread was estimated, of `wires_summary`'s content.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
     raise KeyError(name)
 
 
-def summary(robot: Robot, line: WireDraws) -> WiresUsed:
+def wires_summary(robot: Robot, line: WireDraws) -> WiresUsed:
     """Which wires an answer is for, as ``pose.json`` says it."""
     kept = line.material()
     used: WiresUsed = {
@@ -303,7 +303,7 @@ def doubts(robot: Robot, line: WireDraws) -> list[Notice]:
     return [doubt.of(f"wire {name}") if line.others else doubt for name, one in used.items() for doubt in one.doubts]
 
 
-def warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[Notice]:
+def wire_warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[Notice]:
     """A warning for each doubt about a line's fit, and for each way in which a use leaves what was tested.
 
     Parameters

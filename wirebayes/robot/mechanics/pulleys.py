@@ -51,7 +51,7 @@ class WireRun:
     clear: NDArray[np.bool_]
 
 
-def run(pulleys: Pulleys, line_m: Floats) -> WireRun:
+def wire_run(pulleys: Pulleys, line_m: Floats) -> WireRun:
     """The way of wires to platform points that lie at ``(3, w, n)`` from their exit points."""
     rho, s = pulleys.radius_m[:, None], pulleys.axis.T[:, :, None]
     along = line_m[0] * s[0] + line_m[1] * s[1] + line_m[2] * s[2]
@@ -99,7 +99,7 @@ def traced(pulleys: Pulleys | None, leg: int, line_m: Floats, points: int = 12) 
     if pulleys is None or not pulleys.radius_m[leg]:
         return np.stack([np.zeros(3), line_m])
     own = Pulleys(pulleys.radius_m[leg : leg + 1], pulleys.axis[leg : leg + 1])
-    way, rho, s = run(own, line_m[:, None, None]), own.radius_m[0], own.axis[0]
+    way, rho, s = wire_run(own, line_m[:, None, None]), own.radius_m[0], own.axis[0]
     outward = np.cross(way.across[:, 0, 0], s)
     turn = np.linspace(0.0, way.wrap_rad[0, 0], points)[:, None]
     return np.vstack([rho * ((1 - np.cos(turn)) * outward + np.sin(turn) * s), line_m])

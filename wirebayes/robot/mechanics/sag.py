@@ -38,7 +38,7 @@ def sag(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -
     return share, share * level * length / 8.0, length * (share * level) ** 2 / 24.0
 
 
-def warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[Notice]:
+def sag_warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[Notice]:
     """A sentence on the wire whose own weight matters most, where any does.
 
     Parameters

@@ -59,7 +59,7 @@ def parse(text: str, where: str) -> Robot:
     return _robot(Keys.of_file(Path(where), text))
 
 
-def text_of(name_or_file: str | Path) -> str:
+def robot_text(name_or_file: str | Path) -> str:
     """The text of a robot's file, or of a shipped one."""
     return _text(str(name_or_file))[0]
 

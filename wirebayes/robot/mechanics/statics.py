@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
-from wirebayes.robot.mechanics.pulleys import WireRun, run
+from wirebayes.robot.mechanics.pulleys import WireRun, wire_run
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
 
 _NOWHERE = 1e-300  # m; a wire without length has no direction, and no pull
@@ -72,7 +72,7 @@ def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
     arm = turned(robot.platform_m, rotation)
     line = position_m[:, None] + arm - robot.exit_m.T[:, :, None]
     if robot.pulleys is not None:
-        over = run(robot.pulleys, line)
+        over = wire_run(robot.pulleys, line)
         return Geometry(over.length_m, over.direction, arm, over)
     distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
     return Geometry(distance, line / np.maximum(distance, _NOWHERE), arm)

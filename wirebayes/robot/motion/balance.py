@@ -8,7 +8,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires, tension
 
 
-def scaled(gradient: Floats, H: Floats, scale: Floats) -> tuple[Floats, Floats]:
+def in_metres(gradient: Floats, H: Floats, scale: Floats) -> tuple[Floats, Floats]:
     """Gradient and Hessian by rotations in metres at the platform's edge.
 
     Parameters
@@ -57,7 +57,7 @@ def balance_at(
     R = rotation.transpose(1, 2, 0)
     shape = statics.geometry(robot, position_m.T, R)
     tau, slope = tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)
-    return scaled(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
+    return in_metres(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
 
 
 def tensions_at(

@@ -133,7 +133,7 @@ def over_workspace(
     )
 
 
-def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
+def scaled_robot(robot: Robot, factor: float, mass_kg: float) -> Robot:
     """The same robot at another size and mass; tension bounds follow the mass.
 
     Parameters
@@ -158,7 +158,7 @@ def scaled(robot: Robot, factor: float, mass_kg: float) -> Robot:
     return replace(robot, mass_kg=mass_kg, rule=rule, pulleys=pulleys, drums=drums, **grown)
 
 
-def summary(out: WorkspaceDrift) -> ClaimNumbers:
+def claim_summary(out: WorkspaceDrift) -> ClaimNumbers:
     """The claim in numbers: quantiles over workspace and draws, and how probable it is, somewhere and everywhere."""
     inside = (out.distance_m < DISTANCE_M) & (out.tilt_rad < TILT_RAD)
     distance, tilt = _quantiles(1e3 * out.distance_m), _quantiles(np.degrees(out.tilt_rad))
@@ -200,7 +200,7 @@ def largest_mass(robot: Robot, line: WireDraws, size: float, spread: float = 0.0
     low, high = 1e-3, 20.0
     for _ in range(steps):
         mass = float(np.sqrt(low * high))
-        other = scaled(robot, size, mass)
+        other = scaled_robot(robot, size, mass)
         wires = for_robot(other, line, spread, np.random.default_rng(1))
         out = over_workspace(other, wires, grid(other, (3, 3, 2)))
         good = np.mean(out.holds() >= 0.95) >= 0.95

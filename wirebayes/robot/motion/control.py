@@ -115,7 +115,7 @@ def error(
     times_s : (t,) array
     """
     course = drift.hold(robot, wires, schedule, times_s, position_m, rotation)
-    shift, angle = drift.moved(course, position_m, rotation)
+    shift, angle = drift.distance_moved(course, position_m, rotation)
     return PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.found)
 
 
@@ -183,6 +183,6 @@ def after_calibration(
     out = []
     for schedule in (lambda time_s: joint, expected):
         course = drift.hold(robot, wires, schedule, times_s, position_m, rotation, carried)
-        shift, angle = drift.moved(course, position_m, rotation)
+        shift, angle = drift.distance_moved(course, position_m, rotation)
         out.append(PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.found))
     return out[0], out[1]

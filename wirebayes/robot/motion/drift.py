@@ -217,7 +217,7 @@ class CreepingHold:
         found = path.follow(self.robot, self.wires.part(rows), part[2], part[0], part[1])
         if len(rows) == self.n:
             return found
-        whole = path.Followed(forward.spread(found.here, rows, self.n), np.ones(self.n), np.zeros(self.n))
+        whole = path.Followed(forward.put_back(found.here, rows, self.n), np.ones(self.n), np.zeros(self.n))
         whole.share[rows], whole.drop_m[rows] = found.share, found.drop_m
         return whole
 
@@ -316,7 +316,7 @@ def stably(
     return commands.feasible & (one_sided.lowest_stiffness(robot, wires, pose, (zero, commands.offset_m)) > 0)
 
 
-def moved(course: Course, origin_m: Floats, origin_rotation: Floats) -> tuple[Floats, Floats]:
+def distance_moved(course: Course, origin_m: Floats, origin_rotation: Floats) -> tuple[Floats, Floats]:
     """How far the poses of a course are from an origin.
 
     Parameters

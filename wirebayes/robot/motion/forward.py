@@ -17,7 +17,7 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
 from wirebayes.robot.motion import one_sided
-from wirebayes.robot.motion.balance import scaled
+from wirebayes.robot.motion.balance import in_metres
 
 FOUND, NOT_CONVERGED, NO_EQUILIBRIUM, NOT_HELD, FELL = 0, 1, 2, 3, 4
 _GOING_ON = -1  # of a case that is still being solved
@@ -96,9 +96,9 @@ def solve(
     if len(sane) < n:
         offsets = np.broadcast_to(offset_m, zero_m.shape)[sane]
         x, R = np.broadcast_to(start_m, (n, 3))[sane], np.broadcast_to(start_rotation, (n, 3, 3))[sane]
-        return spread(solve(robot, wires.part(sane), zero_m[sane], offsets, x, R, max_iterations), sane, n)
+        return put_back(solve(robot, wires.part(sane), zero_m[sane], offsets, x, R, max_iterations), sane, n)
     if not n:
-        return spread(None, sane, 0, robot.legs)
+        return put_back(None, sane, 0, robot.legs)
     # Counted from the middle of the exit points, so that nothing depends on where the robot's origin is.
     middle = robot.exit_m.mean(0)
     robot = replace(robot, exit_m=robot.exit_m - middle)
@@ -126,7 +126,7 @@ def solve(
     return found
 
 
-def spread(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int = 0) -> Equilibria:
+def put_back(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int = 0) -> Equilibria:
     """Solutions put back among rows that could not be tried.
 
     Parameters
@@ -356,7 +356,7 @@ def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Float
     shape = statics.geometry(robot, x, R)
     S = statics.stretched(robot, shape, offset)
     tau, slope = tension(wires, S, zero)
-    gradient, H = scaled(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
+    gradient, H = in_metres(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
     height = x[2]
     if robot.degrees == 6:
         c = robot.centre_of_mass_m

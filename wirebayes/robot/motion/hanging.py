@@ -156,7 +156,7 @@ def chosen(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats
     return _basis(ways)
 
 
-def commanded(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> tuple[Floats, int]:
+def commandable(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> tuple[Floats, int]:
     """What the wires can command about a pose in balance.
 
     Parameters

@@ -25,7 +25,7 @@ _NEAR = 1e-6  # of the platform's size: after so short a step the next would be 
 _BARELY = 1e-9  # strain at which a slack wire's stiffness is taken
 
 
-def newton_step(
+def newton_step_with_tensions(
     robot: Robot, wires: Wires, pose: tuple[Floats, Floats], tension_N: Floats, lengths: tuple[Floats, Floats]
 ) -> tuple[Floats, Floats]:
     """One step of poses and tensions towards equilibrium at lengths.
@@ -152,17 +152,17 @@ def approach(
     Parameters
     ----------
     robot, wires, pose, tension_N, lengths
-        As for `newton_step`.
+        As for `newton_step_with_tensions`.
 
     Returns
     -------
     pose : (position, rotation)
         Where no step leads on, the last that was reached.
     ahead : (n, 6 or 3) array
-        As `newton_step` gives it.
+        As `newton_step_with_tensions` gives it.
     """
-    ahead, tau = newton_step(robot, wires, pose, tension_N, lengths)
-    x, R = moved(robot, pose, ahead)
+    ahead, tau = newton_step_with_tensions(robot, wires, pose, tension_N, lengths)
+    x, R = after_step(robot, pose, ahead)
     step, rows = ahead, np.arange(len(x))
     for _ in range(_STEPS):
         length = np.linalg.norm(step, axis=1)
@@ -171,12 +171,12 @@ def approach(
         if not rows.size:
             break
         part = lengths[0][rows], np.broadcast_to(lengths[1], lengths[0].shape)[rows]
-        step, tau = newton_step(robot, wires.part(rows), (x[rows], R[rows]), tau, part)
-        x[rows], R[rows] = moved(robot, (x[rows], R[rows]), step)
+        step, tau = newton_step_with_tensions(robot, wires.part(rows), (x[rows], R[rows]), tau, part)
+        x[rows], R[rows] = after_step(robot, (x[rows], R[rows]), step)
     return (x, R), ahead
 
 
-def moved(robot: Robot, pose: tuple[Floats, Floats], step: Floats) -> tuple[Floats, Floats]:
+def after_step(robot: Robot, pose: tuple[Floats, Floats], step: Floats) -> tuple[Floats, Floats]:
     """Poses after small steps.
 
     Parameters

@@ -112,7 +112,7 @@ def _step(
     Where the step leads further than is believed, nothing is solved: no solution would be taken.
     """
     near, ahead = mixed.approach(robot, wires, start, tension_N, lengths)
-    predicted = mixed.moved(robot, start, ahead)
+    predicted = mixed.after_step(robot, start, ahead)
     # Where the stiffness predicts nothing, as of wires that part just now, what does not jump has not fallen.
     ahead = np.where(np.isfinite(ahead), ahead, 0.0)
     close = np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
@@ -141,7 +141,7 @@ def _let_go(
     balance = there.position_m[loose], there.rotation[loose]
     stiffness = np.moveaxis(balance_at(robot, part, *balance, *own)[1], -1, 0)
     softest = np.linalg.eigh(stiffness)[1][..., 0]
-    aside = mixed.moved(robot, balance, _ASIDE * robot.size_m * softest)
+    aside = mixed.after_step(robot, balance, _ASIDE * robot.size_m * softest)
     found = forward.solve(robot, part, *own, *aside)
     held = np.flatnonzero(found.found)
     for field in fields(forward.Equilibria):
@@ -167,7 +167,7 @@ def settle(
     Equilibria
     """
     step = newton_step(robot, wires, near, lengths)
-    x, R = mixed.moved(robot, near, step)
+    x, R = mixed.after_step(robot, near, step)
     n = len(x)
     tau = tensions_at(robot, wires, x, R, *lengths)
     out = forward.Equilibria(x, R, tau, np.full(n, forward.FOUND), np.ones(n, np.int64), np.zeros(n))

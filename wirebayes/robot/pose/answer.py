@@ -8,7 +8,7 @@ from wirebayes.json_files.pose import (
     Claim,
     ClaimHolds,
     DriftBands,
-    Equilibria,
+    EquilibriaJson,
     EquilibriumPose,
     ForwardKinematics,
     InverseKinematics,
@@ -31,7 +31,7 @@ from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose import controllers, on_plane, stability, variance_shares
 from wirebayes.robot.pose.maps import Map, map_slices, summaries
 from wirebayes.robot.pose.orientation import Orientation, by_lines
-from wirebayes.robot.pose.request import PoseRequest, band
+from wirebayes.robot.pose.request import PoseRequest, band_over_draws
 from wirebayes.robot.proof import proofs
 
 _LEVEL = 1e-6  # sine of a wire's angle to the horizontal: so little is rounding in the robot's file
@@ -56,7 +56,7 @@ class Answer:
     maps: tuple[Map, ...] = ()
 
 
-def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws | None = None) -> Answer:
+def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws | None = None) -> Answer:
     """Inverse and forward kinematics, drift, pose error and where it comes from.
 
     Parameters
@@ -104,7 +104,7 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
         content["plane"] = on_plane.on_plane(robot, shared, commands, x, R, tau[0])
     content["forward"] = _round_trip(robot, shared, commands, x, R)
     content["equilibria"] = _all_equilibria(robot, shared, x, R, rng)
-    proved = proofs.alone(robot, shared, x, R)
+    proved = proofs.only_equilibrium(robot, shared, x, R)
     courses = {}
     for spread in request.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
@@ -119,7 +119,7 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     falls = [
         warning
         for spread, course in courses.items()
-        for warning in stability.warnings(course, spread, content["equilibria"]["commanded_stable"])
+        for warning in stability.stability_warnings(course, spread, content["equilibria"]["commanded_stable"])
     ]
     refused = [Notice("geometry", turned.refused)] if turned.refused else []
     untested = _untested(robot, line, request, commands, tau)
@@ -127,7 +127,7 @@ def answer(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws
     spaces = map_slices(robot, line, request.slices)
     held = [one for one in spaces if len(one.drift.position_m)]
     # the first orientation as a whole, then every slice of each
-    content["workspace"] = {**claim.summary(held[0].drift), "slices": summaries(spaces)} if held else None
+    content["workspace"] = {**claim.claim_summary(held[0].drift), "slices": summaries(spaces)} if held else None
     return Answer(content, courses, spaces)
 
 
@@ -167,7 +167,7 @@ def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible:
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
         "pose": {"position_m": x, "rotation_vector_rad": turning.vector(R[None])[0]},
-        "wires": draws.summary(robot, line),
+        "wires": draws.wires_summary(robot, line),
         "tension_distribution": {
             "choice": robot.rule.choice, "lowest_N": robot.rule.lowest_N, "highest_N": robot.rule.highest_N
         },
@@ -179,8 +179,8 @@ def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible:
 def _inverse(robot: Robot, commands: inverse.Commands, tension_N: Floats) -> InverseKinematics:
     found: InverseKinematics = {
         "tension_N": tension_N,
-        "zero_tension_length_m": band(commands.zero_m),
-        "joint_value_m": band(of_each_winch(robot, commands.joint_m)),
+        "zero_tension_length_m": band_over_draws(commands.zero_m),
+        "joint_value_m": band_over_draws(of_each_winch(robot, commands.joint_m)),
     }
     return found if robot.drums is None else {**found, **_motors(robot, robot.drums, commands.joint_m)}
 
@@ -195,8 +195,8 @@ def _untested(
     robot: Robot, line: WireDraws, request: PoseRequest, commands: inverse.Commands, tension_N: Floats
 ) -> list[Notice]:
     """A warning for each way in which the pose leaves what was tested or what the model knows."""
-    out = draws.warnings(robot, line, tension_N, float(request.times_s[-1]), commands.zero_m)
-    out += sag.warnings(robot, request.position_m, request.rotation, tension_N[0])
+    out = draws.wire_warnings(robot, line, tension_N, float(request.times_s[-1]), commands.zero_m)
+    out += sag.sag_warnings(robot, request.position_m, request.rotation, tension_N[0])
     return out if robot.drums is None else out + _emptied(robot.drums, commands.joint_m[commands.feasible])
 
 
@@ -217,7 +217,7 @@ def _motors(robot: Robot, known: Drums, joint_m: Floats) -> MotorAngles:
 
 def _by_leg(values: Floats) -> Band:
     """Bands of legs one by one: what one leg does not have is no gap in the others."""
-    bands = [band(values[:, [i]]) for i in range(values.shape[1])]
+    bands = [band_over_draws(values[:, [i]]) for i in range(values.shape[1])]
     columns = zip(*(b.values() for b in bands), strict=True)
     mean, sd, low, middle, high = ([None if v is None else v[0] for v in column] for column in columns)
     return {"mean": mean, "sd": sd, "q05": low, "q50": middle, "q95": high}
@@ -235,11 +235,11 @@ def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Float
         "statuses": {text: int((back.status == code).sum()) for code, text in forward.STATUS.items()},
         "largest_round_trip_error_m": float(np.abs(back.position_m - x)[back.found].max(initial=0.0)),
         "slack_wires": int((commands.tension_N[0] <= 0).sum()),
-        "lowest_stiffness_N_m": band(stiff),
+        "lowest_stiffness_N_m": band_over_draws(stiff),
     }
 
 
-def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.random.Generator) -> Equilibria:
+def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.random.Generator) -> EquilibriaJson:
     """The commanded pose, and every stable pose that the same lengths of the mean wire allow, from many starts."""
     mean = control.known(wires)
     tau = inverse.tensions(robot, x[None], R[None])
@@ -273,17 +273,17 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.ra
 
 
 def _drift(course: Course, x: Floats, R: Floats) -> DriftBands:
-    shift, angle = drift.moved(course, x, R)
+    shift, angle = drift.distance_moved(course, x, R)
     shift = np.where(course.found[:, None, None], shift, np.nan)
     return {
         "times_s": course.times_s,
         "solved": float(course.found.mean()),
-        "displacement_mm": band(1e3 * shift),
-        "distance_mm": band(1e3 * np.linalg.norm(shift, axis=-1)),
-        "tilt_deg": band(np.degrees(turning.tilt(course.rotation, R))),
-        "from_vertical_deg": band(np.degrees(turning.tilt(course.rotation))),
-        "rotation_deg": band(np.degrees(angle)),
-        "tension_N": band(course.tension_N),
+        "displacement_mm": band_over_draws(1e3 * shift),
+        "distance_mm": band_over_draws(1e3 * np.linalg.norm(shift, axis=-1)),
+        "tilt_deg": band_over_draws(np.degrees(turning.tilt(course.rotation, R))),
+        "from_vertical_deg": band_over_draws(np.degrees(turning.tilt(course.rotation))),
+        "rotation_deg": band_over_draws(np.degrees(angle)),
+        "tension_N": band_over_draws(course.tension_N),
     }
 
 
@@ -304,7 +304,7 @@ def _claim(courses: dict[float, Course], x: Floats, R: Floats, request: PoseRequ
 
 def _shares(line: WireDraws, courses: dict[float, Course], x: Floats, R: Floats) -> VarianceShares:
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
-    size = {s: np.linalg.norm(drift.moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
+    size = {s: np.linalg.norm(drift.distance_moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
     held = np.isfinite(size[0.0])
     kept: dict[str, Floats] = {}
     for wire, one in line.each.items():

@@ -8,7 +8,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import control, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
-from wirebayes.robot.pose.request import PoseRequest, band
+from wirebayes.robot.pose.request import PoseRequest, band_over_draws
 
 HISTORIES_S = (0.0, 3600.0)  # under load before the calibration: new wires, and an hour
 # to 28 h, eight a decade: the time within tolerance is a point of this grid, at most a quarter too short
@@ -49,8 +49,8 @@ def errors(
                 "controller": name,
                 "times_s": error.times_s,
                 "solved": float(error.found.mean()),
-                "distance_mm": band(1e3 * error.distance_m[error.found]),
-                "rotation_deg": band(np.degrees(error.angle_rad[error.found])),
+                "distance_mm": band_over_draws(1e3 * error.distance_m[error.found]),
+                "rotation_deg": band_over_draws(np.degrees(error.angle_rad[error.found])),
                 **_tolerances(request),
                 **_lasts(error, request),
             })  # fmt: skip

@@ -102,7 +102,7 @@ def summaries(found: tuple[Map, ...]) -> list[SliceOfWorkspace]:
             where: SliceOfWorkspace = {
                 "rotation_vector_rad": one.rotation_rad, "axis": "xyz"[through], "at_m": float(level), "feasible": 0.0
             }  # fmt: skip
-            out.append({**where, **claim.summary(one.drift.part(here, share))} if here.any() else where)
+            out.append({**where, **claim.claim_summary(one.drift.part(here, share))} if here.any() else where)
     return out
 
 

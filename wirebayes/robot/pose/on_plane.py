@@ -8,7 +8,7 @@ from wirebayes.robot.mechanics import plane, statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.pose.request import band
+from wirebayes.robot.pose.request import band_over_draws
 
 
 def lifted(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> str:
@@ -64,7 +64,7 @@ def on_plane(
         "normal_force_N": force,
         "friction_coefficient": known.friction,
         "contact_radius_m": known.contact_radius_m,
-        "friction_half_width_mm": band(1e3 * width),
-        "friction_half_width_rad": band(turn),
+        "friction_half_width_mm": band_over_draws(1e3 * width),
+        "friction_half_width_rad": band_over_draws(turn),
         "sentence": f"{said}.",
     }

@@ -41,7 +41,7 @@ class Orientation:
     refused: str = ""
 
 
-def orientation(robot: Robot, position_m: Floats, asked_rad: Floats | None) -> Orientation:
+def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | None) -> Orientation:
     """The orientation that is asked for as far as it can be had, the rest by balance.
 
     Parameters
@@ -141,7 +141,7 @@ def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, h
     """The orientation that was found, with what was commanded."""
     R, tau = found.rotation[0], found.tension_N[0]
     vector = turning.vector(R[None])[0]
-    places, degrees = hanging.commanded(robot, x, R, tau)
+    places, degrees = hanging.commandable(robot, x, R, tau)
     free = [name for name, given in zip(COMPONENTS, had, strict=True) if not given]
     refused = [i for i in range(3) if np.isfinite(asked[i]) and not had[i]]
     content: OrientationFound = {

@@ -50,7 +50,7 @@ class PoseRequest:
         return 0.0, self.specimen_spread
 
 
-def band(values: Floats) -> Band:
+def band_over_draws(values: Floats) -> Band:
     """Mean, sd and quantiles over the first axis (the draws); NaN draws are left out."""
     good = values[np.isfinite(values).all(axis=tuple(range(1, values.ndim)))]
     if not len(good):

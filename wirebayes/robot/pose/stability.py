@@ -7,7 +7,7 @@ from wirebayes.json_files.pose import FallsReport, Times
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.motion.course import Course, Falls
-from wirebayes.robot.pose.request import band
+from wirebayes.robot.pose.request import band_over_draws
 
 NEAR_SLACK, NEAR_LOOSE = 0.2, 0.3  # shares of first tension and stiffness: a builder wants to know below these
 
@@ -36,8 +36,8 @@ def summary(course: Course) -> FallsReport:
         "slack_probability": slack.mean(0),
         "slack_time_s": [_spread(t[s]) for t, s in zip(falls.slack_s[began].T, slack.T, strict=True)],
         "least_tension_wire": int(_nearest(falls, began)) + 1,
-        "least_tension_share": band(lowest),
-        "stiffness_share": band(falls.stiffness_share[holds]),
+        "least_tension_share": band_over_draws(lowest),
+        "stiffness_share": band_over_draws(falls.stiffness_share[holds]),
     }
 
 
@@ -57,7 +57,7 @@ def _nearest(falls: Falls, began: NDArray[np.bool_]) -> int:
     return int(np.bincount(share.argmin(1), minlength=share.shape[1]).argmax())
 
 
-def warnings(course: Course, spread: float, stable: bool = True) -> list[Notice]:
+def stability_warnings(course: Course, spread: float, stable: bool = True) -> list[Notice]:
     """One warning for each way in which the platform may lose its hold, the worst first.
 
     Parameters

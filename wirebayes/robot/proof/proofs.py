@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from wirebayes.json_files.pose import Certificate, EnclosedBand
+from wirebayes.json_files.pose import CertificateJson, EnclosedBand
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, forward, inverse
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.proof.certificate import certify
-from wirebayes.robot.proof.reach import Reach, apart, reach
+from wirebayes.robot.proof.reach import Reach, each_on_its_own, reach
 from wirebayes.wire.laws import ElasticLaw
 
 _Pose = tuple[Floats, Floats, Floats]  # position, rotation, and how exactly they are known
@@ -17,7 +17,7 @@ _STEP = 0.1  # how far, of the whole creep, wires may be out of step
 SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of the bands, the largest that can be proved
 
 
-def alone(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> Certificate:
+def only_equilibrium(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> CertificateJson:
     """Proof that the mean wire has exactly one equilibrium here, when interval arithmetic is installed.
 
     Parameters
@@ -187,7 +187,9 @@ class _Way:
         if middle is None:
             return None
         half = 0.5 * (self.k1[1] - self.k1[0]), 0.5 * self.bare * (band[1] - band[0])
-        proof = reach(self.robot, self.law, stiff, self.bare * (1 + grown), apart(*half), self.offset, *middle)
+        proof = reach(
+            self.robot, self.law, stiff, self.bare * (1 + grown), each_on_its_own(*half), self.offset, *middle
+        )
         return proof if proof.proved and self._joined(proof, here, k1_N, strain, band) else None
 
     def _joined(self, proof: Reach, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> bool:

@@ -62,7 +62,7 @@ class Reach:
         return self.proved and bool(np.all(np.abs(here - self.line_m @ p) + slack_m <= self.beside_m))
 
 
-def apart(half_k1_N: Floats, half_zero_m: Floats) -> tuple[Floats, Floats]:
+def each_on_its_own(half_k1_N: Floats, half_zero_m: Floats) -> tuple[Floats, Floats]:
     """Generators for wires that vary each on its own: half widths ``(w,)`` of stiffness and of length."""
     none = np.zeros((len(half_k1_N), len(half_k1_N)))
     return np.hstack([np.diag(half_k1_N), none]), np.hstack([none, np.diag(half_zero_m)])
@@ -87,7 +87,7 @@ def reach(
     k1_N, zero_m, offset_m : (w,) arrays
         In the middle.
     generators : (w, q), (w, q) arrays
-        G (N) and H (m); from `apart`, or one column for wires that change together.
+        G (N) and H (m); from `each_on_its_own`, or one column for wires that change together.
     position_m, rotation : (3,), (3, 3) arrays
         Approximate solution for the middle.
 

@@ -22,9 +22,9 @@ from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.motion import control, hanging, inverse
 from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
-from wirebayes.robot.self_calibration.estimate import Calibration, calibrate, corrected
+from wirebayes.robot.self_calibration.estimate import LengthPosterior, corrected_joints, length_posterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
-from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval_about
 
 CANDIDATES = 200  # in the workspace: the best of them come within a few percent of the best there are
 # Times the error of a reference length and the creep of the wire that crept most, by which a pose may be off. In
@@ -32,7 +32,7 @@ CANDIDATES = 200  # in the workspace: the best of them come within a few percent
 _FAR = 10.0
 
 
-def answer(
+def lengths_report(
     robot: Robot, prior: LengthPrior, session: Session, readings: Floats, seed: int = 0, visits: int = 5
 ) -> tuple[CalibrateJson, Calibrated]:
     """Calibrate one robot and say how far the answer can be trusted.
@@ -55,8 +55,8 @@ def answer(
     known : Calibrated
         What a history can start from.
     """
-    known = calibrate(robot, prior, session, readings[None])
-    plain = calibrate(robot, replace(prior, creeps=False), session, readings[None])
+    known = length_posterior(robot, prior, session, readings[None])
+    plain = length_posterior(robot, replace(prior, creeps=False), session, readings[None])
     given: CalibrationPrior = {"reference_sd_mm": 1e3 * prior.reference_sd_m, "specimen_spread": prior.spread}
     if prior.bias_sd_N > 0:
         given["tension_bias_sd_N"] = prior.bias_sd_N
@@ -69,7 +69,7 @@ def answer(
         "holds": len(session.duration_s),
         "read": int(session.read.sum()),
         "usable": usable(known) and not contradicted,
-        "sensors_at_fault": sensors.to_json(at_fault),
+        "sensors_at_fault": sensors.sensors_json(at_fault),
         "misfit": float(known.misfit[0]),
         "prior": given,
         **_named(robot, prior, session, known),
@@ -81,13 +81,13 @@ def answer(
         **_poses(robot, prior, known),
         **_observed(robot, prior, session, np.random.default_rng(seed), visits),
         "warnings": to_json(
-            [*_unsure(known, plain), *contradicted, *sensors.named(at_fault), *doubts(robot, prior.line)]
+            [*_unsure(known, plain), *contradicted, *sensors.sensor_notices(at_fault), *doubts(robot, prior.line)]
         ),
     }
     return content, calibrated(robot, prior, session, known)
 
 
-def usable(known: Calibration) -> bool:
+def usable(known: LengthPosterior) -> bool:
     """Whether the lengths may be set in a controller.
 
     Parameters
@@ -98,7 +98,7 @@ def usable(known: Calibration) -> bool:
     return bool(known.converged[0] and known.p_joint[0] >= SIGNIFICANT)
 
 
-def _named(robot: Robot, prior: LengthPrior, session: Session, known: Calibration) -> NamedEstimates:
+def _named(robot: Robot, prior: LengthPrior, session: Session, known: LengthPosterior) -> NamedEstimates:
     """Estimates in the words of a whole robot's calibration; its geometry is exact here."""
     half = float(ndtri(0.95))
     zero = np.zeros((robot.legs, 3))
@@ -110,21 +110,21 @@ def _named(robot: Robot, prior: LengthPrior, session: Session, known: Calibratio
     open_ = [f"the reference length of wire {i + 1}: known to {1e3 * prior.reference_sd_m:.2g} mm before, to "
              f"{1e3 * sd[i]:.2g} mm now" for i in np.flatnonzero(~(sd < 0.5 * prior.reference_sd_m))]  # fmt: skip
     return {
-        "exit_points_m": interval(robot.exit_m, zero, half),
-        "platform_points_m": interval(robot.platform_m, zero, half),
-        "zero_tension_lengths_m": interval(known.length_m[0], known.length_sd_m[0], half),
-        "references_m": interval(known.unknowns[0, : robot.legs], sd, half),
-        "poses": {"hold": np.asarray(numbers, float).tolist(), **interval(pose, known.ended_sd[0], half)},
+        "exit_points_m": interval_about(robot.exit_m, zero, half),
+        "platform_points_m": interval_about(robot.platform_m, zero, half),
+        "zero_tension_lengths_m": interval_about(known.length_m[0], known.length_sd_m[0], half),
+        "references_m": interval_about(known.unknowns[0, : robot.legs], sd, half),
+        "poses": {"hold": np.asarray(numbers, float).tolist(), **interval_about(pose, known.ended_sd[0], half)},
         "identified": {"determined": determined, "of": robot.legs, "combinations": [], "not_determined": open_},
     }
 
 
-def _poses(robot: Robot, prior: LengthPrior, known: Calibration) -> CalibratedPoses:
+def _poses(robot: Robot, prior: LengthPrior, known: LengthPosterior) -> CalibratedPoses:
     """Where the robot is, and the joint values of its home; none where nothing holds it or nothing was found."""
     if not known.converged[0]:  # nobody should send the robot anywhere by it
         return {"pose_now": None, "joint_values_for_home_m": None}
     turn = rotation.vector(known.rotation)[0]
-    joint = corrected(robot, prior, known, robot.home_m, rotation.matrix(robot.home_rotation_rad))[0]
+    joint = corrected_joints(robot, prior, known, robot.home_m, rotation.matrix(robot.home_rotation_rad))[0]
     held = bool(np.isfinite(joint).all())
     found: CalibratedPoses = {
         "pose_now": {"position_m": known.position_m[0], "rotation_vector_rad": turn},
@@ -135,7 +135,7 @@ def _poses(robot: Robot, prior: LengthPrior, known: Calibration) -> CalibratedPo
     return found
 
 
-def _unsure(known: Calibration, plain: Calibration) -> list[Notice]:
+def _unsure(known: LengthPosterior, plain: LengthPosterior) -> list[Notice]:
     """That lengths should not be used: the search did not converge, or the model does not explain the readings."""
     searched = (("the creep model", known), ("Hooke's law alone", plain))
     astray = [called for called, lengths in searched if not lengths.converged[0]]
@@ -154,7 +154,7 @@ def _unsure(known: Calibration, plain: Calibration) -> list[Notice]:
     return [Notice("misfit", text)]
 
 
-def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: Calibration) -> list[Notice]:
+def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: LengthPosterior) -> list[Notice]:
     """A warning for each hold whose requested pose is not where the joint values lead, for any plausible lengths."""
     if not known.converged[0]:
         return []
@@ -177,14 +177,14 @@ def _at_fault(robot: Robot, prior: LengthPrior, session: Session, readings: Floa
     widest = session.tension_sd_N * float(readings[: holds * robot.legs].max(initial=0.0))  # no more than it ever read
     if holds < sensors.LEAST_HOLDS or prior.bias_sd_N > 0 or not widest > 0:
         return None
-    other = calibrate(robot, replace(prior, bias_sd_N=widest), session, readings[None])
+    other = length_posterior(robot, replace(prior, bias_sd_N=widest), session, readings[None])
     if not other.converged[0]:
         return None
     bias = slice(-robot.legs, None)
     return sensors.weighed(other.unknowns[0, bias], other.covariance[0, bias, bias], widest)
 
 
-def _lengths(robot: Robot, prior: LengthPrior, known: Calibration) -> EstimatedLengths:
+def _lengths(robot: Robot, prior: LengthPrior, known: LengthPosterior) -> EstimatedLengths:
     half = float(ndtri(0.95)) * known.length_sd_m[0]
     sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
     found: EstimatedLengths = {
@@ -211,7 +211,7 @@ def _observed(robot: Robot, prior: LengthPrior, session: Session, rng: np.random
     wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
     wires = control.known(wires)
     zero, offset = inverse.lengths(robot, session.joint_m[session.read])
-    done = observability.sensitivity(
+    done = observability.length_sensitivity(
         robot, wires, session.position_m[session.read], session.rotation[session.read], zero, offset
     )[1]
     seen = observability.observe(done, session.tension_sd_N, prior.reference_sd_m, prior.bias_sd_N, session.bias_sign)
@@ -220,7 +220,7 @@ def _observed(robot: Robot, prior: LengthPrior, session: Session, rng: np.random
     tau = inverse.tensions(robot, x, R)
     good = np.isfinite(tau).all(1)
     commands = inverse.commands(robot, wires, x[good], R[good], tau[good])
-    ahead = observability.sensitivity(robot, wires, x[good], R[good], commands.zero_m, commands.offset_m)[1]
+    ahead = observability.length_sensitivity(robot, wires, x[good], R[good], commands.zero_m, commands.offset_m)[1]
     pick = observability.choose_poses(ahead, visits, session.tension_sd_N, prior.reference_sd_m)
     return {
         "observability": {

@@ -12,7 +12,7 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion.creep import CreepState
 from wirebayes.robot.self_calibration import session as sessions
-from wirebayes.robot.self_calibration.estimate import Calibration
+from wirebayes.robot.self_calibration.estimate import LengthPosterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 
@@ -47,7 +47,7 @@ class Calibrated:
         return sessions.carried(self.robot, self.prior, self.session, unknowns)
 
 
-def calibrated(robot: Robot, prior: LengthPrior, session: Session, known: Calibration) -> Calibrated:
+def calibrated(robot: Robot, prior: LengthPrior, session: Session, known: LengthPosterior) -> Calibrated:
     """What the calibration of one robot leaves known.
 
     Parameters

@@ -19,7 +19,7 @@ _STEPS = 12  # of a descent: noise and creep change before more are worth it
 
 
 @dataclass(frozen=True)
-class Normal:
+class NormalEquations:
     """Normal equations with the holds eliminated."""
 
     by_robot: Floats
@@ -29,7 +29,7 @@ class Normal:
     slope: Floats
 
 
-def eliminated(e: Equations, white: Floats, damping: float) -> Normal:
+def eliminated(e: Equations, white: Floats, damping: float) -> NormalEquations:
     """Normal equations of the robot's unknowns alone.
 
     Parameters
@@ -54,7 +54,7 @@ def eliminated(e: Equations, white: Floats, damping: float) -> Normal:
     right = (gt @ r + B.swapaxes(1, 2) @ alone).sum(0)[:, 0]
     m = len(white)
     matrix = left + (1.0 + damping) * np.eye(m) + damping * np.diag(np.einsum("pki,pki->i", g, g))
-    return Normal(by_robot, alone[..., 0], inverse_, matrix, right + white)
+    return NormalEquations(by_robot, alone[..., 0], inverse_, matrix, right + white)
 
 
 @dataclass(frozen=True)

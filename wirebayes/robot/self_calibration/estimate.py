@@ -17,12 +17,12 @@ from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import LengthPrior, Prediction, Session, predict
-from wirebayes.robot.self_calibration.start import start
+from wirebayes.robot.self_calibration.start import starting_references
 from wirebayes.robot.self_calibration.trust import joint_test
 
 
 @dataclass(frozen=True)
-class Calibration:
+class LengthPosterior:
     """Posterior after a session, for ``m`` robots.
 
     Attributes
@@ -69,9 +69,9 @@ class Calibration:
         return self.length_m - half, self.length_m + half
 
 
-def calibrate(
+def length_posterior(
     robot: Robot, prior: LengthPrior, session: Session, readings: Floats, iterations: int = 40
-) -> Calibration:
+) -> LengthPosterior:
     """Posterior of the wires' lengths from standardised readings of one session on ``m`` robots.
 
     Parameters
@@ -93,7 +93,7 @@ def calibrate(
     m, d = len(readings), len(mean)
     # Unknowns in units of their prior; references first brought near by the geometry of measured tensions.
     white = np.zeros((m, d))
-    white[:, : robot.legs] = start(robot, prior, session, readings) / prior.reference_sd_m
+    white[:, : robot.legs] = starting_references(robot, prior, session, readings) / prior.reference_sd_m
     here = predict(robot, prior, session, mean + white @ root.T)
     cost = _cost(here, readings, white)
     converged, damping = np.zeros(m, bool), np.full(m, 1e-3)
@@ -125,7 +125,7 @@ def calibrate(
     variance = np.einsum("mwd,mde,mwe->mw", G, spread, G)
     ended = np.sqrt(np.einsum("mxd,mde,mxe->mx", P, spread, P)).reshape(m, -1, 6)
     misfit = ((readings - here.readings) ** 2).mean(1)
-    return Calibration(
+    return LengthPosterior(
         mean + white @ root.T, root @ spread @ root.T, here.length_m, np.sqrt(variance), here.creep,
         here.position_m[:, -1], here.rotation[:, -1], here.begun_m, here.begun_rotation,
         here.ended_m, here.ended_rotation, ended, misfit,
@@ -133,7 +133,9 @@ def calibrate(
     )  # fmt: skip
 
 
-def corrected(robot: Robot, prior: LengthPrior, known: Calibration, position_m: Floats, rotation: Floats) -> Floats:
+def corrected_joints(
+    robot: Robot, prior: LengthPrior, known: LengthPosterior, position_m: Floats, rotation: Floats
+) -> Floats:
     """Joint values that bring every calibrated robot to one pose, the creep so far included.
 
     Parameters

@@ -33,7 +33,7 @@ def _response(unknowns: Unknowns, holds: Holds, state: State) -> Floats:
     bare, offset = inverse.lengths(robot, holds.session.joint_m)
     stretched = _way(robot, state, offset)
     zero = stretched / (1 + np.maximum(state.pull_N, 0.0) / wires.theta["k1"].T)
-    change = observability.sensitivity(robot, wires, state.position_m, state.rotation, zero, offset)[1]
+    change = observability.length_sensitivity(robot, wires, state.position_m, state.rotation, zero, offset)[1]
     answer = change * zero[:, None]
     # beyond these, a state is no equilibrium yet
     usual = np.abs(answer).max((1, 2)) <= 2 * np.max(wires.theta["k1"])

@@ -47,7 +47,7 @@ def response(
     return motion, np.asarray(change), (-slope * S / zero).T
 
 
-def sensitivity(
+def length_sensitivity(
     robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, zero_m: Floats, offset_m: Floats
 ) -> tuple[Floats, Floats]:
     """Small motion and change of the tensions per metre of zero-tension length.
@@ -106,7 +106,7 @@ def observe(
     Parameters
     ----------
     change_N : (p, w, w) array
-        From `sensitivity`, a pose a row.
+        From `length_sensitivity`, a pose a row.
     tension_sd_N : float
     prior_sd_m : float
     bias_sd_N : float

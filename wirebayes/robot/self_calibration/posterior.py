@@ -62,7 +62,7 @@ class Whole:
         return float(-0.5 * self.cost - noise)
 
 
-def posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: Grown, last_m: Floats) -> Whole:
+def gaussian_posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: Grown, last_m: Floats) -> Whole:
     """The Gaussian about where a descent ended.
 
     Parameters
@@ -100,4 +100,4 @@ def at_joint_error(found: Whole, factor: float) -> Whole:
     )
     down = Descent(found.state, there, cost_of(there, found.state.white), found.converged)
     noise = replace(found.noise, joint_m=found.noise.joint_m * factor)
-    return replace(posterior(found.unknowns, down, noise, found.creep, found.last_m), degrees=found.degrees)
+    return replace(gaussian_posterior(found.unknowns, down, noise, found.creep, found.last_m), degrees=found.degrees)

@@ -111,7 +111,7 @@ def suspects(found: Whole, holds: Holds) -> Suspects | None:
     return None
 
 
-def to_json(found: Suspects | None) -> SensorsAtFault | None:
+def sensors_json(found: Suspects | None) -> SensorsAtFault | None:
     """What ``calibration.json`` holds of them.
 
     Parameters
@@ -129,7 +129,7 @@ def to_json(found: Suspects | None) -> SensorsAtFault | None:
     }
 
 
-def named(found: Suspects | None) -> list[Notice]:
+def sensor_notices(found: Suspects | None) -> list[Notice]:
     """What to say of them.
 
     Parameters

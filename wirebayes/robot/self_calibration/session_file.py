@@ -34,7 +34,7 @@ def _of_legs(robot: Robot, name: str) -> tuple[str, ...]:
     return tuple(name.format(i) for i in range(1, robot.legs + 1))
 
 
-def read(
+def read_session(
     path: Path, robot: Robot, tension_sd_N: float, tilt_sd_rad: float, biased: bool = False
 ) -> tuple[Session, Floats]:
     """A session and its standardised readings ``(r,)``.
@@ -66,10 +66,10 @@ def read(
         In units of their standard deviations.
     """
     text = read_text(path, f"a header of {columns(robot)}")
-    return parse(csv_table(path, text), robot, tension_sd_N, tilt_sd_rad, biased)
+    return parse_session(csv_table(path, text), robot, tension_sd_N, tilt_sd_rad, biased)
 
 
-def parse(
+def parse_session(
     table: Table, robot: Robot, tension_sd_N: float, tilt_sd_rad: float, biased: bool = False
 ) -> tuple[Session, Floats]:
     """A session and its standardised readings from a table whose header is not checked yet.
@@ -79,7 +79,7 @@ def parse(
     table : Table
     robot : Robot
     tension_sd_N, tilt_sd_rad : float
-        As for `read`.
+        As for `read_session`.
 
     Returns
     -------

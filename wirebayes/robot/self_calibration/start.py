@@ -58,7 +58,9 @@ class _Equations:
     by_length: Floats
 
 
-def start(robot: Robot, prior: LengthPrior, session: Session, readings: Floats, iterations: int = 12) -> Floats:
+def starting_references(
+    robot: Robot, prior: LengthPrior, session: Session, readings: Floats, iterations: int = 12
+) -> Floats:
     """Reference errors ``(m, w)``, m, from closed loops and balance, creep taken as the prior expects it.
 
     Parameters

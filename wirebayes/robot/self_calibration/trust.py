@@ -66,7 +66,7 @@ def unlearnt(prior_mm: float) -> Notice:
     )
 
 
-def interval(mean: Floats, sd: Floats, half: Floats | float) -> Interval:
+def interval_about(mean: Floats, sd: Floats, half: Floats | float) -> Interval:
     """Mean, standard deviation and an interval of `half` standard deviations to either side.
 
     Parameters

@@ -13,7 +13,7 @@ from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.descent import descend
 from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds, Noise, State, linearised
 from wirebayes.robot.self_calibration.holds_creep import creep_of
-from wirebayes.robot.self_calibration.posterior import Whole, posterior
+from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
 from wirebayes.robot.self_calibration.residuals import noise_shown, usual_joint
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
@@ -71,7 +71,7 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
         down = descend(unknowns, holds, noise, state, creep, since)
         state = down.state
         last = inverse.lengths(robot, holds.session.joint_m[-1])[0]
-        found = posterior(unknowns, down, noise, creep, last)
+        found = gaussian_posterior(unknowns, down, noise, creep, last)
         shown, degrees = noise_shown(found, *usual_joint(robot, holds))
         found = replace(found, degrees=degrees)
         rounds.append((np.log([noise.joint_m, noise.balance]), shown))

@@ -31,7 +31,7 @@ from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.sensors import Suspects, suspects
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
-from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval, unlearnt, unlikely
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval_about, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 from wirebayes.robot.self_calibration.whole import estimate
 
@@ -70,7 +70,7 @@ def holds_of(robot: Robot, session: Session, readings: Floats) -> Holds:
     return Holds(session, tension, tilt)
 
 
-def answer(
+def calibration_report(
     robot: Robot,
     prior: LengthPrior,
     errors: StatedErrors,
@@ -125,17 +125,17 @@ def answer(
         "holds": len(session.duration_s),
         "read": int(session.read.sum()),
         "prior": _prior(robot, prior, errors, session),
-        "exit_points_m": interval(*s.exit_m),
-        "platform_points_m": interval(*s.platform_m),
-        "zero_tension_lengths_m": interval(*s.length_m),
-        "references_m": interval(*s.reference_m),
+        "exit_points_m": interval_about(*s.exit_m),
+        "platform_points_m": interval_about(*s.platform_m),
+        "zero_tension_lengths_m": interval_about(*s.length_m),
+        "references_m": interval_about(*s.reference_m),
         "poses": _poses(s, session),
         "misfit": misfit(found),
         "length_rms_mm": _length_rms(found),
         "joint_sd_mm": 1e3 * found.noise.joint_m,
         "identified": _identified(seen),
         "usable": usable,
-        "sensors_at_fault": sensors.to_json(at_fault),
+        "sensors_at_fault": sensors.sensors_json(at_fault),
         "with_creep_model": _lengths(found, s),
         "by_hooke_alone": _lengths(plain, summarised(plain)),
         **_now(robot, found, s, usable),
@@ -148,7 +148,11 @@ def answer(
         "next_positions_m": ahead.position_m,
         "next_pose_sd_mm": 1e3 * ahead.pose_sd_m,
         "warnings": to_json(
-            [*_warnings(found, p, requested, learnt, inexact), *sensors.named(at_fault), *doubts(robot, prior.line)]
+            [
+                *_warnings(found, p, requested, learnt, inexact),
+                *sensors.sensor_notices(at_fault),
+                *doubts(robot, prior.line),
+            ]
         ),
     }
     return WholeAnswer(content, moved(robot, unknowns.parts(found.state.white)), _known(found, session))
@@ -211,7 +215,7 @@ def _prior(robot: Robot, prior: LengthPrior, errors: StatedErrors, session: Sess
 def _poses(s: Summary, session: Session) -> EstimatedPoses:
     numbers = np.arange(1, len(session.duration_s) + 1) if session.number is None else session.number
     mean, sd, half = (np.hstack([place, turn]) for place, turn in zip(s.position_m, s.turn_rad, strict=True))
-    return {"hold": np.asarray(numbers, float).tolist(), **interval(mean, sd, half)}
+    return {"hold": np.asarray(numbers, float).tolist(), **interval_about(mean, sd, half)}
 
 
 def _length_rms(found: Whole) -> float:
@@ -226,7 +230,7 @@ def _lengths(found: Whole, s: Summary) -> EstimatedLengths:
         "converged": found.converged,
         "misfit": misfit(found),
         "p_joint": trust(found),
-        "length_m": interval(*s.length_m),
+        "length_m": interval_about(*s.length_m),
         "creep_strain": s.strain,
         "reference_error_mm": {"mean": 1e3 * s.reference_m.mean, "sd": 1e3 * s.reference_m.sd},
     }
