@@ -138,17 +138,7 @@ def of_check(name: str, test: CheckedExperiment) -> list[str]:
     lines = [f"{name}: {recorded}{steps}; {test['length_mm']:g} mm of {test['material']}"]
     if test["temperature_C"]:
         lines.append("  temperature from {:.3g} to {:.3g} °C".format(*test["temperature_C"]))
-    weights = test["control"] == "force"
-    lines.append(f"  {'hold':>4} {'weight' if weights else 'displacement':>13} {'begins':>9} {'lasts':>9}  readings")
-    for hold in test["holds"]:
-        course = "none: held, not recorded"
-        if hold["number"] is not None:
-            first, last = read(hold, "first"), read(hold, "last")
-            course = f"{hold['readings']} from {hold['first_s']:g} s on, {first:.4g} to {last:.4g} {unit}"
-        place = f"{hold['tension_N']:g} N" if weights else f"{hold['displacement_mm']:g} mm"
-        begins, lasts = (f"{hold[key]:.6g} s" for key in ("start_s", "duration_s"))
-        number = "-" if hold["number"] is None else hold["number"]
-        lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {course}")
+    lines += _holds_table(test, unit)
     for source in ("data", "data and prior", "prior"):
         ranges = [
             f"{p} {_with_unit(range_)}" for p, range_ in test["parameters"].items() if range_["determined_by"] == source
@@ -161,6 +151,22 @@ def of_check(name: str, test: CheckedExperiment) -> list[str]:
         lines += wrap(test["hold_ends"]["sentence"], 110, initial_indent="  ", subsequent_indent="    ")
     count = len(test["warnings"])
     lines.append(f"  {counted(count, 'warning')}, on standard error" if count else "  nothing suspicious")
+    return lines
+
+
+def _holds_table(test: CheckedExperiment, unit: str) -> list[str]:
+    """A line for each hold: what was set, when it begins, how long it lasts, and what was read, in `unit`."""
+    weights = test["control"] == "force"
+    lines = [f"  {'hold':>4} {'weight' if weights else 'displacement':>13} {'begins':>9} {'lasts':>9}  readings"]
+    for hold in test["holds"]:
+        course = "none: held, not recorded"
+        if hold["number"] is not None:
+            first, last = read(hold, "first"), read(hold, "last")
+            course = f"{hold['readings']} from {hold['first_s']:g} s on, {first:.4g} to {last:.4g} {unit}"
+        place = f"{hold['tension_N']:g} N" if weights else f"{hold['displacement_mm']:g} mm"
+        begins, lasts = (f"{hold[key]:.6g} s" for key in ("start_s", "duration_s"))
+        number = "-" if hold["number"] is None else hold["number"]
+        lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {course}")
     return lines
 
 

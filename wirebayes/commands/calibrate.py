@@ -2,7 +2,7 @@
 
 import math
 import os
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from wirebayes.commands.wires import (
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
 from wirebayes.json_files.calibrate import BelongsTo, CalibrateJson, UnknownsJson
+from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import computing
 from wirebayes.robot.exchange.points import with_points
 from wirebayes.robot.mechanics import schema
@@ -130,86 +131,148 @@ def calibrate(
     7
     """
     own, seed = path_of(own_effects), check_seed(seed)
-    tension_sd, tilt_sd, reference_sd = float(tension_sd), float(tilt_sd), float(reference_sd)
+    given = _GivenErrors(
+        float(tension_sd), float(tilt_sd), float(reference_sd), anchor_sd, platform_sd, pose_sd, drum_sd, joint_sd
+    )
     specimen_spread = check_spread(specimen_spread)
-    above_zero(("--tension-sd", tension_sd), ("--tilt-sd", tilt_sd))
-    from_zero(
-        ("--reference-sd", reference_sd), ("--anchor-sd", anchor_sd), ("--platform-sd", platform_sd),
-        ("--pose-sd", pose_sd or 0.0), ("--drum-sd", drum_sd), ("--joint-sd", joint_sd or 0.0),
-    )  # fmt: skip
+    given.check()
     if not 0 <= next_poses <= _MOST_VISITS:
         raise InputError(f"--next-poses: found {next_poses}, expected a number from 0 to {_MOST_VISITS}")
     machine = robot_of(robot)
     if machine.freedom == "orientation":
         raise InputError(f"{machine.name}: found a platform on a ball joint, expected one that calibrate knows")
-    bias = machine.tension_bias_N if tension_bias is None else float(tension_bias)
-    if not 0 <= bias < math.inf:
-        raise InputError(f"--tension-bias: found {bias:g}, expected a number of at least 0")
-    if isinstance(readings, str | os.PathLike):
-        session, values = session_file.read_session(Path(readings), machine, tension_sd, tilt_sd, bias > 0)
-        read = content_hash(Path(readings))
-    else:
-        table = columns_table(readings, Path("readings"), session_file.may_be_empty)
-        session, values = session_file.parse_session(table, machine, tension_sd, tilt_sd, bias > 0)
-        read = hash_of({"readings": [table.header, *table.rows]})
+    bias = _tension_bias(machine, tension_bias)
+    session, values, read = _session(readings, machine, given, bias)
     line = draws_for(machine, wires, draws, experiment, own)
     options = {
-        "--experiment": experiment, "--tension-sd": tension_sd, "--tilt-sd": tilt_sd, "--reference-sd": reference_sd,
-        "--specimen-spread": specimen_spread, "readings": read, **({"--tension-bias": bias} if bias else {}),
-        "--anchor-sd": float(anchor_sd), "--platform-sd": float(platform_sd), "--pose-sd": pose_sd,
-        "--drum-sd": float(drum_sd), "--joint-sd": joint_sd, "--next-poses": next_poses,
-    }  # fmt: skip
+        "--experiment": experiment,
+        **given.of_readings(),
+        "--specimen-spread": specimen_spread,
+        "readings": read,
+        **({"--tension-bias": bias} if bias else {}),
+        **given.of_geometry(),
+        "--next-poses": next_poses,
+    }
     place = ResultFolder.at(output)
     decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
             prior = LengthPrior(
-                line, 1e-3 * max(reference_sd, _EXACT_MM), typical_spread(line, specimen_spread), bias_sd_N=bias
+                line, 1e-3 * max(given.reference_mm, _EXACT_MM), typical_spread(line, specimen_spread), bias_sd_N=bias
             )
-            errors = _errors(machine, session, anchor_sd, platform_sd, pose_sd, drum_sd, joint_sd)
-            calibrated = machine
-            with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
-                if errors is None:
-                    found, known = lengths_report(machine, prior, session, values, seed, next_poses)
-                else:
-                    requests = pose_sd is None
-                    whole = whole_answer.calibration_report(
-                        machine, prior, errors, session, values, seed, requests, next_poses
-                    )
-                    found, known = whole.content, whole.known
-                    path = run.directory / ROBOT
-                    calibrated = _write_robot(path, robot, whole.robot) if found["usable"] else whole.robot
-            write_json(run.directory / "calibration.json", found)
-            if found["usable"]:
-                unknowns: UnknownsJson = {**_belongs_to(calibrated, wires, experiment), **to_dict(known)}
-                write_json(run.directory / UNKNOWNS, unknowns)
-            _write_scene(run.directory / "scene.json", calibrated, found)
+            found, known, whole = _estimated(machine, prior, given, (session, values), seed, next_poses)
+            calibrated = machine if whole is None else whole
+            if found["usable"] and whole is not None:
+                calibrated = _write_robot(run.directory / ROBOT, robot, whole)
+            _write(run.directory, calibrated, found, known, _belongs_to(calibrated, wires, experiment))
             run.finish()
     return Calibration(place, own, computed=run.state != "done")
 
 
-def _errors(
+@dataclass(frozen=True)
+class _GivenErrors:
+    """Standard errors as they are given: of tensions, tilts, lengths, points, poses, drums and joint values."""
+
+    tension_N: float
+    tilt_rad: float
+    reference_mm: float
+    anchor_mm: float
+    platform_mm: float
+    pose_mm: float | None
+    drum_percent: float
+    joint_mm: float | None
+
+    def check(self) -> None:
+        """Refuse what cannot be a standard error."""
+        above_zero(("--tension-sd", self.tension_N), ("--tilt-sd", self.tilt_rad))
+        from_zero(
+            ("--reference-sd", self.reference_mm),
+            ("--anchor-sd", self.anchor_mm),
+            ("--platform-sd", self.platform_mm),
+            ("--pose-sd", self.pose_mm or 0.0),
+            ("--drum-sd", self.drum_percent),
+            ("--joint-sd", self.joint_mm or 0.0),
+        )
+
+    def of_readings(self) -> dict[str, float]:
+        """Options that say how well tensions, tilts and references are known."""
+        return {
+            "--tension-sd": self.tension_N,
+            "--tilt-sd": self.tilt_rad,
+            "--reference-sd": self.reference_mm,
+        }
+
+    def of_geometry(self) -> dict[str, float | None]:
+        """Options that say how well points, poses, drums and joint values are known."""
+        return {
+            "--anchor-sd": float(self.anchor_mm),
+            "--platform-sd": float(self.platform_mm),
+            "--pose-sd": self.pose_mm,
+            "--drum-sd": float(self.drum_percent),
+            "--joint-sd": self.joint_mm,
+        }
+
+    def stated(self, robot: Robot, session: Session) -> StatedErrors | None:
+        """Errors of geometry and poses in metres; None where the lengths alone are to be estimated."""
+        somewhere = bool(np.isfinite(session.position_m).all() and np.isfinite(session.rotation).all())
+        exact = not (self.anchor_mm or self.platform_mm or self.drum_percent)
+        if exact and not self.pose_mm and self.joint_mm is None and somewhere and session.read.any():
+            return None
+        joint = self.joint_mm if self.joint_mm is not None else (0.0 if exact else None)
+        return StatedErrors(
+            1e-3 * self.anchor_mm,
+            1e-3 * self.platform_mm if robot.degrees == 6 else 0.0,  # of a point, they are errors of the exit points
+            1e-3 * (self.pose_mm or 0.0),
+            None if joint is None else 1e-3 * joint,
+            1e-2 * self.drum_percent,
+        )
+
+
+def _tension_bias(robot: Robot, given: float | None) -> float:
+    """Standard deviation of the tension sensors' bias, N: as given, or what the robot's file says."""
+    bias = robot.tension_bias_N if given is None else float(given)
+    if not 0 <= bias < math.inf:
+        raise InputError(f"--tension-bias: found {bias:g}, expected a number of at least 0")
+    return bias
+
+
+def _session(readings: Any, robot: Robot, given: _GivenErrors, bias: float) -> tuple[Session, Floats, str]:
+    """A session, its standardised readings, and the hash of the table that they are from."""
+    sds = given.tension_N, given.tilt_rad
+    if isinstance(readings, str | os.PathLike):
+        session, values = session_file.read_session(Path(readings), robot, *sds, bias > 0)
+        return session, values, content_hash(Path(readings))
+    table = columns_table(readings, Path("readings"), session_file.may_be_empty)
+    session, values = session_file.parse_session(table, robot, *sds, bias > 0)
+    return session, values, hash_of({"readings": [table.header, *table.rows]})
+
+
+def _estimated(
     robot: Robot,
-    session: Session,
-    anchor_sd: float,
-    platform_sd: float,
-    pose_sd: float | None,
-    drum_sd: float,
-    joint_sd: float | None,
-) -> StatedErrors | None:
-    """Errors of geometry and poses in metres; None where the lengths alone are to be estimated."""
-    somewhere = bool(np.isfinite(session.position_m).all() and np.isfinite(session.rotation).all())
-    exact = not (anchor_sd or platform_sd or drum_sd)
-    if exact and not pose_sd and joint_sd is None and somewhere and session.read.any():
-        return None
-    joint = joint_sd if joint_sd is not None else (0.0 if exact else None)
-    return StatedErrors(
-        1e-3 * anchor_sd,
-        1e-3 * platform_sd if robot.degrees == 6 else 0.0,  # of a point, they are errors of the exit points
-        1e-3 * (pose_sd or 0.0),
-        None if joint is None else 1e-3 * joint,
-        1e-2 * drum_sd,
-    )
+    prior: LengthPrior,
+    given: _GivenErrors,
+    read: tuple[Session, Floats],
+    seed: int,
+    visits: int,
+) -> tuple[CalibrateJson, Calibrated, Robot | None]:
+    """The content of ``calibration.json``, the posterior, and the whole robot where more than lengths is estimated."""
+    errors = given.stated(robot, read[0])
+    with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
+        if errors is None:
+            found, known = lengths_report(robot, prior, *read, seed, visits)
+            return found, known, None
+        requests = given.pose_mm is None
+        whole = whole_answer.calibration_report(robot, prior, errors, *read, seed, requests, visits)
+        return whole.content, whole.known, whole.robot
+
+
+def _write(folder: Path, robot: Robot, found: CalibrateJson, known: Calibrated, of: BelongsTo) -> None:
+    """Write what was found; the posterior that a history can start from only where it is usable."""
+    write_json(folder / "calibration.json", found)
+    if found["usable"]:
+        unknowns: UnknownsJson = {**of, **to_dict(known)}
+        write_json(folder / UNKNOWNS, unknowns)
+    _write_scene(folder / "scene.json", robot, found)
 
 
 def _write_scene(path: Path, robot: Robot, found: CalibrateJson) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
@@ -113,43 +114,62 @@ def fit(
     spec = model_spec(elastic_law, history, likelihood)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, keys = path_of(own_effects), names_given(effects)
-    experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
+    experiments = _first_holds(experiments_of(source, experiment, drop_breaks=drop_breaks), train_holds)
     file = experiments[0].source
-    if train_holds is not None:
-        experiments = [e.first(train_holds) for e in experiments]
-    known_effects = catalogue(own)
-    added = [named(key, known_effects) for key in keys]
-    if len({e.name for e in added}) < len(added):
-        raise InputError(f"--effect: found {', '.join(keys)}, expected each effect once")
+    known = catalogue(own)
+    added = _effects_of(keys, known)
     groups = _groups(experiments, together, file)
     if together is not None:
         spec = replace(spec, length_exponent=Normal(1.0, 1.0))
-    jobs = []
-    for folder, members in groups.items():
+    for members in groups.values():
         for effect in added:
-            _check_possible(effect, members, file, known_effects, history)
+            _check_possible(effect, members, file, known, history)
         build(members, added, spec)  # checks priors
-        hashes = {e.name: e.data_hash for e in members}
-        provenance = {"data_file": file.name, "version": __version__, "data_sha256": hashes}
-        jobs.append(Job(folder, members, keys, own, spec, provenance))
+    jobs = [Job(folder, members, keys, own, spec, _provenance(members, file)) for folder, members in groups.items()]
+    fitted = [e for members in groups.values() for e in members]
     configuration = {
         "command": "fit", "version": __version__, "seed": seed, "likelihood": likelihood, "elastic_law": elastic_law,
         "history": history, "effects": list(keys), "own_effects": source_of(own),
         "train_holds": train_holds, "together": together, "check": check,
-        "priors": {e.name: e.priors for members in groups.values() for e in members},
-        "data_sha256": {e.name: e.data_hash for members in groups.values() for e in members},
-    } | ({} if policy is None else {"policy": vars(policy)})  # fmt: skip
+        "priors": {e.name: e.priors for e in fitted},
+        "data_sha256": {e.name: e.data_hash for e in fitted},
+    }  # fmt: skip
+    if policy is not None:
+        configuration["policy"] = vars(policy)
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as opened:
         if opened.state != "done":
-            with computing():
-                alone = check and len(jobs) == 1
-                with checked_meanwhile(jobs[0], place.path, seed) if alone else nullcontext():
-                    run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
-                if check and not alone:
-                    write_checks(jobs, place.path, seed, progress or silent)
+            _compute(jobs, place.path, seed, check, policy or DEFAULT, progress or silent)
             opened.finish()
     return fits_in(place, [job.folder for job in jobs], own, computed=opened.state != "done")
+
+
+def _first_holds(experiments: Sequence[Experiment], count: int | None) -> Sequence[Experiment]:
+    return experiments if count is None else [e.first(count) for e in experiments]
+
+
+def _effects_of(keys: Sequence[str], known: Mapping[str, type[Effect]]) -> list[Effect]:
+    """The effects that were asked for; each may be asked for once."""
+    added = [named(key, known) for key in keys]
+    if len({e.name for e in added}) < len(added):
+        raise InputError(f"--effect: found {', '.join(keys)}, expected each effect once")
+    return added
+
+
+def _provenance(members: Sequence[Experiment], file: Path) -> dict[str, Any]:
+    """What the files of a fit say of where it comes from."""
+    hashes = {e.name: e.data_hash for e in members}
+    return {"data_file": file.name, "version": __version__, "data_sha256": hashes}
+
+
+def _compute(jobs: Sequence[Job], folder: Path, seed: int, check: bool, policy: Policy, report: Progress) -> None:
+    """Do the fits, and check them where that is asked for: a single one while it is sampled, several afterwards."""
+    alone = check and len(jobs) == 1
+    with computing():
+        with checked_meanwhile(jobs[0], folder, seed) if alone else nullcontext():
+            run(jobs, folder, seed, policy=policy, report=report)
+        if check and not alone:
+            write_checks(jobs, folder, seed, report)
 
 
 def fits_in(

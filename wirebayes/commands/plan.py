@@ -1,7 +1,7 @@
 """What a test would teach before it is done."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -45,6 +45,7 @@ from wirebayes.simulation.synthetic import Bench
 from wirebayes.strict.files import PathLike
 from wirebayes.views.plan import Plan
 from wirebayes.views.result import ResultFolder
+from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 
 TESTS = 120  # simulated of each protocol: a mean width is then known to some 5 %
@@ -129,8 +130,7 @@ def plan(
     """
     spec = model_spec(elastic_law, history)
     seed, own = check_seed(seed), path_of(own_effects)
-    if isinstance(tests, bool) or not isinstance(tests, int) or tests < 2:
-        raise InputError(f"tests: found {tests!r}, expected a whole number, 2 or more")
+    _check_tests(tests)
     if budget_min is not None:
         above_zero(("--budget-min", budget_min))
     kinds = catalogue(own)
@@ -152,26 +152,8 @@ def plan(
     with open_run(place.path, configuration) as opened:
         if opened.state == "done":
             return Plan(place, own, computed=False)
-        report = progress or silent
-        judged: list[Judged] = []
-        tension: float | None = None  # of the first test: all state their creep for it
         with computing():
-            for done, (test, words) in enumerate(request.tests):
-                report("protocols", done, len(request.tests))
-                guess = request.guess.at(test.length_mm)
-                test = at_centre(test, guess, spec)
-                tension = middle_tension(test) if tension is None else tension
-                one = np.random.default_rng(seed_of(seed, "plan", test.name))
-                try:
-                    expected = expected_widths(
-                        test, guess, one, spec, tension_N=tension,
-                        length_mm=request.guess.length_mm, kept_draws=0 if machine is None else _ROBOT_TESTS,
-                    )  # fmt: skip
-                except ValueError as error:
-                    raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
-                seen = sensitivity(test, guess, kinds, one, spec, simulations=SIMULATIONS)
-                judged.append(Judged(test, words, expected, seen))
-        report("protocols", len(request.tests), len(request.tests))
+            judged = _judged(request, kinds, spec, seed, progress or silent)
         order = ranked(judged, request.aim, request.budget_min)
         rows = [_row(j, request, place_in, machine, spec) for place_in, j in enumerate(order, 1)]
         summary = _summary(rows, request, machine)
@@ -181,6 +163,35 @@ def plan(
         widths_and_effects(plain(summary), opened.directory / "plan.svg")
         opened.finish()
     return Plan(place, own)
+
+
+def _check_tests(tests: object) -> None:
+    if isinstance(tests, bool) or not isinstance(tests, int) or tests < 2:
+        raise InputError(f"tests: found {tests!r}, expected a whole number, 2 or more")
+
+
+def _judged(
+    request: _Request, kinds: Mapping[str, type[Effect]], spec: ModelSpec, seed: int, report: Progress
+) -> list[Judged]:
+    """What each test would teach, and what it would show of missing effects."""
+    planned = [(at_centre(test, request.guess.at(test.length_mm), spec), words) for test, words in request.tests]
+    tension = middle_tension(planned[0][0])  # all state their creep for the tension of the first
+    kept = 0 if request.robot is None else _ROBOT_TESTS
+    judged = []
+    for done, (test, words) in enumerate(planned):
+        report("protocols", done, len(planned))
+        guess = request.guess.at(test.length_mm)
+        rng = np.random.default_rng(seed_of(seed, "plan", test.name))
+        try:
+            expected = expected_widths(
+                test, guess, rng, spec, tension_N=tension, length_mm=request.guess.length_mm, kept_draws=kept
+            )
+        except ValueError as error:
+            raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
+        seen = sensitivity(test, guess, kinds, rng, spec, simulations=SIMULATIONS)
+        judged.append(Judged(test, words, expected, seen))
+    report("protocols", len(planned), len(planned))
+    return judged
 
 
 def _identity(robot: RobotLike | None) -> str | None:

@@ -1,11 +1,11 @@
 """Synthetic tests with known truth, as files the other functions read."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import get_args
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import Numbers, check_choice, check_seed, check_whole, names_given, path_of, text_of
+from wirebayes.commands.options import Numbers, check_seed, check_whole, model_spec, names_given, path_of, text_of
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import check_run, open_run
@@ -93,31 +93,21 @@ def simulate_tests(
     >>> hung.experiments[0]
     Experiment(wire: 1000 mm of line-1, 3 holds, 15 readings, tensions set)
     """
-    check_choice("elastic_law", elastic_law, get_args(ElasticLaw))
-    check_choice("history", history, get_args(History))
+    spec = model_spec(elastic_law, history)
     own, seed = path_of(own_effects), check_seed(seed)
-    chosen = {
-        name: finite_number(f"--parameter {name}={value}", str(value)) for name, value in (parameters or {}).items()
-    }
+    chosen = _parameters(parameters or {})
     found, amplitudes = _effects(effects, own)
     chosen |= amplitudes
     tests = check_whole("--tests", tests, 1)
     sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
     control: Control = "force" if text_of(weights) else "displacement"
-    option, given = ("--weights", weights) if control == "force" else ("--displacements", displacements)
-    path = _path(option, given, unload)
+    path = _path(control, weights if control == "force" else displacements, unload)
     gaps = frozenset(unrecorded)
     _check_protocol(control, path, sizes, moments, gaps)
-    warmth = _numbers("--temperature", temperature) if text_of(temperature) else []
-    benches = [
-        Bench(
-            _name(tests, sizes, i, length), f"line-{i + 1}", length,
-            times_s=moments, unrecorded=gaps, temperatures_C=warmth,
-        ).setting(control, path, float(resolution))
-        for i in range(tests)
-        for length in sizes
-    ]  # fmt: skip
-    truth = Truth(chosen, tuple(found.values()), elastic_law, history)
+    warmth = _given_numbers("--temperature", temperature)
+    alike = Bench(times_s=moments, unrecorded=gaps, temperatures_C=warmth).setting(control, path, float(resolution))
+    benches = _benches(alike, tests, sizes)
+    truth = Truth(chosen, tuple(found.values()), spec.law, spec.history)
     configuration = {
         "command": "simulate", "version": __version__, "seed": seed, "tests": tests, "lengths_mm": sizes,
         ("weights_N" if control == "force" else "displacements_mm"): path, "times_s": moments,
@@ -134,6 +124,10 @@ def simulate_tests(
             write_tests(place.path, benches, truth, seed)
             run.finish()
     return SimulatedTests(place, own, computed=run.state != "done")
+
+
+def _parameters(given: Mapping[str, float]) -> dict[str, float]:
+    return {name: finite_number(f"--parameter {name}={value}", str(value)) for name, value in given.items()}
 
 
 def _effects(
@@ -153,8 +147,19 @@ def _effects(
     return found, given
 
 
-def _path(option: str, settings: Numbers, unload: int) -> list[float]:
+def _benches(alike: Bench, lines: int, lengths_mm: Sequence[float]) -> list[Bench]:
+    """A test of each length of each line."""
+    out = []
+    for i in range(lines):
+        for length in lengths_mm:
+            name = _name(lines, lengths_mm, i, length)
+            out.append(replace(alike, name=name, material=f"line-{i + 1}", length_mm=length))
+    return out
+
+
+def _path(control: Control, settings: Numbers, unload: int) -> list[float]:
     """What is set in each hold, mm or N: up as given, then so many back down."""
+    option = "--weights" if control == "force" else "--displacements"
     path = _numbers(option, settings)
     if unload >= len(path):
         raise InputError(f"--unload: found {unload}, expected fewer than the {len(path)} {option.removeprefix('--')}")
@@ -184,6 +189,11 @@ def _check_protocol(
 def _name(tests: int, lengths: Sequence[float], test: int, length: float) -> str:
     name = f"wire-{test + 1}" if tests > 1 else "wire"
     return name if len(lengths) == 1 else f"{name}-{length:g}mm"
+
+
+def _given_numbers(option: str, values: Numbers) -> list[float]:
+    """Of an option that may be left out; then none."""
+    return _numbers(option, values) if text_of(values) else []
 
 
 def _numbers(option: str, values: Numbers) -> list[float]:

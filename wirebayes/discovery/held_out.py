@@ -19,7 +19,7 @@ from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.model import Model
-from wirebayes.wire.staircase import linearise
+from wirebayes.wire.staircase import Linearised, linearise
 
 
 @dataclass(frozen=True)
@@ -112,24 +112,48 @@ def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng
     carried = likelihoods.chain(line, sample.readings, mask, *noise)
     log_p = likelihoods.held_out_density(line, carried, sample.readings, sample.protocol.mask & ~mask, *noise)
     elpd = logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf), axis=1) - np.log(log_p.shape[1])
-    error, floor, inside = [], [], []
-    for j in last:
-        keep = sample.protocol.mask[j]
-        by_creep, by_setting = line.by_creep[j][keep], line.by_setting[j][keep]
-        mean = line.reading[j][keep] + by_creep * carried.carried_mean[j]
-        known = variance + by_setting**2 * own["setting_sd"] ** 2
-        drawn = mean + rng.normal(size=mean.shape) * np.sqrt(known + by_creep**2 * carried.carried_var[j])
-        low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
-        y = sample.readings[j][keep][:, 0]
-        error.append(mean.mean(axis=1) - y)
-        floor.append(known.mean(axis=1))
-        inside.append((y >= low) & (y <= high))
-    e = np.concatenate(error)
+    holds = [_scored_hold(sample, line, carried, int(j), noise, rng) for j in last]
+    error = np.concatenate([hold.error for hold in holds])
+    floor = np.concatenate([hold.floor for hold in holds])
+    inside = np.concatenate([hold.inside for hold in holds])
     return HeldOut(
-        [int(n) for n in sample.protocol.number[last]], float((e**2).mean()), len(e),
-        float(np.concatenate(floor).mean()), elpd, float(np.concatenate(inside).mean()),
-        tuple(len(each) for each in error),
-    )  # fmt: skip
+        [int(n) for n in sample.protocol.number[last]],
+        float((error**2).mean()),
+        len(error),
+        float(floor.mean()),
+        elpd,
+        float(inside.mean()),
+        tuple(len(hold.error) for hold in holds),
+    )
+
+
+@dataclass(frozen=True)
+class _ScoredHold:
+    """Of each reading: the error of the mean, the variance that noise alone leaves, whether the 90 % band holds it."""
+
+    error: Array
+    floor: Array
+    inside: Array
+
+
+def _scored_hold(
+    sample: Sample,
+    line: Linearised,
+    carried: likelihoods.Filtered,
+    j: int,
+    noise: tuple[Array, Array],
+    rng: np.random.Generator,
+) -> _ScoredHold:
+    """One hold predicted from the creep that is carried into it; `noise` are reading variance and setting sd."""
+    variance, setting_sd = noise
+    keep = sample.protocol.mask[j]
+    by_creep, by_setting = line.by_creep[j][keep], line.by_setting[j][keep]
+    mean = line.reading[j][keep] + by_creep * carried.carried_mean[j]
+    known = variance + by_setting**2 * setting_sd**2
+    drawn = mean + rng.normal(size=mean.shape) * np.sqrt(known + by_creep**2 * carried.carried_var[j])
+    low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
+    y = sample.readings[j][keep][:, 0]
+    return _ScoredHold(mean.mean(axis=1) - y, known.mean(axis=1), (y >= low) & (y <= high))
 
 
 def gap_closed(plain: HeldOut, final: HeldOut) -> float | None:

@@ -76,26 +76,33 @@ def shrinking(
     train = [held_out.last_third(e) for e in plain.experiments]
     models = ["plain", *names]
     if not all(train):
-        return [Shrinking(_NOT_HELD_OUT.copy(), [{"model": m, **_NOTHING} for m in models]) for _ in train]
+        return [_not_predicted(models) for _ in train]
     bases = [plain, *(stages[-1:] if remains else [])] if remains or stages else []
     smooth = _beside_discrepancy(bases, train, rng, parallel_map)
-    trained = [_Trained(plain.experiments, train, b.effects, b) for b in (plain, *stages)]
-    trained += [t for beside in smooth for t in beside.trained]
+    trained = _to_be_trained(plain, stages, train, smooth)
     predicted = parallel_map(_predicted, trained, rng.spawn(len(trained)))
-    fits = [plain, *stages[-1:], *(fit for beside in smooth for fit in beside.fits)]
-    elpd = left_out.of(fits) if smooth else []
+    elpd = left_out.of(_fits_compared(plain, stages, smooth)) if smooth else []
     found = list(predicted)  # handed over before, so that no core idles
-    by_step, alone_ = found[: len(models)], [part[0] for part in found[len(models) :]]
+    by_step, beside_smooth = found[: len(models)], [part[0] for part in found[len(models) :]]
     n = len(train)
-    flexible = alone_[:n] if smooth else [None] * n
-    final = alone_[-n:] if remains else by_step[-1]
+    flexible = beside_smooth[:n] if smooth else [None] * n
+    final = beside_smooth[-n:] if remains else by_step[-1]
     gain = _gain(elpd, len(stages[-1:]), n, remains) if smooth else None
     out = []
-    for i, before in enumerate(by_step[0]):
-        report = _compared(before, final[i], flexible[i], gain)
-        steps: list[StepJson] = [{"model": m, **_score(part[i])} for m, part in zip(models, by_step, strict=True)]
-        out.append(Shrinking(report, steps))
+    for i in range(n):
+        report = _compared(by_step[0][i], final[i], flexible[i], gain)
+        out.append(Shrinking(report, _steps(models, by_step, i)))
     return out
+
+
+def _not_predicted(models: Sequence[str]) -> Shrinking:
+    """Of an experiment of which no holds can be held out."""
+    return Shrinking(_NOT_HELD_OUT.copy(), [{"model": model, **_NOTHING} for model in models])
+
+
+def _steps(models: Sequence[str], predicted: Sequence[Sequence[held_out.HeldOut]], i: int) -> list[StepJson]:
+    """How each model, from the plain one on, predicts the held-out holds of one experiment."""
+    return [{"model": model, **_score(part[i])} for model, part in zip(models, predicted, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -118,6 +125,21 @@ class _Smooth:
 
     fits: list[LaplaceFit]
     trained: list[_Trained]
+
+
+def _fits_compared(plain: LaplaceFit, stages: Sequence[LaplaceFit], smooth: Sequence[_Smooth]) -> list[LaplaceFit]:
+    """The plain model, the last stage, and what stands beside a smooth discrepancy."""
+    return [plain, *stages[-1:], *(fit for beside in smooth for fit in beside.fits)]
+
+
+def _to_be_trained(
+    plain: LaplaceFit, stages: Sequence[LaplaceFit], train: Sequence[int], smooth: Sequence[_Smooth]
+) -> list[_Trained]:
+    """The models whose predictions are compared: by step, then what stands beside a smooth discrepancy."""
+    out = [_Trained(plain.experiments, train, fit.effects, fit) for fit in (plain, *stages)]
+    for beside in smooth:
+        out += beside.trained
+    return out
 
 
 def _beside_discrepancy(

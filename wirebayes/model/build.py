@@ -67,24 +67,13 @@ def build(
     distributions |= _instrument_priors(experiments, effects)
     for experiment in experiments:
         mark = f"[{experiment.name}]" if several else ""
-        zero_mm = scales.zeros_mm.get(experiment.name, 0.0)
-        defaults = wire_defaults(experiment.length_mm, scales, experiment.control, zero_mm)
-        wanted = SAMPLE if spec.likelihood == "chain" else ("sensor_sd",)
-        distributions |= {f"{name}{mark}": defaults[name] for name in wanted}
-        own = [effect for effect in effects if effect.acts_on(experiment.name, experiment.control)]
-        distributions |= {f"{c}{mark}": a.prior for c, a in _amplitudes(own) if a.of_each_test}
-    units = scales.units
-    learned = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.in_natural_units}
-    every = {
-        name: d if name in learned or isinstance(d, int | float) else scaled(d, units.of(unit_of_column(name, samples)))
-        for name, d in distributions.items()
-    }
+        distributions |= _sample_priors(experiment, effects, mark, spec, scales)
+    every = _in_natural_units(distributions, effects, samples, scales)
     stated = _apply_tables(every, experiments, several)
     fixed = {name: float(d) for name, d in every.items() if isinstance(d, int | float)}
-    shapes = {c for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True) if a.is_shape}
     free = {name: d for name, d in every.items() if name not in fixed}
-    logarithmic = frozenset(n for n, d in free.items() if n.split("[")[0] in _POSITIVE | shapes and d.support()[0] >= 0)
-    powers = _default_powers([name for name in free if name not in stated], fixed, units)
+    logarithmic = _positive(free, effects)
+    powers = _default_powers([name for name in free if name not in stated], fixed, scales.units)
     return Problem(
         tuple(samples),
         Prior(free, fixed, logarithmic, powers),
@@ -166,6 +155,36 @@ def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effe
         marks = [f"[{control}]" for control in controls if effect.control in (None, control)] if apart else [""]
         out |= {f"{c}{mark}": a.prior for mark in marks for c, a in _amplitudes([effect]) if not a.of_each_test}
     return out
+
+
+def _sample_priors(
+    experiment: Experiment, effects: Sequence[Effect], mark: str, spec: ModelSpec, scales: Scales
+) -> dict[str, Any]:
+    """Default priors of what belongs to one sample alone; `mark` distinguishes samples in the names."""
+    zero_mm = scales.zeros_mm.get(experiment.name, 0.0)
+    defaults = wire_defaults(experiment.length_mm, scales, experiment.control, zero_mm)
+    wanted = SAMPLE if spec.likelihood == "chain" else ("sensor_sd",)
+    own = [effect for effect in effects if effect.acts_on(experiment.name, experiment.control)]
+    out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in wanted}
+    return out | {f"{c}{mark}": a.prior for c, a in _amplitudes(own) if a.of_each_test}
+
+
+def _in_natural_units(
+    distributions: Mapping[str, Any], effects: Sequence[Effect], samples: Sequence[Sample], scales: Scales
+) -> dict[str, Any]:
+    """The priors in mm, N and s, of which defaults are in the test's own scales unless an effect says otherwise."""
+    natural = {c for c, a in _amplitudes(effects) if a.in_natural_units}
+    out = {}
+    for name, prior in distributions.items():
+        is_in_them = name in natural or isinstance(prior, int | float)
+        out[name] = prior if is_in_them else scaled(prior, scales.units.of(unit_of_column(name, samples)))
+    return out
+
+
+def _positive(free: Mapping[str, Any], effects: Sequence[Effect]) -> frozenset[str]:
+    """Parameters that are sampled by their logarithm: by their nature positive, and not below zero by their prior."""
+    positive = _POSITIVE | {c for c, a in _amplitudes(effects) if a.is_shape}
+    return frozenset(n for n, d in free.items() if n.split("[")[0] in positive and d.support()[0] >= 0)
 
 
 def _amplitudes(effects: Sequence[Effect]) -> list[tuple[str, Amplitude]]:

@@ -4,7 +4,7 @@ Least squares weights all readings equally and has neither priors nor setting er
 published parameters, and with the posterior.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -123,27 +123,37 @@ def identify(
     low, high = (_logged(end, logarithmic) for end in (wide.min(axis=0), wide.max(axis=0)))
     if "k1" in names:
         low[names.index("k1")] = np.log(_LEAST_STIFFNESS * experiment.tension().max())
-    predicted = _predicted(experiment, variant)
-    measured = experiment.tension()[predicted]
-
-    def natural(z: Array) -> dict[str, Array]:
-        """(n, d) search coordinates as parameters, each (n,)."""
-        columns = np.where(logarithmic, np.exp(np.where(logarithmic, z, 0.0)), z).T
-        rows = dict(zip(names, np.ascontiguousarray(columns), strict=True))
-        return rows | {name: np.full(len(z), value) for name, value in known.items()}
-
-    def misfit(z: Array) -> Array:
-        """(m, n) residuals of (n, d) points; a reading that cannot be predicted counts in full."""
-        values = tension_residuals(experiment, natural(z), variant)[predicted]
-        return np.where(np.isfinite(values), values, measured[:, None])
-
+    search = _Search(experiment, variant, known, names, logarithmic)
     draws = prior.rvs(_DRAWS, rng)[:, columns]
-    end, cost = _best_descent(misfit, _logged(draws, logarithmic), low, high)
-    found = {name: float(value[0]) for name, value in natural(end[None]).items()}
+    end, cost = _best_descent(search.misfit, _logged(draws, logarithmic), low, high)
+    found = {name: float(value[0]) for name, value in search.natural(end[None]).items()}
     ordered = {name: found[name] for name in adjusted(variant)}
-    loose = np.maximum(0.01 * (high - low), cost * _per_unit_misfit(misfit, end))
+    loose = np.maximum(0.01 * (high - low), cost * _per_unit_misfit(search.misfit, end))
     edge = np.minimum(end - low, high - end) < loose
     return LeastSquaresFit(ordered, cost, tuple(name for name, on in zip(names, edge, strict=True) if on))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Coordinates in which least squares are sought: `names`, of which the `logarithmic` ones by their logarithm."""
+
+    experiment: Experiment
+    variant: ModelSpec
+    known: Mapping[str, float]
+    names: Sequence[str]
+    logarithmic: NDArray[np.bool_]
+
+    def natural(self, z: Array) -> dict[str, Array]:
+        """(n, d) search coordinates as parameters, each (n,)."""
+        columns = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, z, 0.0)), z).T
+        rows = dict(zip(self.names, np.ascontiguousarray(columns), strict=True))
+        return rows | {name: np.full(len(z), value) for name, value in self.known.items()}
+
+    def misfit(self, z: Array) -> Array:
+        """(m, n) residuals of (n, d) points; a reading that cannot be predicted counts in full."""
+        predicted = _predicted(self.experiment, self.variant)
+        values = tension_residuals(self.experiment, self.natural(z), self.variant)[predicted]
+        return np.where(np.isfinite(values), values, self.experiment.tension()[predicted][:, None])
 
 
 def _predicted(experiment: Experiment, variant: ModelSpec) -> NDArray[np.bool_]:

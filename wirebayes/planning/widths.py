@@ -128,11 +128,8 @@ def expected_widths(
     problem = build([test], (), spec)
     (sample,) = problem.samples
     target = LogPosterior(problem)
-    truth = np.column_stack([guess[name] for name in problem.names])
-    y = readings(problem, truth, sample, rng)
-    usable = np.isfinite(y[sample.protocol.mask]).all(axis=0) & np.isfinite(problem.prior.log_density()(truth))
-    y = y[..., usable]
-    found, good = _climbed(target, truth[usable], y)
+    truth, y = _simulated(problem, np.column_stack([guess[name] for name in problem.names]), rng)
+    found, good = _climbed(target, truth, y)
     longest = float(sample.protocol.duration_s.max())
     tension = middle_tension(test) if tension_N is None else tension_N
     length = test.length_mm if length_mm is None else length_mm
@@ -142,15 +139,18 @@ def expected_widths(
         values = {name: v.reshape(part.weight.shape) for name, v in quantities(part.theta).items()}
         widths.append({name: _row_widths(v, part.weight) for name, v in values.items()})
         volumes.append(_log_volume(part.theta.reshape(*part.weight.shape, -1), part.weight, problem))
-        for weight, row in list(zip(part.weight, _rows(values), strict=True))[: kept_draws - len(draws)]:
-            pick = rng.choice(len(weight), _KEPT, p=weight)
-            draws.append({name: v[pick] for name, v in row.items()})
-    before = quantities(truth[usable])
-    expected = {
-        name: _width(np.concatenate([w[name] for w in widths]), before[name], _unit(name, test)) for name in widths[0]
-    }
+        draws += _kept(part, values, kept_draws - len(draws), rng)
+    expected = _expected(widths, quantities(truth), test)
     bits = _bits(problem, np.concatenate(volumes))
     return Expected(expected, tension, length, longest, bits, len(good), tuple(draws))
+
+
+def _simulated(problem: Problem, truth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """Parameters with readings of a test that they give, without those that the prior or the model excludes."""
+    (sample,) = problem.samples
+    y = readings(problem, truth, sample, rng)
+    usable = np.isfinite(y[sample.protocol.mask]).all(axis=0) & np.isfinite(problem.prior.log_density()(truth))
+    return truth[usable], y[..., usable]
 
 
 @dataclass(frozen=True)
@@ -159,6 +159,24 @@ class _Posteriors:
 
     theta: Array
     weight: Array
+
+
+def _kept(part: _Posteriors, values: dict[str, Array], count: int, rng: np.random.Generator) -> list[dict[str, Array]]:
+    """Draws of the first so many tests, each as likely as its weight says."""
+    out = []
+    for weight, row in list(zip(part.weight, _rows(values), strict=True))[:count]:
+        pick = rng.choice(len(weight), _KEPT, p=weight)
+        out.append({name: v[pick] for name, v in row.items()})
+    return out
+
+
+def _expected(widths: list[dict[str, Array]], before: dict[str, Array], test: Experiment) -> dict[str, ExpectedWidth]:
+    """Each quantity's width over all simulated tests, and before them."""
+    out = {}
+    for name in widths[0]:
+        after = np.concatenate([part[name] for part in widths])
+        out[name] = _width(after, before[name], _unit(name, test))
+    return out
 
 
 def _posteriors(

@@ -8,7 +8,7 @@ densities are ratios of integrals, found by importance sampling from a proposal 
 reaches what is likely only without a hold. What is not settled then is left to walkers.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from wirebayes.inference.chain_statistics import pareto_smoothed
 from wirebayes.inference.fit import fit, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.weighted_posterior import Posterior
+from wirebayes.model.problem import Problem
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.left_out_density import log_densities, without_hold
 
@@ -99,13 +100,8 @@ def smoothed_leave_one_hold_out(
     problem = fitted.problem
     theta = evenly_thinned(fitted.flat)
     conditional = problem.leave_one_hold_out(theta)
-    where = [(s, int(j)) for s, sample in enumerate(problem.samples) for j in np.flatnonzero(sample.protocol.recorded)]
-    elpd, k = np.zeros(len(where)), np.zeros(len(where))
-    for i, (s, j) in enumerate(where):
-        log_p = conditional[s][j]
-        # A lone first reading is given hold by hold: nothing is left to predict, and no parameter matters.
-        log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else pareto_smoothed(-log_p)
-        elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
+    where = _recorded(problem)
+    elpd, k = _smoothed([conditional[s][j] for s, j in where])
     # smoothing can fail where draws repeat, with a k that looks well
     refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K) | ~np.isfinite(elpd), True
     alone = refitted.copy()
@@ -116,15 +112,36 @@ def smoothed_leave_one_hold_out(
     for done, i in enumerate(np.flatnonzero(alone).tolist()):
         progress(done / alone.sum())
         s, j = where[i]
-        without = fit(without_hold(problem, s, j), seed_of(seed, "without", str(s), str(j)), policy=policy, rough=theta)
-        bridge, shared = log_mean(problem.leave_one_hold_out(evenly_thinned(without.flat))[s][j], conditional[s][j])
+        own = seed_of(seed, "without", str(s), str(j))
+        without = fit(without_hold(problem, s, j), own, policy=policy, rough=theta)
+        there = problem.leave_one_hold_out(evenly_thinned(without.flat))[s][j]
+        bridge, shared = log_mean(there, conditional[s][j])
         if exact or shared >= _SHARED:  # else what importance sampling says, settled or not, is nearer
             elpd[i] = bridge
         converged &= without.converged and shared >= _SHARED
     progress(1.0)
+    return LeftOutHolds(*_holds_named(problem, where), elpd, k, refitted, converged)
+
+
+def _recorded(problem: Problem) -> list[tuple[int, int]]:
+    """Sample and position of every recorded hold."""
+    return [(s, int(j)) for s, sample in enumerate(problem.samples) for j in np.flatnonzero(sample.protocol.recorded)]
+
+
+def _smoothed(conditional: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Log density of each hold given the others, from densities at draws that saw it, and the tail index of weights."""
+    elpd, k = np.zeros(len(conditional)), np.zeros(len(conditional))
+    for i, log_p in enumerate(conditional):
+        # A lone first reading is given hold by hold: nothing is left to predict, and no parameter matters.
+        log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else pareto_smoothed(-log_p)
+        elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
+    return elpd, k
+
+
+def _holds_named(problem: Problem, where: Sequence[tuple[int, int]]) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """Sample and number of each hold."""
     names = tuple(problem.samples[s].name for s, _ in where)
-    numbers = np.array([problem.samples[s].protocol.number[j] for s, j in where])
-    return LeftOutHolds(names, numbers, elpd, k, refitted, converged)
+    return names, np.array([problem.samples[s].protocol.number[j] for s, j in where])
 
 
 def evenly_thinned(theta: Floats, draws: int = _DRAWS) -> Floats:

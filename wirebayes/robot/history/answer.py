@@ -3,12 +3,13 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.json_files.pose_history import ClockJson, DriftOverTime, PoseHistoryJson
+from wirebayes.json_files.pose_history import ClockJson, DriftOverTime, HistoryReadings, PoseHistoryJson
 from wirebayes.json_files.values import Band, Statistic
 from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.typing import Floats
@@ -36,7 +37,10 @@ _CLOCK_DRAWS = 12  # draws that show how much it matters when the wires' clocks 
 _FEWEST = 50  # effective draws; of so many, what lies beyond a 5 % quantile is 2 to 8 %
 _NAMED = 6  # times in a warning: as many as a line holds
 _INERTIA = 0.05  # of the weight: a force above it changes tensions by as much as the creep that is looked for
+_NEVER_HELD = "No draw of the wires holds the platform at the first row; see --position for where it starts."
 _MISFIT = 2.0  # mean squared residual from which on the readings contradict the model
+
+_Again = Callable[[WireDraws, float], Track]  # the same history with few draws, whose clocks restart at a share
 
 
 @dataclass(frozen=True)
@@ -85,39 +89,18 @@ def history_report(
     seed : int
     progress : function of name, done and total
     """
-    rng = np.random.default_rng(seed)
     history = balanced(robot, history)
-    rows = np.unique(np.linspace(0, len(history.times_s) - 1, _SHOWN).round().astype(int))
+    rows = _shown(len(history.times_s))
     content = _requested(robot, line, history, errors)
-    if history.position_m is not None and history.rotation is not None:
-        start = history.position_m[0], history.rotation[0]
-    alike = replace(errors, reference_m=0.0, spread=0.0)  # one way of starting the clocks is compared with another
-    if history.joint_m is not None:
-        found = estimate_poses(robot, line, history, start, errors, rng, progress)
-        joint = history.joint_m
-
-        def again(few: WireDraws, restart: float) -> Track:
-            known = unknowns(robot, few, alike, np.random.default_rng(seed))  # the same draws both times
-            starts = found.starts_s if np.isfinite(restart) else found.starts_s[:1]
-            wires, error = known.columns(known.draws)
-            return follow_log(robot, wires, history, joint, start, starts, error, carried=known.carried(known.draws))
-    else:
-        try:
-            found, joint = commanded.drift_along(robot, line, history, errors, rng, progress)
-        except commanded.Unheld as unheld:
-            sentence = f"No{str(unheld)[2:]}."
-            return HistoryAnswer(_without_answer(content, sentence), {}, rows)
-
-        def again(few: WireDraws, restart: float) -> Track:
-            drawn = np.random.default_rng(seed)  # the same draws both times
-            return commanded.drift_along(robot, few, history, alike, drawn, restart=restart)[0].track
-
+    asked = _Asked(robot, history, start, errors, seed)
+    try:
+        found, joint, again = asked.followed(line, progress)
+    except commanded.Unheld as why:
+        return HistoryAnswer(_without_answer(content, f"No{str(why)[2:]}."), {}, rows)
     if not found.track.held[:, 0].any():
-        sentence = "No draw of the wires holds the platform at the first row; see --position for where it starts."
-        return HistoryAnswer(_without_answer(content, sentence), {}, rows)
+        return HistoryAnswer(_without_answer(content, _NEVER_HELD), {}, rows)
     to = corrections.target(robot, history, found)
     change = corrections.wanted(robot, history, found, to) - joint
-    best = _mean(joint + change) if joint.ndim == 2 else joint + _mean(change)
     course = _course(history, found, rows)
     content |= {
         "history": content["history"] | {"holds": int(found.track.hold[-1]) + 1},
@@ -127,22 +110,86 @@ def history_report(
         "corrections": {
             "times_s": course.times_s,
             "change_mm": _bands(1e3 * winches.of_each_winch(robot, change)[:, rows]),
-            "left_mm": _bands(1e3 * corrections.error_left(robot, history, found, to, best, rows)),
+            "left_mm": _bands(1e3 * corrections.error_left(robot, history, found, to, _corrected(joint, change), rows)),
         },
         "clock": _clock(line, again),
     }
     if history.read:
-        content["readings"] |= {
-            "misfit": found.misfit, "converged": found.converged, "effective_draws": found.effective,
-            "used": found.used,
-        }  # fmt: skip
+        content["readings"] = _with_agreement(content["readings"], found)
     unreached = [] if history.position_m is None else _unreached(history.times_s, found, to, change)
     content["warnings"] = to_json([*unreached, *_warnings(robot, line, history, found, joint, content)])
     tables = {
         "poses.csv": _pose_table(robot, history, found, to),
-        "corrections.csv": _correction_table(robot, history, _mean(joint) if joint.ndim == 3 else joint, change),
+        "corrections.csv": _correction_table(robot, history, joint, change),
     }
     return HistoryAnswer(content, tables, rows, found, to)
+
+
+def _shown(rows: int) -> NDArray[np.intp]:
+    """Of so many rows, those that ``pose.json`` and pictures show."""
+    return np.unique(np.linspace(0, rows - 1, _SHOWN).round().astype(int))
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A history of a robot that starts near a pose, with the errors of what was read."""
+
+    robot: Robot
+    history: History
+    start: tuple[Floats, Floats]
+    errors: Uncertain
+    seed: int
+
+    @property
+    def near(self) -> tuple[Floats, Floats]:
+        """Where the first pose is sought: at the commanded one where there is one."""
+        history = self.history
+        if history.position_m is None or history.rotation is None:
+            return self.start
+        return history.position_m[0], history.rotation[0]
+
+    def followed(self, line: WireDraws, progress: Progress) -> tuple[Estimate, Floats, _Again]:
+        """Poses, joint values, and how to follow once more; `commanded.Unheld` where nothing holds the first pose."""
+        robot, history, rng = self.robot, self.history, np.random.default_rng(self.seed)
+        if history.joint_m is None:
+            found, joint_m = commanded.drift_along(robot, line, history, self.errors, rng, progress)
+            return found, joint_m, self._commanded_again
+        found = estimate_poses(robot, line, history, self.near, self.errors, rng, progress)
+        return found, history.joint_m, partial(self._measured_again, history.joint_m, found.starts_s)
+
+    def _measured_again(self, joint_m: Floats, starts_s: Floats, few: WireDraws, restart: float) -> Track:
+        """With few draws, the same each time, whose clocks start at every hold; once where `restart` is infinite."""
+        known = unknowns(self.robot, few, _alike(self.errors), np.random.default_rng(self.seed))
+        starts_s = starts_s if np.isfinite(restart) else starts_s[:1]
+        wires, error_m = known.columns(known.draws)
+        carried = known.carried(known.draws)
+        return follow_log(self.robot, wires, self.history, joint_m, self.near, starts_s, error_m, carried=carried)
+
+    def _commanded_again(self, few: WireDraws, restart: float) -> Track:
+        """With few draws, the same each time, whose clocks start anew at a share `restart` of the mean tension."""
+        rng = np.random.default_rng(self.seed)
+        found, _ = commanded.drift_along(self.robot, few, self.history, _alike(self.errors), rng, restart=restart)
+        return found.track
+
+
+def _alike(errors: Uncertain) -> Uncertain:
+    """No errors that differ between draws: one way of starting the clocks is compared with another."""
+    return replace(errors, reference_m=0.0, spread=0.0)
+
+
+def _corrected(joint_m: Floats, change_m: Floats) -> Floats:
+    """Joint values to be set, of which measured ones are the same in every draw."""
+    return _mean(joint_m + change_m) if joint_m.ndim == 2 else joint_m + _mean(change_m)
+
+
+def _with_agreement(readings: HistoryReadings, found: Estimate) -> HistoryReadings:
+    """What was read, and how well it agrees with what was found."""
+    return readings | {
+        "misfit": found.misfit,
+        "converged": found.converged,
+        "effective_draws": found.effective,
+        "used": found.used,
+    }
 
 
 def _without_answer(content: PoseHistoryJson, sentence: str) -> PoseHistoryJson:
@@ -241,7 +288,7 @@ def _turn(rotation: Floats) -> Floats:
     return np.where(held[..., 0], turning.vector(np.where(held, rotation, np.eye(3))), np.nan)
 
 
-def _clock(line: WireDraws, run: Callable[[WireDraws, float], Track]) -> ClockJson:
+def _clock(line: WireDraws, run: _Again) -> ClockJson:
     """How far poses move if the wires' clocks start once and run on: no test of holds shows which they do."""
     few = line.part(np.unique(np.linspace(0, line.count - 1, _CLOCK_DRAWS).round().astype(int)))
     anew, once = run(few, RESTART), run(few, np.inf)
@@ -271,15 +318,33 @@ def _unreached(times_s: Floats, found: Estimate, to: Target, change_m: Floats) -
 def _warnings(
     robot: Robot, line: WireDraws, history: History, found: Estimate, joint_m: Floats, content: PoseHistoryJson
 ) -> list[Notice]:
-    out, held = list[Notice](), found.track.held
-    lost = 1.0 - held[:, -1].mean()
+    out = [*_lost(history.times_s, found.track), *_contradicted(history, found, line.count), *_unsure_clock(content)]
+    out += _dynamics(history.times_s, found.plain.position_m[0])
+    holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
+    longest = float(np.diff(history.times_s[holds]).max())
+    lengths = inverse.lengths(robot, joint_m)[0]
+    out += draws.wire_warnings(robot, line, found.track.tension_N, longest, lengths)
+    plain = found.plain
+    return out + sag.sag_warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
+
+
+def _lost(times_s: Floats, track: Track) -> list[Notice]:
+    """That the platform falls, or that wires go slack, in some of the draws."""
+    out = []
+    lost = 1.0 - track.held[:, -1].mean()
     if lost > 0:
-        first = history.times_s[np.argmin(held.all(0))]
+        first = times_s[np.argmin(track.held.all(0))]
         text = f"the platform falls or loses its hold in {100 * lost:.3g} % of the draws, first at {first:g} s"
         out.append(Notice("fall", text))
-    slack = ((found.track.tension_N <= 0) & held[..., None]).any(1).mean(0)
+    slack = ((track.tension_N <= 0) & track.held[..., None]).any(1).mean(0)
     for i in np.flatnonzero(slack > 0.05):
         out.append(Notice("slack", f"wire {i + 1} goes slack in {100 * slack[i]:.0f} % of the draws"))
+    return out
+
+
+def _contradicted(history: History, found: Estimate, draws_used: int) -> list[Notice]:
+    """That the readings do not agree with the joint values, or that few draws agree with both."""
+    out = []
     if history.read and not found.converged:
         text = "the readings could not be brought together with the joint values: no mode was reached"
         out.append(Notice("not-converged", text))
@@ -292,26 +357,25 @@ def _warnings(
     if found.effective is not None and found.effective < _FEWEST:
         then = "the bands' ends are rough" if found.used else "the readings are not used, the bands are those without"
         text = (
-            f"only about {found.effective:.0f} of {line.count} draws agree with the readings: {then}; take more "
+            f"only about {found.effective:.0f} of {draws_used} draws agree with the readings: {then}; take more "
             "--draws, and check payload and standard errors"
         )
         out.append(Notice("few-draws", text))
-    clock = content["clock"]
-    width = content["drift"][0]["distance_mm"]
-    widths = np.asarray(width["q95"], float) - np.asarray(width["q05"], float)
-    if clock["largest_mm"] > 0.5 * np.max(widths, initial=0.0, where=np.isfinite(widths)):
-        text = (
-            f"when the wires' clocks restart matters here: by up to {clock['largest_mm']:.3g} mm, more than half of "
-            "the band; give a column hold to say it"
-        )
-        out.append(Notice("clock", text))
-    out += _dynamics(history.times_s, found.plain.position_m[0])
-    holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
-    longest = float(np.diff(history.times_s[holds]).max())
-    lengths = inverse.lengths(robot, joint_m)[0]
-    out += draws.wire_warnings(robot, line, found.track.tension_N, longest, lengths)
-    plain = found.plain
-    return out + sag.sag_warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
+    return out
+
+
+def _unsure_clock(content: PoseHistoryJson) -> list[Notice]:
+    """That poses depend on when the wires' clocks restart."""
+    largest_mm = content["clock"]["largest_mm"]
+    distance = content["drift"][0]["distance_mm"]
+    widths = np.asarray(distance["q95"], float) - np.asarray(distance["q05"], float)
+    if not largest_mm > 0.5 * np.max(widths, initial=0.0, where=np.isfinite(widths)):
+        return []
+    text = (
+        f"when the wires' clocks restart matters here: by up to {largest_mm:.3g} mm, more than half of "
+        "the band; give a column hold to say it"
+    )
+    return [Notice("clock", text)]
 
 
 def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
@@ -360,6 +424,7 @@ def _correction_table(
 ) -> tuple[list[str], list[list[Any]]]:
     """Corrected joint values (motor angles too), and what they change, with its standard deviation."""
     columns: dict[str, Any] = {"time_s": history.times_s}
+    joint_m = _mean(joint_m) if joint_m.ndim == 3 else joint_m
     described = _described(change_m)
     mean, sd = (winches.of_each_winch(robot, described[name]) for name in ("mean", "sd"))
     joint = winches.of_each_winch(robot, joint_m) + mean

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.estimate import Estimate
@@ -76,7 +77,9 @@ def wanted(robot: Robot, history: History, found: Estimate, to: Target) -> Float
     return out
 
 
-def error_left(robot: Robot, history: History, found: Estimate, to: Target, joint_m: Floats, rows: Floats) -> Floats:
+def error_left(
+    robot: Robot, history: History, found: Estimate, to: Target, joint_m: Floats, rows: NDArray[np.intp]
+) -> Floats:
     """Distance from the target that corrected joint values leave.
 
     Parameters

@@ -105,8 +105,8 @@ def follow_log(
     """
     n = max(v.shape[-1] for v in wires.theta.values())
     times, legs = history.times_s, robot.legs
-    shapes = ((3,), (3, 3), (legs,), (legs,))
-    position, rotation, tension, strain = (np.full((n, len(times), *shape), np.nan) for shape in shapes)
+    hold = np.searchsorted(starts_s, times, "right") - 1
+    track = _empty(n, legs, np.maximum(hold, 0))
     schedule, since = _schedule(times, joint_m), float(times[0])
     brought = fresh(legs, n) if carried is None else _without_clocks(carried, wires)
     walk = _begin(history.robot_at(robot, 0), wires, schedule, since, start, brought, error_m)
@@ -123,12 +123,18 @@ def follow_log(
             since = ahead.pop(0)
             walk = _again(walk, schedule, since)
         live = walk.live
-        position[live, k], rotation[live, k] = walk.here.position_m[live], walk.here.rotation[live]
-        tension[live, k] = walk.here.tension_N[live]
-        strain[:, k] = np.broadcast_to(walk.creep.state().strain(wires).T, (n, legs))
+        track.position_m[live, k], track.rotation[live, k] = walk.here.position_m[live], walk.here.rotation[live]
+        track.tension_N[live, k] = walk.here.tension_N[live]
+        track.strain[:, k] = np.broadcast_to(walk.creep.state().strain(wires).T, (n, legs))
         progress(k)
-    hold = np.searchsorted(starts_s, times, "right") - 1
-    return Track(position, rotation, tension, strain, np.maximum(hold, 0))
+    return track
+
+
+def _empty(columns: int, legs: int, hold: NDArray[np.int64]) -> Track:
+    """A track of which no row is known yet."""
+    shapes = ((3,), (3, 3), (legs,), (legs,))
+    position, rotation, tension, strain = (np.full((columns, len(hold), *shape), np.nan) for shape in shapes)
+    return Track(position, rotation, tension, strain, hold)
 
 
 def clock_starts(history: History, tension_N: Floats, share: float = RESTART) -> Floats:

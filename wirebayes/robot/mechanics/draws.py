@@ -134,32 +134,39 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
     names = CORE + tuple(c for e in effects for c in e.columns())
     by_length = [e for e in effects if e.place == "sample"]
     scaled = any(LENGTH_EXPONENT in one.parameters for one in lines)
-    shared = spread == 0 and not robot.given and not line.others and not scaled and not by_length
-    theta: dict[str, Floats] = {}
-    for name in names:
-        if shared:
-            theta[name] = line.parameters[name][None]
-            continue
-        rows = [np.broadcast_to(_value(wire, name, effects), (n,)) for wire in lines]
-        theta[name] = np.stack(rows)
+    theta: dict[str, Floats]
+    if spread == 0 and not robot.given and not line.others and not scaled and not by_length:  # shared by all legs
+        theta = {name: line.parameters[name][None] for name in names}
+    else:
+        theta = {name: _of_legs([_value(wire, name, effects) for wire in lines], n) for name in names}
     if spread > 0:
         if rng is None:
             raise ValueError("a specimen spread needs a random generator")
         for name in differing(line):
-            sd = np.stack([np.broadcast_to(spread_of(one, name, spread), (n,)) for one in lines])
+            sd = _of_legs([spread_of(one, name, spread) for one in lines], n)
             theta[name] = theta[name] * np.exp(sd * rng.standard_normal((robot.legs, n)))
     length = np.array([wire.length_mm for wire in lines])[:, None]
     longer = np.where(_is_given(robot), 1.0, 1e3 * nominal_length(robot)[:, None] / length)
     if scaled:
-        exponent = [np.broadcast_to(one.parameters.get(LENGTH_EXPONENT, np.ones(1)), (n,)) for one in lines]
-        theta["B"] = theta["B"] * longer ** (np.stack(exponent) - 1.0)
-    reference = line.tension_ref_N
-    if any(one.tension_ref_N != reference for one in line.others.values()):
-        reference = _by_leg([one.tension_ref_N for one in lines])
+        exponent = _of_legs([one.parameters.get(LENGTH_EXPONENT, np.ones(1)) for one in lines], n)
+        theta["B"] = theta["B"] * longer ** (exponent - 1.0)
+    reference = _reference_tension(line, lines)
     hold = steady_hold(theta, length * longer, reference, length_ref_mm=length)
     theta = dict(Placed(by_length, theta).change("sample", theta, hold))
     others = tuple(e for e in effects if e.place != "sample")
     return Wires(line.law, line.history, theta, length, others, reference)
+
+
+def _reference_tension(line: WireDraws, lines: Sequence[WireDraws]) -> Any:
+    """Reference tension of effects: one, or a leg's own where lines differ."""
+    if any(one.tension_ref_N != line.tension_ref_N for one in line.others.values()):
+        return _by_leg([one.tension_ref_N for one in lines])
+    return line.tension_ref_N
+
+
+def _of_legs(values: Sequence[Floats | float], n: int) -> Floats:
+    """Values of ``w`` legs, each of one draw or of ``n``, as ``(w, n)``."""
+    return np.stack([np.broadcast_to(value, (n,)) for value in values])
 
 
 def differing(line: WireDraws) -> tuple[str, ...]:

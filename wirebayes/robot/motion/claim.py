@@ -113,8 +113,7 @@ def over_workspace(
         return WorkspaceDrift(np.empty((0, 3)), empty, empty, np.empty((0, robot.legs)), 0.0, 0.0)
     x, tau = position_m[good], tau[good]
     n, p = max(v.shape[-1] for v in wires.theta.values()), len(x)
-    # Draws vary fastest; every (position, draw) is one row of the batch.
-    many = replace(wires, theta={k: np.tile(np.broadcast_to(v, (len(v), n)), p) for k, v in wires.theta.items()})
+    many = _at_each(wires, n, p)
     where, pull = np.repeat(x, n, 0), np.repeat(tau, n, 0)
     R = np.repeat(turn[good], n, 0)
     state = fresh(robot.legs, n * p)
@@ -131,6 +130,12 @@ def over_workspace(
     return WorkspaceDrift(
         x, shift.reshape(p, n), tilt.reshape(p, n), tau, float(good.mean()), float(course.found.mean())
     )
+
+
+def _at_each(wires: Wires, draws: int, positions: int) -> Wires:
+    """A row for every position and draw, of which draws vary fastest."""
+    theta = {k: np.tile(np.broadcast_to(v, (len(v), draws)), positions) for k, v in wires.theta.items()}
+    return replace(wires, theta=theta)
 
 
 def scaled_robot(robot: Robot, factor: float, mass_kg: float) -> Robot:

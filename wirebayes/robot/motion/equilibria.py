@@ -1,6 +1,7 @@
 """Every stable equilibrium of one set of lengths, as far as many starts find them."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import plane, statics
@@ -49,21 +50,27 @@ def equilibria(
     tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
     found = solve(robot, wires, tiled, offset_m, begin, turn, 400)
     good = np.flatnonzero(found.found)
-    near_m = 1e-6 * robot.span_m  # poses nearer than this, rotations at the platform's edge, are one
     height = statics.potential(
         robot, wires, found.position_m.T, np.moveaxis(found.rotation, 0, -1), zero_m[:, None], offset_m[:, None]
     )
-    kept: list[int] = []
-    for i in good[np.argsort(height[good], kind="stable")]:
-        apart = [
-            max(np.abs(found.position_m[i] - found.position_m[k]).max(),
-                robot.size_m * np.abs(found.rotation[i] - found.rotation[k]).max())
-            for k in kept
-        ]  # fmt: skip
-        if all(a > near_m for a in apart):
-            kept.append(int(i))
-    pick = np.array(kept, int)
+    pick = _distinct(robot, found, good[np.argsort(height[good], kind="stable")])
     return Equilibria(
-        found.position_m[pick], found.rotation[pick], found.tension_N[pick], found.status[pick],
-        found.iterations[pick], found.residual_N[pick],
-    )  # fmt: skip
+        found.position_m[pick],
+        found.rotation[pick],
+        found.tension_N[pick],
+        found.status[pick],
+        found.iterations[pick],
+        found.residual_N[pick],
+    )
+
+
+def _distinct(robot: Robot, found: Equilibria, order: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Of poses in an order those that no earlier one is near to, rotations being compared at the platform's edge."""
+    near_m = 1e-6 * robot.span_m
+    kept: list[int] = []
+    for i in order:
+        shift = np.abs(found.position_m[i] - found.position_m[kept]).max(1, initial=0.0)
+        turn = robot.size_m * np.abs(found.rotation[i] - found.rotation[kept]).max((1, 2), initial=0.0)
+        if (np.maximum(shift, turn) > near_m).all():
+            kept.append(int(i))
+    return np.array(kept, int)

@@ -80,18 +80,12 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
     if turned.found is not None:
         content["orientation"] = turned.found
     if not content["feasible"]:
-        content["sentence"] = lifted or _why_not(robot, x, turned)
-        content["warnings"] = unheld(content["sentence"])
-        return Answer(content, {})
+        return _unheld(content, lifted or _why_not(robot, x, turned))
     shared = draws.for_robot(robot, line)
     commands = inverse.commands(robot, shared, x[None], R[None], tau)
     content["feasible_draws"] = float(commands.feasible.mean())
     if not commands.feasible.any():
-        content["feasible"] = False
-        content["sentence"] = "These wires cannot pull as hard as the pose requires, however far stretched."
-        content["warnings"] = unheld(content["sentence"])
-        return Answer(content, {})
-    rng = np.random.default_rng(request.seed)
+        return _unheld(content, "These wires cannot pull as hard as the pose requires, however far stretched.")
     if robot.winch is not None:
         tau = commands.tension_N[commands.feasible].mean(0, keepdims=True)
         R = inverse.commands(robot, control.known(shared), x[None], R[None], tau).rotation[0]
@@ -99,36 +93,74 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
         content["pose"]["rotation_vector_rad"] = turning.vector(R[None])[0]
         if robot.joints < robot.freedoms:
             content["orientation"] = by_lines(robot)
-    content["inverse"] = _inverse(robot, commands, tau[0])
+    return _held_answer(_Held(robot, line, shared, request, commands, tau), other, turned, content)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """A pose that wires hold, `wires` being those without spread: its tensions ``(1, w)`` and the commands to it."""
+
+    robot: Robot
+    line: WireDraws
+    wires: Wires
+    request: PoseRequest
+    commands: inverse.Commands
+    tension_N: Floats
+
+
+def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, content: PoseJson) -> Answer:
+    """What is said of a pose that can be held, besides what `content` has already."""
+    robot, line, request = held.robot, held.line, held.request
+    x, R = request.position_m, request.rotation
+    rng = np.random.default_rng(request.seed)
+    content["inverse"] = _inverse(robot, held.commands, held.tension_N[0])
     if robot.plane is not None:
-        content["plane"] = on_plane.on_plane(robot, shared, commands, x, R, tau[0])
-    content["forward"] = _round_trip(robot, shared, commands, x, R)
-    content["equilibria"] = _all_equilibria(robot, shared, x, R, rng)
-    proved = proofs.only_equilibrium(robot, shared, x, R)
-    courses = {}
-    for spread in request.spreads:
-        wires = draws.for_robot(robot, line, spread, rng)
-        courses[spread] = drift.from_command(robot, wires, x, R, request.times_s)
-    content["certificate"] = {**proved, **proofs.enclosed(robot, shared, courses[0.0], x, R)}
+        content["plane"] = on_plane.on_plane(robot, held.wires, held.commands, x, R, held.tension_N[0])
+    content["forward"] = _round_trip(robot, held.wires, held.commands, x, R)
+    content["equilibria"] = _all_equilibria(robot, held.wires, x, R, rng)
+    proved = proofs.only_equilibrium(robot, held.wires, x, R)
+    courses = _courses(held, rng)
+    content["certificate"] = {**proved, **proofs.enclosed(robot, held.wires, courses[0.0], x, R)}
     content["drift"] = [{"specimen_spread": s, **_drift(c, x, R)} for s, c in courses.items()]
     content["stability"] = [{"specimen_spread": s, **stability.summary(c)} for s, c in courses.items()]
     content["claim"] = _claim(courses, x, R, request)
     content["pose_error"] = controllers.errors(robot, line, request, rng, other)
     content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
     content["variance_shares"] = _shares(line, courses, x, R)
-    falls = [
-        warning
-        for spread, course in courses.items()
-        for warning in stability.stability_warnings(course, spread, content["equilibria"]["commanded_stable"])
-    ]
-    refused = [Notice("geometry", turned.refused)] if turned.refused else []
-    untested = _untested(robot, line, request, commands, tau)
-    content["warnings"] = to_json([*_weak(commands), *falls, *refused, *untested])
+    content["warnings"] = to_json(_warnings(held, courses, content["equilibria"]["commanded_stable"], turned))
     spaces = map_slices(robot, line, request.slices)
-    held = [one for one in spaces if len(one.drift.position_m)]
+    reached = [one for one in spaces if len(one.drift.position_m)]
     # the first orientation as a whole, then every slice of each
-    content["workspace"] = {**claim.claim_summary(held[0].drift), "slices": summaries(spaces)} if held else None
+    content["workspace"] = {**claim.claim_summary(reached[0].drift), "slices": summaries(spaces)} if reached else None
     return Answer(content, courses, spaces)
+
+
+def _courses(held: _Held, rng: np.random.Generator) -> dict[float, Course]:
+    """The drift from the pose, by the spread between specimens."""
+    request = held.request
+    courses = {}
+    for spread in request.spreads:
+        wires = draws.for_robot(held.robot, held.line, spread, rng)
+        courses[spread] = drift.from_command(held.robot, wires, request.position_m, request.rotation, request.times_s)
+    return courses
+
+
+def _warnings(held: _Held, courses: dict[float, Course], stable: bool, turned: Orientation) -> list[Notice]:
+    """What speaks against the answer: weak wires, falls, what was asked for in vain, and what was never tested."""
+    out = _weak(held.commands)
+    for spread, course in courses.items():
+        out += stability.stability_warnings(course, spread, stable)
+    if turned.refused:
+        out.append(Notice("geometry", turned.refused))
+    return out + _untested(held)
+
+
+def _unheld(content: PoseJson, sentence: str) -> Answer:
+    """An answer that ends because nothing holds the platform, and why."""
+    content["feasible"] = False
+    content["sentence"] = sentence
+    content["warnings"] = unheld(sentence)
+    return Answer(content, {})
 
 
 def _why_not(robot: Robot, x: Floats, turned: Orientation) -> str:
@@ -191,12 +223,11 @@ def _weak(commands: inverse.Commands) -> list[Notice]:
     return [Notice("unheld", text)] if weak > 0 else []
 
 
-def _untested(
-    robot: Robot, line: WireDraws, request: PoseRequest, commands: inverse.Commands, tension_N: Floats
-) -> list[Notice]:
+def _untested(held: _Held) -> list[Notice]:
     """A warning for each way in which the pose leaves what was tested or what the model knows."""
-    out = draws.wire_warnings(robot, line, tension_N, float(request.times_s[-1]), commands.zero_m)
-    out += sag.sag_warnings(robot, request.position_m, request.rotation, tension_N[0])
+    robot, request, commands = held.robot, held.request, held.commands
+    out = draws.wire_warnings(robot, held.line, held.tension_N, float(request.times_s[-1]), commands.zero_m)
+    out += sag.sag_warnings(robot, request.position_m, request.rotation, held.tension_N[0])
     return out if robot.drums is None else out + _emptied(robot.drums, commands.joint_m[commands.feasible])
 
 

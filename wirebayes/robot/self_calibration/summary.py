@@ -91,6 +91,21 @@ def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
     return np.asarray(stdtrit(own, 0.95))
 
 
+def _slope_of_lengths(found: Whole) -> Floats:
+    """The last zero-tension lengths by all unknowns: references, drums and the strain, with all that it depends on."""
+    unknowns, robot = found.unknowns, found.unknowns.robot
+    joint, strain = found.last_m, found.creep.strain[-1]
+    bare = joint + unknowns.parts(found.state.white).reference_m
+    slope = np.zeros((robot.legs, unknowns.count))
+    slope[:, unknowns.slices["wires"]] = bare[:, None] * found.creep.by_wires[-1]
+    leg = np.arange(robot.legs)
+    slope[leg, unknowns.references.start + leg] += (1 + strain) * unknowns.prior.reference_sd_m
+    if unknowns.errors.drum > 0:
+        drum = leg if robot.winch is None else robot.winch
+        slope[leg, unknowns.slices["drum"].start + drum] = unknowns.errors.drum * joint * ~robot.is_linear
+    return slope
+
+
 def _standard_deviations(found: Whole) -> dict[str, Floats]:
     unknowns, robot, prior, at = found.unknowns, found.unknowns.robot, found.unknowns.prior, found.unknowns.slices
     w, d = robot.legs, robot.degrees
@@ -101,16 +116,7 @@ def _standard_deviations(found: Whole) -> dict[str, Floats]:
         own = sd[at[name]]
         return np.asarray(error * own.reshape(shape) if len(own) else np.zeros(shape))
 
-    # the last zero-tension lengths: references, drums and the strain, with all that it depends on
-    joint, strain = found.last_m, found.creep.strain[-1]
-    bare = joint + unknowns.parts(found.state.white).reference_m
-    slope = np.zeros((w, unknowns.count))
-    slope[:, at["wires"]] = bare[:, None] * found.creep.by_wires[-1]
-    leg = np.arange(w)
-    slope[leg, unknowns.references.start + leg] += (1 + strain) * prior.reference_sd_m
-    if unknowns.errors.drum > 0:
-        drum = leg if robot.winch is None else robot.winch
-        slope[leg, at["drum"].start + drum] = unknowns.errors.drum * joint * ~robot.is_linear
+    slope = _slope_of_lengths(found)
     return {
         "exit_m": unknown("exit", unknowns.errors.exit_m, (w, 3)),
         "platform_m": unknown("platform", unknowns.errors.platform_m, (w, 3)),

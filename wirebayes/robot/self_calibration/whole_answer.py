@@ -12,6 +12,7 @@ from wirebayes.json_files.calibrate import (
     EstimatedLengths,
     EstimatedPoses,
     IdentifiedJson,
+    ObservabilityJson,
 )
 from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.typing import Floats
@@ -109,16 +110,10 @@ def calibration_report(
     if inexact:  # how far from exact the joint values are tells more than that there is no answer
         unknowns = replace(unknowns, errors=replace(errors, joint_m=None))
         found = best(unknowns, holds, rng)
-    unknowns = found.unknowns
-    plain = estimate(replace(unknowns, prior=replace(prior, creeps=False)), holds, found.state)
     seen = identified(found)
     ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
     s = summarised(found)
-    learnt = seen.determined > 0 or seen.of == 0
-    uneven = found.noise.balance > _UNEVEN
-    biased = at_fault is not None and at_fault.p_none < SIGNIFICANT
-    explained = p >= SIGNIFICANT and not (inexact or uneven or biased)
-    usable = bool(found.converged and learnt and explained)
+    verdict = _Verdict(found, p, seen, at_fault, inexact=inexact, requested=requested)
     content: CalibrateJson = {
         "version": 2,
         "robot": robot.name,
@@ -134,28 +129,56 @@ def calibration_report(
         "length_rms_mm": _length_rms(found),
         "joint_sd_mm": 1e3 * found.noise.joint_m,
         "identified": _identified(seen),
-        "usable": usable,
+        "usable": verdict.usable,
         "sensors_at_fault": sensors.sensors_json(at_fault),
         "with_creep_model": _lengths(found, s),
-        "by_hooke_alone": _lengths(plain, summarised(plain)),
-        **_now(robot, found, s, usable),
-        "observability": {
-            "rank": seen.determined,
-            "of": seen.of,
-            "weakest_combination": [],
-            "sentence": f"The readings determine {seen.determined} of {seen.of} combinations of points and references.",
-        },
+        "by_hooke_alone": _by_hooke_alone(found, holds, prior),
+        **_now(robot, found, s, verdict.usable),
+        "observability": _observability(seen),
         "next_positions_m": ahead.position_m,
         "next_pose_sd_mm": 1e3 * ahead.pose_sd_m,
-        "warnings": to_json(
-            [
-                *_warnings(found, p, requested, learnt, inexact),
-                *sensors.sensor_notices(at_fault),
-                *doubts(robot, prior.line),
-            ]
-        ),
+        "warnings": to_json([*_warnings(verdict), *sensors.sensor_notices(at_fault), *doubts(robot, prior.line)]),
     }
-    return WholeAnswer(content, moved(robot, unknowns.parts(found.state.white)), _known(found, session))
+    return WholeAnswer(content, moved(robot, found.unknowns.parts(found.state.white)), _known(found, session))
+
+
+@dataclass(frozen=True)
+class _Verdict:
+    """What decides whether the values may be set in a controller.
+
+    Attributes
+    ----------
+    p : float
+        Probability of readings and references that contradict model and priors as much.
+    inexact : bool
+        Joint values that were taken as exact are not.
+    requested : bool
+        Stated poses were taken for requests.
+    """
+
+    found: Whole
+    p: float
+    seen: Identified
+    at_fault: Suspects | None
+    inexact: bool
+    requested: bool
+
+    @property
+    def learnt(self) -> bool:
+        """Whether the readings determine anything that was not known."""
+        return self.seen.determined > 0 or self.seen.of == 0
+
+    @property
+    def uneven(self) -> bool:
+        """Whether the tensions do not carry the weight."""
+        return self.found.noise.balance > _UNEVEN
+
+    @property
+    def usable(self) -> bool:
+        """Whether the values are known and nothing contradicts them."""
+        biased = self.at_fault is not None and self.at_fault.p_none < SIGNIFICANT
+        explained = self.p >= SIGNIFICANT and not (self.inexact or self.uneven or biased)
+        return bool(self.found.converged and self.learnt and explained)
 
 
 def _at_fault(found: Whole, holds: Holds, p: float) -> Suspects | None:
@@ -239,6 +262,22 @@ def _lengths(found: Whole, s: Summary) -> EstimatedLengths:
     return out
 
 
+def _by_hooke_alone(found: Whole, holds: Holds, prior: LengthPrior) -> EstimatedLengths:
+    """What would be found if the wires did not creep."""
+    without = replace(found.unknowns, prior=replace(prior, creeps=False))
+    plain = estimate(without, holds, found.state)
+    return _lengths(plain, summarised(plain))
+
+
+def _observability(seen: Identified) -> ObservabilityJson:
+    return {
+        "rank": seen.determined,
+        "of": seen.of,
+        "weakest_combination": [],
+        "sentence": f"The readings determine {seen.determined} of {seen.of} combinations of points and references.",
+    }
+
+
 def _identified(seen: Identified) -> IdentifiedJson:
     return {
         "determined": seen.determined,
@@ -272,28 +311,28 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
     return out
 
 
-def _warnings(found: Whole, p: float, requested: bool, learnt: bool, inexact: bool) -> list[Notice]:
-    out = []
+def _warnings(verdict: _Verdict) -> list[Notice]:
+    found, out = verdict.found, []
     if not found.converged:
         text = "not converged: do not use these values; read more poses, or check the readings and the stated errors"
         out.append(Notice("not-converged", text))
-    if requested:
+    if verdict.requested:
         text = (
             "the stated poses are those that the joint values were computed for, or contradict the readings: they are "
             "taken for requests, and the poses as unknown; give --pose-sd if they were measured"
         )
         out.append(Notice("data", text))
-    if found.converged and inexact:
+    if found.converged and verdict.inexact:
         text = (
             f"geometry, taken as exact, and joint values agree to {1e3 * found.noise.joint_m:.2g} mm only: do not use "
             "these values; give --anchor-sd, or --joint-sd if the joint values are that uncertain"
         )
         out.append(Notice("misfit", text))
-    elif found.converged and p < SIGNIFICANT:
-        out.append(unlikely(p))
-    if found.converged and not learnt:
+    elif found.converged and verdict.p < SIGNIFICANT:
+        out.append(unlikely(verdict.p))
+    if found.converged and not verdict.learnt:
         out.append(unlearnt(1e3 * found.unknowns.prior.reference_sd_m))
-    if found.noise.balance > _UNEVEN:
+    if verdict.uneven:
         text = (
             f"the tensions leave {100 * found.noise.balance:.2g} % of the weight unbalanced: the platform was held by "
             "something else, or the tensions are not those of the wires; do not use these values"
