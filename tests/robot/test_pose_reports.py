@@ -461,7 +461,8 @@ def test_what_leaves_the_tests_is_said_of_the_whole_request(monkeypatch: pytest.
     for known, words in ((None, ["line", "sag"]), (SimpleNamespace(wire_m=np.array([4.0])), ["line", "sag", None])):
         asked.clear()
         robot: Any = SimpleNamespace(drums=known)
-        found = answer._untested(robot, None, request, commands, tension)  # type: ignore[arg-type]
+        held = answer._Held(robot, None, None, request, commands, tension)  # type: ignore[arg-type]
+        found = answer._untested(held)
         assert found[:2] == words[:2] and len(found) == len(words)
         assert asked[:2] == [([[5.0]], 90.0, [[1.0], [1.0]]), (request.position_m, [5.0])]
         assert asked[2:] == ([] if known is None else [[[2.0]]])

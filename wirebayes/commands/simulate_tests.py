@@ -100,8 +100,7 @@ def simulate_tests(
     chosen |= amplitudes
     tests = check_whole("--tests", tests, 1)
     sizes, moments = _numbers("--lengths", lengths), _numbers("--times", times)
-    control: Control = "force" if text_of(weights) else "displacement"
-    path = _path(control, weights if control == "force" else displacements, unload)
+    control, path = _settings(displacements, weights, unload)
     gaps = frozenset(unrecorded)
     _check_protocol(control, path, sizes, moments, gaps)
     warmth = _given_numbers("--temperature", temperature)
@@ -157,13 +156,14 @@ def _benches(alike: Bench, lines: int, lengths_mm: Sequence[float]) -> list[Benc
     return out
 
 
-def _path(control: Control, settings: Numbers, unload: int) -> list[float]:
+def _settings(displacements: Numbers, weights: Numbers, unload: int) -> tuple[Control, list[float]]:
     """What is set in each hold, mm or N: up as given, then so many back down."""
-    option = "--weights" if control == "force" else "--displacements"
-    path = _numbers(option, settings)
+    control: Control = "force" if text_of(weights) else "displacement"
+    option, given = ("--weights", weights) if control == "force" else ("--displacements", displacements)
+    path = _numbers(option, given)
     if unload >= len(path):
         raise InputError(f"--unload: found {unload}, expected fewer than the {len(path)} {option.removeprefix('--')}")
-    return path + path[-2 : -2 - unload : -1]
+    return control, path + path[-2 : -2 - unload : -1]
 
 
 def _check_protocol(

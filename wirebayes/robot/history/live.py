@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Floats
+from wirebayes.robot.history.beside import beside, beside_fresh
 from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
 from wirebayes.robot.history.live_input import checked_number, checked_reading, checked_vector, refuse_bad
@@ -23,9 +24,8 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch
-from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import balance, forward, inverse, mixed, path, plausible
-from wirebayes.robot.motion.creep import CreepState, HoldCreep
+from wirebayes.robot.motion.creep import HoldCreep
 
 _LONG = 5e-2  # of the platform's size: a longer Newton step is followed with care instead
 _AGAIN = 5e-3  # of the platform's size: after a shorter one, less than a micrometre is left
@@ -133,14 +133,14 @@ class LiveEstimator:
         if reads:
             white = np.concatenate([white, known.differences(np.zeros(d))])
         wires, error = known.columns(white)
-        self._wires, self._error = _beside(wires, known.plain), np.concatenate([error, np.zeros((1, robot.legs))])
+        self._wires, self._error = beside(wires, known.plain), np.concatenate([error, np.zeros((1, robot.legs))])
         self._n, self._columns = n, len(self._error)
         self._of = sensors(robot, errors)
         self._offset = self._rng.standard_normal((n, m))
         self._information = Information.none(d, m, n)
         self._moves, self._sane = np.zeros((n, d)), np.ones(n, bool)
         self._refreshed = self._last = -np.inf
-        self._start, self._state = start, _beside_fresh(known.carried(white), robot.legs)
+        self._start, self._state = start, beside_fresh(known.carried(white), robot.legs)
         self._live = np.ones(self._columns, bool)
         self._joint = np.empty((self._columns, robot.legs))
 
@@ -347,61 +347,49 @@ class LiveEstimator:
 
     def _pose(self, time_s: float, nominal: Floats) -> LivePose:
         """The draws, moved by the readings, in numbers."""
-        n, live = self._n, self._live[: self._n]
-        shown = live & self._sane if (live & self._sane).any() else live
-        centre = self._R[n if self._reads else -1]
+        centre = self._R[self._n if self._reads else -1]
+        own = self._own_draws(centre)
+        mean, sd = own.mean(0), own.std(0)
+        low, high = _quantiles(own[:, :3], np.array([0.05, 0.95]))
+        w = self.robot.legs
+        wanted, wanted_sd = mean[6 : 6 + w], sd[6 : 6 + w]
+        change = of_each_winch(self.robot, wanted - nominal)
+        return LivePose(
+            time_s,
+            mean[:3],
+            sd[:3],
+            low,
+            high,
+            matrix(mean[3:6]) @ centre,
+            sd[3:6],
+            of_each_winch(self.robot, wanted),
+            of_each_winch(self.robot, wanted_sd),
+            change,
+            change / mean_of_each_winch(self.robot, self.robot.lines),
+            mean[6 + w :],
+            float(self._live[: self._n].mean()),
+        )
+
+    def _own_draws(self, centre: Floats) -> Floats:
+        """Position, rotation from `centre`, joint values and tensions of the draws that count; NaN if none does."""
         turned = self._R @ centre.T
-        turn = 0.5 * np.stack([turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0],
-                               turned[:, 1, 0] - turned[:, 0, 1]], 1)  # fmt: skip
+        xyz = [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]]
         target = self._x[-1:], self._R[-1:], self._tension[-1:]
         strain = self._state.strain(self._wires)
         wanted = inverse.commands(self.robot, self._wires, *target, strain, self._error.T).joint_m
-        values = np.concatenate([self._x, turn, wanted, self._tension], 1)
-        own = values[:n]
+        values = np.concatenate([self._x, 0.5 * np.stack(xyz, 1), wanted, self._tension], 1)
+        own = values[: self._n]
         if self._reads:
-            own = own + self._moves @ slopes(values[n:-1])
+            own = own + self._moves @ slopes(values[self._n : -1])
+        live = self._live[: self._n]
+        shown = live & self._sane if (live & self._sane).any() else live
         own = own if shown.all() else own[shown]
-        if not len(own):
-            own = np.full((1, values.shape[1]), np.nan)
-        mean, sd = own.mean(0), own.std(0)
-        ordered = np.sort(own[:, :3], 0)
-        last = len(own) - 1
-        at = np.array([0.05, 0.95]) * last
-        below = at.astype(int)
-        low, high = ordered[below] + (at - below)[:, None] * (ordered[np.minimum(below + 1, last)] - ordered[below])
-        w = self.robot.legs
-        joint, joint_sd, change = (
-            of_each_winch(self.robot, v) for v in (mean[6 : 6 + w], sd[6 : 6 + w], mean[6 : 6 + w] - nominal)
-        )
-        straight = change / mean_of_each_winch(self.robot, self.robot.lines)
-        return LivePose(
-            time_s, mean[:3], sd[:3], low, high, matrix(mean[3:6]) @ centre, sd[3:6], joint, joint_sd,
-            change, straight, mean[6 + w :], float(live.mean()),
-        )  # fmt: skip
+        return own if len(own) else np.full((1, values.shape[1]), np.nan)
 
 
-def _beside(first: Wires, other: Wires) -> Wires:
-    """Columns of wires of one model side by side."""
-    theta = {}
-    counts = [max(v.shape[-1] for v in wires.theta.values()) for wires in (first, other)]
-    for name, value in first.theta.items():
-        rows = max(len(value), len(other.theta[name]))
-        both = [np.broadcast_to(v, (rows, n)) for v, n in zip((value, other.theta[name]), counts, strict=True)]
-        theta[name] = np.concatenate(both, 1)
-    return replace(first, theta=theta)
-
-
-def _beside_fresh(carried: CreepState, legs: int) -> CreepState:
-    """What columns of wires carry, and beside them that of a column which never crept."""
-
-    def one_more(values: Floats | float, last: Floats | float = 0.0) -> Floats:
-        whole = np.broadcast_to(values, carried.creep_mm.shape)
-        return np.concatenate([whole, np.broadcast_to(last, (legs, 1))], 1)
-
-    return replace(
-        carried,
-        creep_mm=one_more(carried.creep_mm),
-        beside_mm={key: one_more(value) for key, value in carried.beside_mm.items()},
-        past=tuple((start, one_more(amount), one_more(k2, k2[:, :1])) for start, amount, k2 in carried.past),
-        elongation_mm=one_more(carried.elongation_mm),
-    )
+def _quantiles(values: Floats, probability: Floats) -> Floats:
+    """Quantiles ``(q, d)`` of ``(n, d)`` values, linear between neighbours."""
+    ordered, last = np.sort(values, 0), len(values) - 1
+    at = probability * last
+    below = at.astype(int)
+    return ordered[below] + (at - below)[:, None] * (ordered[np.minimum(below + 1, last)] - ordered[below])
