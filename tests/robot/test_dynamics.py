@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wirebayes.robot.history.answer import _dynamics
+from wirebayes.robot.history.doubts import _dynamics
 from wirebayes.robot.mechanics.description import GRAVITY
 
 

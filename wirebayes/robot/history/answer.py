@@ -1,6 +1,5 @@
 """What `pose` answers about a history: where the platform was, its drift, and the joint values that bring it back."""
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,22 +10,22 @@ from numpy.typing import NDArray
 
 from wirebayes.json_files.pose_history import ClockJson, DriftOverTime, HistoryReadings, PoseHistoryJson
 from wirebayes.json_files.values import Band, Statistic
-from wirebayes.notice import Notice, to_json
+from wirebayes.notice import to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.corrections import Target
+from wirebayes.robot.history.doubts import history_warnings, unreached
 from wirebayes.robot.history.estimate import Estimate, Progress, estimate_poses
 from wirebayes.robot.history.follow import RESTART, Track, follow_log
 from wirebayes.robot.history.history import History
+from wirebayes.robot.history.tables import correction_table, mean_of_held, pose_table, rotation_vectors
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
-from wirebayes.robot.mechanics import draws, sag, winches
+from wirebayes.robot.mechanics import draws, winches
 from wirebayes.robot.mechanics import rotation as turning
-from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
-from wirebayes.robot.mechanics.drums import motor_angle
 from wirebayes.robot.motion import drift as drifting
-from wirebayes.robot.motion import inverse
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.motion.creep import fresh
 from wirebayes.robot.pose.answer import unheld
@@ -34,11 +33,7 @@ from wirebayes.robot.pose.request import band_over_draws
 
 _SHOWN = 200  # times in pose.json and in pictures; the tables have every row
 _CLOCK_DRAWS = 12  # draws that show how much it matters when the wires' clocks start
-_FEWEST = 50  # effective draws; of so many, what lies beyond a 5 % quantile is 2 to 8 %
-_NAMED = 6  # times in a warning: as many as a line holds
-_INERTIA = 0.05  # of the weight: a force above it changes tensions by as much as the creep that is looked for
 _NEVER_HELD = "No draw of the wires holds the platform at the first row; see --position for where it starts."
-_MISFIT = 2.0  # mean squared residual from which on the readings contradict the model
 
 _Again = Callable[[WireDraws, float], Track]  # the same history with few draws, whose clocks restart at a share
 
@@ -106,7 +101,7 @@ def history_report(
         "history": content["history"] | {"holds": int(found.track.hold[-1]) + 1},
         "drift": [_drift(course, to, rows, errors.spread)],
         "position_m": _bands(course.position_m),
-        "rotation_vector_rad": _bands(_turn(course.rotation)) if robot.degrees == 6 else None,
+        "rotation_vector_rad": _bands(rotation_vectors(course.rotation)) if robot.degrees == 6 else None,
         "corrections": {
             "times_s": course.times_s,
             "change_mm": _bands(1e3 * winches.of_each_winch(robot, change)[:, rows]),
@@ -116,11 +111,11 @@ def history_report(
     }
     if history.read:
         content["readings"] = _with_agreement(content["readings"], found)
-    unreached = [] if history.position_m is None else _unreached(history.times_s, found, to, change)
-    content["warnings"] = to_json([*unreached, *_warnings(robot, line, history, found, joint, content)])
+    missed = [] if history.position_m is None else unreached(history.times_s, found, to, change)
+    content["warnings"] = to_json([*missed, *history_warnings(robot, line, history, found, joint, content)])
     tables = {
-        "poses.csv": _pose_table(robot, history, found, to),
-        "corrections.csv": _correction_table(robot, history, joint, change),
+        "poses.csv": pose_table(robot, history, found, to),
+        "corrections.csv": correction_table(robot, history, joint, change),
     }
     return HistoryAnswer(content, tables, rows, found, to)
 
@@ -179,7 +174,7 @@ def _alike(errors: Uncertain) -> Uncertain:
 
 def _corrected(joint_m: Floats, change_m: Floats) -> Floats:
     """Joint values to be set, of which measured ones are the same in every draw."""
-    return _mean(joint_m + change_m) if joint_m.ndim == 2 else joint_m + _mean(change_m)
+    return mean_of_held(joint_m + change_m) if joint_m.ndim == 2 else joint_m + mean_of_held(change_m)
 
 
 def _with_agreement(readings: HistoryReadings, found: Estimate) -> HistoryReadings:
@@ -282,12 +277,6 @@ def _bands(values: Floats) -> Band:
             "q95": over_time("q95")}  # fmt: skip
 
 
-def _turn(rotation: Floats) -> Floats:
-    """Rotation vectors; NaN where the platform has fallen."""
-    held = np.asarray(np.isfinite(rotation).all((-2, -1), keepdims=True))
-    return np.where(held[..., 0], turning.vector(np.where(held, rotation, np.eye(3))), np.nan)
-
-
 def _clock(line: WireDraws, run: _Again) -> ClockJson:
     """How far poses move if the wires' clocks start once and run on: no test of holds shows which they do."""
     few = line.part(np.unique(np.linspace(0, line.count - 1, _CLOCK_DRAWS).round().astype(int)))
@@ -295,162 +284,3 @@ def _clock(line: WireDraws, run: _Again) -> ClockJson:
     apart = np.linalg.norm(anew.position_m - once.position_m, axis=-1)
     middle = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in apart.T])
     return {"largest_mm": 1e3 * float(np.nanmax(middle)), "at_the_end_mm": 1e3 * float(middle[-1])}
-
-
-def _unreached(times_s: Floats, found: Estimate, to: Target, change_m: Floats) -> list[Notice]:
-    """Which commanded poses no corrections ``(n, t, w)`` lead to, though the platform still hangs then."""
-    never = found.track.held.any(0) & ~np.isfinite(change_m).all(-1).any(0)
-    unheld = ~np.isfinite(to.tension_N).all(-1)
-    reasons = {
-        "no tensions within the bounds hold the platform at the pose": unheld,
-        "no draw's wires can pull as hard as it takes at the pose": ~unheld,
-    }
-    out = []
-    for reason, why in reasons.items():
-        rows = np.flatnonzero(never & why)
-        if rows.size:
-            times = ", ".join(f"{times_s[k]:.10g}" for k in rows[:_NAMED])
-            more = f" s and {rows.size - _NAMED} times more" if rows.size > _NAMED else " s"
-            out.append(Notice("unheld", f"{reason} commanded at {times}{more}: no corrections lead there"))
-    return out
-
-
-def _warnings(
-    robot: Robot, line: WireDraws, history: History, found: Estimate, joint_m: Floats, content: PoseHistoryJson
-) -> list[Notice]:
-    out = [*_lost(history.times_s, found.track), *_contradicted(history, found, line.count), *_unsure_clock(content)]
-    out += _dynamics(history.times_s, found.plain.position_m[0])
-    holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
-    longest = float(np.diff(history.times_s[holds]).max())
-    lengths = inverse.lengths(robot, joint_m)[0]
-    out += draws.wire_warnings(robot, line, found.track.tension_N, longest, lengths)
-    plain = found.plain
-    return out + sag.sag_warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
-
-
-def _lost(times_s: Floats, track: Track) -> list[Notice]:
-    """That the platform falls, or that wires go slack, in some of the draws."""
-    out = []
-    lost = 1.0 - track.held[:, -1].mean()
-    if lost > 0:
-        first = times_s[np.argmin(track.held.all(0))]
-        text = f"the platform falls or loses its hold in {100 * lost:.3g} % of the draws, first at {first:g} s"
-        out.append(Notice("fall", text))
-    slack = ((track.tension_N <= 0) & track.held[..., None]).any(1).mean(0)
-    for i in np.flatnonzero(slack > 0.05):
-        out.append(Notice("slack", f"wire {i + 1} goes slack in {100 * slack[i]:.0f} % of the draws"))
-    return out
-
-
-def _contradicted(history: History, found: Estimate, draws_used: int) -> list[Notice]:
-    """That the readings do not agree with the joint values, or that few draws agree with both."""
-    out = []
-    if history.read and not found.converged:
-        text = "the readings could not be brought together with the joint values: no mode was reached"
-        out.append(Notice("not-converged", text))
-    elif found.misfit is not None and found.misfit > _MISFIT:
-        text = (
-            f"the readings contradict joint values and wires: mean squared residual {found.misfit:.3g}, expected about "
-            "1; check signs, units, payload and the standard errors"
-        )
-        out.append(Notice("misfit", text))
-    if found.effective is not None and found.effective < _FEWEST:
-        then = "the bands' ends are rough" if found.used else "the readings are not used, the bands are those without"
-        text = (
-            f"only about {found.effective:.0f} of {draws_used} draws agree with the readings: {then}; take more "
-            "--draws, and check payload and standard errors"
-        )
-        out.append(Notice("few-draws", text))
-    return out
-
-
-def _unsure_clock(content: PoseHistoryJson) -> list[Notice]:
-    """That poses depend on when the wires' clocks restart."""
-    largest_mm = content["clock"]["largest_mm"]
-    distance = content["drift"][0]["distance_mm"]
-    widths = np.asarray(distance["q95"], float) - np.asarray(distance["q05"], float)
-    if not largest_mm > 0.5 * np.max(widths, initial=0.0, where=np.isfinite(widths)):
-        return []
-    text = (
-        f"when the wires' clocks restart matters here: by up to {largest_mm:.3g} mm, more than half of "
-        "the band; give a column hold to say it"
-    )
-    return [Notice("clock", text)]
-
-
-def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
-    """That a platform accelerates too much for its inertia to be left out.
-
-    Parameters
-    ----------
-    times_s : (t,) array
-    position_m : (t, 3) array
-        Between two rows the motion is taken to be even.
-    """
-    if len(times_s) < 3:
-        return []
-    step = np.diff(times_s)
-    speed = np.diff(position_m, axis=0) / step[:, None]
-    share = np.linalg.norm(np.diff(speed, axis=0), axis=1) / (0.5 * (step[1:] + step[:-1])) / GRAVITY
-    share = np.where(np.isfinite(share), share, 0.0)
-    k = int(share.argmax())
-    if share[k] <= _INERTIA:
-        return []
-    text = (
-        f"the platform's inertia is left out: at {times_s[k + 1]:.10g} s it takes {100 * share[k]:.2g} % of its weight "
-        "to accelerate it, so tensions and poses are those of a slower motion along the same way"
-    )
-    return [Notice("left-out", text)]
-
-
-def _pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> tuple[list[str], list[list[Any]]]:
-    """Mean, sd and quantiles of every coordinate, of the distance from the target, and the tensions."""
-    track = found.track
-    parts = {f"{axis}_m": track.position_m[..., i] for i, axis in enumerate("xyz")}
-    if robot.degrees == 6:
-        parts |= {f"r{axis}_rad": _turn(track.rotation)[..., i] for i, axis in enumerate("xyz")}
-    parts["distance_mm"] = 1e3 * np.linalg.norm(track.position_m - to.position_m, axis=-1)
-    columns: dict[str, Any] = {"time_s": history.times_s, "hold": track.hold + 1}
-    for name, values in parts.items():
-        quantity, unit = name.rsplit("_", 1)
-        columns |= {f"{quantity}_{label}_{unit}": value for label, value in _described(values).items()}
-    columns |= {f"tension_{i + 1}_N": _mean(track.tension_N[..., i]) for i in range(robot.legs)}
-    columns["held"] = track.held.mean(0)
-    return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
-
-
-def _correction_table(
-    robot: Robot, history: History, joint_m: Floats, change_m: Floats
-) -> tuple[list[str], list[list[Any]]]:
-    """Corrected joint values (motor angles too), and what they change, with its standard deviation."""
-    columns: dict[str, Any] = {"time_s": history.times_s}
-    joint_m = _mean(joint_m) if joint_m.ndim == 3 else joint_m
-    described = _described(change_m)
-    mean, sd = (winches.of_each_winch(robot, described[name]) for name in ("mean", "sd"))
-    joint = winches.of_each_winch(robot, joint_m) + mean
-    for i in range(robot.joints):
-        columns[f"joint_{i + 1}_m"] = joint[:, i]
-    if robot.drums is not None:
-        angle = winches.of_each_winch(robot, motor_angle(robot.drums, joint_m + described["mean"]))
-        known = winches.of_each_winch(robot, robot.drums.radius_m)
-        columns |= {f"motor_{i + 1}_rad": angle[:, i] for i in np.flatnonzero(known)}
-    for i in range(robot.joints):
-        columns[f"change_{i + 1}_mm"], columns[f"change_{i + 1}_sd_mm"] = 1e3 * mean[:, i], 1e3 * sd[:, i]
-    return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
-
-
-def _described(values: Floats) -> dict[str, Floats]:
-    """Mean, sd, 5, 50 and 95 % over the draws that have a value, by the labels of the tables' columns."""
-    mean = _mean(values)
-    sd = np.sqrt(_mean((values - mean) ** 2))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a row where no draw hangs has no quantiles
-        quantile = np.nanquantile if np.isnan(values).any() else np.quantile
-        low, middle, high = quantile(values, [0.05, 0.5, 0.95], axis=0)
-    return {"mean": mean, "sd": sd, "q05": low, "q50": middle, "q95": high}
-
-
-def _mean(values: Floats) -> Floats:
-    """Mean over the draws that have a value."""
-    good = np.isfinite(values)
-    return np.asarray(np.where(good, values, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan))

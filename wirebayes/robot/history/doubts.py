@@ -1,0 +1,148 @@
+"""What speaks against an answer about a history: poses out of reach, falls, readings that contradict, fast motion."""
+
+import numpy as np
+
+from wirebayes.json_files.pose_history import PoseHistoryJson
+from wirebayes.notice import Notice
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.history.corrections import Target
+from wirebayes.robot.history.estimate import Estimate
+from wirebayes.robot.history.follow import Track
+from wirebayes.robot.history.history import History
+from wirebayes.robot.mechanics import draws, sag
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.motion import inverse
+
+_FEWEST = 50  # effective draws; of so many, what lies beyond a 5 % quantile is 2 to 8 %
+_NAMED = 6  # times in a warning: as many as a line holds
+_INERTIA = 0.05  # of the weight: a force above it changes tensions by as much as the creep that is looked for
+_MISFIT = 2.0  # mean squared residual from which on the readings contradict the model
+
+
+def unreached(times_s: Floats, found: Estimate, to: Target, change_m: Floats) -> list[Notice]:
+    """Which commanded poses no corrections ``(n, t, w)`` lead to, though the platform still hangs then.
+
+    Parameters
+    ----------
+    times_s : (t,) array
+    found : Estimate
+    to : Target
+    change_m : (n, t, w) array
+        Corrections, NaN where there are none.
+    """
+    never = found.track.held.any(0) & ~np.isfinite(change_m).all(-1).any(0)
+    unheld = ~np.isfinite(to.tension_N).all(-1)
+    reasons = {
+        "no tensions within the bounds hold the platform at the pose": unheld,
+        "no draw's wires can pull as hard as it takes at the pose": ~unheld,
+    }
+    out = []
+    for reason, why in reasons.items():
+        rows = np.flatnonzero(never & why)
+        if rows.size:
+            times = ", ".join(f"{times_s[k]:.10g}" for k in rows[:_NAMED])
+            more = f" s and {rows.size - _NAMED} times more" if rows.size > _NAMED else " s"
+            out.append(Notice("unheld", f"{reason} commanded at {times}{more}: no corrections lead there"))
+    return out
+
+
+def history_warnings(
+    robot: Robot, line: WireDraws, history: History, found: Estimate, joint_m: Floats, content: PoseHistoryJson
+) -> list[Notice]:
+    """What speaks against poses that were found over time.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+    history : History
+    found : Estimate
+    joint_m : (t, w) or (n, t, w) array
+        Joint values at the rows.
+    content : dict
+        Of ``pose.json``, with ``clock`` and ``drift``.
+    """
+    out = [*_lost(history.times_s, found.track), *_contradicted(history, found, line.count), *_unsure_clock(content)]
+    out += _dynamics(history.times_s, found.plain.position_m[0])
+    holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
+    longest = float(np.diff(history.times_s[holds]).max())
+    lengths = inverse.lengths(robot, joint_m)[0]
+    out += draws.wire_warnings(robot, line, found.track.tension_N, longest, lengths)
+    plain = found.plain
+    return out + sag.sag_warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
+
+
+def _lost(times_s: Floats, track: Track) -> list[Notice]:
+    """That the platform falls, or that wires go slack, in some of the draws."""
+    out = []
+    lost = 1.0 - track.held[:, -1].mean()
+    if lost > 0:
+        first = times_s[np.argmin(track.held.all(0))]
+        text = f"the platform falls or loses its hold in {100 * lost:.3g} % of the draws, first at {first:g} s"
+        out.append(Notice("fall", text))
+    slack = ((track.tension_N <= 0) & track.held[..., None]).any(1).mean(0)
+    for i in np.flatnonzero(slack > 0.05):
+        out.append(Notice("slack", f"wire {i + 1} goes slack in {100 * slack[i]:.0f} % of the draws"))
+    return out
+
+
+def _contradicted(history: History, found: Estimate, draws_used: int) -> list[Notice]:
+    """That the readings do not agree with the joint values, or that few draws agree with both."""
+    out = []
+    if history.read and not found.converged:
+        text = "the readings could not be brought together with the joint values: no mode was reached"
+        out.append(Notice("not-converged", text))
+    elif found.misfit is not None and found.misfit > _MISFIT:
+        text = (
+            f"the readings contradict joint values and wires: mean squared residual {found.misfit:.3g}, expected about "
+            "1; check signs, units, payload and the standard errors"
+        )
+        out.append(Notice("misfit", text))
+    if found.effective is not None and found.effective < _FEWEST:
+        then = "the bands' ends are rough" if found.used else "the readings are not used, the bands are those without"
+        text = (
+            f"only about {found.effective:.0f} of {draws_used} draws agree with the readings: {then}; take more "
+            "--draws, and check payload and standard errors"
+        )
+        out.append(Notice("few-draws", text))
+    return out
+
+
+def _unsure_clock(content: PoseHistoryJson) -> list[Notice]:
+    """That poses depend on when the wires' clocks restart."""
+    largest_mm = content["clock"]["largest_mm"]
+    distance = content["drift"][0]["distance_mm"]
+    widths = np.asarray(distance["q95"], float) - np.asarray(distance["q05"], float)
+    if not largest_mm > 0.5 * np.max(widths, initial=0.0, where=np.isfinite(widths)):
+        return []
+    text = (
+        f"when the wires' clocks restart matters here: by up to {largest_mm:.3g} mm, more than half of "
+        "the band; give a column hold to say it"
+    )
+    return [Notice("clock", text)]
+
+
+def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
+    """That a platform accelerates too much for its inertia to be left out.
+
+    Parameters
+    ----------
+    times_s : (t,) array
+    position_m : (t, 3) array
+        Between two rows the motion is taken to be even.
+    """
+    if len(times_s) < 3:
+        return []
+    step = np.diff(times_s)
+    speed = np.diff(position_m, axis=0) / step[:, None]
+    share = np.linalg.norm(np.diff(speed, axis=0), axis=1) / (0.5 * (step[1:] + step[:-1])) / GRAVITY
+    share = np.where(np.isfinite(share), share, 0.0)
+    k = int(share.argmax())
+    if share[k] <= _INERTIA:
+        return []
+    text = (
+        f"the platform's inertia is left out: at {times_s[k + 1]:.10g} s it takes {100 * share[k]:.2g} % of its weight "
+        "to accelerate it, so tensions and poses are those of a slower motion along the same way"
+    )
+    return [Notice("left-out", text)]

@@ -1,0 +1,101 @@
+"""The tables of an answer about a history: poses, and the joint values that bring the platform back."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.history.corrections import Target
+from wirebayes.robot.history.estimate import Estimate
+from wirebayes.robot.history.history import History
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics import winches
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.drums import motor_angle
+
+
+def pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> tuple[list[str], list[list[Any]]]:
+    """Mean, sd and quantiles of every coordinate, of the distance from the target, and the tensions.
+
+    Parameters
+    ----------
+    robot : Robot
+    history : History
+    found : Estimate
+    to : Target
+
+    Returns
+    -------
+    header : list of str
+    rows : list of lists
+    """
+    track = found.track
+    parts = {f"{axis}_m": track.position_m[..., i] for i, axis in enumerate("xyz")}
+    if robot.degrees == 6:
+        parts |= {f"r{axis}_rad": rotation_vectors(track.rotation)[..., i] for i, axis in enumerate("xyz")}
+    parts["distance_mm"] = 1e3 * np.linalg.norm(track.position_m - to.position_m, axis=-1)
+    columns: dict[str, Any] = {"time_s": history.times_s, "hold": track.hold + 1}
+    for name, values in parts.items():
+        quantity, unit = name.rsplit("_", 1)
+        columns |= {f"{quantity}_{label}_{unit}": value for label, value in _described(values).items()}
+    columns |= {f"tension_{i + 1}_N": mean_of_held(track.tension_N[..., i]) for i in range(robot.legs)}
+    columns["held"] = track.held.mean(0)
+    return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
+
+
+def correction_table(
+    robot: Robot, history: History, joint_m: Floats, change_m: Floats
+) -> tuple[list[str], list[list[Any]]]:
+    """Corrected joint values (motor angles too), and what they change, with its standard deviation.
+
+    Parameters
+    ----------
+    robot : Robot
+    history : History
+    joint_m : (t, w) or (n, t, w) array
+        Joint values before they are corrected.
+    change_m : (n, t, w) array
+
+    Returns
+    -------
+    header : list of str
+    rows : list of lists
+    """
+    columns: dict[str, Any] = {"time_s": history.times_s}
+    joint_m = mean_of_held(joint_m) if joint_m.ndim == 3 else joint_m
+    described = _described(change_m)
+    mean, sd = (winches.of_each_winch(robot, described[name]) for name in ("mean", "sd"))
+    joint = winches.of_each_winch(robot, joint_m) + mean
+    for i in range(robot.joints):
+        columns[f"joint_{i + 1}_m"] = joint[:, i]
+    if robot.drums is not None:
+        angle = winches.of_each_winch(robot, motor_angle(robot.drums, joint_m + described["mean"]))
+        known = winches.of_each_winch(robot, robot.drums.radius_m)
+        columns |= {f"motor_{i + 1}_rad": angle[:, i] for i in np.flatnonzero(known)}
+    for i in range(robot.joints):
+        columns[f"change_{i + 1}_mm"], columns[f"change_{i + 1}_sd_mm"] = 1e3 * mean[:, i], 1e3 * sd[:, i]
+    return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
+
+
+def _described(values: Floats) -> dict[str, Floats]:
+    """Mean, sd, 5, 50 and 95 % over the draws that have a value, by the labels of the tables' columns."""
+    mean = mean_of_held(values)
+    sd = np.sqrt(mean_of_held((values - mean) ** 2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a row where no draw hangs has no quantiles
+        quantile = np.nanquantile if np.isnan(values).any() else np.quantile
+        low, middle, high = quantile(values, [0.05, 0.5, 0.95], axis=0)
+    return {"mean": mean, "sd": sd, "q05": low, "q50": middle, "q95": high}
+
+
+def rotation_vectors(rotation: Floats) -> Floats:
+    """Rotation vectors; NaN where the platform has fallen."""
+    held = np.asarray(np.isfinite(rotation).all((-2, -1), keepdims=True))
+    return np.where(held[..., 0], turning.vector(np.where(held, rotation, np.eye(3))), np.nan)
+
+
+def mean_of_held(values: Floats) -> Floats:
+    """Mean over the draws that have a value."""
+    good = np.isfinite(values)
+    return np.asarray(np.where(good, values, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan))
