@@ -28,6 +28,7 @@ from wirebayes.wire.effect import Effect
 
 Report = Callable[[str, float, float], None]
 CLOSE = 0.00135  # risk on either side that a p on the level itself gives so few, or so many, exceedances
+_AT_ONCE = 100  # simulations of one piece: a tenth of a second or two, beside which what is sent hardly counts
 MOST_TIMES = 4  # as many simulations at most, in units of the requested number
 
 
@@ -227,9 +228,21 @@ def with_more(
     -------
     list of Replicates
     """
-    more = list(parallel_map(simulated_with_patterns, blocks, repeat(trials), repeat(n), rng.spawn(len(blocks))))
+    sizes = _pieces(n)
+    each_block = [block for block in blocks for _ in sizes]
+    each_size = sizes * len(blocks)
+    generators = rng.spawn(len(each_block))
+    made = list(parallel_map(simulated_with_patterns, each_block, repeat(trials), each_size, generators))
+    of_block = range(0, len(made), len(sizes))
+    more = [screening.joined_replicates(made[first : first + len(sizes)]) for first in of_block]
     pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
     return [screening.joined_replicates(parts) for parts in pairs]
+
+
+def _pieces(n: int) -> list[int]:
+    """Sizes of nearly equal pieces of n simulations, which processes share: as many whatever the number of cores."""
+    count = max(1, -(-n // _AT_ONCE))
+    return [n // count + (number < n % count) for number in range(count)]
 
 
 def _strike_gross_errors(
