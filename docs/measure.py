@@ -25,7 +25,7 @@ RESULTS = DOCS / "results"
 # what each study is called, with the file that it writes
 STUDIES = {
     "any_scale": ("-m analyses.posterior.any_scale --rows {folder} --output {folder}/any_scale.json", "any_scale.json"),
-    # 1d5.csv is a public file, named in the study's docstring
+    # 1d5.csv is a public file, named in the study's docstring; the others are data of tests
     "real_files": (
         "-m analyses.posterior.real_files --elastomer ../1d5.csv --output {folder}/real_files.json",
         "real_files.json",
@@ -178,33 +178,50 @@ def _any_scale(kept: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+_RECORDINGS = {
+    "tendon": "the relaxation of a tendon fascicle, as ``import`` makes a hold of it: the hold begins in the middle of "
+    "the ramp, and what followed the ramp by less than its time is left out",
+    "tendon_by_hand": "the same relaxation as somebody wrote it down, from the end of the ramp and all of it",
+    "pull": "a strip of VHB 4910 that is pulled at constant speed and never held, as a staircase of short holds with "
+    "N = 1, U = 1 and no preload",
+    "elastomer": "the relaxation of such a strip, which follows a power law",
+}
+_MODELS = {"preload_known": "without a preload", "preload_open": "with one", "linear": ""}
+
+
 def _real_files(kept: dict[str, Any]) -> str:
     """A paragraph on each public recording."""
-    about = {
-        "tendon": "the relaxation of a tendon fascicle",
-        "elastomer": "that of a strip of VHB 4910, which relaxes by a power law",
-    }
-    lines = [f"{_run_of(kept)} reads two public recordings."]
+    lines = [f"{_run_of(kept)} reads public recordings."]
     for file, found in kept["result"].items():
         plain, later = found["least_squares"], found["later"]
-        known, free = (
-            ", ".join(f"{name} {_three(low)} to {_three(high)}" for name, (low, _, high) in found[of].items())
-            for of in ("posterior", "posterior_with_preload")
-        )
-        numbers = ", ".join(f"{name} {_three(plain[name])}" for name in ("k1", "k2", "N"))
+        numbers = ", ".join(f"{name} {_three(plain[name])}" for name in ("k1", "k2", "N") if name in plain)
         fit, band, by_draws, by_plain = (
             _milli(value)
             for value in (plain["rms_N"], later["band_N"], later["posterior_rms_N"], later["least_squares_rms_N"])
         )
+        intervals = "; ".join(_intervals(called, one) for called, one in found["posterior"].items())
         lines += [
             "",
-            f"*{file.capitalize()}*: {about[file]}, {found['readings']} readings in {found['duration_s']:.0f} s. Least "
-            f"squares, without a preload, find {numbers}, fit to {fit}, and do not say what these are worth. 90 % "
-            f"intervals are {known} without a preload, {free} with one. From the first third of the time, "
+            f"*{file.replace('_', ' ').capitalize()}*: {_RECORDINGS[file]}; {found['readings']} readings in "
+            f"{found['duration_s']:.0f} s. Least squares, without a preload, find {numbers}, fit to {fit}, and do not "
+            f"say what these are worth. 90 % intervals: {intervals}. From the first third of the time, "
             f"{later['in_band_90']} of {later['readings']} later readings lie in their 90 % bands, {band} wide on "
-            f"average; rms {by_draws}, least squares {by_plain}.",
+            f"average{_or_not(later)}; rms {by_draws}, least squares {by_plain}.",
         ]
     return "\n".join(lines) + "\n"
+
+
+def _intervals(called: str, posterior: dict[str, Any]) -> str:
+    """Of the parameters of a fit, with what is wrong with it."""
+    names = [name for name in ("k1", "k2", "N") if name in posterior]
+    ends = ((name, posterior[name][0], posterior[name][2]) for name in names)
+    each = ", ".join(f"{name} {_three(low)} to {_three(high)}" for name, low, high in ends)
+    p = f"model check p = {posterior['model_check']:.2g}"
+    return " ".join(filter(None, [each, _MODELS[called], f"({p}{_or_not(posterior)})"]))
+
+
+def _or_not(fit: dict[str, Any]) -> str:
+    return "" if fit["converged"] else ", of a fit that did not converge"
 
 
 def _milli(newtons: float) -> str:

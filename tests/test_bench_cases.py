@@ -4,16 +4,20 @@ Most were simulated, so the truth is known; the tendons are public recordings, c
 Long recordings keep every second to fifth reading.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import wirebayes as wb
+from analyses.posterior import real_files
 from wirebayes.io import data_checks
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.model.build import build
 from wirebayes.views.posterior import Posterior
+from wirebayes.wire.staircase import simulate
 
 CASES = Path(__file__).parent / "data" / "bench"
 FEW = wb.Policy(walkers=64, round_draws=2048, ess=1000.0, most_steps=800)
@@ -132,6 +136,30 @@ def test_a_relaxation_from_one_ramp_is_one_hold_and_says_what_that_leaves_open()
     (hold,) = test.holds
     assert hold.setting == pytest.approx(0.716, abs=0.001)
     assert data_checks.ONE_HOLD in [notice.text for notice in data_checks.of_experiment(test)]
+
+
+@pytest.mark.parametrize(
+    ("read", "k1", "k2", "N"),
+    [
+        (lambda: real_files.written_by_hand(real_files.BY_HAND), 54.3, 0.241, 0.486),
+        (lambda: real_files.imported(real_files.TENDON, 14.33, ["Extension=displacement"]), 117.3, 0.967, 0.202),
+    ],
+    ids=["by hand, from the end of the ramp", "imported, from the middle of the ramp"],
+)
+def test_least_squares_of_a_tendon_depend_on_where_its_hold_begins(read, k1, k2, N):
+    (hold,) = read().holds
+    found = real_files.by_least_squares(hold.time_s, hold.readings, 14.33, 14.33 + hold.setting)
+    assert found[[0, 2, 3]] == pytest.approx([k1, k2, N], rel=2e-3)
+
+
+def test_a_pull_is_a_staircase_of_the_model():
+    """The study's own equations against the simulator's, from the linear law."""
+    (sample,) = build([replace(real_files.pulled(real_files.PULL, 80.0), priors=real_files.LINEAR)]).samples
+    wire = {"k1": 6.65, "B": 44.0, "U": 1.0, "k2": 0.16, "N": 1.0, "preload": 0.0}
+    own = {name: np.full(1, value) for name, value in wire.items()}
+    expected = simulate(sample.protocol, own, sample.model, np.zeros((len(sample.protocol.setting), 1)))
+    found = real_files.staircase((6.65, 44.0, 0.16), 80.0, sample.protocol.setting)
+    assert found == pytest.approx(expected[:, 0, 0], rel=1e-12)
 
 
 @pytest.mark.slow
