@@ -1,8 +1,8 @@
 """A pose of a robot on creeping wires."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ from wirebayes.commands.wires import (
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.json_files.plain import plain
+from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import computing
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
@@ -162,60 +163,96 @@ def pose(
     >>> known.summary()["history"]["calibration"]["holds"]
     9
     """
-    own, seed = path_of(own_effects), check_seed(seed)
     over_time = joints is not None or trajectory is not None
     draws = (OVER_TIME if over_time else DRAWS) if draws is None else draws
+    given = _Given(robot, wires, draws, experiment, path_of(own_effects), check_seed(seed), output, progress)
     _refuse_calibration(calibration is not None and not over_time)
-    payload, bare = float(payload), robot_of(robot)
-    machine = loaded(bare, payload, payload_at)
-    line = draws_for(machine, wires, draws, experiment, own)
-    asked = AskedPose(machine, line, *asked_place(machine, position, rotation), seed, own)
-    moments, tolerance, tolerance_tilt = rising_times(times), float(tolerance), float(tolerance_tilt)
-    above_zero(("--tolerance", tolerance), ("--tolerance-tilt", tolerance_tilt))
+    bare = robot_of(robot)
+    machine = loaded(bare, float(payload), payload_at)
+    line = given.draws_of(wires, machine)
+    asked = AskedPose(machine, line, *asked_place(machine, position, rotation), given.seed, given.own_effects)
+    allowed = _Allowed(rising_times(times), float(tolerance), float(tolerance_tilt))
+    allowed.check()
     specimen_spread = typical_spread(line, check_spread(specimen_spread, alike=False))
-    carried = {"--payload": payload, **spelled({"--payload-at": payload_at})}
+    carried = {"--payload": float(payload), **spelled({"--payload-at": payload_at})}
     at = spelled({"--position": position, "--rotation": rotation})
-
-    def begun(options: dict[str, Any]) -> Begun:
-        every = {"--experiment": experiment, **options}
-        decides = configuration("pose", robot, posterior_of(wires, experiment), draws, seed, own, every)
-        return Begun(decides, ResultFolder.at(output), progress)
-
     if over_time:
         _refuse_beside_history("--map-heights and --map-rotation", map_heights is not None or map_rotations is not None)
         _refuse_beside_history("--times and --other-fit", other_fit is not None or text_of(times) != text_of(TIMES_S))
         errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
         errors = calibrated_errors(errors, calibration, bare, line, wires, experiment)
         if joints is None:
-            return pose_along(asked, trajectory, errors, begun({**carried, **at}))
+            return pose_along(asked, trajectory, errors, given.begun({**carried, **at}))
         _refuse_both(trajectory is not None)
-        return pose_from_joints(asked, joints, errors, begun({**carried, **at}))
+        return pose_from_joints(asked, joints, errors, given.begun({**carried, **at}))
     slices = _slices(machine, map_heights, map_rotations)
-    other = None if other_fit is None else draws_for(machine, other_fit, draws, experiment, own)
-    fitted_otherwise = None if other_fit is None else content_hash(folder_of(other_fit, experiment) / POSTERIOR)
-    options = at | {
+    other = None if other_fit is None else given.draws_of(other_fit, machine)
+    options = {
+        **at,
         "--times": text_of(times),
-        "--tolerance": tolerance,
-        "--tolerance-tilt": tolerance_tilt,
+        "--tolerance": allowed.distance_mm,
+        "--tolerance-tilt": allowed.tilt_deg,
         "--specimen-spread": specimen_spread,
-        "--other-fit": fitted_otherwise,
+        "--other-fit": None if other_fit is None else content_hash(folder_of(other_fit, experiment) / POSTERIOR),
         **carried,
     }
     if slices is not LEVEL:
         options["--map-heights, --map-rotation"] = plain(asdict(slices))
-    there = balanced_orientation(machine, asked.position_m, asked.rotation_rad)
-    request = PoseRequest(
+    return pose_at(asked, _request(asked, allowed, specimen_spread, slices), other, given.begun(options))
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What a single pose and poses over time are given alike."""
+
+    robot: RobotLike
+    wires: Wires
+    draws: int
+    experiment: str | None
+    own_effects: Path | None
+    seed: int
+    output: PathLike | None
+    progress: Progress
+
+    def draws_of(self, wires: Wires, machine: Robot) -> WireDraws:
+        """Draws of the posterior of some wires, for the robot with its payload."""
+        return draws_for(machine, wires, self.draws, self.experiment, self.own_effects)
+
+    def begun(self, options: Mapping[str, Any]) -> Begun:
+        """Where results go, and what decides them."""
+        posterior = posterior_of(self.wires, self.experiment)
+        every = {"--experiment": self.experiment, **options}
+        decides = configuration("pose", self.robot, posterior, self.draws, self.seed, self.own_effects, every)
+        return Begun(decides, ResultFolder.at(self.output), self.progress)
+
+
+@dataclass(frozen=True)
+class _Allowed:
+    """How far the platform may be from its pose, and when that is looked at."""
+
+    times_s: Floats
+    distance_mm: float
+    tilt_deg: float
+
+    def check(self) -> None:
+        """Refuse what allows nothing."""
+        above_zero(("--tolerance", self.distance_mm), ("--tolerance-tilt", self.tilt_deg))
+
+
+def _request(asked: AskedPose, allowed: _Allowed, specimen_spread: float, slices: Slices) -> PoseRequest:
+    """The pose that is asked for, balance deciding what was left free."""
+    there = balanced_orientation(asked.robot, asked.position_m, asked.rotation_rad)
+    return PoseRequest(
         there.position_m,
         there.rotation,
-        moments,
-        tolerance_m=1e-3 * tolerance,
-        tolerance_rad=math.radians(tolerance_tilt),
+        allowed.times_s,
+        tolerance_m=1e-3 * allowed.distance_mm,
+        tolerance_rad=math.radians(allowed.tilt_deg),
         specimen_spread=specimen_spread,
-        seed=seed,
+        seed=asked.seed,
         slices=slices,
         orientation=there,
     )
-    return pose_at(asked, request, other, begun(options))
 
 
 def pose_at(asked: AskedPose, request: PoseRequest, other: WireDraws | None, begun: Begun) -> Pose:

@@ -16,6 +16,7 @@ from wirebayes.effects import source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.between_specimens import between_specimens
 from wirebayes.json_files.plain import plain
+from wirebayes.numeric.evenly import evenly
 from wirebayes.results import read_back
 from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics import schema
@@ -300,7 +301,7 @@ def wire_draws(stored: Stored, count: int) -> WireDraws:
     sample = stored.sample
     effects = tuple(sample.model.effects)
     names = [*CORE, *(c for e in material(effects) for c in e.columns())]
-    pick = np.unique(np.linspace(0, len(stored.draws["k1"]) - 1, count).round().astype(int))
+    pick = evenly(len(stored.draws["k1"]), count)
     protocol, readings = sample.protocol, sample.readings[..., 0][sample.protocol.mask]
     parameters = {name: stored.draws[name][pick] for name in names}
     if stored.length_exponent is not None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.discovery.settings import HOLD_LENGTHS, TIME_LENGTHS
+from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.protocol import Protocol
 
@@ -81,7 +82,7 @@ def _functions(protocol: Protocol, covariance: _Covariance, most: int) -> Array:
     """
     every = _Readings.of(protocol)
     n = len(every.hold)
-    some = every.rows(np.unique(np.linspace(0, n - 1, min(n, _DECOMPOSED)).round().astype(np.int64)))
+    some = every.rows(evenly(n, min(n, _DECOMPOSED)))
     values, vectors = np.linalg.eigh(covariance(some, some))
     top = np.argsort(values)[::-1][:most]
     size, vectors = np.sqrt(np.maximum(values[top], 0.0)), vectors[:, top]

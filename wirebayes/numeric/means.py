@@ -1,8 +1,10 @@
-"""Means of numbers that have no scale."""
+"""Means of numbers that have no scale, and of those that are there."""
 
 from collections.abc import Iterable
 
 import numpy as np
+
+from wirebayes.numeric.typing import Floats
 
 
 def geometric_mean(values: Iterable[float]) -> float:
@@ -13,3 +15,9 @@ def geometric_mean(values: Iterable[float]) -> float:
     mantissas, exponents = np.frexp(every)
     whole, rest = divmod(int(exponents.sum()), len(every))
     return float(np.ldexp(np.exp(np.log(mantissas).mean() + np.log(2.0) * rest / len(every)), whole))
+
+
+def mean_of_finite(values: Floats) -> Floats:
+    """Mean over the first axis of the values that are finite; NaN where none is."""
+    good = np.isfinite(values)
+    return np.asarray(np.where(good, values, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan))

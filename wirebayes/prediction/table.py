@@ -10,6 +10,7 @@ import xarray as xr
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.readings import READ, SET
 from wirebayes.notice import Notice
+from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import predict
 from wirebayes.prediction.request import ProtocolRequest
@@ -114,7 +115,7 @@ def _drawn(members: Sequence[tuple[float, ProtocolRequest]], seed: int, draws: i
     for probability, request in members:
         stored, n = request.stored, max(round(probability * draws), 2)
         theta = stored.theta
-        theta = theta[np.unique(np.linspace(0, len(theta) - 1, n).round().astype(int))]
+        theta = theta[evenly(len(theta), n)]
         parts.append(predict(stored.problem, theta, stored.sample, request.prediction, rng))
     return np.concatenate(parts, axis=-1)
 
@@ -150,7 +151,7 @@ class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __ini
         control: Control = "displacement" if "mean_N" in self else "force"
         unit, setting = READ_UNIT[control], SET[control]
         holds = np.unique(self["hold"].values)
-        named = holds[np.unique(np.linspace(0, len(holds) - 1, _MOST_NAMED).round().astype(int))]
+        named = holds[evenly(len(holds), _MOST_NAMED)]
         for hold in holds:
             rows = self.isel(reading=np.flatnonzero(self["hold"].values == hold))
             time = rows["time_s"].values

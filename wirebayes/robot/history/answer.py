@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from wirebayes.json_files.pose_history import ClockJson, DriftOverTime, HistoryReadings, PoseHistoryJson
 from wirebayes.json_files.values import Band, Statistic
 from wirebayes.notice import to_json
+from wirebayes.numeric.evenly import evenly
+from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.balanced import balanced
@@ -19,7 +21,7 @@ from wirebayes.robot.history.doubts import history_warnings, unreached
 from wirebayes.robot.history.estimate import Estimate, Progress, estimate_poses
 from wirebayes.robot.history.follow import RESTART, Track, follow_log
 from wirebayes.robot.history.history import History
-from wirebayes.robot.history.tables import correction_table, mean_of_held, pose_table, rotation_vectors
+from wirebayes.robot.history.tables import correction_table, pose_table, rotation_vectors
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, winches
 from wirebayes.robot.mechanics import rotation as turning
@@ -85,7 +87,7 @@ def history_report(
     progress : function of name, done and total
     """
     history = balanced(robot, history)
-    rows = _shown(len(history.times_s))
+    rows = evenly(len(history.times_s), _SHOWN)
     content = _requested(robot, line, history, errors)
     asked = _Asked(robot, history, start, errors, seed)
     try:
@@ -118,11 +120,6 @@ def history_report(
         "corrections.csv": correction_table(robot, history, joint, change),
     }
     return HistoryAnswer(content, tables, rows, found, to)
-
-
-def _shown(rows: int) -> NDArray[np.intp]:
-    """Of so many rows, those that ``pose.json`` and pictures show."""
-    return np.unique(np.linspace(0, rows - 1, _SHOWN).round().astype(int))
 
 
 @dataclass(frozen=True)
@@ -174,7 +171,7 @@ def _alike(errors: Uncertain) -> Uncertain:
 
 def _corrected(joint_m: Floats, change_m: Floats) -> Floats:
     """Joint values to be set, of which measured ones are the same in every draw."""
-    return mean_of_held(joint_m + change_m) if joint_m.ndim == 2 else joint_m + mean_of_held(change_m)
+    return mean_of_finite(joint_m + change_m) if joint_m.ndim == 2 else joint_m + mean_of_finite(change_m)
 
 
 def _with_agreement(readings: HistoryReadings, found: Estimate) -> HistoryReadings:
@@ -279,7 +276,7 @@ def _bands(values: Floats) -> Band:
 
 def _clock(line: WireDraws, run: _Again) -> ClockJson:
     """How far poses move if the wires' clocks start once and run on: no test of holds shows which they do."""
-    few = line.part(np.unique(np.linspace(0, line.count - 1, _CLOCK_DRAWS).round().astype(int)))
+    few = line.part(evenly(line.count, _CLOCK_DRAWS))
     anew, once = run(few, RESTART), run(few, np.inf)
     apart = np.linalg.norm(anew.position_m - once.position_m, axis=-1)
     middle = np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.nan for row in apart.T])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.conditioning import LogReadings, draw_posterior, find_mode, slack_wires
 from wirebayes.robot.history.follow import Track, clock_starts, follow_log, refined_joints
@@ -98,7 +99,7 @@ def estimate_poses(
     if mode is None:  # not even the mean wires hang in balance
         return replace(way.followed(known.draws), converged=False, effective=0.0, used=False)
     out = draw_posterior(lambda: unknowns(robot, line, errors, rng), read, mode, way.white, rng)
-    left = _mean(read.residual(out.track, np.zeros_like(out.white)))
+    left = mean_of_finite(read.residual(out.track, np.zeros_like(out.white)))
     used = out.effective >= min(_TOO_FEW, 0.5 * line.count)
     if used:
         found = Estimate(out.track, way.plain, *known.columns(out.white[:, : known.count]), way.starts_s)
@@ -107,12 +108,6 @@ def estimate_poses(
     squares = (left / read.of.sd) ** 2
     misfit = float(np.nanmean(squares)) if np.isfinite(squares).any() else np.nan
     return replace(found, misfit=misfit, converged=mode.converged, effective=out.effective, used=used)
-
-
-def _mean(left: Floats) -> Floats:
-    """Mean over the draws ``(n, t, m)`` that hold the platform; NaN where nothing was read."""
-    good = np.isfinite(left)
-    return np.asarray(np.where(good, left, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan))
 
 
 def log_readings(history: History, legs: int) -> Floats:

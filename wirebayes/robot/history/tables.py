@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.estimate import Estimate
@@ -39,7 +40,7 @@ def pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> t
     for name, values in parts.items():
         quantity, unit = name.rsplit("_", 1)
         columns |= {f"{quantity}_{label}_{unit}": value for label, value in _described(values).items()}
-    columns |= {f"tension_{i + 1}_N": mean_of_held(track.tension_N[..., i]) for i in range(robot.legs)}
+    columns |= {f"tension_{i + 1}_N": mean_of_finite(track.tension_N[..., i]) for i in range(robot.legs)}
     columns["held"] = track.held.mean(0)
     return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
 
@@ -63,7 +64,7 @@ def correction_table(
     rows : list of lists
     """
     columns: dict[str, Any] = {"time_s": history.times_s}
-    joint_m = mean_of_held(joint_m) if joint_m.ndim == 3 else joint_m
+    joint_m = mean_of_finite(joint_m) if joint_m.ndim == 3 else joint_m
     described = _described(change_m)
     mean, sd = (winches.of_each_winch(robot, described[name]) for name in ("mean", "sd"))
     joint = winches.of_each_winch(robot, joint_m) + mean
@@ -80,8 +81,8 @@ def correction_table(
 
 def _described(values: Floats) -> dict[str, Floats]:
     """Mean, sd, 5, 50 and 95 % over the draws that have a value, by the labels of the tables' columns."""
-    mean = mean_of_held(values)
-    sd = np.sqrt(mean_of_held((values - mean) ** 2))
+    mean = mean_of_finite(values)
+    sd = np.sqrt(mean_of_finite((values - mean) ** 2))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a row where no draw hangs has no quantiles
         quantile = np.nanquantile if np.isnan(values).any() else np.quantile
@@ -93,9 +94,3 @@ def rotation_vectors(rotation: Floats) -> Floats:
     """Rotation vectors; NaN where the platform has fallen."""
     held = np.asarray(np.isfinite(rotation).all((-2, -1), keepdims=True))
     return np.where(held[..., 0], turning.vector(np.where(held, rotation, np.eye(3))), np.nan)
-
-
-def mean_of_held(values: Floats) -> Floats:
-    """Mean over the draws that have a value."""
-    good = np.isfinite(values)
-    return np.asarray(np.where(good, values, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan))

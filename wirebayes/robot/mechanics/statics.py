@@ -84,6 +84,11 @@ def jacobian(robot: Robot, shape: Geometry) -> Floats:
     return J if robot.motions is None else np.einsum("ij,jwn->iwn", robot.motions, J)
 
 
+def wire_jacobian(robot: Robot, shape: Geometry) -> Floats:
+    """Change of the wires' lengths with a small motion, ``(6 or 3, w, n)``: of all the lines that each runs in."""
+    return jacobian(robot, shape) * robot.lines[:, None]
+
+
 def _with_moments(robot: Robot, u: Floats, r: Floats) -> Floats:
     """Vectors ``(3, w, n)`` at platform points with their moments about the reference point, as far as they count."""
     if robot.degrees == 3:

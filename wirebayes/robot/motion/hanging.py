@@ -338,7 +338,7 @@ def _first_tensions(robot: Robot, x: Floats, R: Floats) -> Floats:
     """Tensions that come nearest to balance, none below the lowest."""
     turn = np.moveaxis(R, 0, -1)
     shape = statics.geometry(robot, x.T, turn)
-    J = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0)[:, :3]
+    J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0)[:, :3]
     load = statics.weight(robot, turn).T[:, :3]
     tau = (np.linalg.pinv(J, rcond=1e-3) @ load[..., None])[..., 0]
     return np.asarray(np.clip(tau, max(robot.rule.lowest_N, 1e-3 * robot.mass_kg * GRAVITY), robot.rule.highest_N))

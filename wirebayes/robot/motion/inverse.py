@@ -60,7 +60,7 @@ def tensions(robot: Robot, position_m: Floats, rotation: Floats, choice: Choice 
     chosen = choice or CHOICES[rule.choice]
     R = np.moveaxis(rotation, 0, -1)
     shape = statics.geometry(robot, position_m.T, R)
-    structure = -statics.jacobian(robot, shape) * robot.lines[:, None]
+    structure = -statics.wire_jacobian(robot, shape)
     load = -statics.weight(robot, R)
     # Moments are brought to newtons so that the rank test and the residual weigh both alike.
     structure[3:] /= robot.size_m

@@ -44,7 +44,7 @@ def equations(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, 
     force, H = statics.unbalance_and_stiffness(robot, shape, turn, tau.T, np.zeros_like(tau.T))
     scale = scale_of(robot)
     by_turn = np.moveaxis(H, -1, 0)[:, :, 3:] * scale[:, None]
-    by_tension = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0) * scale[:, None]
+    by_tension = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0) * scale[:, None]
     return (force * scale[:, None]).T, by_turn, by_tension
 
 

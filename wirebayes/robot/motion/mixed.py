@@ -56,7 +56,7 @@ def newton_step_with_tensions(
     shape = statics.geometry(robot, pose[0].T, R)
     _, K = statics.unbalance_and_stiffness(robot, shape, R, tau, np.zeros_like(tau))
     K *= scale[:, None] * scale.T[..., None]
-    J = statics.jacobian(robot, shape) * robot.lines[:, None] * scale[:, None]
+    J = statics.wire_jacobian(robot, shape) * scale[:, None]
     load = -statics.weight(robot, R) * scale
     carried = stretched_length(wires, zero, tau)
     slope = tension(wires, np.maximum(carried, zero * (1.0 + _BARELY)), zero)[1]

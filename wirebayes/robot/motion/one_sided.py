@@ -70,7 +70,7 @@ def _bounds(
     both = np.where(np.isfinite(both), both, 0.0) * (scale * scale.T)
     values = np.asarray(np.linalg.eigvalsh(both), np.float64)
     least = values[:, 0].copy()
-    along = statics.jacobian(robot, shape) * robot.lines[:, None] * scale[:, None]
+    along = statics.wire_jacobian(robot, shape) * scale[:, None]
     taut = tension(wires, np.maximum(stretched, zero * (1.0 + TOUCHING)), zero)[1]
     for k in np.flatnonzero(known & touching.any(0) & (least <= _APART * values[:, -1])):
         on = touching[:, k]

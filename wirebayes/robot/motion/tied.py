@@ -140,7 +140,7 @@ def _here(robot: Robot, wires: Wires, cases: _Cases, creep: Floats, error: Float
     S = statics.stretched(robot, shape, offset.T)
     tau, slope = tension(wires, S, zero.T)
     gradient, H = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
-    J = statics.jacobian(robot, shape) * robot.lines[:, None] * scale[:, None, None]
+    J = statics.wire_jacobian(robot, shape) * scale[:, None, None]
     # a tension depends on the strain alone: by the zero-tension length it falls as it grows by the stretched one
     by_joint = slope.T * np.where(linear, robot.ratio, -(S.T / zero) * grown)
     tension_by_pose = np.moveaxis(slope * J, -1, 0).swapaxes(1, 2)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from wirebayes.json_files.pose import BetweenCalibrations, ControllerError, TimeWithin, Tolerances
+from wirebayes.numeric.evenly import evenly
 from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -79,7 +80,7 @@ def between_calibrations(
         For each spread, load history and controller: joints held still, or commands that compensate for the creep.
     """
     x, R = request.position_m, request.rotation
-    line = line.part(np.unique(np.linspace(0, line.count - 1, _DRAWS).round().astype(int)))
+    line = line.part(evenly(line.count, _DRAWS))
     load = np.repeat(inverse.tensions(robot, x[None], R[None]).T, line.count, 1)
     out: list[BetweenCalibrations] = []
     for spread in request.spreads:

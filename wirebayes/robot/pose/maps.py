@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.json_files.pose import SliceOfWorkspace
+from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import draws, plane
 from wirebayes.robot.mechanics.description import Robot
@@ -78,7 +79,7 @@ def map_slices(robot: Robot, line: WireDraws, slices: Slices) -> tuple[Map, ...]
     """
     if robot.freedom == "orientation":  # it has one position
         return ()
-    few = line.part(np.unique(np.linspace(0, line.count - 1, _DRAWS).round().astype(int)))
+    few = line.part(evenly(line.count, _DRAWS))
     wires = draws.for_robot(robot, few)
     where = claim.grid(robot, _GRID if (robot.upper_m > robot.lower_m).all() else _FLAT)
     if slices.heights_m is not None:

@@ -5,6 +5,7 @@ platform's edge. Where a wire may go slack its slope is the hull of both sides: 
 proofs.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -261,3 +262,8 @@ def _block(corner: Any, right: Any, below_right: Any, size: Any, below: Any = No
             if below is not None:
                 out[i + 3, j] = below[i, j] / size
     return out
+
+
+def above(balls: Sequence[Any]) -> Floats:
+    """The next number above each; infinite where a ball is."""
+    return np.array([np.nextafter(float(ball), np.inf) if ball.is_finite() else np.inf for ball in balls])

@@ -9,7 +9,7 @@ import numpy as np
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.proof.ball_arithmetic import Balance, Bounds
+from wirebayes.robot.proof.ball_arithmetic import Balance, Bounds, above
 from wirebayes.wire.laws import ElasticLaw
 
 
@@ -116,4 +116,4 @@ def _krawczyk(system: Balance, C: Floats, radius: Floats) -> Floats:
     for wrench, tau in pulls:
         image -= (precondition * wrench) * tau
     out = [image[i, 0].abs_upper() for i in range(d)]
-    return np.array([np.nextafter(float(v), np.inf) if v.is_finite() else np.inf for v in out])
+    return above(out)

@@ -12,7 +12,7 @@ import numpy as np
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import vector
-from wirebayes.robot.proof.ball_arithmetic import Balance, Strand
+from wirebayes.robot.proof.ball_arithmetic import Balance, Strand, above
 from wirebayes.wire.laws import ElasticLaw
 
 _UP = 1.0 + 1e-12  # more than the few roundings of a sum
@@ -182,7 +182,7 @@ def _image(
         change += (precondition * wire.wrench) * arb_mat([wire.by_parameter])
     image -= change * _column([middle.arb(0, 1)] * q)
     out = [image[k, 0].abs_upper() for k in range(d)]
-    return np.array([np.nextafter(float(v), np.inf) if v.is_finite() else np.inf for v in out])
+    return above(out)
 
 
 def _wire_in_box(middle: Balance, wide: Balance, i: int, box: _Box, G: Floats, H: Floats) -> _WireInBox:

@@ -86,51 +86,108 @@ def length_posterior(
 
     Returns
     -------
-    Calibration
+    LengthPosterior
     """
     mean, cov = prior.moments(robot.legs)
     root = np.asarray(np.linalg.cholesky(cov), np.float64)
-    m, d = len(readings), len(mean)
+    target = _Target(robot, prior, session, readings, mean, root)
     # Unknowns in units of their prior; references first brought near by the geometry of measured tensions.
-    white = np.zeros((m, d))
+    white = np.zeros((len(readings), len(mean)))
     white[:, : robot.legs] = starting_references(robot, prior, session, readings) / prior.reference_sd_m
-    here = predict(robot, prior, session, mean + white @ root.T)
-    cost = _cost(here, readings, white)
-    converged, damping = np.zeros(m, bool), np.full(m, 1e-3)
-    J = np.zeros((m, readings.shape[1], d))
-    moved = np.ones(m, bool)
+    mode = _mode(target, white, iterations)
+    here = mode.here
+    J, G, P = target.derivatives(mode.white, here)
+    spread = inv(np.swapaxes(J, 1, 2) @ J + np.eye(len(mean)))
+    variance = np.einsum("mwd,mde,mwe->mw", G, spread, G)
+    ended = np.sqrt(np.einsum("mxd,mde,mxe->mx", P, spread, P)).reshape(len(readings), -1, 6)
+    return LengthPosterior(
+        unknowns=mean + mode.white @ root.T,
+        covariance=root @ spread @ root.T,
+        length_m=here.length_m,
+        length_sd_m=np.sqrt(variance),
+        creep=here.creep,
+        position_m=here.position_m[:, -1],
+        rotation=here.rotation[:, -1],
+        begun_m=here.begun_m,
+        begun_rotation=here.begun_rotation,
+        ended_m=here.ended_m,
+        ended_rotation=here.ended_rotation,
+        ended_sd=ended,
+        misfit=((readings - here.readings) ** 2).mean(1),
+        p_joint=joint_test(mode.cost, readings.shape[1], mode.white, spread, robot.legs),
+        converged=mode.converged & here.solved,
+    )
+
+
+@dataclass(frozen=True)
+class _Target:
+    """The posterior of a session on ``m`` robots, by unknowns in units of their prior: ``mean + root @ white``."""
+
+    robot: Robot
+    prior: LengthPrior
+    session: Session
+    readings: Floats
+    mean: Floats
+    root: Floats
+
+    def predicted(self, white: Floats, near: tuple[Floats, Floats] | None = None) -> Prediction:
+        """What unknowns ``(m, d)`` lead to; `near` are poses at the beginning of every hold."""
+        return predict(self.robot, self.prior, self.session, self.mean + white @ self.root.T, near=near)
+
+    def derivatives(self, white: Floats, at: Prediction) -> tuple[Floats, Floats, Floats]:
+        """As `derivatives`, of some of the robots."""
+        return derivatives(self.robot, self.prior, self.session, self.mean, self.root, white, at)
+
+    def cost(self, at: Prediction, white: Floats) -> Floats:
+        """(m,) minus twice the log posterior; infinite where nothing holds the platform."""
+        value = ((self.readings - at.readings) ** 2).sum(1) + (white**2).sum(1)
+        return np.where(at.solved, value, np.inf)
+
+
+@dataclass(frozen=True)
+class _Mode:
+    """Where the search of the modes of ``m`` posteriors ended."""
+
+    white: Floats
+    here: Prediction
+    cost: Floats
+    converged: NDArray[np.bool_]
+
+
+def _mode(target: _Target, white: Floats, iterations: int) -> _Mode:
+    """Modes by Levenberg-Marquardt, all robots at once, from a start ``(m, d)``."""
+    m, d = white.shape
+    here = target.predicted(white)
+    cost = target.cost(here, white)
+    converged, moved, damping = np.zeros(m, bool), np.ones(m, bool), np.full(m, 1e-3)
+    J = np.zeros((m, target.readings.shape[1], d))
     for _ in range(iterations):
         open_ = np.flatnonzero(~converged & moved)  # where a step failed, the derivatives stay: they are the work
         if len(open_):
-            J[open_] = derivatives(robot, prior, session, mean, root, white[open_], _part(here, open_))[0]
+            J[open_] = target.derivatives(white[open_], _part(here, open_))[0]
         normal = np.swapaxes(J, 1, 2) @ J + np.eye(d)
-        slope = np.einsum("mrd,mr->md", J, readings - here.readings) - white
+        slope = np.einsum("mrd,mr->md", J, target.readings - here.readings) - white
         # What a whole step could still gain in twice the log posterior: below a thousandth, the mode is reached.
         decrement = np.einsum("md,md->m", slope, solve(normal, slope[..., None])[..., 0])
         # A mode on the edge of slackness has no zero slope; there, no step however short improves.
         converged |= (decrement < 1e-3) | (damping > 1e8)
         if converged.all():
             break
-        ridge = damping[:, None, None] * np.einsum("mdd->md", normal)[:, None] * np.eye(d)
-        step = solve(normal + ridge, slope[..., None])[..., 0]
+        step = _damped_step(normal, slope, damping)
         step[converged] = 0.0
-        there = predict(robot, prior, session, mean + (white + step) @ root.T, near=(here.begun_m, here.begun_rotation))
-        new = _cost(there, readings, white + step)
+        there = target.predicted(white + step, near=(here.begun_m, here.begun_rotation))
+        new = target.cost(there, white + step)
         better = new < cost - 1e-9 * np.where(np.isfinite(cost), cost, 0.0)
         white, moved = np.where(better[:, None], white + step, white), better
         damping = np.where(better, damping / 10, damping * 10)
         here, cost = _pick(better, there, here), np.where(better, new, cost)
-    J, G, P = derivatives(robot, prior, session, mean, root, white, here)
-    spread = inv(np.swapaxes(J, 1, 2) @ J + np.eye(d))
-    variance = np.einsum("mwd,mde,mwe->mw", G, spread, G)
-    ended = np.sqrt(np.einsum("mxd,mde,mxe->mx", P, spread, P)).reshape(m, -1, 6)
-    misfit = ((readings - here.readings) ** 2).mean(1)
-    return LengthPosterior(
-        mean + white @ root.T, root @ spread @ root.T, here.length_m, np.sqrt(variance), here.creep,
-        here.position_m[:, -1], here.rotation[:, -1], here.begun_m, here.begun_rotation,
-        here.ended_m, here.ended_rotation, ended, misfit,
-        joint_test(cost, readings.shape[1], white, spread, robot.legs), converged & here.solved,
-    )  # fmt: skip
+    return _Mode(white, here, cost, converged)
+
+
+def _damped_step(normal: Floats, slope: Floats, damping: Floats) -> Floats:
+    """Steps ``(m, d)`` by normal equations whose diagonals are larger by a share `damping` ``(m,)``."""
+    ridge = damping[:, None, None] * np.einsum("mdd->md", normal)[:, None] * np.eye(slope.shape[1])
+    return solve(normal + ridge, slope[..., None])[..., 0]
 
 
 def corrected_joints(
@@ -206,11 +263,6 @@ def derivatives(
     turned = rotation.vector(np.where(held, change, np.eye(3))).reshape(*p.ended_m.shape)
     poses = np.concatenate([p.ended_m, turned], -1).reshape(2 * d * m, -1)
     return difference(p.readings), difference(p.length_m), difference(poses)
-
-
-def _cost(p: Prediction, readings: Floats, white: Floats) -> Floats:
-    value = ((readings - p.readings) ** 2).sum(1) + (white**2).sum(1)
-    return np.where(p.solved, value, np.inf)
 
 
 def _pick(first: NDArray[np.bool_], a: Prediction, b: Prediction) -> Prediction:

@@ -40,7 +40,7 @@ def response(
     tau, slope = tension(wires, S, zero)
     _, H = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
     K = np.moveaxis(H, -1, 0)
-    J = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0)
+    J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0)
     motion = np.asarray(-solve(K, J), np.float64)
     change = slope.T[:, :, None] * (np.swapaxes(J, 1, 2) @ motion) + np.eye(robot.legs)
     # The tension depends on S/ℓ alone under either law, so its slope by ℓ follows from that by S.

@@ -94,7 +94,7 @@ def _located(
     for _ in range(_STEPS):
         shape = statics.geometry(robot, x, R)
         gap = statics.stretched(robot, shape, offset.T).T - goal
-        J = np.moveaxis(statics.jacobian(robot, shape) * robot.lines[:, None], -1, 0).swapaxes(1, 2) * scale(robot)
+        J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0).swapaxes(1, 2) * scale(robot)
         toward = np.zeros((len(gap), d))
         toward[:, :3] = (x.T - middle) * (robot.span_m / reach)
         pull = np.zeros(d)
