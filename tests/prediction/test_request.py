@@ -12,7 +12,7 @@ from wirebayes.io.readings import protocol_table
 from wirebayes.model.build import build
 from wirebayes.prediction.request import request_of
 from wirebayes.results.read_back import Stored
-from wirebayes.strict.table import Table
+from wirebayes.strict.table import CsvTable
 
 TRAINED = """hold,displacement_mm,time_s,tension_N,temperature_C
 1,1,0,1.00,20.0
@@ -40,7 +40,7 @@ def stored(tmp_path: Path) -> Stored:
     return Stored({"k1": np.ones(3)}, sample, "chain")
 
 
-def ask(folder: Path, text: str) -> Table:
+def ask(folder: Path, text: str) -> CsvTable:
     path = folder / "protocol.csv"
     path.write_text(text)
     return protocol_table(path)

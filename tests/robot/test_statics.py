@@ -80,11 +80,11 @@ def test_many_small_systems_are_solved_at_once(d):
     matrices[2] -= 5.0 * np.eye(d)  # not positive definite
     upper = np.moveaxis(np.triu(matrices), 0, -1)
     before = upper.copy(), right.T.copy()
-    x, positive = cholesky.solve(upper, right.T)
+    x, positive = cholesky.solve_symmetric(upper, right.T)
     np.testing.assert_array_equal(upper, before[0])
     np.testing.assert_array_equal(right.T, before[1])
     assert positive.tolist() == [k != 2 for k in range(7)]
     good = np.flatnonzero(positive)
     np.testing.assert_allclose(x.T[good], np.linalg.solve(matrices[good], right[good][..., None])[..., 0], rtol=1e-9)
     flat = np.moveaxis(np.broadcast_to(np.outer(right[0], right[0]), (1, d, d)), 0, -1)  # rank one: lost to rounding
-    assert not cholesky.solve(flat, right[:1].T)[1][0]
+    assert not cholesky.solve_symmetric(flat, right[:1].T)[1][0]

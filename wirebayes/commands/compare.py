@@ -152,7 +152,7 @@ def plan_comparison(
 
     Returns
     -------
-    Plan
+    ComparisonPlan
 
     Raises
     ------
@@ -214,7 +214,7 @@ def carry_out(plan: ComparisonPlan, output: PathLike | None, progress: Progress 
 
     Parameters
     ----------
-    plan : Plan
+    plan : ComparisonPlan
     output : path, optional
         Folder of the results; a temporary one when left out. Models judged there already are not judged again.
     progress : callable or None

@@ -83,7 +83,7 @@ def packed(experiment: Experiment, file: str, task: BatchTask) -> bytes:
     experiment : Experiment
     file : str
         Where it was read, for the table.
-    task : Task
+    task : BatchTask
         What to do with it.
 
     Returns

@@ -60,7 +60,7 @@ def candidates(
 
     Parameters
     ----------
-    base : Candidate
+    base : ModelToCompare
         Law, history and likelihood that the others share.
     known : mapping of name to effect class
     only : sequence of str, optional
@@ -191,7 +191,7 @@ def problem_of(candidate: ModelToCompare, training: Experiment, effects: Sequenc
 
     Parameters
     ----------
-    candidate : Candidate
+    candidate : ModelToCompare
         Parameters that it fixes leave the posterior.
     effects : sequence of Effect
         What `effects_of` returned.

@@ -49,7 +49,7 @@ class Task:
     ----------
     experiment : Experiment
         All its holds.
-    candidate : Candidate
+    candidate : ModelToCompare
     train_holds : int or None
         Learn from the first so many recorded holds only, for both judgements. None: leave one out among all holds,
         and predict the last third from the rest.

@@ -11,7 +11,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import experiment_of
 from wirebayes.io.readings import OPTIONAL, READ, REQUIRED, protocol_columns
 from wirebayes.strict.columns import columns_table, is_table, names_of
-from wirebayes.strict.table import Header, Table
+from wirebayes.strict.table import CsvTable, Header
 from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control
 
@@ -104,14 +104,14 @@ def from_arrays(
     return experiment_of(keys, lambda: table_of(columns, SOURCE, REQUIRED, OPTIONAL, may_be_empty=empty))
 
 
-def protocol_of_columns(columns: Any, control: Control = "displacement") -> Table:
+def protocol_of_columns(columns: Any, control: Control = "displacement") -> CsvTable:
     """The table of a protocol from a DataFrame or a mapping of columns; NaN in what is read is an empty cell."""
     return table_of(columns, Path("protocol"), *protocol_columns(control), may_be_empty=(READ[control],))
 
 
 def table_of(
     columns: Any, source: Path, required: Sequence[str], optional: Sequence[str], may_be_empty: Sequence[str] = ()
-) -> Table:
+) -> CsvTable:
     """Columns in memory as the table that the readers of files check.
 
     Parameters

@@ -14,7 +14,7 @@ from wirebayes.io.readings import SET, STRETCH, Hold, checked_readings, readings
 from wirebayes.numeric.frozen import frozen
 from wirebayes.strict.files import read_text
 from wirebayes.strict.hint import hint
-from wirebayes.strict.table import LARGEST, Table
+from wirebayes.strict.table import LARGEST, CsvTable
 from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control
 
@@ -102,14 +102,14 @@ def _read_one(keys: Keys, shared: dict[str, dict[str, Any]], shared_lines: dict[
     return replace(experiment, priors=shared | experiment.priors, prior_lines=lines)
 
 
-def experiment_of(keys: Keys, readings: Callable[[], Table]) -> Experiment:
+def experiment_of(keys: Keys, readings: Callable[[], CsvTable]) -> Experiment:
     """Check what is said of one test, then its readings.
 
     Parameters
     ----------
     keys : Keys
         ``name``, ``material``, ``length_mm`` and the optional keys of an experiment file.
-    readings : function that returns a Table
+    readings : function that returns a CsvTable
         Called once the keys before the readings are known to be right.
 
     Raises

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.numeric.frozen import frozen
-from wirebayes.strict.table import Table, read_table
+from wirebayes.strict.table import CsvTable, read_table
 from wirebayes.wire.protocol import Control
 
 REQUIRED = ("hold", "displacement_mm", "time_s", "tension_N")
@@ -75,12 +75,12 @@ class Hold:
         return self.readings if self.control == "displacement" else self.setting
 
 
-def readings_table(path: Path) -> Table:
+def readings_table(path: Path) -> CsvTable:
     """A readings' CSV split into fields, not checked any further."""
     return read_table(path, REQUIRED, OPTIONAL)
 
 
-def checked_readings(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
+def checked_readings(table: CsvTable, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
     """Check a table of readings.
 
     Parameters
@@ -130,12 +130,12 @@ def protocol_columns(control: Control) -> tuple[tuple[str, ...], tuple[str, ...]
     return ("hold", SET[control], "time_s"), (READ[control], *OPTIONAL)
 
 
-def protocol_table(path: Path, control: Control = "displacement") -> Table:
+def protocol_table(path: Path, control: Control = "displacement") -> CsvTable:
     """The CSV of a protocol to predict, split into fields: the readings' columns, with what is read optional."""
     return read_table(path, *protocol_columns(control))
 
 
-def protocol_holds(table: Table, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
+def protocol_holds(table: CsvTable, length_mm: float, control: Control = "displacement") -> tuple[Hold, ...]:
     """Check a protocol.
 
     The column of what is read, when there is one, is filled at most at the first time of a hold; every other
@@ -169,7 +169,7 @@ def protocol_holds(table: Table, length_mm: float, control: Control = "displacem
 class _Rows:
     """The columns of a table of readings, a value a row; `read` is NaN where nothing was read."""
 
-    table: Table
+    table: CsvTable
     control: Control
     number: Sequence[int]
     setting: Sequence[float]
@@ -238,7 +238,7 @@ class _Rows:
         )
 
 
-def _holds(table: Table, length_mm: float, control: Control, values: Sequence[float]) -> tuple[Hold, ...]:
+def _holds(table: CsvTable, length_mm: float, control: Control, values: Sequence[float]) -> tuple[Hold, ...]:
     count = range(len(table.rows))
     rows = _Rows(
         table,
@@ -266,7 +266,7 @@ def _holds(table: Table, length_mm: float, control: Control, values: Sequence[fl
     return tuple(holds)
 
 
-def _check_size(table: Table, holds: Sequence[Hold]) -> None:
+def _check_size(table: CsvTable, holds: Sequence[Hold]) -> None:
     """Refuse more readings than a fit can pad and hold in memory."""
     longest = max(hold.time_s.size for hold in holds)
     if len(holds) * longest > MOST:
@@ -275,7 +275,7 @@ def _check_size(table: Table, holds: Sequence[Hold]) -> None:
         raise InputError(f"{table.path}: found {found}, expected {expected}")
 
 
-def _temperatures(table: Table, values: Sequence[float]) -> list[float] | None:
+def _temperatures(table: CsvTable, values: Sequence[float]) -> list[float] | None:
     """Logged temperatures, where there is a column of them; a row without a reading need not have one."""
     if "temperature_C" not in table.header:
         return None
@@ -289,7 +289,7 @@ def _temperatures(table: Table, values: Sequence[float]) -> list[float] | None:
     return out
 
 
-def _check_displacement(table: Table, row: int, displacement: float, length_mm: float) -> None:
+def _check_displacement(table: CsvTable, row: int, displacement: float, length_mm: float) -> None:
     """Refuse a displacement that leaves no wire, or stretches it beyond what any thread bears."""
     if length_mm + displacement <= 0:
         expected = f"a displacement above -{length_mm:g} mm, the wire's length"
@@ -326,7 +326,7 @@ def times_run_on(times_s: Sequence[NDArray[np.float64]]) -> float:
     return float(np.exp(sum(lgamma(n + 1) for n in counts) - lgamma(sum(counts) + 1)))
 
 
-def _check_sign(table: Table, holds: Sequence[Hold]) -> None:
+def _check_sign(table: CsvTable, holds: Sequence[Hold]) -> None:
     """Refuse tensions that are clearly a push: a wire only pulls, and a slack one reads nothing but noise."""
     tension = np.concatenate([hold.tension_N for hold in holds])
     means = np.array([hold.tension_N.mean() for hold in holds])

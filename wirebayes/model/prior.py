@@ -77,7 +77,7 @@ class Prior:
         Parameters that are known and not sampled.
     logarithmic : frozenset of str
         Positive parameters, sampled as logarithms.
-    powers : dict of name to Power
+    powers : dict of name to PowerScaled
         Of parameters whose unit depends on an exponent, the other column or a number.
     """
 

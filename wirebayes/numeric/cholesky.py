@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from wirebayes.numeric.typing import Floats
 
 
-def solve(H: Floats, right: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def solve_symmetric(H: Floats, right: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Solve ``H x = right`` for symmetric matrices.
 
     Parameters

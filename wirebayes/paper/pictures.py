@@ -91,7 +91,7 @@ class Gallery:
         ----------
         published : dict of name to float
             The wire's row of Table 4; its curve is drawn hold by hold.
-        seen : mapping of likelihood to HeldOut
+        seen : mapping of likelihood to Forecast
         """
         for likelihood, out in seen.items():
             spoken = figures.WORDS[likelihood]

@@ -14,7 +14,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.read_back import Stored
 from wirebayes.sentences import counted
-from wirebayes.strict.table import Table
+from wirebayes.strict.table import CsvTable
 from wirebayes.wire.effect import EventEffect
 from wirebayes.wire.protocol import Protocol
 
@@ -40,12 +40,12 @@ class ProtocolRequest:
     sentence: str
 
 
-def request_of(table: Table, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
+def request_of(table: CsvTable, stored: Stored, *, fresh: bool = False) -> ProtocolRequest:
     """Check the table of a protocol against what was trained on.
 
     Parameters
     ----------
-    table : Table
+    table : CsvTable
         Rows of a protocol file, or of arrays given in its place: ``hold``, what is set (``displacement_mm``, or
         ``tension_N`` under weights) and ``time_s``, with ``temperature_C`` where the training data had it, and
         optionally what is read, filled only at a hold's first time.
@@ -135,7 +135,7 @@ def _listed(ranges: Sequence[tuple[int, int]]) -> str:
 class _File:
     """The holds of a protocol file, and where each reading stands in it."""
 
-    table: Table
+    table: CsvTable
     holds: tuple[Hold, ...]
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.strict.table import Table
+from wirebayes.strict.table import CsvTable
 
 
 def is_table(value: Any) -> bool:
@@ -22,7 +22,7 @@ def names_of(columns: Any) -> list[Any]:
     return list(columns.columns) if hasattr(columns, "columns") else list(columns)
 
 
-def columns_table(columns: Any, source: Path, may_be_empty: Callable[[str], bool]) -> Table:
+def columns_table(columns: Any, source: Path, may_be_empty: Callable[[str], bool]) -> CsvTable:
     """Columns as a table whose header is not checked yet.
 
     Parameters
@@ -53,7 +53,7 @@ def columns_table(columns: Any, source: Path, may_be_empty: Callable[[str], bool
 
 
 @dataclass(frozen=True)
-class _Columns(Table):
+class _Columns(CsvTable):
     """A table without lines: its rows are counted from 0, as indices are."""
 
     def place(self, row: int, column: str) -> str:

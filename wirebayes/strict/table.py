@@ -83,7 +83,7 @@ class Numbers:
 
 
 @dataclass(frozen=True)
-class Table:
+class CsvTable:
     """A CSV split into fields; `complain` turns a row and a column into a place a person can find.
 
     Attributes
@@ -197,7 +197,7 @@ class Table:
         return value
 
 
-def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> Table:
+def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> CsvTable:
     """Split a CSV into cells, each column once and every row as long as the header.
 
     Parameters
@@ -215,7 +215,7 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> 
     while not lines[-1].strip():
         lines.pop()
     cells = [[cell.strip() for cell in line.split(",")] for line in lines]
-    table = Table(path, cells[0], cells[1:])
+    table = CsvTable(path, cells[0], cells[1:])
     table.check_header(header)
     _check_lengths(table)
     if not table.rows:
@@ -223,10 +223,10 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> 
     return table
 
 
-def csv_table(source: Path, text: str) -> Table:
+def csv_table(source: Path, text: str) -> CsvTable:
     """The text of another program's CSV, split into cells: they may be quoted, and empty lines are passed over.
 
-    The header is not checked (`Table.check_header`).
+    The header is not checked (`CsvTable.check_header`).
 
     Raises
     ------
@@ -238,12 +238,14 @@ def csv_table(source: Path, text: str) -> Table:
     if not numbered:
         raise InputError(f"{source}, line 1: found nothing, expected a header and rows of numbers")
     (header_line, header), rows = numbered[0], numbered[1:]
-    table = Table(source, header, [row for _, row in rows], header_line=header_line, lines=[line for line, _ in rows])
+    table = CsvTable(
+        source, header, [row for _, row in rows], header_line=header_line, lines=[line for line, _ in rows]
+    )
     _check_lengths(table)
     return table
 
 
-def _check_lengths(table: Table) -> None:
+def _check_lengths(table: CsvTable) -> None:
     """Refuse a row that is longer or shorter than the header."""
     wanted = len(table.header)
     for row, cells in enumerate(table.rows):

@@ -16,7 +16,7 @@ from wirebayes.io.bench.table_numbers import COLUMN_ROLES
 from wirebayes.io.data_checks import falls
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import experiment_of
-from wirebayes.strict.table import Table
+from wirebayes.strict.table import CsvTable
 from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control
 
@@ -76,7 +76,7 @@ def as_experiment(
     extra: dict[str, Any] = {"control": control} if control != "displacement" else {}
     extra |= {RESOLUTION[control]: resolution} if resolution else {}
 
-    def readings() -> Table:
+    def readings() -> CsvTable:
         texts = [["" if value is None else repr(value) for value in row] for row in rows]
         return _RawReadings(table.sheet.path, list(header), texts, table, columns, origin)
 
@@ -84,7 +84,7 @@ def as_experiment(
 
 
 @dataclass(frozen=True)
-class _RawReadings(Table):
+class _RawReadings(CsvTable):
     """Readings whose complaints name the line and column of the raw file."""
 
     raw: RawTable

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 from wirebayes.io.bench.columns import Column
 from wirebayes.io.bench.quantities import Role
-from wirebayes.io.bench.sheet import Row, is_value
+from wirebayes.io.bench.sheet import SheetRow, is_value
 from wirebayes.io.bench.stamps import is_coarse
 from wirebayes.io.bench.table import RawTable
 from wirebayes.sentences import counted
@@ -31,7 +31,7 @@ def complete_rows(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTabl
     return replace(table, rows=tuple(kept)), notes
 
 
-def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Row], int]:
+def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[SheetRow], int]:
     """Rows in which something is read, and how many lines without numbers stand under them."""
     rows = list(table.rows)
     while rows and not any(is_value(rows[-1].cell(i)) for i in indices):
@@ -40,7 +40,7 @@ def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Ro
     return [row for row in rows if any(row.cell(i) for i in indices)], below
 
 
-def _filled(rows: list[Row], table: RawTable, columns: dict[Role, Column]) -> list[Row]:
+def _filled(rows: list[SheetRow], table: RawTable, columns: dict[Role, Column]) -> list[SheetRow]:
     """Rows with the hold and the displacement of the row above where they have none."""
     may_be_left_out = [columns[role].index for role in ("hold", "displacement") if role in columns]
     last = dict.fromkeys(may_be_left_out, "")
@@ -53,7 +53,7 @@ def _filled(rows: list[Row], table: RawTable, columns: dict[Role, Column]) -> li
     return filled
 
 
-def _without_repetitions(rows: list[Row], table: RawTable, time: int) -> list[Row]:
+def _without_repetitions(rows: list[SheetRow], table: RawTable, time: int) -> list[SheetRow]:
     """Rows that do not repeat the one above; with coarse times those are readings that agree, not copies."""
     kept = [row for i, row in enumerate(rows) if not i or row.cells != rows[i - 1].cells]
     times = [row.cells[time] for row in kept]
@@ -61,7 +61,7 @@ def _without_repetitions(rows: list[Row], table: RawTable, time: int) -> list[Ro
     return rows if repeating and is_coarse(replace(table, rows=tuple(rows)), time) else kept
 
 
-def _check_no_cell_is_empty(rows: list[Row], table: RawTable, columns: dict[Role, Column]) -> None:
+def _check_no_cell_is_empty(rows: list[SheetRow], table: RawTable, columns: dict[Role, Column]) -> None:
     for row in rows:
         for role, column in columns.items():
             if not row.cells[column.index]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from wirebayes.errors import InputError
 from wirebayes.io.bench import labview
 from wirebayes.io.bench.decode import UNICODE
-from wirebayes.io.bench.sheet import Row, Sheet, is_value
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
 
 _NAMES = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 LONGEST_LINE = 100_000  # characters: thousands of columns; Python's csv refuses longer cells
@@ -77,7 +77,7 @@ def _cells(line: str, sign: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])]
 
 
-def _rows(lines: list[str], sign: str) -> tuple[Row, ...]:
+def _rows(lines: list[str], sign: str) -> tuple[SheetRow, ...]:
     rows = []
     for number, line in enumerate(lines, start=1):
         sign_of_comment = _COMMENT.match(line)
@@ -86,5 +86,5 @@ def _rows(lines: list[str], sign: str) -> tuple[Row, ...]:
         while cells and not cells[-1]:
             cells.pop()
         if cells:
-            rows.append(Row(number, tuple(cells), bool(sign_of_comment)))
+            rows.append(SheetRow(number, tuple(cells), bool(sign_of_comment)))
     return tuple(rows)

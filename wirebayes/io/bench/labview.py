@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench.sheet import Row, Sheet, is_value
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
 
 _SIGNATURE = "LabVIEW Measurement"
 _END = "***End_of_Header***"
@@ -38,7 +38,7 @@ def sheet_of_measurement(path: Path, lines: list[str], encoding: str = "utf-8") 
     if not heads:
         raise InputError(f"{path}, line {len(lines)}: found no line {_TIMES}, expected a table of channels below it")
     header, *others = heads
-    rows = [Row(header + 1, _filled(split[header])), _units(split, header)]
+    rows = [SheetRow(header + 1, _filled(split[header])), _units(split, header)]
     for head in others:
         if split[head] != split[header]:
             found = f"the channels {', '.join(filter(None, split[head]))}"
@@ -46,7 +46,7 @@ def sheet_of_measurement(path: Path, lines: list[str], encoding: str = "utf-8") 
     for number, cells in enumerate(split[header + 1 :], start=header + 2):
         first = next((cell for cell in cells if cell), "")
         if is_value(first):  # the preamble of another segment begins with words
-            rows.append(Row(number, _filled(cells)))
+            rows.append(SheetRow(number, _filled(cells)))
     return Sheet(path, tuple(row for row in rows if row.cells), described="LabVIEW measurement", encoding=encoding)
 
 
@@ -55,7 +55,7 @@ def _is_head(split: list[list[str]], i: int) -> bool:
     return i > 0 and split[i - 1][0] == _END and not is_value(split[i][0]) and len([c for c in split[i] if c]) > 1
 
 
-def _units(split: list[list[str]], header: int) -> Row:
+def _units(split: list[list[str]], header: int) -> SheetRow:
     """The row of units that the preamble of the channels states: one for each of them, times before or between."""
     names = split[header]
     labels, dimensions, line = list[str](), list[str](), header
@@ -72,7 +72,7 @@ def _units(split: list[list[str]], header: int) -> Row:
         else:
             units.append(labels[channel] if channel < len(labels) and name != "Comment" else "")
             channel += 1
-    return Row(line + 1, _filled(units))
+    return SheetRow(line + 1, _filled(units))
 
 
 def _filled(cells: list[str]) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ _BARE_CLOCK = re.compile(rf"(?P<date>(?!))?{_CLOCK}", re.IGNORECASE)  # the same
 
 
 @dataclass(frozen=True)
-class Row:
+class SheetRow:
     """One line of a file.
 
     Attributes
@@ -59,7 +59,7 @@ class Sheet:
     Attributes
     ----------
     path : Path
-    rows : tuple of Row
+    rows : tuple of SheetRow
         Those that hold something.
     lettered : bool
         Whether people know its columns by letters.
@@ -70,7 +70,7 @@ class Sheet:
     """
 
     path: Path
-    rows: tuple[Row, ...]
+    rows: tuple[SheetRow, ...]
     lettered: bool = False
     described: str = ""
     encoding: str = "utf-8"

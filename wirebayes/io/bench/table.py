@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import ROLES, quantity_unit
-from wirebayes.io.bench.sheet import Row, Sheet, is_value
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
 
 _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
 LONGEST_HEADER = 200  # characters: names and units take a few words, prose is no header
@@ -23,7 +23,7 @@ class RawTable:
     header : tuple of str
     units : tuple of str
         Of the row of units under the header; empty texts where there is none.
-    rows : tuple of Row
+    rows : tuple of SheetRow
     header_line : int
     above : tuple of str
         Of the row above the header, which may name specimens; empty texts where there is none.
@@ -36,7 +36,7 @@ class RawTable:
     sheet: Sheet
     header: tuple[str, ...]
     units: tuple[str, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[SheetRow, ...]
     header_line: int
     above: tuple[str, ...] = ()
     specimen: str = ""
@@ -125,12 +125,12 @@ def find_table(sheet: Sheet) -> RawTable:
     return RawTable(sheet, header, padded, body, head.line, names)
 
 
-def _is_header(row: Row) -> bool:
+def _is_header(row: SheetRow) -> bool:
     """Whether a row names two columns or more, by words rather than by numbers."""
     return len(row.filled) > 1 and sum(map(is_value, row.filled)) <= len(row.filled) // 2
 
 
-def _check_names_are_short(sheet: Sheet, head: Row) -> None:
+def _check_names_are_short(sheet: Sheet, head: SheetRow) -> None:
     for column, cell in enumerate(head.cells):
         if len(cell) > LONGEST_HEADER:
             where = f"line {head.line}, column {sheet.column_name(column)}"
@@ -138,7 +138,7 @@ def _check_names_are_short(sheet: Sheet, head: Row) -> None:
             raise InputError(f"{sheet.path}, {where}: found {found}, expected at most {LONGEST_HEADER}")
 
 
-def _check_width(sheet: Sheet, head: Row, body: Sequence[Row], width: int) -> None:
+def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: int) -> None:
     """Refuse values to the right of the header."""
     named = len(head.cells)
     for row in body:
@@ -150,7 +150,7 @@ def _check_width(sheet: Sheet, head: Row, body: Sequence[Row], width: int) -> No
             )
 
 
-def _first(rows: tuple[Row, ...]) -> int | None:
+def _first(rows: tuple[SheetRow, ...]) -> int | None:
     """The first row of readings: one that is followed by rows like it."""
     measured = [not row.comment and _is_measured(row) for row in rows]
     for i, yes in enumerate(measured):
@@ -160,12 +160,12 @@ def _first(rows: tuple[Row, ...]) -> int | None:
     return None
 
 
-def _is_measured(row: Row) -> bool:
+def _is_measured(row: SheetRow) -> bool:
     values = sum(map(is_value, row.filled))
     return values >= 2 and 2 * values >= len(row.filled)
 
 
-def _are_units(row: Row) -> bool:
+def _are_units(row: SheetRow) -> bool:
     """Whether most cells are units, in brackets or not, or stand for none."""
     cells = [cell.strip("[]() ") for cell in row.filled]
     named = [cell for cell in cells if cell not in ("", "-", "–", "1", "#")]

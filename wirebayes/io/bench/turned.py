@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from wirebayes.io.bench.header import is_of, name_and_unit
 from wirebayes.io.bench.quantities import Role, quantity_unit
-from wirebayes.io.bench.sheet import Row, is_number
+from wirebayes.io.bench.sheet import SheetRow, is_number
 from wirebayes.io.bench.table import RawTable
 
 FEWEST = 3  # columns: two may be two sensors, with a number in their names
@@ -102,27 +102,27 @@ def _name_of_cells(table: RawTable, across: _Across, read: Role) -> tuple[str, s
     return name, stated if quantity_unit(stated, read) else ""
 
 
-def _by_row(table: RawTable, across: _Across, column: int) -> list[Row]:
+def _by_row(table: RawTable, across: _Across, column: int) -> list[SheetRow]:
     """A hold in each row."""
     return [
-        Row(row.line, (str(hold), row.cell(column), time, _reading(table, row, i)))
+        SheetRow(row.line, (str(hold), row.cell(column), time, _reading(table, row, i)))
         for hold, row in enumerate(table.rows, start=1)
         for i, time in across.values.items()
         if row.cell(i)
     ]
 
 
-def _by_column(table: RawTable, across: _Across, column: int) -> list[Row]:
+def _by_column(table: RawTable, across: _Across, column: int) -> list[SheetRow]:
     """A hold in each column."""
     return [
-        Row(row.line, (str(hold), row.cell(column), setting, _reading(table, row, i)))
+        SheetRow(row.line, (str(hold), row.cell(column), setting, _reading(table, row, i)))
         for hold, (i, setting) in enumerate(across.values.items(), start=1)
         for row in table.rows
         if row.cell(i)
     ]
 
 
-def _reading(table: RawTable, row: Row, column: int) -> str:
+def _reading(table: RawTable, row: SheetRow, column: int) -> str:
     cell = row.cell(column)
     if not is_number(cell):
         raise table.complain(row.line, column, repr(cell), "a number, or nothing where nothing was read")

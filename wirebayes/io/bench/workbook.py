@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench.sheet import Row, Sheet, is_value
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.strict.hint import hint
 
@@ -56,11 +56,11 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Shee
     return Sheet(path, rows[full[0]], lettered=True, described=f"sheet {full[0]}")
 
 
-def _measured(row: Row) -> bool:
+def _measured(row: SheetRow) -> bool:
     return sum(map(is_value, row.filled)) >= 2
 
 
-def _rows(sheet: Any) -> tuple[Row, ...]:
+def _rows(sheet: Any) -> tuple[SheetRow, ...]:
     out = []
     for line, cells in enumerate(sheet.iter_rows(), start=1):
         texts = [_text(cell) for cell in cells]
@@ -68,7 +68,7 @@ def _rows(sheet: Any) -> tuple[Row, ...]:
             texts.pop()
         if texts:
             comment = texts[0].startswith("#") and not texts[0].startswith("#N")  # "#N/A" is Excel's, not a person's
-            out.append(Row(line, (texts[0].lstrip("# "), *texts[1:]) if comment else tuple(texts), comment))
+            out.append(SheetRow(line, (texts[0].lstrip("# "), *texts[1:]) if comment else tuple(texts), comment))
     return tuple(out)
 
 

@@ -122,8 +122,8 @@ def find_mode(known: LogUnknowns, read: LogReadings, way: Way, without: NDArray[
 
     Parameters
     ----------
-    known : Unknowns
-    read : Readings
+    known : LogUnknowns
+    read : LogReadings
     way : function of white unknowns (n, d), a name, and wires that are left out
     without : (w,) bool array
         Wires that are left out.
@@ -158,7 +158,7 @@ def draw_posterior(
     ----------
     known : function
         Gives the unknowns with new draws of the prior.
-    read : Readings
+    read : LogReadings
     mode : Mode
     way : function of white unknowns (n, d), a name, and wires that are left out
     rng : numpy Generator

@@ -134,7 +134,7 @@ def plain_track(
 
     Parameters
     ----------
-    known : Unknowns
+    known : LogUnknowns
         Holds the robot and the mean wire.
     history : History
         With joint values.

@@ -14,7 +14,7 @@ from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import plausible
 from wirebayes.sentences import counted
 from wirebayes.strict.files import read_text
-from wirebayes.strict.table import LARGEST_READING, Header, Numbers, Table, csv_table
+from wirebayes.strict.table import LARGEST_READING, CsvTable, Header, Numbers, csv_table
 
 POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 PAYLOAD, CENTRE = "payload_kg", ("payload_x_m", "payload_y_m", "payload_z_m")
@@ -63,12 +63,12 @@ def read_log(path: Path, robot: Robot, columns_of: Callable[[Robot, Sequence[str
     return parse_log(csv_table(path, text), robot, columns_of)
 
 
-def parse_log(table: Table, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], Header]) -> History:
+def parse_log(table: CsvTable, robot: Robot, columns_of: Callable[[Robot, Sequence[str]], Header]) -> History:
     """A history from a table whose header is not checked yet.
 
     Parameters
     ----------
-    table : Table
+    table : CsvTable
     robot : Robot
     columns_of : callable
         `measured_columns` or `commanded_columns`.

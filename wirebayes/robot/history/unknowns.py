@@ -93,7 +93,7 @@ class LogUnknowns:
 
 
 def slopes(values: Floats) -> Floats:
-    """Derivatives ``(d, ...)`` by the white unknowns of values ``(1 + d, ...)`` at `Unknowns.differences`."""
+    """Derivatives ``(d, ...)`` by the white unknowns of values ``(1 + d, ...)`` at `LogUnknowns.differences`."""
     return np.asarray((values[1:] - values[0]) / _STEP)
 
 

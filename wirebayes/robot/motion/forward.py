@@ -269,7 +269,7 @@ def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, NDArra
     damped = at.H.copy()
     for i in range(robot.degrees):
         damped[i, i] += damping * level
-    step, positive = cholesky.solve(damped, -at.gradient)
+    step, positive = cholesky.solve_symmetric(damped, -at.gradient)
     indefinite = np.flatnonzero(~positive)
     if indefinite.size:
         part = damped[..., indefinite], at.gradient[:, indefinite], level[indefinite], cases.floor[indefinite]

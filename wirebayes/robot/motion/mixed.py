@@ -103,7 +103,7 @@ class _Quadratic:
         """Where the energy would be least if just these wires were taut, and whether it would."""
         stiff, at_rest = np.where(taut, self.slope, 0.0), np.where(taut, self.pull, 0.0)
         H = self.K + np.einsum("iwn,jwn->ijn", self.J * stiff, self.J)
-        return cholesky.solve(H, -(self.load + (self.J * at_rest).sum(1)))
+        return cholesky.solve_symmetric(H, -(self.load + (self.J * at_rest).sum(1)))
 
 
 def _lowest(energy: _Quadratic, taut: NDArray[np.bool_]) -> tuple[Floats, Floats]:

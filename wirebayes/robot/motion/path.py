@@ -198,5 +198,5 @@ def newton_step(robot: Robot, wires: Wires, start: tuple[Floats, Floats], length
         Displacement, m, then turn in metres at the platform's edge; NaN where the stiffness is not positive definite.
     """
     gradient, H = balance_at(robot, wires, *start, *lengths)
-    step, positive = cholesky.solve(H, -gradient)
+    step, positive = cholesky.solve_symmetric(H, -gradient)
     return np.where(positive, step, np.nan).T

@@ -13,7 +13,7 @@ from wirebayes.robot.mechanics.joint_columns import column_of_leg, meant
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
-from wirebayes.strict.table import Table
+from wirebayes.strict.table import CsvTable
 
 _FAR = 10.0  # times the robot's size: no wire is so long, and of millimetres those above a hundredth of it are noticed
 _TWICE = 2.0  # times its length: no wire stretches so far, but a wire of two lines looks so where one line was given
@@ -50,14 +50,14 @@ def wrong(robot: Robot, joint_m: Floats) -> tuple[tuple[int, int], str] | None:
     return None
 
 
-def refuse(robot: Robot, joint_m: Floats, table: Table, columns: Sequence[str]) -> None:
+def refuse(robot: Robot, joint_m: Floats, table: CsvTable, columns: Sequence[str]) -> None:
     """Refuse joint values of a table that cannot be meant.
 
     Parameters
     ----------
     robot : Robot
     joint_m : (t, w) array
-    table : Table
+    table : CsvTable
         Where they were read, a row a time.
     columns : sequence of str
         The columns of the joint values.

@@ -92,7 +92,7 @@ def usable(known: LengthPosterior) -> bool:
 
     Parameters
     ----------
-    known : Calibration
+    known : LengthPosterior
         Of one robot.
     """
     return bool(known.converged[0] and known.p_joint[0] >= SIGNIFICANT)

@@ -55,7 +55,7 @@ def calibrated(robot: Robot, prior: LengthPrior, session: Session, known: Length
     robot : Robot
     prior : LengthPrior
     session : Session
-    known : estimate.Calibration
+    known : estimate.LengthPosterior
         Of one robot. Biases of its sensors are averaged over.
     """
     own = replace(prior, bias_sd_N=0.0)

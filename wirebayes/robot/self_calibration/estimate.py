@@ -199,7 +199,7 @@ def corrected_joints(
     ----------
     robot : Robot
     prior : LengthPrior
-    known : Calibration
+    known : LengthPosterior
         Of m robots.
     position_m : (3,) array
     rotation : (3, 3) array

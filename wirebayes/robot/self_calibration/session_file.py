@@ -13,7 +13,7 @@ from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import plausible
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.strict.files import read_text
-from wirebayes.strict.table import LARGEST_READING, Header, Numbers, Table, csv_table
+from wirebayes.strict.table import LARGEST_READING, CsvTable, Header, Numbers, csv_table
 
 POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 NORMAL = ("normal_x", "normal_y")
@@ -70,13 +70,13 @@ def read_session(
 
 
 def parse_session(
-    table: Table, robot: Robot, tension_sd_N: float, tilt_sd_rad: float, biased: bool = False
+    table: CsvTable, robot: Robot, tension_sd_N: float, tilt_sd_rad: float, biased: bool = False
 ) -> tuple[Session, Floats]:
     """A session and its standardised readings from a table whose header is not checked yet.
 
     Parameters
     ----------
-    table : Table
+    table : CsvTable
     robot : Robot
     tension_sd_N, tilt_sd_rad : float
         As for `read_session`.
@@ -138,21 +138,21 @@ def _rotations(robot: Robot, position: Floats, turn: Floats) -> Floats:
     return np.asarray(np.where(known[:, None, None], matrix(turn), np.nan))
 
 
-def _motions_without_bias(table: Table) -> InputError:
+def _motions_without_bias(table: CsvTable) -> InputError:
     """The error for directions of motion that nothing depends on."""
     found = "directions of motion, but the sensors have no bias"
     expected = "--tension-bias N, or tension_bias_N under [sensors] in the robot's file"
     return InputError(f"{table.path}, {table.header_place()}: found {found}, expected {expected}")
 
 
-def _refuse_twice(table: Table, number: Floats) -> None:
+def _refuse_twice(table: CsvTable, number: Floats) -> None:
     """Refuse a hold's number that stands there before."""
     for row, value in enumerate(number.tolist()):
         if value in number[:row]:
             raise table.complain(row, "hold", f"{value:g} once more", "a row for each hold")
 
 
-def _refuse_half(table: Table, cells: Floats, name: str) -> None:
+def _refuse_half(table: CsvTable, cells: Floats, name: str) -> None:
     """Refuse rows with some of several cells empty."""
     given = np.isfinite(cells)
     half = given.any(1) & ~given.all(1)
