@@ -18,7 +18,8 @@ from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.estimate import corrected_joints, length_posterior
-from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
+from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 TENSION_SD_N, REFERENCE_SD_M, SPREAD, LOWEST_N = 0.02, 5e-3, 0.05, 2.5
 POSES, CANDIDATES, TESTS = 10, 200, 6

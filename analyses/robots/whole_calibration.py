@@ -2,7 +2,7 @@
 
 A robot stands at poses with tensions drawn anew for each; its anchors, reference lengths, wires and specimens are off
 from what the estimator is told, and its encoders read the true lengths with an error that it is not told. Sessions come
-from the forward statics with creep (`session.predict`), which the estimator does not use.
+from the forward statics with creep (`predicted.predict`), which the estimator does not use.
 
     python -m analyses.robots.whole_calibration coverage 200
     python -m analyses.robots.whole_calibration exact 120
@@ -36,6 +36,7 @@ from wirebayes.robot.self_calibration import (
     equations,
     holds_creep,
     posterior,
+    predicted,
     residuals,
     session,
     whole_answer,
@@ -93,11 +94,11 @@ def case(
     values = rng.multivariate_normal(mean, cov, 1)
     # two wires off their plane hold no pose that was chosen: commanded for the told robot, they hang where they hang
     commanded = robot if kind == "planar-2" else true
-    log = _visited(commanded, prior, values, rng, stops, 0.5 if tensions else 1.0)
+    log = visited(commanded, prior, values, rng, stops, 0.5 if tensions else 1.0)
     if log is None:
         return None
     with np.errstate(all="ignore"):
-        real = session.predict(true, prior, log, values)
+        real = predicted.predict(true, prior, log, values)
     if not real.solved[0] or not np.isfinite(real.readings).all():
         return None
     pull_N = real.readings[0].reshape(stops, robot.legs) * log.tension_sd_N
@@ -119,7 +120,7 @@ def case(
                 real.position_m[0], real.rotation[0], pull_N)  # fmt: skip
 
 
-def _visited(
+def visited(
     robot: Robot, prior: session.LengthPrior, values: np.ndarray, rng: np.random.Generator, stops: int, share: float
 ) -> session.Session | None:
     """Poses of the true robot, each with tensions near others drawn from a share of the range that its file allows."""

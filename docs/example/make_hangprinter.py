@@ -15,7 +15,8 @@ import numpy as np
 import wirebayes as wb
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
+from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 HERE = Path(__file__).parent
 LINE = {

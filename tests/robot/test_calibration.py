@@ -8,7 +8,8 @@ from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.estimate import corrected_joints, length_posterior
-from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
+from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.start import starting_references
 
 

@@ -207,7 +207,8 @@ def session_csv(tmp_path):
     from wirebayes.robot.mechanics import draws, rotation, schema
     from wirebayes.robot.motion import inverse
     from wirebayes.robot.self_calibration import session_file
-    from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
+    from wirebayes.robot.self_calibration.predicted import predict
+    from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
     robot = schema.read("linear-7")
     line = draws.WireDraws({k: np.full(3, v) for k, v in

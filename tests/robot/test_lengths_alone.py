@@ -13,8 +13,9 @@ from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import residuals
 from wirebayes.robot.self_calibration.equations import Holds
+from wirebayes.robot.self_calibration.predicted import predict
 from wirebayes.robot.self_calibration.seeds import best
-from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import summarised
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 

@@ -13,7 +13,8 @@ from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import answer, session_file
 from wirebayes.robot.self_calibration.estimate import length_posterior
-from wirebayes.robot.self_calibration.session import LengthPrior, Session, predict
+from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.trust import joint_test
 from wirebayes.strict.table import csv_table
 

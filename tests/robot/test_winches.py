@@ -13,13 +13,14 @@ from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.commands.import_robot import import_robot
 from wirebayes.errors import InputError
+from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import joint_columns, schema
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
+from wirebayes.robot.self_calibration import predicted, whole_answer
 from wirebayes.robot.self_calibration import session as sessions
-from wirebayes.robot.self_calibration import whole_answer
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
 
 G = 9.80665
@@ -234,37 +235,70 @@ def test_pose_and_its_log_know_winches(fitted, tmp_path):  # noqa: F811
     assert "joint_4_m" in header and "joint_5_m" not in header
 
 
-def test_calibration_finds_each_lines_own_length(tmp_path):
+def _calibrated(name, tmp_path):
+    """The printer, or a drawn robot of pairs, and the stiffness of its lines."""
+    if name == "printer":
+        return schema.read(printer(tmp_path, drum="")), 4000.0
+    robot, k1 = pairs(np.random.default_rng(2), int(name[-1]), 1e-3)
+    half = 0.1 * robot.span_m
+    lowest, highest = 0.02 * robot.mass_kg * G, 5.0 * robot.mass_kg * G
+    return replace(
+        robot, lower_m=robot.home_m - half, upper_m=robot.home_m + half,
+        rule=replace(robot.rule, lowest_N=lowest, highest_N=highest),
+    ), min(k1, 300.0 * robot.mass_kg * G)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["printer", "pairs-3", "pairs-4"])
+def test_calibration_finds_each_lines_own_length(name, tmp_path):
     """Pairs whose lines are off one by one, by encoders and by how each lies on its drum."""
-    robot = schema.read(printer(tmp_path, drum=""))
+    robot, k1 = _calibrated(name, tmp_path)
+    small, weight = 1e-3 * robot.span_m / 3.0, robot.mass_kg * G / 20.0
     rng = np.random.default_rng(4)
-    parameters = {"k1": 4000.0, "B": 0.1, "U": 1.0, "k2": 0.03, "N": 0.5}
+    parameters = {"k1": k1, "B": 400.0 / k1, "U": 1.0, "k2": 0.03, "N": 0.5}
     line = WireDraws({k: v * np.exp(0.02 * rng.normal(size=50)) for k, v in parameters.items()}, 1000.0)
-    prior = sessions.LengthPrior(line, 3e-3, 0.0)
+    prior = sessions.LengthPrior(line, 3 * small, 0.0)
     mean, covariance = prior.moments(robot.legs)
     value = rng.multivariate_normal(mean, covariance, 1)
-    value[0, : robot.legs] = 2e-3 * rng.normal(size=robot.legs)
+    value[0, : robot.legs] = 2 * small * rng.normal(size=robot.legs)
     wires, error = prior.wires(robot, value)
     stops = 14
-    x = rng.uniform(robot.lower_m, robot.upper_m, (4 * stops, 3))
+    x = rng.uniform(robot.lower_m, robot.upper_m, (8 * stops, 3))
     level = np.broadcast_to(np.eye(3), (len(x), 3, 3))
+    lowest = robot.rule.lowest_N
 
     def varied(structure, load, low, high):
-        return inverse.CHOICES["minimum_norm"](structure, load, rng.uniform(5.0, 20.0), high)
+        return inverse.CHOICES["minimum_norm"](structure, load, rng.uniform(1.0, 4.0) * lowest, high)
 
     tau = inverse.tensions(robot, x, level, varied)
     joint = inverse.commands(robot, wires.part(np.zeros(len(x), int)), x, level, tau).joint_m
     kept = np.flatnonzero(np.isfinite(joint).all(1))[:stops]
     assert len(kept) == stops
     x, level, joint = x[kept], level[kept], joint[kept]
-    log = sessions.Session(x, level, joint, np.full(stops, 30.0), np.ones(stops, bool), 0.05)
-    real = sessions.predict(robot, prior, log, value)
+    log = sessions.Session(x, level, joint, np.full(stops, 30.0), np.ones(stops, bool), 0.05 * weight)
+    real = predicted.predict(robot, prior, log, value)
     readings = real.readings[0] + rng.normal(size=real.readings.shape[1])
-    encoder = 1e-4 * rng.normal(size=(stops, robot.joints))[:, robot.winch]
-    read = joint + encoder + 1e-4 * rng.normal(size=joint.shape)
+    encoder = 0.1 * small * rng.normal(size=(stops, robot.joints))[:, robot.winch]
+    read = joint + encoder + 0.1 * small * rng.normal(size=joint.shape)
     nowhere = replace(log, position_m=np.full_like(x, np.nan), rotation=np.full(level.shape, np.nan), joint_m=read)
     found = whole_answer.calibration_report(robot, prior, StatedErrors(), nowhere, readings, 0, False, 0).content
     assert found["usable"], found["warnings"]
     off = np.array(found["references_m"]["mean"]) - error[0]
     assert np.abs(off / found["references_m"]["sd"]).max() < 4
-    assert np.median(found["references_m"]["sd"]) < 0.5 * 3e-3
+    told = 0.7 if name == "pairs-3" else 0.5  # six lines from above carry the weight in one way only
+    assert np.median(found["references_m"]["sd"]) < told * 3 * small
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4, 5])
+def test_the_exported_model_of_drawn_pairs_rests_in_mujoco(seed):
+    """Every line is a tendon as long as its winch makes it; the platform starts in the orientation that hangs there."""
+    mujoco = pytest.importorskip("mujoco")
+    robot, k1 = pairs(np.random.default_rng(seed), 3 + seed % 2, 1e-3)
+    if commanded(robot, k1) is None:
+        pytest.skip("nothing holds it")
+    line = WireDraws({"k1": np.full(2, k1), "B": np.zeros(2), "U": np.ones(2), "k2": np.full(2, 0.03),
+                      "N": np.full(2, 0.5)}, 1000.0)  # fmt: skip
+    model = mujoco.MjModel.from_xml_string(files.mujoco(robot, line))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert model.ntendon == robot.legs
+    assert np.abs(data.qacc).max() < 1e-6 * G

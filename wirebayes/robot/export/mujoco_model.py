@@ -46,7 +46,7 @@ def mjcf(
     towards_m : (w, 3) array, optional
         Where the pulleys look; default: to the platform points at the home pose.
     """
-    m, arm2 = robot.mass_kg, robot.size_m**2
+    m, arm2 = float(robot.mass_kg), robot.size_m**2
     turn = matrix(robot.home_rotation_rad)
     joints = _joints(robot, turn, damping_N_s_m)
     if towards_m is None:

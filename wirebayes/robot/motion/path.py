@@ -149,7 +149,7 @@ def _let_go(
 
 
 def settle(
-    robot: Robot, wires: Wires, near: tuple[Floats, Floats], lengths: tuple[Floats, Floats]
+    robot: Robot, wires: Wires, near: tuple[Floats, Floats], lengths: tuple[Floats, Floats], small: float = _SMALL
 ) -> forward.Equilibria:
     """Solutions hardly away from poses: one Newton step is exact enough for most, the others are solved in full.
 
@@ -161,6 +161,8 @@ def settle(
         Poses (n, 3), m, and (n, 3, 3), which the solutions are expected to be close to.
     lengths : (zero, offset)
         Zero-tension lengths (n, w) and lengths beyond the exit points, m.
+    small : float
+        Longest Newton step, of the platform's size, that is taken as the solution.
 
     Returns
     -------
@@ -172,7 +174,7 @@ def settle(
     tau = tensions_at(robot, wires, x, R, *lengths)
     out = forward.Equilibria(x, R, tau, np.full(n, forward.FOUND), np.ones(n, np.int64), np.zeros(n))
     # the error left is of the order of the step's square over a wire's length
-    far = np.flatnonzero(~(np.linalg.norm(step, axis=1) < _SMALL * robot.size_m))
+    far = np.flatnonzero(~(np.linalg.norm(step, axis=1) < small * robot.size_m))
     if far.size:
         rest = forward.solve(robot, wires.part(far), lengths[0][far], lengths[1][far], near[0][far], near[1][far])
         for field in fields(forward.Equilibria):

@@ -11,7 +11,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion.creep import CreepState
-from wirebayes.robot.self_calibration import session as sessions
+from wirebayes.robot.self_calibration import predicted
 from wirebayes.robot.self_calibration.estimate import LengthPosterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
@@ -44,7 +44,7 @@ class Calibrated:
 
     def carried(self, unknowns: Floats) -> CreepState:
         """Creep that wires of unknowns ``(n, d)`` carry out of the session; it depends on them as the readings do."""
-        return sessions.carried(self.robot, self.prior, self.session, unknowns)
+        return predicted.carried(self.robot, self.prior, self.session, unknowns)
 
 
 def calibrated(robot: Robot, prior: LengthPrior, session: Session, known: LengthPosterior) -> Calibrated:

@@ -16,7 +16,8 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.session import LengthPrior, Prediction, Session, predict
+from wirebayes.robot.self_calibration.predicted import Prediction, predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.start import starting_references
 from wirebayes.robot.self_calibration.trust import joint_test
 

@@ -80,7 +80,10 @@ def gaussian_posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: G
     covariance = inv(normal.matrix)
     by_robot = normal.by_robot
     hold = normal.inverse + by_robot @ covariance @ by_robot.swapaxes(1, 2)
-    good = down.converged and bool(np.isfinite(covariance).all() and np.isfinite(cost))
+    finite = bool(np.isfinite(covariance).all() and np.isfinite(hold).all() and (np.diag(covariance) > 0).all())
+    if not finite:  # a search that ended nowhere leaves what was known before
+        covariance, by_robot, hold = np.eye(len(covariance)), np.zeros_like(by_robot), np.zeros_like(hold)
+    good = down.converged and finite and bool(np.isfinite(cost))
     return Whole(unknowns, state, covariance, by_robot, hold, e, noise, np.inf, creep, good, cost, last_m)
 
 

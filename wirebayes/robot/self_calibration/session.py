@@ -1,10 +1,9 @@
-"""A calibration session: what the robot did and read, what was known before, and what any unknowns predict.
+"""A calibration session: what the robot did and read, and what was known before.
 
 Unknown are the error of every wire's reference length, the line's parameters, each specimen's own deviation and, where
 a prior allows it, the bias of each tension sensor: its zero, or friction of guides and winch between it and the wire.
 """
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,11 +21,8 @@ from wirebayes.robot.mechanics.draws import (
     spread_of,
 )
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward, inverse
-from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
 from wirebayes.robot.motion.drift import without_creep
 
-_LONGEST = 2.5  # in the logarithm of time: a third of a hold's thousandfold, between two updates of the tensions
 _LEAST = 1e-6  # relative: wires that are said to be alike still get a spread, far below anything that matters
 
 
@@ -169,151 +165,3 @@ def _own(line: WireDraws) -> list[str]:
     """The parameters of one line."""
     exponent = [name for name in (LENGTH_EXPONENT,) if name in line.parameters]
     return [*CORE, *(column for effect in line.material() for column in effect.columns()), *exponent]
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """Readings and state that unknowns lead to, ``n`` rows.
-
-    Attributes
-    ----------
-    readings : (n, r) array
-        Tensions of all read holds, then tilts, in units of their standard errors.
-    length_m, creep : (n, w) arrays
-        Zero-tension lengths at the end, creep included; their creep strain.
-    position_m, rotation : (n, q, 3), (n, q, 3, 3) arrays
-        Pose at every reading.
-    begun_m, begun_rotation : (n, p, 3), (n, p, 3, 3) arrays
-        Pose at the beginning of every hold.
-    ended_m, ended_rotation : (n, p, 3), (n, p, 3, 3) arrays
-        Pose at the end of every hold.
-    read_length_m : (n, q, w) array
-        Zero-tension lengths at every reading.
-    solved : (n,) bool array
-    """
-
-    readings: Floats
-    length_m: Floats
-    creep: Floats
-    position_m: Floats
-    rotation: Floats
-    begun_m: Floats
-    begun_rotation: Floats
-    ended_m: Floats
-    ended_rotation: Floats
-    read_length_m: Floats
-    solved: NDArray[np.bool_]
-
-
-def predict(
-    robot: Robot,
-    prior: LengthPrior,
-    session: Session,
-    unknowns: Floats,
-    longest_step: float = _LONGEST,
-    near: tuple[Floats, Floats] | None = None,
-) -> Prediction:
-    """Run the session for every row of unknowns ``(n, d)``: every creep step under the tensions it meets.
-
-    Parameters
-    ----------
-    robot : Robot
-    prior : LengthPrior
-    session : Session
-    unknowns : (n, d) array
-    longest_step : float
-        Longest step in the logarithm of time between tension updates; the first is a thousandth of the hold.
-    near : (n, p, 3), (n, p, 3, 3) arrays, optional
-        Where the holds are known to begin, about; default: the requested poses.
-    """
-    wires, error = prior.wires(robot, unknowns)
-    n = len(unknowns)
-    bias, sign = prior.bias_N(robot.legs, unknowns), iter(session.bias_sign)
-    solved = np.ones(n, bool)
-    tensions, lengths, begun, read, ended = [], [], [], [], []
-    for k, hold in enumerate(_holds(robot, wires, error, session, longest_step, near)):
-        here, length = hold.here, hold.bare_m * (1 + hold.state.strain(wires).T)
-        begun.append(hold.begun)
-        ended.append(here)
-        solved &= here.found
-        if session.read[k]:
-            read.append(here)
-            tensions.append(here.tension_N + bias * next(sign))
-            lengths.append(length)
-    position, turn = _poses(read)
-    readings = np.concatenate(tensions, 1) / session.tension_sd_N
-    if session.tilt_sd_rad is not None:
-        normals = turn[:, :, :2, 2].reshape(n, -1)
-        readings = np.concatenate([readings, normals / session.tilt_sd_rad], 1)
-    strain = np.broadcast_to(hold.state.strain(wires).T, length.shape)
-    return Prediction(
-        readings, length, strain, position, turn, *_poses(begun), *_poses(ended), np.stack(lengths, 1), solved
-    )
-
-
-def _poses(solved: Sequence[forward.Equilibria]) -> tuple[Floats, Floats]:
-    """Positions (n, p, 3) and rotations (n, p, 3, 3) of solved holds."""
-    return np.stack([one.position_m for one in solved], 1), np.stack([one.rotation for one in solved], 1)
-
-
-def carried(robot: Robot, prior: LengthPrior, session: Session, unknowns: Floats) -> CreepState:
-    """What the wires of every row of unknowns ``(n, d)`` carry out of the session.
-
-    Parameters
-    ----------
-    robot : Robot
-    prior : LengthPrior
-    session : Session
-    unknowns : (n, d) array
-
-    Returns
-    -------
-    CreepState
-        NaN where a row does not hold the platform.
-    """
-    wires, error = prior.wires(robot, unknowns)
-    lost = np.zeros(len(unknowns), bool)
-    for hold in _holds(robot, wires, error, session, _LONGEST):
-        lost |= ~hold.here.found
-    return replace(hold.state, elongation_mm=np.where(lost, np.nan, hold.state.elongation_mm))
-
-
-@dataclass(frozen=True)
-class _Hold:
-    """A hold of the session: the poses at its beginning and end, lengths before creep, and what is carried out."""
-
-    begun: forward.Equilibria
-    here: forward.Equilibria
-    bare_m: Floats
-    state: CreepState
-
-
-def _holds(
-    robot: Robot,
-    wires: Wires,
-    error_m: Floats,
-    session: Session,
-    longest_step: float,
-    near: tuple[Floats, Floats] | None = None,
-) -> Iterator[_Hold]:
-    """Every creep step of a session under the tensions it meets; arguments as in `predict`."""
-    n, legs = error_m.shape
-    state = fresh(legs, n)
-    for k, (joint, duration) in enumerate(zip(session.joint_m, session.duration_s, strict=True)):
-        bare, offset = inverse.lengths(robot, np.broadcast_to(joint, (n, legs)))
-        bare = bare + error_m
-        begin = (session.position_m[k], session.rotation[k]) if near is None else (near[0][:, k], near[1][:, k])
-        begun = here = forward.solve(robot, wires, bare * (1 + state.strain(wires).T), offset, *begin)
-        creep = HoldCreep(wires, state, here.tension_N.T)
-        for time in _steps(float(duration), longest_step):
-            state = creep.advance(time, here.tension_N.T)
-            here = forward.solve(
-                robot, wires, bare * (1 + state.strain(wires).T), offset, here.position_m, here.rotation
-            )
-        yield _Hold(begun, here, bare, state)
-
-
-def _steps(duration_s: float, longest: float) -> Floats:
-    """Times of a hold, geometrically spaced no wider than `longest`, after a first thousandth."""
-    steps = int(np.ceil(np.log(1e3) / longest))
-    return duration_s * 1e-3 ** (1 - np.arange(steps + 1) / steps)

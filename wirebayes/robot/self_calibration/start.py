@@ -14,7 +14,8 @@ from wirebayes.robot.mechanics import rotation, statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import stretched_length
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.session import LengthPrior, Prediction, Session, predict
+from wirebayes.robot.self_calibration.predicted import Prediction, predict
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 
 @dataclass(frozen=True)

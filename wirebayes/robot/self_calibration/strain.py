@@ -1,22 +1,21 @@
 """How much longer than its zero-tension length before creep a wire of known tension is: creep, then stretch.
 
 Creep follows the tensions of the whole session. Within a hold with fixed joint values it lengthens the wires and so
-lowers their tensions; the equilibrium's response says by how much.
+lowers their tensions (`within_holds`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.wires import Wires, stretched_length
-from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.robot.self_calibration.unknowns import Unknowns
+from wirebayes.robot.self_calibration.within_holds import Course, Loaded, crept
 
 _STEP = 1e-3  # of a prior's standard deviation: differences of smooth functions
 _LOAD = 1e-2  # relative change of all tensions
-_PASSES, _SAME = 8, 1e-4  # of a hold; of its largest tension: creep answers to a tenth of that
-_SHARES = np.array([1e-3, 1e-2, 1e-1, 1.0])  # of a hold's duration
 
 
 @dataclass(frozen=True)
@@ -30,11 +29,14 @@ class Grown:
         By the wires' unknowns in units of their prior.
     by_pull : (p, w) array
         By the hold's tension, 1/N.
+    course : Course, optional
+        How tensions came there.
     """
 
     strain: Floats
     by_wires: Floats
     by_pull: Floats
+    course: Course | None = None
 
 
 def differing_wires(unknowns: Unknowns, white: Floats) -> Wires:
@@ -74,7 +76,13 @@ def by_unknown(unknowns: Unknowns, values: Floats) -> Floats:
     return out
 
 
-def grown(unknowns: Unknowns, white: Floats, pull_N: Floats, response_N: Floats, duration_s: Floats) -> Grown:
+def grown(
+    unknowns: Unknowns,
+    white: Floats,
+    pull_N: Floats,
+    loaded: Callable[[Floats], Loaded],
+    known: Course | None = None,
+) -> Grown:
     """Creep of every hold under tensions that ended at known values.
 
     Parameters
@@ -83,9 +91,10 @@ def grown(unknowns: Unknowns, white: Floats, pull_N: Floats, response_N: Floats,
     white : (m,) array
     pull_N : (p, w) array
         Tensions when the holds ended; negative ones are slack.
-    response_N : (p, w, w) array
-        Change of the tensions when wires lengthen by a strain, at fixed joint values.
-    duration_s : (p,) array
+    loaded : function of (p, w, n) array to Loaded
+        What tensions of n columns that end so were before.
+    known : Course, optional
+        Of a state near by.
     """
     wires = differing_wires(unknowns, white)
     columns = _count(wires)
@@ -96,34 +105,14 @@ def grown(unknowns: Unknowns, white: Floats, pull_N: Floats, response_N: Floats,
     more = wires.part(np.concatenate([np.arange(columns), [0, 0]]))
     factor = np.ones(columns + 2)
     factor[-2:] = 1 + _LOAD, 1 - _LOAD
-    strain = _through(more, pull_N, factor, response_N, duration_s)
+    strain, course = crept(more, loaded(np.maximum(pull_N[..., None] * factor, 0.0)), known)
     slope = (strain[..., -2] - strain[..., -1]) / (2 * _LOAD * np.maximum(pull_N, 1e-300))
     taut = pull_N > 0
-    return Grown(strain[..., 0], by_unknown(unknowns, strain[..., :-2]), np.where(taut, slope, 0.0))
+    return Grown(strain[..., 0], by_unknown(unknowns, strain[..., :-2]), np.where(taut, slope, 0.0), course)
 
 
 def _count(wires: Wires) -> int:
     return max(np.shape(v)[-1] for v in wires.theta.values())
-
-
-def _through(wires: Wires, pull_N: Floats, factor: Floats, response_N: Floats, duration_s: Floats) -> Floats:
-    """Creep strains ``(p, w, n)`` at the end of every hold, for n wires under tensions times a factor."""
-    state = fresh(pull_N.shape[1], len(factor))
-    out = []
-    for k, duration in enumerate(duration_s):
-        end = np.maximum(pull_N[k, :, None] * factor, 0.0)
-        times = duration * _SHARES
-        path = np.array([end] * len(times))
-        for _ in range(_PASSES):  # first under the last tension, then under those that creep leads to it by
-            creep = HoldCreep(wires, state, path[0])
-            states = [creep.advance(float(time), tension) for time, tension in zip(times, path, strict=True)]
-            ahead = np.array([s.strain(wires) - states[-1].strain(wires) for s in [state, *states[:-1]]])
-            before, path = path, np.maximum(end + response_N[k] @ ahead, 0.0)
-            if np.abs(path - before).max() < _SAME * end.max():
-                break
-        state = states[-1]
-        out.append(state.strain(wires))
-    return np.stack(out)
 
 
 @dataclass(frozen=True)

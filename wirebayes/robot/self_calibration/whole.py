@@ -12,7 +12,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.descent import descend
 from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds, Noise, State, linearised
-from wirebayes.robot.self_calibration.holds_creep import creep_of
+from wirebayes.robot.self_calibration.holds_creep import ROUGHLY, creep_of
 from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
 from wirebayes.robot.self_calibration.residuals import noise_shown, usual_joint
 from wirebayes.robot.self_calibration.strain import Grown
@@ -22,6 +22,7 @@ _ROUNDS = 25  # of noise and creep
 _SOFT = 0.03  # of what is known best of tensions
 _WHOLE_ROUNDS = 3  # before creep goes half the way only
 _STILL = 0.05  # of every unknown's standard deviation
+_STEADY = 10.0  # creep may err as many times more as unknowns move by tenths of a standard deviation
 _SETTLED = 0.02  # of a noise, relative
 _CREEPING = 0.8  # slope of what is shown over what is thought: a secant of more would leap
 _UNEVEN = 0.3  # of the weight: tensions that were read badly, at a rough pose
@@ -57,7 +58,7 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
     """
     robot = unknowns.robot
     noise = _before_reading(unknowns, holds)
-    since, creep = state, creep_of(unknowns, holds, state)
+    since, creep = state, creep_of(unknowns, holds, state, roughly=ROUGHLY)
 
     state = _from_rough(unknowns, holds, noise, state, creep)
     if unknowns.errors.joint_m is None:
@@ -65,9 +66,10 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
         if np.isfinite(holds.tension_N).any():
             noise = replace(noise, joint_m=_shown(unknowns, holds, noise, state, creep, "loop"))
     rounds: list[tuple[Floats, Floats]] = []
+    roughly = ROUGHLY
     for _ in range(_ROUNDS):
         since = _between(since, state) if len(rounds) > _WHOLE_ROUNDS else state
-        creep = creep_of(unknowns, holds, since)
+        creep = creep_of(unknowns, holds, since, creep, roughly)
         down = descend(unknowns, holds, noise, state, creep, since)
         state = down.state
         last = inverse.lengths(robot, holds.session.joint_m[-1])[0]
@@ -76,6 +78,7 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
         found = replace(found, degrees=degrees)
         rounds.append((np.log([noise.joint_m, noise.balance]), shown))
         moved_on = np.abs(state.white - since.white) / np.sqrt(np.diag(found.covariance))
+        roughly = float(np.clip(_STEADY * moved_on.max(initial=0.0), 1.0, ROUGHLY))
         if np.abs(shown - rounds[-1][0]).max() < _SETTLED and moved_on.max(initial=0.0) < _STILL:
             return found
         joint, balance = np.exp(_ahead(rounds))

@@ -1,0 +1,124 @@
+"""What any unknowns predict of a session: its readings, poses and lengths, and what the wires carry out of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.motion import forward
+from wirebayes.robot.motion.creep import CreepState
+from wirebayes.robot.self_calibration.holding import LONGEST, holds
+from wirebayes.robot.self_calibration.session import LengthPrior, Session
+
+_RESOLVED = 1e-3  # of the weight: tensions on the way to what wires carry, whatever was read of them
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Readings and state that unknowns lead to, ``n`` rows.
+
+    Attributes
+    ----------
+    readings : (n, r) array
+        Tensions of all read holds, then tilts, in units of their standard errors.
+    length_m, creep : (n, w) arrays
+        Zero-tension lengths at the end, creep included; their creep strain.
+    position_m, rotation : (n, q, 3), (n, q, 3, 3) arrays
+        Pose at every reading.
+    begun_m, begun_rotation : (n, p, 3), (n, p, 3, 3) arrays
+        Pose at the beginning of every hold.
+    ended_m, ended_rotation : (n, p, 3), (n, p, 3, 3) arrays
+        Pose at the end of every hold.
+    read_length_m : (n, q, w) array
+        Zero-tension lengths at every reading.
+    solved : (n,) bool array
+    """
+
+    readings: Floats
+    length_m: Floats
+    creep: Floats
+    position_m: Floats
+    rotation: Floats
+    begun_m: Floats
+    begun_rotation: Floats
+    ended_m: Floats
+    ended_rotation: Floats
+    read_length_m: Floats
+    solved: NDArray[np.bool_]
+
+
+def predict(
+    robot: Robot,
+    prior: LengthPrior,
+    session: Session,
+    unknowns: Floats,
+    longest_step: float = LONGEST,
+    near: tuple[Floats, Floats] | None = None,
+) -> Prediction:
+    """Run the session for every row of unknowns ``(n, d)``: every creep step under the tensions it meets.
+
+    Parameters
+    ----------
+    robot : Robot
+    prior : LengthPrior
+    session : Session
+    unknowns : (n, d) array
+    longest_step : float
+        Longest step in the logarithm of time between tension updates; the first is a thousandth of the hold.
+    near : (n, p, 3), (n, p, 3, 3) arrays, optional
+        Where the holds are known to begin, about; default: the requested poses.
+    """
+    wires, error = prior.wires(robot, unknowns)
+    n = len(unknowns)
+    bias, sign = prior.bias_N(robot.legs, unknowns), iter(session.bias_sign)
+    solved = np.ones(n, bool)
+    tensions, lengths, begun, read, ended = [], [], [], [], []
+    for k, hold in enumerate(holds(robot, wires, error, session, session.tension_sd_N, longest_step, near)):
+        here, length = hold.here, hold.bare_m * (1 + hold.state.strain(wires).T)
+        begun.append(hold.begun)
+        ended.append(here)
+        solved &= here.found
+        if session.read[k]:
+            read.append(here)
+            tensions.append(here.tension_N + bias * next(sign))
+            lengths.append(length)
+    position, turn = _poses(read)
+    readings = np.concatenate(tensions, 1) / session.tension_sd_N
+    if session.tilt_sd_rad is not None:
+        normals = turn[:, :, :2, 2].reshape(n, -1)
+        readings = np.concatenate([readings, normals / session.tilt_sd_rad], 1)
+    strain = np.broadcast_to(hold.state.strain(wires).T, length.shape)
+    return Prediction(
+        readings, length, strain, position, turn, *_poses(begun), *_poses(ended), np.stack(lengths, 1), solved
+    )
+
+
+def _poses(solved: Sequence[forward.Equilibria]) -> tuple[Floats, Floats]:
+    """Positions (n, p, 3) and rotations (n, p, 3, 3) of solved holds."""
+    return np.stack([one.position_m for one in solved], 1), np.stack([one.rotation for one in solved], 1)
+
+
+def carried(robot: Robot, prior: LengthPrior, session: Session, unknowns: Floats) -> CreepState:
+    """What the wires of every row of unknowns ``(n, d)`` carry out of the session.
+
+    Parameters
+    ----------
+    robot : Robot
+    prior : LengthPrior
+    session : Session
+    unknowns : (n, d) array
+
+    Returns
+    -------
+    CreepState
+        NaN where a row does not hold the platform.
+    """
+    wires, error = prior.wires(robot, unknowns)
+    lost = np.zeros(len(unknowns), bool)
+    resolved = _RESOLVED * max(robot.mass_kg * GRAVITY, robot.rule.lowest_N)
+    for hold in holds(robot, wires, error, session, resolved):
+        lost |= ~hold.here.found
+    return replace(hold.state, elongation_mm=np.where(lost, np.nan, hold.state.elongation_mm))
