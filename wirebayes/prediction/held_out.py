@@ -200,7 +200,9 @@ def _chain_scores(
     protocol, read = experiment.protocol(), experiment.readings()[..., None]
     later = protocol.mask & requested[:, None]
     firsts = later & (np.arange(protocol.mask.shape[1]) == 0)
-    parts: list[tuple[Array, Array, Array]] = []
+    whole: list[Array] = []
+    first: list[Array] = []
+    together: list[Array] = []
     theta = evenly_thinned(fitted.flat)
     for start in range(0, len(theta), _CHUNK):
         own = fitted.problem.parameters(theta[start : start + _CHUNK], here)
@@ -208,11 +210,12 @@ def _chain_scores(
         noise = likelihoods.reading_variance(own["sensor_sd"], here.resolution), own["setting_sd"]
         with np.errstate(all="ignore"):
             before = likelihoods.chain(line, read, protocol.mask & ~requested[:, None], *noise)
-            holds, first = (likelihoods.held_out_density(line, before, read, rows, *noise) for rows in (later, firsts))
-            together = likelihoods.chain(line, read, protocol.mask, *noise).log_likelihood[requested].sum(axis=0)
-        parts.append((holds, first, together))
-    whole_hold, first_reading, every = (_log_mean(np.concatenate(v, axis=-1)) for v in zip(*parts, strict=True))
-    return whole_hold, whole_hold - first_reading, float(every)
+            whole.append(likelihoods.held_out_density(line, before, read, later, *noise))
+            first.append(likelihoods.held_out_density(line, before, read, firsts, *noise))
+            every = likelihoods.chain(line, read, protocol.mask, *noise)
+        together.append(every.log_likelihood[requested].sum(axis=0))
+    whole_hold, first_reading = _log_mean(np.concatenate(whole, axis=-1)), _log_mean(np.concatenate(first, axis=-1))
+    return whole_hold, whole_hold - first_reading, float(_log_mean(np.concatenate(together, axis=-1)))
 
 
 def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, requested: NDArray[np.bool_]) -> Array:

@@ -32,16 +32,27 @@ def pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> t
     rows : list of lists
     """
     track = found.track
-    parts = {f"{axis}_m": track.position_m[..., i] for i, axis in enumerate("xyz")}
-    if robot.degrees == 6:
-        parts |= {f"r{axis}_rad": rotation_vectors(track.rotation)[..., i] for i, axis in enumerate("xyz")}
-    parts["distance_mm"] = 1e3 * np.linalg.norm(track.position_m - to.position_m, axis=-1)
     columns: dict[str, Any] = {"time_s": history.times_s, "hold": track.hold + 1}
-    for name, values in parts.items():
-        quantity, unit = name.rsplit("_", 1)
-        columns |= {f"{quantity}_{label}_{unit}": value for label, value in _described(values).items()}
-    columns |= {f"tension_{i + 1}_N": mean_of_finite(track.tension_N[..., i]) for i in range(robot.legs)}
+    for i, axis in enumerate("xyz"):
+        columns |= _with_bands(axis, "m", track.position_m[..., i])
+    if robot.degrees == 6:
+        turn = rotation_vectors(track.rotation)
+        for i, axis in enumerate("xyz"):
+            columns |= _with_bands(f"r{axis}", "rad", turn[..., i])
+    columns |= _with_bands("distance", "mm", 1e3 * np.linalg.norm(track.position_m - to.position_m, axis=-1))
+    for i in range(robot.legs):
+        columns[f"tension_{i + 1}_N"] = mean_of_finite(track.tension_N[..., i])
     columns["held"] = track.held.mean(0)
+    return _as_table(columns)
+
+
+def _with_bands(quantity: str, unit: str, values: Floats) -> dict[str, Floats]:
+    """Columns of mean, sd and quantiles of a quantity."""
+    return {f"{quantity}_{label}_{unit}": value for label, value in _described(values).items()}
+
+
+def _as_table(columns: dict[str, Any]) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows of columns."""
     return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
 
 
@@ -66,17 +77,20 @@ def correction_table(
     columns: dict[str, Any] = {"time_s": history.times_s}
     joint_m = mean_of_finite(joint_m) if joint_m.ndim == 3 else joint_m
     described = _described(change_m)
-    mean, sd = (winches.of_each_winch(robot, described[name]) for name in ("mean", "sd"))
+    mean = winches.of_each_winch(robot, described["mean"])
+    sd = winches.of_each_winch(robot, described["sd"])
     joint = winches.of_each_winch(robot, joint_m) + mean
     for i in range(robot.joints):
         columns[f"joint_{i + 1}_m"] = joint[:, i]
     if robot.drums is not None:
         angle = winches.of_each_winch(robot, motor_angle(robot.drums, joint_m + described["mean"]))
         known = winches.of_each_winch(robot, robot.drums.radius_m)
-        columns |= {f"motor_{i + 1}_rad": angle[:, i] for i in np.flatnonzero(known)}
+        for i in np.flatnonzero(known).tolist():
+            columns[f"motor_{i + 1}_rad"] = angle[:, i]
     for i in range(robot.joints):
-        columns[f"change_{i + 1}_mm"], columns[f"change_{i + 1}_sd_mm"] = 1e3 * mean[:, i], 1e3 * sd[:, i]
-    return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
+        columns[f"change_{i + 1}_mm"] = 1e3 * mean[:, i]
+        columns[f"change_{i + 1}_sd_mm"] = 1e3 * sd[:, i]
+    return _as_table(columns)
 
 
 def _described(values: Floats) -> dict[str, Floats]:
