@@ -1,5 +1,7 @@
 """Starts for the calibration of a whole robot: poses from lengths, as far as these tell them."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
@@ -19,6 +21,7 @@ from wirebayes.robot.self_calibration.unknowns import Unknowns
 from wirebayes.robot.self_calibration.whole import estimate, with_levels
 
 _TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
+_WEAK = 1e-2  # pull towards the workspace and the home orientation, beside lengths
 _SMALL = 1e-3  # N of imbalance for which a tension may be 1 N smaller: decides among those that carry alike
 _OTHERS = 2  # further starts, where the first does not explain the readings
 
@@ -81,41 +84,70 @@ def _located(
     bare, offset = inverse.lengths(robot, joint)
     goal = np.repeat((bare + parts.reference_m) * ratio[lost], _TRIALS, 0)
     offset = np.repeat(offset, _TRIALS, 0)
-    middle, half = 0.5 * (robot.lower_m + robot.upper_m), 0.5 * (robot.upper_m - robot.lower_m)
-    half = np.maximum(half, 0.05 * robot.span_m)
-    x = middle + 1.2 * half * rng.uniform(-1, 1, (len(goal), 3))
+    search = _PoseSearch(robot, goal, offset)
+    trial = rng.uniform(-1, 1, (len(goal), 3))
     stated = np.repeat(holds.placed[lost], _TRIALS)
-    x = np.where(stated[:, None], np.repeat(position[lost], _TRIALS, 0), x)
+    x = search.middle + 1.2 * search.half * trial
+    x = np.where(stated[:, None], np.repeat(position[lost], _TRIALS, 0), x).T
     R = np.moveaxis(np.repeat(turn[lost], _TRIALS, 0), 0, -1)
-    x = x.T
-    d, reach = robot.degrees, 10 * half  # a weak pull towards the workspace and the home orientation
-    weak = 1e-2
-    home = turns.matrix(robot.home_rotation_rad)
     for _ in range(_STEPS):
+        step = search.step(x, R)
+        x = x + np.where(stated[:, None], 0.0, step[:, :3]).T
+        if robot.degrees == 6:
+            R = turns.compose(step[:, 3:].T, R)
+    bad = search.misfit(x, R).reshape(len(lost), _TRIALS)
+    chosen = np.arange(len(lost)) * _TRIALS + bad.argmin(1)
+    return x.T[chosen], np.moveaxis(R, -1, 0)[chosen]
+
+
+@dataclass(frozen=True)
+class _PoseSearch:
+    """Poses whose wires are as long as `goal` less `offset`, ``(n, w)`` m, pulled weakly towards workspace and home."""
+
+    robot: Robot
+    goal: Floats
+    offset: Floats
+
+    @property
+    def middle(self) -> Floats:
+        """(3,) of the workspace."""
+        return 0.5 * (self.robot.lower_m + self.robot.upper_m)
+
+    @property
+    def half(self) -> Floats:
+        """(3,) half of the workspace's sides, a flat one's too."""
+        half = 0.5 * (self.robot.upper_m - self.robot.lower_m)
+        return np.maximum(half, 0.05 * self.robot.span_m)
+
+    def gap(self, shape: statics.Geometry) -> Floats:
+        """(n, w) by how much wires are too long."""
+        return statics.stretched(self.robot, shape, self.offset.T).T - self.goal
+
+    def step(self, x: Floats, R: Floats) -> Floats:
+        """(n, d) Gauss-Newton steps, none longer than a fifth of the robot."""
+        robot = self.robot
         shape = statics.geometry(robot, x, R)
-        gap = statics.stretched(robot, shape, offset.T).T - goal
+        gap = self.gap(shape)
         J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0).swapaxes(1, 2) * scale(robot)
-        toward = np.zeros((len(gap), d))
-        toward[:, :3] = (x.T - middle) * (robot.span_m / reach)
-        pull = np.zeros(d)
+        reach = 10 * self.half
+        toward, pull = np.zeros((len(gap), robot.degrees)), np.zeros(robot.degrees)
+        toward[:, :3] = (x.T - self.middle) * (robot.span_m / reach)
         pull[:3] = robot.span_m / reach
-        if d == 6:
+        if robot.degrees == 6:
+            home = turns.matrix(robot.home_rotation_rad)
             toward[:, 3:] = turns.vector(np.moveaxis(R, -1, 0) @ home.T) * robot.size_m
             pull[3:] = 1.0
-        A = J.swapaxes(1, 2) @ J + weak**2 * np.diag(pull**2)
-        b = (J.swapaxes(1, 2) @ gap[..., None])[..., 0] + weak**2 * pull * toward
+        A = J.swapaxes(1, 2) @ J + _WEAK**2 * np.diag(pull**2)
+        b = (J.swapaxes(1, 2) @ gap[..., None])[..., 0] + _WEAK**2 * pull * toward
         step = -solve(A, b[..., None])[..., 0]
         size = np.linalg.norm(step, axis=1, keepdims=True)
-        step = step * np.minimum(1.0, 0.2 * robot.span_m / np.maximum(size, 1e-300)) * scale(robot)
-        x = x + np.where(stated[:, None], 0.0, step[:, :3]).T
-        if d == 6:
-            R = turns.compose(step[:, 3:].T, R)
-    shape = statics.geometry(robot, x, R)
-    gap = statics.stretched(robot, shape, offset.T).T - goal
-    out = np.maximum(np.abs(x.T - middle) - 1.2 * half, 0.0)
-    bad = np.nan_to_num((gap**2).sum(1) + (out**2).sum(1), nan=np.inf).reshape(len(lost), _TRIALS)
-    best = np.arange(len(lost)) * _TRIALS + bad.argmin(1)
-    return x.T[best], np.moveaxis(R, -1, 0)[best]
+        return step * np.minimum(1.0, 0.2 * robot.span_m / np.maximum(size, 1e-300)) * scale(robot)
+
+    def misfit(self, x: Floats, R: Floats) -> Floats:
+        """(n,) how badly poses close the loops, and how far outside the workspace they are."""
+        gap = self.gap(statics.geometry(self.robot, x, R))
+        out = np.maximum(np.abs(x.T - self.middle) - 1.2 * self.half, 0.0)
+        return np.nan_to_num((gap**2).sum(1) + (out**2).sum(1), nan=np.inf)
 
 
 def best(unknowns: Unknowns, holds: Holds, rng: np.random.Generator) -> Whole:
