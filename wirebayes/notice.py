@@ -34,6 +34,7 @@ KINDS = {
     "misfit": Kind("Readings contradict the model that should explain them by more than their stated errors.", True),
     "failed": Kind("Something could not be computed at all, for the reason given.", True),
     "unheld": Kind("No tensions hold the platform at a pose, or not those of every draw.", True),
+    "uncarried": Kind("No wire carries any weight, and the robot's file names no table or rail that does.", True),
     "fall": Kind("The platform falls or loses its hold, or is close to it.", True),
     "slack": Kind("A wire goes slack, or keeps little of its tension.", True),
     "break": Kind(

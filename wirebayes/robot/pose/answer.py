@@ -80,7 +80,7 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
     if turned.found is not None:
         content["orientation"] = turned.found
     if not content["feasible"]:
-        return _unheld(content, lifted or _why_not(robot, x, turned))
+        return _unheld(content, *((lifted, "unheld") if lifted else _why_not(robot, x, turned)))
     shared = draws.for_robot(robot, line)
     commands = inverse.commands(robot, shared, x[None], R[None], tau)
     content["feasible_draws"] = float(commands.feasible.mean())
@@ -155,24 +155,26 @@ def _warnings(held: _Held, courses: dict[float, Course], stable: bool, turned: O
     return out + _untested(held)
 
 
-def _unheld(content: PoseJson, sentence: str) -> Answer:
+def _unheld(content: PoseJson, sentence: str, kind: str = "unheld") -> Answer:
     """An answer that ends because nothing holds the platform, and why."""
     content["feasible"] = False
     content["sentence"] = sentence
-    content["warnings"] = unheld(sentence)
+    content["warnings"] = unheld(sentence, kind)
     return Answer(content, {})
 
 
-def _why_not(robot: Robot, x: Floats, turned: Orientation) -> str:
-    """Why nothing holds the platform at the requested pose."""
+def _why_not(robot: Robot, x: Floats, turned: Orientation) -> tuple[str, str]:
+    """Why nothing holds the platform at the requested pose, and of which kind of warning that is."""
     if not statics.geometry(robot, x[:, None], turned.rotation[..., None]).clear[0]:
-        return "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
+        nowhere = "A platform point lies on an exit point, inside a pulley or on its swivel axis: no wire runs there."
+        return nowhere, "unheld"
     if robot.motions is None and not _pulled_up(robot, x, turned.rotation):
-        return (
+        open_ = (
             "No wire pulls upwards, so the wires cannot carry the weight here. If a table or a rail carries the "
             "platform, say so in the robot's file: [plane] with normal = [0.0, 0.0, 1.0]."
         )
-    return turned.sentence or "No tensions within the bounds hold the platform at this pose."
+        return open_, "uncarried"
+    return turned.sentence or "No tensions within the bounds hold the platform at this pose.", "unheld"
 
 
 def _pulled_up(robot: Robot, x: Floats, R: Floats) -> bool:
@@ -181,15 +183,16 @@ def _pulled_up(robot: Robot, x: Floats, R: Floats) -> bool:
     return bool((-direction[2]).max() > _LEVEL)
 
 
-def unheld(sentence: str) -> list[NoticeJson]:
+def unheld(sentence: str, kind: str = "unheld") -> list[NoticeJson]:
     """The only warning of an answer that ends because nothing holds the platform.
 
     Parameters
     ----------
     sentence : str
         Why.
+    kind : str
     """
-    return to_json([Notice("unheld", sentence[:1].lower() + sentence[1:].rstrip("."))])
+    return to_json([Notice(kind, sentence[:1].lower() + sentence[1:].rstrip("."))])
 
 
 def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible: bool) -> PoseJson:
