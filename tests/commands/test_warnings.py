@@ -61,7 +61,7 @@ COMMANDS: dict[str, Callable[[Any, Path], Result[Any]]] = {
     "batch": lambda fitted, out: wb.batch([wire(), mixed()], discover=False, check=False, policy=HASTY, output=out),
     "plan": lambda fitted, out: wb.plan(wire(), tests=4, budget_min=0.5, output=out),
     "pose": lambda fitted, out: wb.pose("linear-7", fitted, draws=20, times=[0, 60], output=out),
-    "unheld": lambda fitted, out: wb.pose("linear-7", fitted, draws=20, position=[9, 9, 9], output=out),
+    "unheld": lambda fitted, out: wb.pose("linear-7", fitted, draws=20, position=[3, 3, 0.6], output=out),
     "trajectory": lambda fitted, out: wb.pose(
         "linear-7", fitted, draws=8, output=out,
         trajectory={"time_s": [0, 9000], "x_m": [0, 0], "y_m": [0, 0], "z_m": [0.6, 0.6]},

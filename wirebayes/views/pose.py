@@ -75,7 +75,7 @@ def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path, given: Given) -
             )
         return f"give the controller the joint values of {corrections}"
     if any(warning["kind"] == "uncarried" for warning in found["warnings"]):
-        return "[plane] in the robot's file, if a table or a rail carries the platform; else wires from above it"
+        return "[plane] in the robot's file, if a table or a rail carries the platform; else another pose"
     if lost or not found.get("feasible", True):
         return "another pose or payload, or other bounds of the tension in the robot's file"
     calibrate = f"wirebayes calibrate {given.file} READINGS.csv --wires {given.wires}"

@@ -89,7 +89,7 @@ _TERMS = ("90 % interval", "drift", "tilt", "controller", "specimen spread", "ex
 def _next(pose: PoseJson) -> str:
     """What to do with this answer."""
     if any(warning["kind"] == "uncarried" for warning in pose["warnings"]):
-        return "Next: [plane] in the robot's file, if a table or a rail carries the platform; else wires from above it."
+        return "Next: [plane] in the robot's file, if a table or a rail carries the platform; else another pose."
     if not pose["feasible"]:
         return "Next: another pose or payload, or other bounds of the tension in the robot's file."
     return "Next: wirebayes calibrate finds the wires' lengths again, once the drift is more than you allow."

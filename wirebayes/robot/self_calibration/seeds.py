@@ -169,6 +169,8 @@ def best(unknowns: Unknowns, holds: Holds, rng: np.random.Generator) -> Whole:
             white = np.zeros(unknowns.count)
             white[: unknowns.slices["drum"].start] = 0.5 * rng.standard_normal(unknowns.slices["drum"].start)
         other = estimate(unknowns, holds, seed(unknowns, holds, white, rng))
+        if not other.converged and other.evidence > found.evidence:  # likelier, and only short of rounds
+            other = estimate(unknowns, holds, other.state)
         if other.converged > found.converged or other.evidence > found.evidence:
             found = other
     return found
