@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wirebayes.discovery.profile import Profile, Top, integrated, is_close, top_of
+from wirebayes.discovery.profile import Profile, Top, has_near_neighbours, integral_of, top_of
 
 
 def width(value: list[float], grid: Any = (0.0, 1.0, 3.0, 4.0, 9.0)) -> Any:
@@ -44,8 +44,8 @@ def test_of_a_parabola_counts_what_lies_between_the_ends_of_the_prior(top: float
 @pytest.mark.parametrize(("drop", "close"), [(1.19, True), (1.21, False)])
 def test_neighbours_within_a_nat_or_so_are_close_enough(drop: float, close: bool) -> None:
     grid = np.array([0.0, 1.0, 2.0, 9.0])
-    assert is_close(Profile(grid, np.array([-0.5, 0.0, -drop, -50.0]), [])) == close
-    assert is_close(Profile(grid, np.array([0.0, -drop, -9.0, -50.0]), [])) == close
+    assert has_near_neighbours(Profile(grid, np.array([-0.5, 0.0, -drop, -50.0]), [])) == close
+    assert has_near_neighbours(Profile(grid, np.array([0.0, -drop, -9.0, -50.0]), [])) == close
 
 
 @pytest.mark.parametrize(("slope", "top"), [(3.0, 1.0), (-3.0, 0.0), (0.0, None)])
@@ -54,7 +54,7 @@ def test_an_amplitude_at_its_end_is_integrated(slope: float, top: float | None) 
     grid = np.linspace(0.05, 1.0, 20)
     profile = Profile(grid, 7.0 + slope * grid, [])
     assert top is None or abs(grid[profile.best] - top) < 0.06
-    log_bayes, sd = integrated(profile, 0.0, 100.0)
+    log_bayes, sd = integral_of(profile, 0.0, 100.0)
     exact = (np.exp(slope) - 1.0) / slope if slope else 1.0
     assert log_bayes == pytest.approx(7.0 + np.log(exact), abs=0.01 if slope >= 0 else 0.02)
     assert 0.2 < sd < 0.3

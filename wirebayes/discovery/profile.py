@@ -60,7 +60,7 @@ class Profile:
         return self.rows(converged) if converged.any() else self
 
 
-def is_close(profile: Profile) -> bool:
+def has_near_neighbours(profile: Profile) -> bool:
     """Whether the best amplitude's neighbours are so near it that nothing between them would be news."""
     best = profile.best
     beside = profile.value[max(best - 1, 0) : best + 2]
@@ -112,7 +112,7 @@ def top_of(profile: Profile, per_delta: float) -> Top | None:
     return Top(float(grid[best] + summit * scale * per_delta), float(sd), float(value[best] + rise))
 
 
-def integrated(profile: Profile, neutral: float, per_delta: float) -> tuple[float, float]:
+def integral_of(profile: Profile, neutral: float, per_delta: float) -> tuple[float, float]:
     """Log of the profile's integral over the amplitudes tried and up to neutral, and their standard deviation.
 
     Parameters

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.discovery.profile import Profile, integrated, is_close, top_of
+from wirebayes.discovery.profile import Profile, has_near_neighbours, integral_of, top_of
 from wirebayes.discovery.sharing import alike
 from wirebayes.inference.climb import Optimum
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
@@ -178,7 +178,7 @@ class _Amplitude:
 def _looked_closer(amplitude: _Amplitude, profile: Profile) -> Profile:
     """The profile with amplitudes about its top, followed outwards where that lies at an end."""
     outward = closer = 0
-    while closer < _CLOSER and not (closer and is_close(profile)):
+    while closer < _CLOSER and not (closer and has_near_neighbours(profile)):
         at = float(profile.amplitude[profile.best])
         at_end = profile.best in (0, len(profile.amplitude) - 1)
         if at_end and amplitude.low < at < amplitude.high and at != amplitude.neutral and outward < _OUTWARD:
@@ -278,7 +278,7 @@ def _summary(effect: Effect, which: Sequence[int], amplitude: _Amplitude, profil
     at = profile.amplitude[best : best + 1]
     top = top_of(profile, amplitude.per_delta)
     if top is None:
-        log_bayes, sd = integrated(profile, amplitude.neutral, amplitude.per_delta)
+        log_bayes, sd = integral_of(profile, amplitude.neutral, amplitude.per_delta)
     else:
         log_bayes, sd = top.log_integral(amplitude.low, amplitude.high), top.sd
     ends = [end.z[best : best + 1] for end in profile.ends]
