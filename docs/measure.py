@@ -63,9 +63,9 @@ STUDIES = {
     ),
     "robot_exact_geometry": ("-m analyses.robots.whole_calibration exact 240 --output {folder}/it.json", "it.json"),
     "discover_hidden": (
-        "-m analyses.hidden_effects --size small --answer api --simulations 199 --judge-draws 40 --kinds single pair "
-        "without foreign two three mixed periodic --deltas 5 10 --seed 5002 --protocols paper unloading uneven dense "
-        "temperature slack --output {folder}",
+        "-m analyses.hidden_effects --size small --answer api --simulations 199 --judge-draws 40 --kinds single "
+        "without foreign two three mixed periodic --seed 5005 --protocols paper unloading uneven dense temperature "
+        "slack --output {folder}",
         "scores.json",
     ),
     "real_wires": ("analyses/discovery/real_wires.py --together --output {folder}/wires.json", "wires.json"),
