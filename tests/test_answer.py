@@ -142,10 +142,12 @@ def test_a_pose_that_no_draw_keeps_to_the_end_is_said_to_be_none(tmp_path: Path)
 
 
 def test_a_pose_that_nothing_holds_leads_to_another_one(tmp_path: Path) -> None:
-    found = {"robot": "r", "feasible": False, "sentence": "No.", "wires": {}}
+    found = {"robot": "r", "feasible": False, "sentence": "No.", "wires": {}, "warnings": []}
     assert stored(Pose, tmp_path, "pose.json", found).next_step().startswith("another pose or payload")
     held = stored(Pose, tmp_path, "pose.json", found | {"feasible": True})
     assert held.next_step().startswith("wirebayes calibrate")
+    uncarried = found | {"warnings": [{"kind": "uncarried", "text": "No wire pulls upwards."}]}
+    assert stored(Pose, tmp_path, "pose.json", uncarried).next_step().startswith("[plane]")
 
 
 def test_lengths_that_did_not_converge_are_not_for_the_controller(tmp_path: Path) -> None:
@@ -176,7 +178,7 @@ def test_corrections_are_offered_only_where_there_are_some(
     (tmp_path / "corrections.csv").write_text(f"time_s,joint_1_m,change_1_mm\n0.0,,\n60.0,,{change}\n")
     band = {"q05": [0.0, end], "q50": [0.0, end], "q95": [0.0, end]}
     drift = {"distance_mm": band, "times_s": [0.0, 60.0], "specimen_spread": 0.0}
-    found = {"robot": "r", "feasible": True, "drift": [drift], "wires": {}}
+    found = {"robot": "r", "feasible": True, "drift": [drift], "wires": {}, "warnings": []}
     assert stored(Pose, tmp_path, "pose.json", found).next_step().startswith(begins)
     (tmp_path / "corrections.csv").unlink()
     alone = stored(Pose, tmp_path, "pose.json", found).next_step()

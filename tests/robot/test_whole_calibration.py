@@ -1,22 +1,21 @@
 """Calibration of whole robots from the command line: anchors unknown, poses unknown, lengths alone."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.stats import norm, t
 
 from tests.robot.test_commands import fitted, session_csv  # noqa: F401
 from wirebayes.cli import main
 from wirebayes.robot.mechanics import schema
-from wirebayes.robot.self_calibration import summary
+from wirebayes.robot.self_calibration import descent, summary
 
 
 def test_rows_without_a_pose_and_unknown_anchors_are_estimated(fitted, session_csv, tmp_path):  # noqa: F811
     file, truth = session_csv
-    lines = [line.split(",") for line in file.read_text().splitlines()]
-    for cells in lines[1:]:
-        cells[1:7] = [""] * 6
-    file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
+    _without_poses(file)
     out = tmp_path / "out"
     arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--draws", "40", "--anchor-sd", "0.5"]
     assert main([*arguments, "--next-poses", "2", "--output", str(out)]) == 0
@@ -36,3 +35,33 @@ def test_intervals_rest_on_as_many_degrees_of_freedom_as_follow_the_joint_error(
     wider = sd * summary._FACTOR ** np.array([1.0, 0.5, 0.0, 0.0])
     half = summary._half(sd, wider, 3.0)
     np.testing.assert_allclose(half, [t.ppf(0.95, 3), t.ppf(0.95, 12), norm.ppf(0.95), norm.ppf(0.95)], rtol=1e-5)
+
+
+def test_equations_that_are_singular_without_damping_are_damped(fitted, session_csv, tmp_path, monkeypatch):  # noqa: F811
+    """The first step comes out as no numbers: the estimate is found a step later."""
+    file, truth = session_csv
+    _without_poses(file)
+    made = descent.eliminated
+    asked = []
+
+    def singular(e, white, damping):
+        normal = made(e, white, damping)
+        asked.append(damping)
+        return replace(normal, matrix=np.full_like(normal.matrix, np.nan)) if len(asked) == 1 else normal
+
+    monkeypatch.setattr(descent, "eliminated", singular)
+    arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--draws", "40", "--anchor-sd", "0.5"]
+    assert main([*arguments, "--output", str(tmp_path / "out")]) == 0
+    assert asked[:2] == pytest.approx([1e-6, 1e-5])
+    found = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    assert found["usable"]
+    length = found["zero_tension_lengths_m"]
+    assert (np.abs(np.array(length["mean"]) - truth) < 4 * np.array(length["sd"])).all()
+
+
+def _without_poses(session):
+    """Take the poses out of a session's file."""
+    lines = [line.split(",") for line in session.read_text().splitlines()]
+    for cells in lines[1:]:
+        cells[1:7] = [""] * 6
+    session.write_text("\n".join(",".join(cells) for cells in lines) + "\n")

@@ -1,15 +1,11 @@
 """What was understood of experiments."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from wirebayes.answers import terminal
 from wirebayes.json_files.check import CheckJson
 from wirebayes.sentences import counted, unit_text
-
-if TYPE_CHECKING:
-    pass
-
 from wirebayes.views.result import NOTHING, Given, Result, figure, html_table, short_interval
 
 CHECKED = "check.json"

@@ -85,24 +85,14 @@ def descend(
     steps : int
         At most.
     """
-    damping, d = 1e-6, unknowns.robot.degrees
-    reach = np.where(np.arange(d) < 3, _FAR * unknowns.robot.span_m, _TURN * unknowns.robot.size_m)
+    damping = 1e-6
     equations = linearised(unknowns, holds, noise, state, creep, since)
     cost = cost_of(equations, state.white)
     for _ in range(steps):
-        normal = eliminated(equations, state.white, damping)
-        change = -solve(normal.matrix, normal.slope[:, None])[:, 0]
-        hold = normal.alone + normal.by_robot @ change
-        share = min(1.0, 1.0 / max(float((np.abs(hold[:, :d]) / reach).max()), 1e-300))
-        there = _stepped(unknowns.robot, state, share * change, share * hold)
-        ahead = linearised(unknowns, holds, noise, there, creep, since)
-        new = cost_of(ahead, there.white)
-        foreseen = _foreseen(equations, share * change, share * hold) + float(there.white @ there.white)
-        for _ in range(_CORRECTIONS):
-            if cost - new > _AS_FORESEEN * (cost - foreseen):
-                break
-            there, ahead = _corrected(unknowns, holds, noise, there, ahead, creep, since)
-            new = cost_of(ahead, there.white)
+        change, hold = _step(unknowns.robot, equations, state.white, damping)
+        new = np.inf  # where the equations are singular with so little damping
+        if np.isfinite(change).all() and np.isfinite(hold).all():
+            there, ahead, new = _ahead(unknowns, holds, noise, state, equations, change, hold, creep, since)
         if new < cost:
             gain = cost - new
             state, equations, cost = there, ahead, new
@@ -114,6 +104,36 @@ def descend(
             if damping > 1e6:
                 return Descent(state, equations, cost, True)
     return Descent(state, equations, cost, False)
+
+
+def _step(robot: Robot, e: Equations, white: Floats, damping: float) -> tuple[Floats, Floats]:
+    """A damped step of the robot's unknowns (m,) and of each hold (p, d and its tensions), as far as slopes reach."""
+    normal = eliminated(e, white, damping)
+    change = -solve(normal.matrix, normal.slope[:, None])[:, 0]
+    hold = normal.alone + normal.by_robot @ change
+    d = robot.degrees
+    reach = np.where(np.arange(d) < 3, _FAR * robot.span_m, _TURN * robot.size_m)
+    farthest = float((np.abs(hold[:, :d]) / reach).max())
+    share = min(1.0, 1.0 / max(farthest, 1e-300))
+    return share * change, share * hold
+
+
+def _ahead(
+    unknowns: Unknowns, holds: Holds, noise: Noise, state: State, e: Equations, change: Floats, hold: Floats,
+    creep: Grown, since: State,
+) -> tuple[State, Equations, float]:  # fmt: skip
+    """Where a step leads, the equations and the sum of squares there; led back where it gains less than foreseen."""
+    cost = cost_of(e, state.white)
+    there = _stepped(unknowns.robot, state, change, hold)
+    ahead = linearised(unknowns, holds, noise, there, creep, since)
+    new = cost_of(ahead, there.white)
+    foreseen = _foreseen(e, change, hold) + float(there.white @ there.white)
+    for _ in range(_CORRECTIONS):
+        if cost - new > _AS_FORESEEN * (cost - foreseen):
+            break
+        there, ahead = _corrected(unknowns, holds, noise, there, ahead, creep, since)
+        new = cost_of(ahead, there.white)
+    return there, ahead, new
 
 
 def cost_of(e: Equations, white: Floats) -> float:
