@@ -45,14 +45,14 @@ STUDIES = {
     ),
     # ../before is a checkout of the commit before priors were free of scale
     "wires_before": (
-        "-m analyses.posterior.wires_before --against ../before --rows {folder} --output {folder}/wires.json",
+        "-m analyses.posterior.wires_before --against ../before --seeds 20 --rows {folder} "
+        "--output {folder}/wires.json",
         "wires.json",
     ),
     "coverage": ("-m analyses.posterior.coverage --output {folder}", "coverage.json"),
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
-    "robot_calibration": ("-m analyses.robots.whole_calibration coverage 120 --output {folder}/it.json", "it.json"),
-    "robot_calibration_again": (
-        "-m analyses.robots.whole_calibration coverage 108 --seed 21 --output {folder}/it.json",
+    "robot_calibration": (
+        "-m analyses.robots.whole_calibration coverage 200 --seed 4000 --output {folder}/it.json",
         "it.json",
     ),
     "robot_lengths_alone": ("-m analyses.robots.whole_calibration lengths 100 --output {folder}/it.json", "it.json"),
@@ -123,7 +123,6 @@ def texts() -> dict[Path, str]:
         DOCS / "wires-before.inc": _wires_before(kept["wires_before"]),
         DOCS / "coverage.inc": _coverage(kept["coverage"]),
         DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"])
-        + _robots_again(kept["robot_calibration_again"])
         + _lengths_alone(kept["robot_lengths_alone"])
         + _exact_geometry(kept["robot_exact_geometry"]),
         DOCS / "real-wires.inc": _real_wires(kept["real_wires"]),
@@ -377,19 +376,6 @@ def _robot_calibration(kept: dict[str, Any]) -> str:
         share = found["shares"][mode]
         lines += _row(mode, share["robots"], *(f"{100 * share[name]:.0f}" for name in (*_HELD, "converged", "usable")))
     return "\n".join(lines) + "\n\n"
-
-
-def _robots_again(kept: dict[str, Any]) -> str:
-    """The shares of other robots by later code, with their standard errors."""
-    share = kept["result"]["shares"]["all"]
-    held = ", ".join(
-        f"{words} {100 * share[name]:.0f} ± {100 * share[f'{name}_se']:.1f} %" for name, words in _HELD.items()
-    )
-    usable = f"{100 * share['usable']:.0f} % [{100 * share['usable_low']:.0f}, {100 * share['usable_high']:.0f} %]"
-    return (
-        f"{_run_of(kept)},\n{kept['result']['robots']} other robots (mean and standard error over robots): {held};\n"
-        f"usable {usable}.\n\n"
-    )
 
 
 def _lengths_alone(kept: dict[str, Any]) -> str:
