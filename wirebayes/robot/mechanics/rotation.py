@@ -16,11 +16,18 @@ def matrix(rotation_vector_rad: Floats) -> Floats:
 
 
 def vector(rotation: Floats) -> Floats:
-    """Rotation vectors ``(..., 3)``, rad, of rotation matrices ``(..., 3, 3)``; exact also near zero and near pi."""
+    """Rotation vectors ``(..., 3)``, rad, of rotation matrices ``(..., 3, 3)``; exact also near zero and near pi.
+
+    NaN where a matrix is not finite, as searches may try.
+    """
     from scipy.spatial.transform import Rotation
 
     flat = np.reshape(rotation, (-1, 3, 3))
-    return np.asarray(Rotation.from_matrix(flat).as_rotvec()).reshape(*np.shape(rotation)[:-2], 3)
+    known = np.isfinite(flat).all(axis=(1, 2))
+    out = np.full((len(flat), 3), np.nan)
+    if known.any():
+        out[known] = Rotation.from_matrix(flat[known]).as_rotvec()
+    return out.reshape(*np.shape(rotation)[:-2], 3)
 
 
 def cross_matrix(v: Floats) -> Floats:
