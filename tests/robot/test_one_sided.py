@@ -69,7 +69,8 @@ def test_the_least_is_found_whatever_the_cones():
     assert 0 < sum(signs) < 60  # both verdicts were asked for
 
 
-def test_a_symmetric_platform_is_held_by_wires_at_zero_and_tilts_as_they_part():
+def _symmetric():
+    """A platform that four upper wires carry and four lower ones, at 0 N, keep from toppling; with its commands."""
     exits = np.array([[x, y, z] for z in (5.0, 1.0) for x, y in ((-4.0, 3.0), (4.0, 3.0), (4.0, -3.0), (-4.0, -3.0))])
     points = np.array([
         [x, y, z]
@@ -88,6 +89,11 @@ def test_a_symmetric_platform_is_held_by_wires_at_zero_and_tilts_as_they_part():
     tau = inverse.tensions(robot, *pose)
     assert tau[0, 4:] == pytest.approx(0.0, abs=1e-6)
     commands = inverse.commands(robot, wires, *pose, tau)
+    return robot, wires, pose, commands
+
+
+def test_a_symmetric_platform_is_held_by_wires_at_zero_and_tilts_as_they_part():
+    robot, wires, pose, commands = _symmetric()
     lengths = commands.zero_m, commands.offset_m
     stiff = one_sided.lowest_stiffness(robot, wires, pose, lengths)[0]
     probed = _probed(robot, wires, pose, lengths, np.random.default_rng(1), 1e-5)
@@ -102,3 +108,13 @@ def test_a_symmetric_platform_is_held_by_wires_at_zero_and_tilts_as_they_part():
     down = robot.home_m[2] - course.position_m[0, -1, 2]
     assert 0 < aside < down  # the upper wires creep, it sinks, tilts and leans on lower ones
     assert (course.tension_N[0, -1, 4:] > 0).sum() in (1, 2)
+
+
+def test_a_direction_that_is_not_finite_is_no_support(monkeypatch):
+    """Of a balance that a search tries where an exit point and a platform point coincide."""
+    robot, wires, pose, commands = _symmetric()
+    lengths = commands.zero_m, commands.offset_m
+    assert one_sided.held(robot, wires, pose, lengths).all()
+    jacobian = statics.wire_jacobian
+    monkeypatch.setattr(one_sided.statics, "wire_jacobian", lambda *given: jacobian(*given) * np.nan)
+    assert not one_sided.held(robot, wires, pose, lengths).any()

@@ -72,9 +72,10 @@ def _bounds(
     least = values[:, 0].copy()
     along = statics.wire_jacobian(robot, shape) * scale[:, None]
     taut = tension(wires, np.maximum(stretched, zero * (1.0 + TOUCHING)), zero)[1]
-    for k in np.flatnonzero(known & touching.any(0) & (least <= _APART * values[:, -1])):
-        on = touching[:, k]
-        least[k] = _least_of(both[k], along[:, on, k] * np.sqrt(taut[on, k]))
+    resisting = along * np.sqrt(taut)
+    decided = known & np.isfinite(resisting).all(axis=(0, 1))
+    for k in np.flatnonzero(decided & touching.any(0) & (least <= _APART * values[:, -1])):
+        least[k] = _least_of(both[k], resisting[:, touching[:, k], k])
     return np.asarray(touching.any(0)), np.where(known, least, np.nan), values[:, -1]
 
 
