@@ -55,13 +55,19 @@ STUDIES = {
         "-m analyses.robots.whole_calibration coverage 200 --seed 4000 --output {folder}/it.json",
         "it.json",
     ),
-    "robot_lengths_alone": ("-m analyses.robots.whole_calibration lengths 100 --output {folder}/it.json", "it.json"),
+    "robot_lengths_alone": (
+        "-m analyses.robots.whole_calibration lengths 100 --seed 31 --output {folder}/it.json",
+        "it.json",
+    ),
     "discover_clean": (
         "-m analyses.hidden_effects --size small --answer api --simulations 199 --kinds clean --clean 1200 --seed 5000 "
         "--output {folder}",
         "scores.json",
     ),
-    "robot_exact_geometry": ("-m analyses.robots.whole_calibration exact 240 --output {folder}/it.json", "it.json"),
+    "robot_exact_geometry": (
+        "-m analyses.robots.whole_calibration exact 200 --seed 3001 --output {folder}/it.json",
+        "it.json",
+    ),
     "discover_hidden": (
         "-m analyses.hidden_effects --size small --answer api --simulations 199 --judge-draws 40 --kinds single "
         "without foreign two three mixed periodic --seed 5005 --protocols paper unloading uneven dense temperature "
