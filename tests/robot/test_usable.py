@@ -66,7 +66,12 @@ def test_the_verdict_turns_at_its_threshold():
         one = replace(known, p_joint=np.array([p]))
         assert answer.usable(one) is good
         assert bool(answer._unsure(one, known)) is not good
-    assert not answer.usable(replace(known, converged=np.array([False])))
+    astray = replace(known, converged=np.array([False]))
+    assert not answer.usable(astray)
+    assert "do not use" in answer._unsure(astray, known)[0].text
+    # lengths that ignore creep are for comparison only
+    (notice,) = answer._unsure(known, astray)
+    assert notice.kind == "not-converged" and "do not use" not in notice.text
 
 
 def test_the_joint_test_keeps_its_level_and_sees_each_part():

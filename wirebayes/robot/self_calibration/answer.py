@@ -136,22 +136,24 @@ def _poses(robot: Robot, prior: LengthPrior, known: LengthPosterior) -> Calibrat
 
 
 def _unsure(known: LengthPosterior, plain: LengthPosterior) -> list[Notice]:
-    """That lengths should not be used: the search did not converge, or the model does not explain the readings."""
-    searched = (("the creep model", known), ("Hooke's law alone", plain))
-    astray = [called for called, lengths in searched if not lengths.converged[0]]
-    advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
-    if astray:
-        text = f"not converged with {' and '.join(astray)}: do not use these lengths; {advice}"
+    """What speaks against the lengths, or against the comparison with those that ignore creep."""
+    if not known.converged[0]:
+        advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
+        text = f"not converged with the creep model: do not use these lengths; {advice}"
         return [Notice("not-converged", text)]
-    if known.p_joint[0] >= SIGNIFICANT:
-        return []
-    text = (
-        "robot and wires do not explain the readings together with the reference lengths (joint test, "
-        f"p = {known.p_joint[0]:.2g}, mean squared residual {known.misfit[0]:.3g}): do not use these lengths; check "
-        "exit and platform points, which are taken as exact, --wires, the readings' units and signs, --tension-sd and "
-        "--reference-sd"
-    )
-    return [Notice("misfit", text)]
+    notices = []
+    if not plain.converged[0]:
+        text = "not converged with Hooke's law alone: what ignoring creep would cost is not known"
+        notices.append(Notice("not-converged", text))
+    if not known.p_joint[0] >= SIGNIFICANT:  # where it is not known, too
+        text = (
+            "robot and wires do not explain the readings together with the reference lengths (joint test, "
+            f"p = {known.p_joint[0]:.2g}, mean squared residual {known.misfit[0]:.3g}): do not use these lengths; "
+            "check exit and platform points, which are taken as exact, --wires, the readings' units and signs, "
+            "--tension-sd and --reference-sd"
+        )
+        notices.append(Notice("misfit", text))
+    return notices
 
 
 def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: LengthPosterior) -> list[Notice]:
