@@ -14,6 +14,7 @@ from wirebayes.processes.workers import cores
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
+    from multiprocessing.process import BaseProcess
 
 T = TypeVar("T")
 _THREADS = Path("/proc/self/task")  # one folder a thread; on Linux alone
@@ -37,36 +38,41 @@ def in_copies(pieces: Sequence[Callable[[], T]]) -> list[T]:
     Exception
         What a piece raises.
     """
-    from multiprocessing import get_context, parent_process
+    from multiprocessing import parent_process
 
     copies = min(cores(), len(pieces)) - 1
     if copies < 1 or parent_process() is not None or not _has_one_thread():
         return [piece() for piece in pieces]
-    context = get_context("fork")
     waiting = _queue(len(pieces))
+    started = _started(copies, pieces, waiting)
     done: dict[int, T] = {}
-    ends, processes = [], []
+    try:
+        for number in _numbers(waiting):
+            done[number] = pieces[number]()
+    finally:
+        os.close(waiting)
+        answers: list[dict[int, T] | Exception] = [_answer(process, end) for process, end in started]
+    for answer in answers:
+        if isinstance(answer, Exception):
+            raise answer
+        done |= answer
+    return [done[number] if number in done else piece() for number, piece in enumerate(pieces)]
+
+
+def _started(copies: int, pieces: Sequence[Callable[[], T]], waiting: int) -> "list[tuple[BaseProcess, Connection]]":
+    """Copies that work on the pieces, each with the end of a pipe where its results arrive."""
+    from multiprocessing import get_context
+
+    context = get_context("fork")
+    started: list[tuple[BaseProcess, Connection]] = []
     with held_back():
         for _ in range(copies):
             here, there = context.Pipe(duplex=False)
             process = context.Process(target=_work, args=(pieces, waiting, there))
             process.start()
             there.close()
-            ends.append(here)
-            processes.append(process)
-    try:
-        for number in _numbers(waiting):
-            done[number] = pieces[number]()
-    finally:
-        os.close(waiting)
-        answers: list[dict[int, T] | Exception] = [_answer(end) for end in ends]
-        for process in processes:
-            process.join()
-    for answer in answers:
-        if isinstance(answer, Exception):
-            raise answer
-        done |= answer
-    return [done[number] if number in done else piece() for number, piece in enumerate(pieces)]
+            started.append((process, here))
+    return started
 
 
 def _has_one_thread() -> bool:
@@ -96,10 +102,11 @@ def _work(pieces: Sequence[Callable[[], T]], waiting: int, answers: "Connection"
         answers.send(error)
 
 
-def _answer(end: "Connection") -> "dict[int, T] | Exception":
-    """What a copy sends; nothing where it was ended before."""
+def _answer(process: "BaseProcess", end: "Connection") -> "dict[int, T] | Exception":
+    """What a copy sends before it ends; nothing where it was ended before."""
     try:
         answer: dict[int, T] | Exception = end.recv()
-        return answer
     except EOFError:
-        return {}
+        answer = {}
+    process.join()
+    return answer
