@@ -30,6 +30,7 @@ def explored(
     remainders: dict[str, float] | None = None,
     families: tuple[tuple[str, ...], ...] = (),
     own_fits: dict[str, float] | None = None,
+    pair: str = "",
 ) -> tuple[stepwise.Explored, list[str]]:
     """What the search makes of sets whose evidence is written down, and the order in which it fitted them."""
     order: list[str] = []
@@ -46,6 +47,7 @@ def explored(
     monkeypatch.setattr(stepwise, "_fit", fit)
     known = {name: np.array([value]) for name, value in (credits or {}).items()}
     monkeypatch.setattr(stepwise, "_credits", lambda expansions, trials: known)
+    monkeypatch.setattr(stepwise, "_leading_pair", lambda expansions, trials: frozenset(pair))
     monkeypatch.setattr(stepwise, "reference_of", lambda block: None)
     monkeypatch.setattr(stepwise, "remainder_evidence", lambda block, reference: smooth)
     settings = Settings(kinds=dict.fromkeys(range(NAMES)))  # type: ignore[arg-type]
@@ -70,6 +72,18 @@ def test_each_combination_of_families_is_looked_at_before_look_alikes(monkeypatc
     assert order == ["a", "i", "j", "b", "c", "d", "e"]
     beside, _ = explored(monkeypatch, singles, {"a": {"z": 6.0}}, families=(tuple("abcdefgh"),))
     assert frozenset("az") in beside.fitted
+
+
+def test_two_effects_that_only_show_together_are_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Alone neither comes near the best: the better one is fitted first, and then both."""
+    singles = {"a": 20.0, "b": 19.0, "y": 1.0, "z": 0.5}
+    beside = {"y": {"z": 10.0}}
+    assert explored(monkeypatch, singles, beside)[1] == ["a", "b"]
+    found, order = explored(monkeypatch, singles, beside, pair="yz")
+    assert order == ["y", "a", "b", "yz"]
+    assert found.fitted[frozenset("yz")].effects.log_bayes == 11.0
+    # one of which no climb ended, and one that finds nothing beside it, lead nowhere
+    assert explored(monkeypatch, singles, beside, pair="xz")[1] == ["z", "a", "b"]
 
 
 def test_what_lies_too_far_below_the_best_is_not_fitted(monkeypatch: pytest.MonkeyPatch) -> None:

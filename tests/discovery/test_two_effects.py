@@ -85,6 +85,26 @@ def test_all_pairs_of_different_effects_count_and_forms_share_the_weight_of_thei
     assert scan(x).two[0] == pytest.approx(logsumexp(terms) - plain, abs=1e-8)
 
 
+def test_each_pair_by_itself_adds_up_to_all_pairs(expansion: Expansion) -> None:
+    each = two_effects.log_bayes_of_each_pair(expansion)
+    apart = ~np.eye(len(each), dtype=bool)
+    assert logsumexp(each[apart]) == pytest.approx(scan(expansion).two[0], abs=1e-8)
+
+
+def test_beside_each_pair_stands_what_an_effect_explains_alone(expansion: Expansion) -> None:
+    x, alone = expansion, scan(expansion).effects[0]
+    each = np.diag(two_effects.log_bayes_of_each_pair(x))
+    for kind, value in enumerate(each):
+        own = x.kinds == kind
+        one_sign = np.where(x.one_sided[own], np.log(2.0), 0.0)
+        assert value == pytest.approx(logsumexp(alone[own] + one_sign) - np.log(own.sum()), abs=1e-8)
+
+
+def test_without_a_tangent_no_pair_explains_anything(expansion: Expansion) -> None:
+    nowhere = replace(expansion, residual=np.full_like(expansion.residual, np.nan))
+    assert (two_effects.log_bayes_of_each_pair(nowhere) == -np.inf).all()
+
+
 def test_one_effect_makes_no_pair(expansion: Expansion) -> None:
     alone = expansion.kinds == 0
     one = replace(

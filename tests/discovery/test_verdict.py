@@ -1,19 +1,20 @@
 """From weighed sets to a decision: the guard of further effects and the second test, each at its threshold."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from wirebayes.discovery import alternatives, global_test, held_out, retest, verdict
+from wirebayes.discovery import alternatives, global_test, held_out, predicting, retest, verdict
 from wirebayes.discovery import gains as gains_module
 from wirebayes.discovery.fitted_sets import Accepted, Explored, FittedSet
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.judgement import verdict_on
 from wirebayes.discovery.model_space import EffectSet, log_prior
 from wirebayes.discovery.retest import Retest
-from wirebayes.discovery.settings import Settings
+from wirebayes.discovery.settings import MORE, REACH, Settings
 from wirebayes.discovery.verdict import accepted_effects, decide, evidence
 
 ONE = np.ones(1)
@@ -73,6 +74,79 @@ def test_a_second_effect_must_predict(monkeypatch: pytest.MonkeyPatch, gain: flo
     assert names(found) == kept
     # what does not predict has no weight, nor has any set that contains it
     assert ("b" in found.posterior.inclusion) == (kept == "ab")
+
+
+def contested(pair: float, smooth: float, beside: dict[str, float]) -> Explored:
+    """Two names with so much evidence, a remainder alone, and remainders beside the first."""
+    sets = {"a": 20.0, "ab": pair}
+    known = explored(sets, smooth)
+    changed = [replace(s, remainder=np.array([beside.get("".join(s.names), -20.0)])) for s in known.sets[1:]]
+    for s in changed:
+        known.fitted[s.key].effects = s
+    return replace(known, sets=(known.sets[0], *changed))
+
+
+def left_out_scores(
+    monkeypatch: pytest.MonkeyPatch, elpd: dict[str, float], remainder: dict[str, float | None]
+) -> None:
+    """What leaving out one hold at a time gives of each set, and what a remainder gains beside it."""
+
+    def names_of(block: Any) -> str:
+        return "".join(getattr(block, "effects", ()))
+
+    monkeypatch.setattr(LeftOut, "of", lambda self, fits: [np.array([elpd[names_of(fit)]]) for fit in fits])
+    monkeypatch.setattr(predicting, "discrepancy_gain", lambda block, *others: remainder[names_of(block)])
+
+
+@pytest.mark.parametrize(("by_pair", "established"), [(14.1, ["a", "b"]), (13.9, ["a"])])
+def test_a_remainder_gives_way_to_a_further_name_that_predicts_better(
+    monkeypatch: pytest.MonkeyPatch, by_pair: float, established: list[str]
+) -> None:
+    """By more than four, which is what a name has to gain; evidence has the remainder far ahead."""
+    sets = contested(30.0 + UNLIKELIER, -20.0, {"a": 12.0})
+    left_out_scores(monkeypatch, {"": 0.0, "a": 20.0, "ab": 20.0 + by_pair}, {"a": 10.0})
+    found = decided(monkeypatch, sets, {}, {})
+    assert [f.name for f in evidence(found, 0.01, 0).established] == established
+    assert (found.posterior.remainder[0] > 0.5) == (established == ["a"])
+
+
+def test_what_a_remainder_loses_does_not_count_for_a_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a remainder that only harms, a name has to gain four as beside none."""
+    sets = contested(30.0 + UNLIKELIER, -20.0, {"a": 12.0})
+    left_out_scores(monkeypatch, {"": 0.0, "a": 20.0, "ab": 23.0}, {"a": -5.0})
+    assert decided(monkeypatch, sets, {}, {}).posterior.remainder[0] > 0.5
+
+
+@pytest.mark.parametrize(("ahead", "stays"), [(REACH - 0.1, False), (REACH + 0.1, True)])
+def test_a_remainder_stays_where_names_are_far_less_probable(
+    monkeypatch: pytest.MonkeyPatch, ahead: float, stays: bool
+) -> None:
+    beside = ahead - np.log(MORE)  # of the remainder beside the first name
+    sets = contested(20.0 + UNLIKELIER, -20.0, {"a": beside})
+    left_out_scores(monkeypatch, {"": 0.0, "a": 20.0, "ab": 90.0}, {"a": 1.0})
+    assert (decided(monkeypatch, sets, {}, {}).posterior.remainder[0] > 0.5) == stays
+
+
+def test_a_remainder_alone_gives_way_to_two_names_and_not_to_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One name and a remainder alone have the same prior: their evidence decides."""
+    left_out_scores(monkeypatch, {"": 0.0, "a": 30.0, "ab": 60.0}, {"": 5.0})
+    one = decided(monkeypatch, explored({"a": 20.0}, smooth=21.0), {}, {})
+    assert one.best is None and one.posterior.remainder[0] > 0.7
+    two = decided(monkeypatch, contested(30.0, 31.0, {}), {}, {})
+    assert names(two) == "ab" and two.posterior.remainder[0] < 0.1
+
+
+def test_a_remainder_does_not_give_way_to_names_that_do_not_predict(monkeypatch: pytest.MonkeyPatch) -> None:
+    sets = contested(30.0 + UNLIKELIER, -20.0, {"a": 12.0})
+    left_out_scores(monkeypatch, {"": 0.0, "a": 20.0, "ab": 90.0}, {"a": 10.0})
+    found = decided(monkeypatch, sets, {"ab": 3.9}, {})
+    assert names(found) == "a" and found.posterior.remainder[0] > 0.5
+
+
+def test_with_too_few_holds_to_leave_one_out_no_remainder_gives_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    sets = contested(30.0 + UNLIKELIER, -20.0, {"a": 12.0})
+    left_out_scores(monkeypatch, {"": 0.0, "a": 20.0, "ab": 90.0}, {"a": None})
+    assert decided(monkeypatch, sets, {}, {}).posterior.remainder[0] > 0.5
 
 
 @pytest.mark.parametrize(("p", "remains"), [(0.031, False), (0.029, True)])

@@ -23,6 +23,7 @@ class Frontier:
     parents: dict[Key, tuple[Key, str]] = field(default_factory=dict)
     credit: dict[Key, float] = field(default_factory=dict)
     towards: list[Key] = field(default_factory=list)
+    pair: Key = frozenset()
 
     def add(
         self, parent: EffectSet, name: str, found: NameEvidence, credit: float = -np.inf, own_fit: float = np.inf
@@ -94,10 +95,23 @@ class Frontier:
             rank[key] = looked.count(self.kinds(key))
             looked.append(self.kinds(key))
         near.sort(key=lambda k: rank[k])  # the order within a rank stays
-        waiting = [k for k in self.towards if k not in self.fitted]
+        pair = [self.pair] if self.pair in self.known else []
+        waiting = [k for k in (*self.towards, *pair) if k not in self.fitted]
         # as many at once whatever the number of cores, so that the sets are the same
         wave = list(dict.fromkeys([*waiting, *near]))[:most]
         return wave or [k for k in near if promises[k] == best][:1]  # the best set is always fitted
+
+    def lead_to(self, pair: Key) -> None:
+        """Go towards two effects that only show together: to the better one, and from there to both.
+
+        Parameters
+        ----------
+        pair : set of str
+            Their names, or none.
+        """
+        self.pair = pair
+        singles = [frozenset({name}) for name in sorted(pair) if frozenset({name}) in self.known]
+        self.towards += sorted(singles, key=self.promise)[-1:]
 
     def step_aside(self, key: Key) -> None:
         """From a set close to the best, go towards one where a name of it may give way to another of its family.

@@ -37,6 +37,7 @@ from wirebayes.discovery.settings import (
     Settings,
 )
 from wirebayes.discovery.smooth_credit import beside_smooth
+from wirebayes.discovery.two_effects import log_bayes_of_each_pair
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import ParallelMap
@@ -76,6 +77,7 @@ def explore(
     for name in found.winners:
         beside = np.maximum(smooth + credits[name], 0.0).sum() if name in credits else -np.inf
         frontier.add(root, name, found, float(beside))
+    frontier.lead_to(_leading_pair(expansions, trials))
     done, start = frontier.fitted, FittedSet(root, plain, (), found, ([], []))
     while wave := frontier.next_looks(_looks(len(done))):
         parents = [done.get(frontier.parents[key][0], start) for key in wave]
@@ -136,6 +138,20 @@ def _credits(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> dict[s
         here = values[:, k] + occam(probe.one_sided)
         out[probe.effect.name] = np.maximum(out.get(probe.effect.name, -np.inf), here)
     return out
+
+
+def _leading_pair(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> Key:
+    """The two effects that explain most together, linearly, where it is more than one explains; else none.
+
+    Two that only show together are not met one at a time: beside the plain model neither explains anything.
+    """
+    names = list(dict.fromkeys(trial.effect.name for trial in trials))
+    explained = np.sum([np.maximum(log_bayes_of_each_pair(x), 0.0) for x in expansions], axis=0)
+    alone = np.diag(explained).max(initial=0.0)
+    np.fill_diagonal(explained, 0.0)
+    one, other = np.unravel_index(np.argmax(explained), explained.shape)
+    gain = explained[one, other] - alone + occam(one_sided=False)
+    return frozenset({names[one], names[other]}) if gain > WORTH_A_REFIT else frozenset()
 
 
 def _fit(

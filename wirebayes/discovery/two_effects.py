@@ -7,7 +7,7 @@ there; a setting error takes the place of a slip only until the elastic curve ha
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.discovery.noise_integral import Expansion, Projected
+from wirebayes.discovery.noise_integral import Expansion, Projected, has_tangent, project
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.typing import Array
 
@@ -33,24 +33,64 @@ def log_bayes_of_two(x: Expansion, found: Projected, single: Array, plain: Array
     plain : (n,) array
         Log evidence of none.
     """
-    groups = [np.flatnonzero(x.kinds == kind) for kind in np.unique(x.kinds[x.kinds >= 0])]
+    groups = _forms_of_each(x)
     if len(groups) < 2:
         return np.full(len(single), -np.inf)
-    first = _leading(single, groups)
-    explained = _explained(x, found, first)
-    left = np.maximum(found.rss[:, :, None, None] - explained, x.least[:, None, None, None])
+    value = _log_evidence(x, found, _leading(single, groups), groups)
+    return np.asarray(log_sum(value.reshape(len(value), -1), axis=1) - plain)
+
+
+def log_bayes_of_each_pair(x: Expansion) -> Array:
+    """(e, e) log Bayes factor of each effect, in its best form, with each other one in any; of the first row.
+
+    As in `log_bayes_of_two`, for effects in the order of their numbers in `x.kinds`. Each effect alone, in any form, is
+    on the diagonal.
+    """
+    groups, first_row = _forms_of_each(x), x.of(np.array([0]))
+    if not has_tangent(first_row)[0]:
+        return np.full((len(groups), len(groups)), -np.inf)
+    found, least = project(first_row), first_row.least[:, None, None]
+    upward = np.where(x.one_sided, np.maximum(found.along, 0.0), found.along)
+    left = np.maximum(found.rss[..., None] - upward**2 / found.square, least)
+    single = log_sum(found.shared[..., None] - 0.5 * x.degrees * np.log(left), axis=1)
+    nothing = log_sum(found.shared - 0.5 * x.degrees * np.log(np.maximum(found.rss, least[..., 0])), axis=1)
+    value = _log_evidence(first_row, found, _best_forms(single, groups), groups)[0]
+    pairs = np.stack([log_sum(value[:, group], axis=1) for group in groups], axis=1)
+    alone = single[0] + _log_shares(x, groups)
+    np.fill_diagonal(pairs, [log_sum(alone[group]) for group in groups])
+    return pairs - nothing[0]
+
+
+def _forms_of_each(x: Expansion) -> list[NDArray[np.int64]]:
+    """The numbers of the signatures of each effect."""
+    return [np.flatnonzero(x.kinds == kind) for kind in np.unique(x.kinds[x.kinds >= 0])]
+
+
+def _log_evidence(x: Expansion, found: Projected, first: NDArray[np.int64], groups: list[NDArray[np.int64]]) -> Array:
+    """(n, j, m) of some signatures (n, j) with each one of another effect; forms share the weight of their effect."""
+    left = np.maximum(found.rss[:, :, None, None] - _explained(x, found, first), x.least[:, None, None, None])
     evidence = log_sum(found.shared[:, :, None, None] - 0.5 * x.degrees * np.log(left), axis=1)
+    prior = _log_shares(x, groups)
+    different = x.kinds[first][:, :, None] != x.kinds
+    return np.where(different, evidence + prior[first][:, :, None] + prior, -np.inf)
+
+
+def _log_shares(x: Expansion, groups: list[NDArray[np.int64]]) -> Array:
+    """(m,) log prior of each signature among those of its effect; twice as dense where it has one sign."""
     prior = np.full(len(x.kinds), -np.inf)
     for group in groups:
         prior[group] = np.where(x.one_sided[group], np.log(2.0), 0.0) - np.log(len(group))
-    different = x.kinds[first][:, :, None] != x.kinds
-    value = np.where(different, evidence + prior[first][:, :, None] + prior, -np.inf)
-    return np.asarray(log_sum(value.reshape(len(value), -1), axis=1) - plain)
+    return prior
+
+
+def _best_forms(single: Array, groups: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """(n, e) the signature of each effect that explains most."""
+    return np.stack([group[np.argmax(single[:, group], axis=1)] for group in groups], axis=1)
 
 
 def _leading(single: Array, groups: list[NDArray[np.int64]]) -> NDArray[np.int64]:
     """(n, j) the best signatures of the effects that explain most."""
-    best = np.stack([group[np.argmax(single[:, group], axis=1)] for group in groups], axis=1)
+    best = _best_forms(single, groups)
     order = np.argsort(-np.take_along_axis(single, best, axis=1), axis=1, kind="stable")
     return np.take_along_axis(best, order[:, :FIRST], axis=1)
 

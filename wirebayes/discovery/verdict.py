@@ -1,6 +1,6 @@
 """From the probabilities of models to the evidence on each material: families, what they gain, and what remains."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -10,12 +10,13 @@ from scipy.special import logsumexp
 from wirebayes.discovery import model_space
 from wirebayes.discovery.families import Family
 from wirebayes.discovery.fitted_sets import Accepted, Explored, Fits, FittedSet, Key
-from wirebayes.discovery.gains import family_gain, last_gain, name_gain
+from wirebayes.discovery.gains import family_gain, name_gain
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence
 from wirebayes.discovery.model_space import EffectSet, ModelPosterior
+from wirebayes.discovery.predicting import Predicting
 from wirebayes.discovery.retest import Retest, complete, fails, retested
-from wirebayes.discovery.settings import ALPHA_AFTER, KEEP_ELPD, LEAST_HOLDS, P_SLOPE, Settings
+from wirebayes.discovery.settings import ALPHA_AFTER, LEAST_HOLDS, P_SLOPE, Settings
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import ParallelMap
@@ -75,58 +76,67 @@ def decide(
     -------
     Decision
     """
-    predicts = _Predicting(Fits(plain, explored, settings, rng), left_out)
+    predicting = Predicting(explored, Fits(plain, explored, settings, rng), left_out, rng, parallel_map)
     weigh = partial(model_space.log_weights, names=len(settings.kinds), families=families, other=explored.left_over)
-
-    def posterior(sets: Sequence[EffectSet], without: Array, beside: Array) -> ModelPosterior:
-        return model_space.posterior(sets, without, beside, len(plain), families)
-
-    sets = list(explored.sets)
-    while True:
-        found = posterior(sets, *weigh(sets))
-        best = _best_fitted(found, explored)
-        if best is None:
-            return Decision(found, None, None)
-        if predicts(best, found):
-            break
-        sets = [s for s in sets if not _kinds(best.effects, found) <= _kinds(s, found)]
+    sets, gave_way, found = _predicting_sets(explored, weigh, predicting, families, len(plain))
+    best = _best_fitted(found, explored)
+    if best is None:
+        return Decision(found, None, None)
     retest = retested(best, rng, parallel_map)
     if fails(retest):
-        passing = complete(found, explored, best, lambda candidate: predicts(candidate, found), rng, parallel_map)
+        predicts = partial(predicting.last_predicts, found=found)
+        passing = complete(found, explored, best, predicts, rng, parallel_map)
         if passing is not None:
             sets = [s for s in sets if s.key != best.effects.key and s.key not in passing.failed]
             best, retest = passing.best, passing.retest
-    found = posterior(sets, *_after(retest, sets, weigh(sets), best, found))
+    weights = _after(retest, sets, weigh(sets), best, found)
+    found = _posterior(sets, weights, gave_way, families, len(plain))
     if not found.best.names:
         return Decision(found, None, retest)
     if any(len(e.recorded_holds) < LEAST_HOLDS for block in plain for e in block.experiments):
         return Decision(found, best, retest)
     own = dict.fromkeys(found.family(name) for name in best.effects.names)
-    by_family = {family: family_gain(best, family, found, predicts.fits, left_out) for family in own}
-    first_gain = name_gain(best, best.effects.names[0], predicts.fits, left_out)
+    by_family = {family: family_gain(best, family, found, predicting.fits, left_out) for family in own}
+    first_gain = name_gain(best, best.effects.names[0], predicting.fits, left_out)
     return Decision(found, best, retest, by_family, first_gain)
 
 
-@dataclass(frozen=True)
-class _Predicting:
-    """Whether the last family of a set, if it is not the only one, predicts holds that are left out."""
+_Weights = tuple[Array, Array]  # log weights of sets, without a remainder and with one
 
-    fits: Fits
-    left_out: LeftOut
-    gains: dict[Key, float] = field(default_factory=dict)
 
-    def __call__(self, candidate: FittedSet, found: ModelPosterior) -> bool:
-        key = candidate.effects.key
-        if len(key) == 1:
-            return True
-        if key not in self.gains:
-            self.gains[key] = last_gain(candidate, found, self.fits, self.left_out)
-        return self.gains[key] > KEEP_ELPD
+def _predicting_sets(
+    explored: Explored,
+    weigh: Callable[[Sequence[EffectSet]], _Weights],
+    predicting: Predicting,
+    families: Sequence[Family],
+    blocks: int,
+) -> tuple[list[EffectSet], set[Key], ModelPosterior]:
+    """The sets whose last family predicts, those of them whose remainder does not, and what they say together."""
+    sets, gave_way = list(explored.sets), set[Key]()
+    while True:
+        found = _posterior(sets, weigh(sets), gave_way, families, blocks)
+        if giving_way := predicting.giving_way(found):
+            gave_way |= giving_way
+            continue
+        best = _best_fitted(found, explored)
+        if best is None or predicting.last_predicts(best, found):
+            return sets, gave_way, found
+        sets = [s for s in sets if not _kinds(best.effects, found) <= _kinds(s, found)]
+        gave_way.clear()  # to sets that may be gone
+
+
+def _posterior(
+    sets: Sequence[EffectSet], weights: _Weights, gave_way: set[Key], families: Sequence[Family], blocks: int
+) -> ModelPosterior:
+    """Probabilities, where no remainder stands beside the sets where it gave way."""
+    without, beside = weights
+    stays = np.array([s.key not in gave_way for s in sets])
+    return model_space.posterior(sets, without, np.where(stays, beside, -np.inf), blocks, families)
 
 
 def _after(
-    retest: Retest, sets: Sequence[EffectSet], weights: tuple[Array, Array], best: FittedSet, found: ModelPosterior
-) -> tuple[Array, Array]:
+    retest: Retest, sets: Sequence[EffectSet], weights: _Weights, best: FittedSet, found: ModelPosterior
+) -> _Weights:
     """The log weights of sets, without a remainder and with one, once the best one has been tested."""
     without, beside = weights
     if retest.p is None:
