@@ -10,10 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from analyses.robots.hanging import lowest_energy
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
+from tests.robot.test_history import CORE, _joint_values_for, _simulated
 from wirebayes.cli import main
 from wirebayes.commands.import_robot import import_robot
 from wirebayes.errors import InputError
 from wirebayes.robot.export import files
+from wirebayes.robot.history.history import History
+from wirebayes.robot.history.live import LiveEstimator
+from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics import joint_columns, schema
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -286,6 +290,34 @@ def test_calibration_finds_each_lines_own_length(name, tmp_path):
     assert np.abs(off / found["references_m"]["sd"]).max() < 4
     told = 0.7 if name == "pairs-3" else 0.5  # six lines from above carry the weight in one way only
     assert np.median(found["references_m"]["sd"]) < told * 3 * small
+
+def test_a_running_robot_is_brought_back_by_winches_whose_lines_creep_unlike(tmp_path):
+    """Against a simulation of its own, which knows the lengths of lines and no winches."""
+    robot = schema.read(printer(tmp_path, drum=""))
+    robot = replace(robot, centre_of_mass_m=np.array([0.03, 0.06, -0.05]), home_m=np.array([0.1, -0.15, 0.3]))
+    home, line = (robot.home_m, np.eye(3)), WireDraws({k: np.full(2, v) for k, v in CORE.items()}, 1000.0)
+    of_lines = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    nominal = of_lines[[0, 2, 4, 6]]
+    np.testing.assert_array_equal(nominal[robot.winch], of_lines)
+    live, still = (LiveEstimator(robot, line, Uncertain(), home, reads=False) for _ in range(2))
+    times, joint, sent, seen = np.array([0.0, 5, 10, 20, 40, 80, 160, 320, 600, 601]), nominal, [], []
+    for time in times:
+        now, drifted = live.step(time, joint, nominal_m=nominal), still.step(time, nominal)
+        seen.append(now.position_m)
+        sent.append(joint)
+        joint = now.joint_m
+    assert now.joint_m.shape == now.joint_sd_m.shape == now.correction_m.shape == now.straight_correction_m.shape == (4,)
+    each = np.array(sent)[:, robot.winch]
+    history = History(times, each, None, None, np.zeros(10), np.zeros((10, 3)), np.ones(10))
+    place, _, tension = _simulated(robot, CORE, history)
+    unlike = np.abs(np.diff(tension[-1, :6].reshape(3, 2)))
+    assert unlike.min() > 0.1 * tension[-1].mean()
+    drift = np.linalg.norm(drifted.position_m - robot.home_m)
+    np.testing.assert_allclose(seen, place, atol=0.02 * drift)
+    np.testing.assert_allclose(place[-1], robot.home_m, atol=0.02 * drift)
+    np.testing.assert_allclose(now.tension_N, tension[-1], atol=2e-3 * tension.max())
+    with pytest.raises(InputError, match="joint_m: found 7 in a list, expected 4 numbers"):
+        live.step(700.0, of_lines)
 
 
 @pytest.mark.parametrize("seed", [2, 3, 4, 5])
