@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from .rates import Row, rate, share_of
-from .rows import accepted_of_group, unknown_or_its_group, visible_beside
+from .rows import accepted_of_group, likely_of_group, unknown_or_its_group, visible_beside
 from .target import Target, at_least, at_most, number
 
 WANTED = 0.90  # of the judge's rate
@@ -29,10 +29,13 @@ def shares(rows: list[Row]) -> Iterator[Target]:
         yield _share(
             f"{label}: both accepted, where it is as sure", apart, lambda r: all(accepted_of_group(r)), "all_sure"
         )
+        yield _share(f"{label}: both more likely than not", apart, lambda r: all(likely_of_group(r)), "all")
     known = [r for r in of["mixed"] if visible_beside(r)[0]]
     yield _share("beside a foreign effect: the known one accepted", known, lambda r: accepted_of_group(r)[0], "known")
     accepted = "beside a foreign effect: the known one accepted, where it is as sure"
     yield _share(accepted, known, lambda r: accepted_of_group(r)[0], "known_sure")
+    likely = "beside a foreign effect: the known one more likely than not"
+    yield _share(likely, known, lambda r: likely_of_group(r)[0], "known")
     yield _share("beside a foreign effect: a remainder is likely", of["mixed"], _remainder_is_likely, "remains")
     for kind, label in (("without", "effect removed"), ("foreign", "effect in no catalogue")):
         seen = [r for r in of[kind] if r["delta"] >= 8 and r["detected"]]

@@ -8,6 +8,7 @@ from .rates import Row
 
 NOTHING = "nothing-missing"
 CONDITIONAL = 8.0  # delta beside the other effects from which one is expected to be named
+LIKELY = 0.5  # probability above which a family is more likely than not
 VISIBLE = 0.8  # share of delta that must survive a refit of the plain model for a case to count as visible
 
 
@@ -111,6 +112,16 @@ def false_names(row: Row) -> list[str]:
 def accepted_of_group(row: Row) -> list[bool]:
     """For each hidden effect whether it, or one whose signature is nearly the same, was accepted."""
     return [any(name in group for name in row["accepted"]) for group in row["groups"]]
+
+
+def likely_of_group(row: Row) -> list[bool]:
+    """For each hidden effect whether a family that is more likely than not has it, or one whose signature is the same.
+
+    The families of the median probability model (Barbieri and Berger 2004): the judge's most probable set, of which he
+    need not be sure, is compared with these.
+    """
+    likely = [family["members"] for family in row["families"] if family["inclusion"] > LIKELY]
+    return [any(name in group for members in likely for name in members) for group in row["groups"]]
 
 
 def unknown_or_its_group(row: Row) -> bool:

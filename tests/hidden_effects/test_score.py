@@ -210,6 +210,20 @@ def test_several_effects_are_measured_against_the_ideal_judge():
     assert not {r["target"]: r for r in targets(hidden)}["beside a foreign effect: the known one accepted"]["found"]
 
 
+def test_what_is_more_likely_than_not_is_compared_with_the_judges_most_probable_set():
+    """He need not be sure of his set: nor does it count here which of the families are established."""
+
+    def row(*inclusion):
+        members = (["toe", "ageing"], ["yield"])
+        stated = [{"members": m, "inclusion": p, "established": False} for m, p in zip(members, inclusion, strict=True)]
+        return several("two", [], 0.9) | {"families": stated}
+
+    rows = [row(0.51, 0.51), row(0.49, 0.99), row(0.99, 0.5), row(0.6, 0.6)]
+    found = {r["target"]: r for r in targets(rows)}
+    likely = found["of the judge's rate: two effects: both more likely than not"]
+    assert likely["found"]["value"] == pytest.approx(0.5 / 0.5)
+
+
 def said(kind, probability, accepted=("toe",)):
     return {"kind": kind, "detected": True, "names": ["toe"], "groups": [["toe"]], "remainder": probability,
             "accepted": list(accepted)}  # fmt: skip
