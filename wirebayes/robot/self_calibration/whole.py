@@ -10,6 +10,7 @@ import numpy as np
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.motion import inverse
+from wirebayes.robot.self_calibration.approach import onward
 from wirebayes.robot.self_calibration.descent import descend
 from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds, Noise, State, linearised
 from wirebayes.robot.self_calibration.holds_creep import ROUGHLY, creep_of
@@ -18,11 +19,14 @@ from wirebayes.robot.self_calibration.residuals import noise_shown, usual_joint
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
-_ROUNDS = 25  # of noise and creep
+_ROUNDS = 60  # of noise and creep: most end in ten
 _SOFT = 0.03  # of what is known best of tensions
 _WHOLE_ROUNDS = 3  # before creep goes half the way only
 _STILL = 0.05  # of every unknown's standard deviation
 _STEADY = 10.0  # creep may err as many times more as unknowns move by tenths of a standard deviation
+# Where unknowns do not come to rest, it may be creep's own error that moves them: half as large after three rounds.
+_FINER, _FINEST = 0.8, 0.1
+_LEVEL_FIT = 0.5  # of the sum of squares, from one round to the next: more, and there is a way to go still
 _SETTLED = 0.02  # of a noise, relative
 _CREEPING = 0.8  # slope of what is shown over what is thought: a secant of more would leap
 _UNEVEN = 0.3  # of the weight: tensions that were read badly, at a rough pose
@@ -56,31 +60,39 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
     state : State
         A rough guess.
     """
-    robot = unknowns.robot
     noise = _before_reading(unknowns, holds)
-    since, creep = state, creep_of(unknowns, holds, state, roughly=ROUGHLY)
-
+    creep = creep_of(unknowns, holds, state, roughly=ROUGHLY)
     state = _from_rough(unknowns, holds, noise, state, creep)
     if unknowns.errors.joint_m is None:
         noise = replace(noise, balance=_shown(unknowns, holds, noise, state, creep, "balance"))
         if np.isfinite(holds.tension_N).any():
             noise = replace(noise, joint_m=_shown(unknowns, holds, noise, state, creep, "loop"))
+    return _at_rest(unknowns, holds, noise, state, creep)
+
+
+def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> Whole:
+    """State, noise and creep in turns, each from the others, until none of them moves on."""
     rounds: list[tuple[Floats, Floats]] = []
-    roughly = ROUGHLY
+    passed, roughly, cost = [state], ROUGHLY, np.inf
+    last = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])[0]
+    usual = usual_joint(unknowns.robot, holds)
     for _ in range(_ROUNDS):
-        since = _between(since, state) if len(rounds) > _WHOLE_ROUNDS else state
+        since = passed[-1]
         creep = creep_of(unknowns, holds, since, creep, roughly)
         down = descend(unknowns, holds, noise, state, creep, since)
         state = down.state
-        last = inverse.lengths(robot, holds.session.joint_m[-1])[0]
         found = gaussian_posterior(unknowns, down, noise, creep, last)
-        shown, degrees = noise_shown(found, *usual_joint(robot, holds))
+        shown, degrees = noise_shown(found, *usual)
         found = replace(found, degrees=degrees)
         rounds.append((np.log([noise.joint_m, noise.balance]), shown))
-        moved_on = np.abs(state.white - since.white) / np.sqrt(np.diag(found.covariance))
-        roughly = float(np.clip(_STEADY * moved_on.max(initial=0.0), 1.0, ROUGHLY))
-        if np.abs(shown - rounds[-1][0]).max() < _SETTLED and moved_on.max(initial=0.0) < _STILL:
+        sd = np.sqrt(np.diag(found.covariance))
+        moved_on = float((np.abs(state.white - since.white) / sd).max(initial=0.0))
+        level = np.abs(shown - rounds[-1][0]).max() < _SETTLED and abs(cost - found.cost) < _LEVEL_FIT
+        if level and moved_on < _STILL:
             return found
+        cost = found.cost
+        roughly = max(_FINEST, min(_STEADY * moved_on, ROUGHLY * _FINER ** len(rounds)))
+        passed = onward(passed, state, sd, holds.session.tension_sd_N) if len(rounds) > _WHOLE_ROUNDS else [state]
         joint, balance = np.exp(_ahead(rounds))
         noise = replace(noise, joint_m=float(joint), balance=float(balance))
     return replace(found, converged=False)
@@ -94,12 +106,6 @@ def _before_reading(unknowns: Unknowns, holds: Holds) -> Noise:
     usual = 0.5 * (low + high) if robot.rule.choice == "middle" else low
     finest = min(holds.session.tension_sd_N, low) if np.isfinite(holds.tension_N).any() else low
     return Noise(joint, FRICTIONLESS, _UNREAD * (high - low), usual, _SOFT * finest)
-
-
-def _between(before: State, after: State) -> State:
-    """Where creep is taken about: halfway, since creep that wires slackened by would make them taut again in turns."""
-    white, pull = 0.5 * (before.white + after.white), 0.5 * (before.pull_N + after.pull_N)
-    return replace(after, white=white, pull_N=pull)
 
 
 def _ahead(rounds: list[tuple[Floats, Floats]]) -> Floats:
