@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wirebayes.robot.mechanics import draws
-from wirebayes.robot.motion import drift, equilibria, forward, inverse
+from wirebayes.robot.motion import drift, equilibria, forward, inverse, path
 from wirebayes.robot.pose import stability
 from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest
@@ -120,6 +120,24 @@ def test_falls_are_found_at_their_time_and_reported(kind, seed):
     assert report["fall_time_s"]["first"] == ours
     warnings = stability.stability_warnings(course, 0.0)
     assert "falls in 100 % of the draws" in warnings[0].text
+
+
+def test_where_a_fall_is_within_a_step_is_looked_for_once_the_step_is_short(monkeypatch):
+    d = _top_heavy("body-7", 2, 6, 0.05)
+    taken, step = [], path._step
+    monkeypatch.setattr(path, "_step", lambda *given: taken.append(1) or step(*given))
+
+    def fallen():
+        taken.clear()
+        course = drift.from_command(d.robot, draws.for_robot(d.robot, d.line), d.position_m, d.rotation, TIMES)
+        return course.falls.time_s, len(taken)
+
+    times, steps = fallen()
+    monkeypatch.setattr(drift, "_GLANCE", path.SMALLEST)
+    exact, more = fallen()
+    assert np.isfinite(exact).sum() >= 3
+    np.testing.assert_allclose(times, exact, rtol=1e-3)
+    assert steps < 0.75 * more
 
 
 def test_early_times_do_not_depend_on_later_ones():

@@ -20,6 +20,9 @@ _LEAST_STEP = 1e-4
 # of the way so far: the longest step in which a platform may fall. Where within it is told by a straight line, while
 # creep runs away as the square root of the time that is left: a twentieth of the step is then a thousandth of the time.
 _FALL_STEP = 0.02
+# of a longer step: the smallest part that a search for a fall tries there. A shorter step is taken next in any case, so
+# that it is enough to know that something happens; where exactly, the last and short one tells.
+_GLANCE = 2.0**-4
 _RESOLVED = 1e-6  # of all creep that tension leads to: what grows less is rounding in tensions, not a drift
 _POWERS = 0.1, 3.0  # of time, between which steps are laid; draws of an estimate may have any N
 
@@ -179,7 +182,8 @@ class CreepingHold:
         creep, now = self.creep, self.creep.time_s
         done = np.maximum(creep.progress(time), 1e-300)
         guess = creep.toward(time, np.zeros(1) if self.slope is None else self.slope)
-        there = self._follow(guess, time)
+        long = not least and 1.0 - (now / time) ** self.power > _FALL_STEP
+        there = self._follow(guess, time, _GLANCE if long else path.SMALLEST)
         first = creep.toward(time, np.zeros(1), creep.amount_at(there.here.tension_N.T))
         if self.slope is None:
             # Nothing to extrapolate from yet: correct twice, the change says how good the first correction was.
@@ -200,7 +204,7 @@ class CreepingHold:
             return worst
         here = self._settle(last, time, there.here)
         fell = self.live & ~(there.here.found & here.found)
-        if fell.any() and not least and 1.0 - (now / time) ** self.power > _FALL_STEP:
+        if fell.any() and long:
             return np.inf
         self._note(fell, there, here, (now, time))
         if creep.follow == "current":
@@ -210,11 +214,11 @@ class CreepingHold:
         self.lengths = self._lengths(time, last.state())
         return worst
 
-    def _follow(self, creep: HoldCreep, time_s: float) -> path.Followed:
+    def _follow(self, creep: HoldCreep, time_s: float, smallest: float) -> path.Followed:
         rows = np.flatnonzero(self.live)
         new = self._lengths(time_s, creep.state())
         part = [(a[rows], b[rows]) for a, b in (self.lengths, new, (self.here.position_m, self.here.rotation))]
-        found = path.follow(self.robot, self.wires.part(rows), part[2], part[0], part[1])
+        found = path.follow(self.robot, self.wires.part(rows), part[2], part[0], part[1], smallest)
         if len(rows) == self.n:
             return found
         whole = path.Followed(forward.put_back(found.here, rows, self.n), np.ones(self.n), np.zeros(self.n))

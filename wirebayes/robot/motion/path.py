@@ -17,7 +17,7 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, mixed
 from wirebayes.robot.motion.balance import balance_at, tensions_at
 
-_SMALLEST = 2.0**-20  # of a step: a jump that is left there is a fall
+SMALLEST = 2.0**-20  # of a step: a jump that is left there is a fall
 _TRUST = 0.5  # a step that ends further from its prediction, relative to its length, is divided
 # The longest prediction that is believed, of the robot's span, and rad: where wires slacken at the new lengths the
 # stiffness is all but singular, the prediction goes anywhere, and any jump would be within its trust.
@@ -52,6 +52,7 @@ def follow(
     start: tuple[Floats, Floats],
     old: tuple[Floats, Floats],
     new: tuple[Floats, Floats],
+    smallest: float = SMALLEST,
 ) -> Followed:
     """Follow equilibria from old lengths to new ones, in a straight line.
 
@@ -64,6 +65,8 @@ def follow(
         Stable poses at the old lengths.
     old, new : pairs of (n, w) arrays
         Zero-tension lengths and offsets, as in `forward.solve`.
+    smallest : float
+        Share of the change down to which it is divided; what jumps there still counts as a fall.
 
     Returns
     -------
@@ -92,7 +95,7 @@ def follow(
         step[rows] *= np.where(hesitant[rows], 1.0, 2.0)
         hesitant[live] = ~held
         step[live[~held]] *= 0.5
-        fell = ~held & (step[live] < _SMALLEST)
+        fell = ~held & (step[live] < smallest)
         if fell.any():  # downhill from where they hung
             hung = [a[fell] for a in (*between, *at)]
             caught = forward.solve(robot, part.part(np.flatnonzero(fell)), *hung)
