@@ -306,7 +306,8 @@ def test_a_running_robot_is_brought_back_by_winches_whose_lines_creep_unlike(tmp
         seen.append(now.position_m)
         sent.append(joint)
         joint = now.joint_m
-    assert now.joint_m.shape == now.joint_sd_m.shape == now.correction_m.shape == now.straight_correction_m.shape == (4,)
+    assert now.joint_m.shape == now.joint_sd_m.shape == (4,)
+    assert now.correction_m.shape == now.straight_correction_m.shape == (4,)
     each = np.array(sent)[:, robot.winch]
     history = History(times, each, None, None, np.zeros(10), np.zeros((10, 3)), np.ones(10))
     place, _, tension = _simulated(robot, CORE, history)
