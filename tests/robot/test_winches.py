@@ -291,6 +291,7 @@ def test_calibration_finds_each_lines_own_length(name, tmp_path):
     told = 0.7 if name == "pairs-3" else 0.5  # six lines from above carry the weight in one way only
     assert np.median(found["references_m"]["sd"]) < told * 3 * small
 
+
 def test_a_running_robot_is_brought_back_by_winches_whose_lines_creep_unlike(tmp_path):
     """Against a simulation of its own, which knows the lengths of lines and no winches."""
     robot = schema.read(printer(tmp_path, drum=""))
