@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import stats
 
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.io import paper
 from wirebayes.model.build import build
 from wirebayes.wire.effect import Amplitude, Effect
@@ -23,7 +23,7 @@ class OwnPower(Effect):
 
 def main():
     nylon = paper.experiments()[2]
-    result = fit(build([nylon], [OwnPower()]), seed=1)
+    result = fit_problem(build([nylon], [OwnPower()]), seed=1)
     p = result.flat[:, result.problem.names.index("own_power.p")]
     print(f"p = {p.mean():.2f}, standard deviation {p.std():.2f}, converged: {result.chains.converged}")
 

@@ -19,11 +19,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from wirebayes.report.blocks import save
+from wirebayes.report.blocks import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, corner
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.report.pictures.discover import left_over
-from wirebayes.results.read_back import Stored, load
+from wirebayes.results.read_back import Stored, load_posterior
 
 DOCS = Path(__file__).parent
 README = DOCS.parent / "README.md"
@@ -246,10 +246,10 @@ def first_screen(page: Path, target: Path) -> None:
 
 def pairs(posterior: Path, target: Path) -> None:
     """Draw every pair of parameters, as the page of a fit does."""
-    stored = load(posterior)
+    stored = load_posterior(posterior)
     figure = corner(stored.draws, stored.sample.model.effects)
     assert figure is not None
-    save(figure, target)
+    save_figure(figure, target)
 
 
 def main() -> None:
@@ -265,7 +265,7 @@ def main() -> None:
             shutil.copy(folder / file, DOCS / "gallery" / f"{picture_name}.svg")
         found = folder / "out/discover/bench"
         pairs(found / "final", DOCS / "gallery" / "corner.svg")
-        drawn = picture(load(found / "plain"), load(found / "final"))
+        drawn = picture(load_posterior(found / "plain"), load_posterior(found / "final"))
         drawn.savefig(DOCS / "images" / "readings.png", dpi=110, metadata={"Software": None})
         README.write_text(readme(README.read_text(encoding="utf-8"), folder, outputs), encoding="utf-8")
         first_screen(folder / "my-wire-fit" / "report.html", DOCS / "images" / "page.png")

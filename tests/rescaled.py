@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from analyses.posterior.any_scale import REST, SHARES, Line, line, measured, under_steps, under_weights
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
@@ -82,7 +82,7 @@ def some_effects(tests: list[Experiment], count: int, rng: np.random.Generator) 
         kinds = [kind for kind in kinds if kind.scope == "material"]
     possible = [forms for forms in (kind.variants(protocols) for kind in kinds) if forms]
     chosen = rng.permutation(len(possible))[:count]
-    return tuple(named(possible[i][rng.integers(len(possible[i]))].key) for i in chosen)
+    return tuple(effect_named(possible[i][rng.integers(len(possible[i]))].key) for i in chosen)
 
 
 def factors(index: int, *, powers_of_two: bool) -> Units:

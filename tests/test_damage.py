@@ -15,7 +15,7 @@ import pytest
 
 from tests.hostile.mutations import json_changed, netcdf_changed, scrambled, text_changed
 from wirebayes.cli import main
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.results import store
 from wirebayes.simulation.synthetic import Bench, Truth, draw
@@ -38,7 +38,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     wire.mkdir(parents=True)
     bench = Bench("simulated", "line", 1000.0, displacements_mm=(1.0, 2.0, 3.0, 4.0))
     problem = draw([bench], Truth(), seed=3).problem
-    store.save(fit(problem, 1, policy=HASTY), wire, {})
+    store.save_posterior(fit_problem(problem, 1, policy=HASTY), wire, {})
     configuration = {"command": "fit", "version": "0.1.0", "seed": 0, "own_effects": None}
     (folder / "fit" / "configuration.json").write_text(json.dumps(configuration))
     (folder / "protocol.csv").write_text("hold,displacement_mm,time_s\n9,5,0\n9,5,60\n")

@@ -286,7 +286,7 @@ def test_the_page_on_robots_has_every_key_of_a_robots_file(monkeypatch):
     leg = "[[leg]]\nwire = 'own'\npulley_radius_m = 0.01\nswivel_axis = [0, 0, 1]\n" + drum
     wire = "[wires.own]\nk1_N = 800\nB_mm = 0.3\nU = 0.8\nk2 = 0.03\nN = 0.64\nlength_mm = 1000\n"
     schema.parse(text.replace("[[leg]]\n", leg) + wire, "whole")
-    schema.read("linear-7")
+    schema.read_robot_file("linear-7")
     known = set(re.findall(r"[A-Za-z]\w+|[UN]\b", " ".join(re.findall(r"\* - (.+)", KEYS))))
     missing = {key for key in asked if key.rpartition(".")[2] not in known and key != "wires.own"}
     assert len(asked) > 40

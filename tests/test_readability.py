@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from analyses.project.measures import local_names, nodes, trees
+from analyses.project.measures import homonyms, local_names, nodes, trees
 
 ROOT = Path(__file__).parent.parent
 SOURCES = {path: path.read_text() for path in sorted((ROOT / "wirebayes").rglob("*.py"))}
@@ -167,6 +167,15 @@ def test_what_is_dense_is_found():
     assert beyond((nodes(many), len(local_names(many))), MOST_NODES, MOST_NAMES)
     assert len(local_names(packed)) == 0
     assert beyond((nodes(packed), 0), MOST_NODES, MOST_NAMES)
+
+
+def test_no_public_name_stands_for_two_things():
+    assert homonyms(trees(ROOT)) == {}, "give each a name of its own, or an underscore where one file alone uses it"
+
+
+def test_a_name_in_two_files_is_found():
+    one, two = ast.parse("def page(): ...\n\nclass Hold: ..."), ast.parse("def page(): ...\n\ndef _hold(): ...")
+    assert homonyms({Path("a.py"): one, Path("b.py"): two}) == {"page": ["a.py", "b.py"]}
 
 
 def test_the_files_that_contributing_names_are_there():

@@ -138,7 +138,7 @@ def from_json(stored: Sequence[NoticeJson]) -> tuple[Notice, ...]:
     return tuple(Notice(entry["kind"], entry["text"]) for entry in stored)
 
 
-def named(parts: Mapping[str, Warned]) -> list[NoticeJson]:
+def notices_by_part(parts: Mapping[str, Warned]) -> list[NoticeJson]:
     """The warnings of several parts of a result, each with the part's name before it.
 
     Parameters

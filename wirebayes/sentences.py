@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from wirebayes.json_files.discovery import Answer
+from wirebayes.json_files.discovery import SharedFindings
 
 
 def listed(words: Sequence[str], last: str = "and") -> str:
@@ -35,7 +35,7 @@ def spoken(effect: str) -> str:
     return "something unknown" if name == "unknown" else f"{name.replace('_', ' ')}{at}"
 
 
-def likely(found: Answer) -> str:
+def likely(found: SharedFindings) -> str:
     """Names of the set among which the largest share lies, each with its probability; empty where there is no name.
 
     Parameters
@@ -50,7 +50,7 @@ def likely(found: Answer) -> str:
     return listed([f"{'nothing known' if n == 'unknown' else spoken(n)} ({100 * p:.0f} %)" for n, p in ranked], "or")
 
 
-def families_said(found: Answer) -> list[str]:
+def families_said(found: SharedFindings) -> list[str]:
     """Sentences of the established families that have several members.
 
     Parameters
@@ -62,7 +62,7 @@ def families_said(found: Answer) -> list[str]:
     return [family["sentence"] for family in families if family["established"] and family["members"][1:]]
 
 
-def undecided(found: Answer) -> str:
+def undecided(found: SharedFindings) -> str:
     """What an ambiguous answer is undecided between: an established family in its own words, else the likely names.
 
     Parameters
@@ -76,7 +76,7 @@ def undecided(found: Answer) -> str:
     return f"something is missing; these readings do not tell what: {likely(found)}"
 
 
-def said_beside(found: Answer) -> list[str]:
+def said_beside(found: SharedFindings) -> list[str]:
     """What is said beside the verdict: families that it does not speak of itself, and a remainder that does not count.
 
     Parameters

@@ -18,8 +18,8 @@ import numpy as np
 
 from analyses.benchmarks import parsed
 from analyses.benchmarks.plain import ours
-from wirebayes.effects import CATALOGUE, named
-from wirebayes.inference.fit import fit
+from wirebayes.effects import CATALOGUE, effect_named
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
@@ -99,7 +99,7 @@ def share_in_likelihood(problem, seed):
     kind.log_likelihood, LogPosterior.__call__ = watch(likelihood, "likelihood"), watch(target, "target")
     try:
         began = time.process_time()
-        fit(problem, seed)
+        fit_problem(problem, seed)
         whole = time.process_time() - began
     finally:
         kind.log_likelihood, LogPosterior.__call__ = likelihood, target
@@ -113,7 +113,7 @@ def against_numpy(wire):
     print(f"\n{'numpy over compiled':28s}" + "".join(f"{n:>8d}" for n in BATCHES))
     out = {}
     for key in ("", "toe", "memory"):
-        problem, out[key or "none"] = build([wire], [named(key)] if key else []), []
+        problem, out[key or "none"] = build([wire], [effect_named(key)] if key else []), []
         for n in BATCHES:
             theta = problem.prior.rvs(n, np.random.default_rng(0))
             compute, best = partial(problem.log_likelihood, theta), []
@@ -131,7 +131,7 @@ def with_effects(keys):
     print("\neffective draws per evaluation with one effect, all counted (one seed; ! not converged)")
     out = {}
     for wire in experiments():
-        each = {key: ours(build([wire], [named(key)]), 0, 0.0)[0] for key in keys}
+        each = {key: ours(build([wire], [effect_named(key)]), 0, 0.0)[0] for key in keys}
         out[wire.name] = {key: (r["ess_per_evaluation"], r["converged"]) for key, r in each.items()}
         values = [value for value, _ in out[wire.name].values()]
         told = (f"{key} {value:.3f}{'' if good else ' !'}" for key, (value, good) in out[wire.name].items())
@@ -159,7 +159,7 @@ def main():
     wire = experiments()[0]
     singles = [k for k in CATALOGUE if "@" not in k and _plain(k)]
     print("\neffect: cost over that of no effect")
-    found = timed([build([wire])] + [build([wire], [named(k)]) for k in singles])
+    found = timed([build([wire])] + [build([wire], [effect_named(k)]) for k in singles])
     out["effects"] = {k: cost / found[0][0] for k, (cost, _) in zip(["none", *singles], found, strict=True)}
     for key, ratio in out["effects"].items():
         print(f"  {key:28s} {ratio:6.2f}")
@@ -185,7 +185,7 @@ def main():
 
 def _plain(key):
     try:
-        named(key)
+        effect_named(key)
     except Exception:  # effects that want a hold or a parameter named
         return False
     return True

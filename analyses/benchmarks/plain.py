@@ -30,7 +30,7 @@ def ours(problem, seed, seconds, wanted=20_000):
     with ExitStack() as patches, costs.part("burn"):
         for module, name in parts:
             patches.enter_context(patch.object(module, name, watched(getattr(module, name))))
-        chains = ensemble.sample(target, seed, Policy(ess=wanted))
+        chains = ensemble.sample_posterior(target, seed, Policy(ess=wanted))
     for book in (costs.cpu, costs.wall):
         book["burn"] -= book["sample"]
     z = chains.z

@@ -18,8 +18,9 @@ from unittest.mock import patch
 
 import wirebayes
 from analyses.benchmarks import parsed
-from wirebayes.discovery.search import discover
-from wirebayes.inference.fit import fit
+from wirebayes.discovery.search import investigate
+from wirebayes.discovery.settings import Settings
+from wirebayes.inference.fit import fit_problem
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.build import build
@@ -47,8 +48,8 @@ def reproduce():
 
 
 WORK = {
-    "one fit": lambda: fit(build(experiments()[:1]), 0),
-    "one discover": lambda: discover(experiments()[:1]),
+    "one fit": lambda: fit_problem(build(experiments()[:1]), 0),
+    "one discover": lambda: investigate(experiments()[:1], Settings()),
     "reproduce": reproduce,
 }
 

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from wirebayes.inference.fit import Fit, fit, parameters_at, seed_of
+from wirebayes.inference.coordinates.transform import Transformation
+from wirebayes.inference.fit import Fit, fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.model.problem import Problem, with_readings
 from wirebayes.model.replicate import readings
@@ -78,7 +79,7 @@ def one(
             break
         redrawn += 1
     target = fitted(simulated)
-    done = fit(target, seed_of(seed, "fit"), policy=policy or Policy())
+    done = fit_problem(target, seed_of(seed, "fit"), policy=policy or Policy())
     draws = _last_of_every_walker(done)
     columns = np.column_stack([draws, target.log_likelihood(draws)])
     value = np.append(truth[0], target.log_likelihood(truth))
@@ -92,6 +93,12 @@ def _last_of_every_walker(done: Fit) -> Array:
     """(n, d) draws that are as good as independent: walkers only meet through the differential-evolution move."""
     z = done.chains.z[:, -1]
     return parameters_at(done.problem, z.reshape(-1, z.shape[-1]))
+
+
+def parameters_at(problem: Problem, z: Array) -> Array:
+    """(n, d) parameters of a problem without integrated amplitudes, of (n, d) coordinates that were sampled."""
+    own = problem.in_units(problem.own_units)
+    return own.theta_in(problem.units, Transformation(own).to_natural(z))
 
 
 def extremeness(share_below: Array) -> float:

@@ -17,8 +17,8 @@ from analyses.hidden_effects.rates import rate, upper_bound
 from analyses.posterior.any_scale import kinds_of, made_test
 from analyses.resumable import study
 from wirebayes.discovery.model_check import check_model
-from wirebayes.discovery.search import discover
-from wirebayes.discovery.settings import ALPHA
+from wirebayes.discovery.search import investigate
+from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.inference.fit import seed_of
 from wirebayes.results.jobs import Job
 
@@ -34,7 +34,7 @@ def one(seed: int, index: int) -> dict[str, Any]:
     row = {"index": index, **made.about, "p": check.p, "simulations": check.simulations}
     if check.passed and index % SEARCHED:
         return row
-    (found,) = discover([made.test], seed=own_seed, simulations=SIMULATIONS)["experiments"].values()
+    (found,) = investigate([made.test], Settings(simulations=SIMULATIONS), own_seed).report["experiments"].values()
     return row | {"verdict": found["verdict"], "accepted": found["accepted"], "p_of_search": found["p_global"]}
 
 

@@ -45,7 +45,7 @@ def values(case: str, seed: int) -> tuple[dict[str, Array], dict[str, Array]]:
 def by_counting(data: dict[str, Array], chance: dict[str, Array]) -> float:
     """p where all simulations are counted, as often as a value is exceeded."""
     null = [np.log(len(v)) - np.log(stats.rankdata(-v, method="max")) for v in chance.values()]
-    found = max(float(screening.counted(data[name][0], v)) for name, v in chance.items())
+    found = max(float(screening.empirical_surprise(data[name][0], v)) for name, v in chance.items())
     return float((1 + (np.max(null, axis=0) >= found).sum()) / (1 + len(null[0])))
 
 

@@ -14,7 +14,6 @@ from wirebayes.discovery import held_out
 from wirebayes.discovery.investigation import final_models
 from wirebayes.discovery.search import investigate
 from wirebayes.discovery.settings import Settings
-from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io import paper
 from wirebayes.model.spec import PLAIN_SPEC
@@ -25,7 +24,7 @@ TRAIN = {"roc-line-1m": 8, "roc-line-1.71m": 8, "nylon-1.5m": 8, "kite-1.5m": 5}
 def unseen(experiment, seed=0):
     """What is named on the first holds, and both models' error on the rest."""
     trained = experiment.train(TRAIN[experiment.name])
-    findings = investigate([trained], Settings(kinds=CATALOGUE), seed)
+    findings = investigate([trained], Settings(), seed)
     verdict = findings.report["experiments"][experiment.name]
     effects = final_models(findings)[0].effects
     rng = np.random.default_rng(seed)
@@ -78,7 +77,7 @@ def main():
     if chosen.together:
         groups |= {"two Roc lines": [wires[:2]], "all four": [wires]}
     for title, files in groups.items():
-        reports = [investigate(file, Settings(kinds=CATALOGUE), 0).report["experiments"] for file in files]
+        reports = [investigate(file, Settings(), 0).report["experiments"] for file in files]
         results[title] = {name: said(report) for found in reports for name, report in found.items()}
         for name, r in results[title].items():
             shared = f", shared with {', '.join(r['shared_with'])}" if r["shared_with"] else ""

@@ -40,7 +40,7 @@ from wirebayes.io.run_folder import write_csv
 from wirebayes.prediction.request import request_of
 from wirebayes.prediction.table import mixture_table
 from wirebayes.results.jobs import Job, one
-from wirebayes.results.read_back import Stored, load
+from wirebayes.results.read_back import Stored, load_posterior
 from wirebayes.results.summary import CREEP_TIMES_S
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import schema
@@ -149,7 +149,7 @@ def fitted(experiment: Experiment, keys: tuple[str, ...], near: dict[str, float]
         job = Job("fit", (experiment,), keys, near=near)
         one(job, Path(folder), seed, POLICY)
         summary = json.loads((Path(folder) / "fit" / "summary.json").read_text())
-        return load(Path(folder) / "fit"), bool(summary["converged"])
+        return load_posterior(Path(folder) / "fit"), bool(summary["converged"])
 
 
 def true_line(simulated: Simulated, training: Stored) -> WireDraws:
@@ -185,14 +185,14 @@ def figures(stored: Stored, simulated: Simulated, folder: Path) -> list[dict[str
         add("predict", f"hold {row[1]}", float(reading), row[6], row[8])
 
     line, real = wire_draws(stored, DRAWS), true_line(simulated, stored)
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     low, high = line.tension_range_N or (1.0, 1.0)
     loads = [float(np.sqrt(low * high)), high]
     tables = [files.creep_table(robot, line, loads, TIMES_S), files.creep_table(robot, real, loads, TIMES_S)]
     for row, exact in zip(*tables, strict=True):
         add("export", f"{row[1]:g} s", exact[5], row[4], row[6])
 
-    robot = at_tension(schema.read("linear-7"), float(np.sqrt(low * high)))
+    robot = at_tension(schema.read_robot_file("linear-7"), float(np.sqrt(low * high)))
     for time in (60.0, 600.0, 3600.0):
         drift = [claim.over_workspace(robot, for_robot(robot, w), robot.home_m[None], time) for w in (line, real)]
         believed, true = (1e3 * d.distance_m[0] for d in drift)
@@ -220,7 +220,7 @@ def case(index: int) -> dict[str, Any]:
         oracle, converged = fitted(training, keys, None, index)
         out: dict[str, Any] = {"index": index, "effects": keys, "oracle_converged": converged}
         out["oracle"] = figures(oracle, simulated, folder)
-        found = investigate([training], Settings(kinds=CATALOGUE, simulations=SIMULATIONS), index)
+        found = investigate([training], Settings(simulations=SIMULATIONS), index)
         report = found.report["experiments"]["wire"]
         accepted = set(report["accepted"])
         out |= {"verdict": report["verdict"], "accepted": sorted(accepted), "p": report["p_global"],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import json
 import subprocess
 import sys
@@ -41,16 +40,16 @@ def ask(spec: Spec, cases: Path, how: str, simulations: int | None = None) -> di
 def _answer(spec: Spec, file: Path, how: str, without: tuple[str, ...], simulations: int | None) -> dict[str, Any]:
     seed = int(spec.key, 16) % 2**31
     if how in ("api", "apart"):
-        from wirebayes.discovery.search import discover
+        from wirebayes.discovery.search import catalogue_without, investigate
+        from wirebayes.discovery.settings import SIMULATIONS, Settings
         from wirebayes.io.experiment_file import read_experiments
 
-        # posteriors are not judged here and cost minutes: left out where the function offers to
-        options: dict[str, Any] = {"posterior": False} if "posterior" in inspect.signature(discover).parameters else {}
-        options |= {} if simulations is None else {"simulations": simulations}
+        # without the posteriors that the command adds: they are not judged here and cost minutes
+        settings = Settings(kinds=catalogue_without(without), simulations=simulations or SIMULATIONS)
         experiments = read_experiments(file)
         materials = {e.material: [x for x in experiments if x.material == e.material] for e in experiments}
         groups = [experiments] if how == "api" else list(materials.values())
-        answers = [discover(members, without=without, seed=seed, **options) for members in groups]
+        answers = [investigate(members, settings, seed).report for members in groups]
         return {**answers[0], "experiments": {k: v for a in answers for k, v in a["experiments"].items()}}
     if how == "cli":
         with tempfile.TemporaryDirectory() as folder:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from analyses.resumable import study
-from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
@@ -138,7 +138,7 @@ def one(seed: int, index: int) -> dict[str, Any]:
     """One test: what was done, and which 90 % intervals hold the truth."""
     own_seed = seed_of(seed, "any scale", str(index))
     made = made_test(own_seed, index)
-    done = fit(build([made.test]), own_seed, policy=POLICY)
+    done = fit_problem(build([made.test]), own_seed, policy=POLICY)
     low, high = np.quantile(done.flat, [0.05, 0.95], axis=0)
     columns = {name: done.problem.names.index(name) for name in PLAIN}
     inside = {name: bool(low[i] <= made.truth[name] <= high[i]) for name, i in columns.items()}

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from analyses.resumable import records
-from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.run_folder import write_json
 from wirebayes.model.likelihoods import chain, reading_variance
@@ -90,11 +90,11 @@ def one(seed: int, index: int) -> dict[str, Any]:
     """The row of a wire: whose 90 % intervals hold the truth, and how many held-out readings lie in their bands."""
     own = seed_of(seed, "coverage", str(index))
     made = wire(own)
-    whole = fit(made.problem, own, policy=POLICY)
+    whole = fit_problem(made.problem, own, policy=POLICY)
     low, high = np.quantile(whole.flat, [0.05, 0.95], axis=0)
     inside = (made.theta[0] >= low) & (made.theta[0] <= high)
     first, count = training(made)
-    part = fit(first, seed_of(own, "training"), policy=POLICY)
+    part = fit_problem(first, seed_of(own, "training"), policy=POLICY)
     caught = held_out(made, part.flat[:: max(1, len(part.flat) // 4000)], count, np.random.default_rng(own))
     return {
         "index": index,

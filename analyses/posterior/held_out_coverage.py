@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy import stats
 
-from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
@@ -46,7 +46,7 @@ def one(job: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, bool]:
     drawn = readings(truth, truth.prior.rvs(1, rng), truth.samples[0], rng)[..., 0]
     holds = tuple(replace(h, readings=drawn[j, : len(h.time_s)]) for j, h in enumerate(experiment.holds))
     simulated = replace(experiment, holds=holds)
-    fitted = fit(with_wires(build([simulated.train(TRAINED)])), int(rng.integers(2**32)), policy=POLICY)
+    fitted = fit_problem(with_wires(build([simulated.train(TRAINED)])), int(rng.integers(2**32)), policy=POLICY)
     result = held_out(fitted, simulated, rng)
     assert result.free is not None
     free, given = (np.array([*scores.coverage().values()]) for scores in (result.free, result.given))

@@ -11,7 +11,7 @@ import numpy as np
 
 from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates, effects_of, problem_of
 from wirebayes.effects import catalogue
-from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.io.experiment_file import select
 from wirebayes.io.paper import experiments
 from wirebayes.prediction.leave_one_hold_out import LARGEST_K, smoothed_leave_one_hold_out
@@ -30,7 +30,7 @@ def main() -> None:
     known = catalogue()
     for candidate in candidates(experiment, ModelToCompare(BASE, "", ""), known, MODELS):
         problem = problem_of(candidate, experiment, effects_of(candidate, experiment, known, SEED))
-        fitted = fit(problem, seed_of(SEED, "leave one hold out", candidate.name))
+        fitted = fit_problem(problem, seed_of(SEED, "leave one hold out", candidate.name))
         quick, slow = (
             smoothed_leave_one_hold_out(fitted, SEED),
             smoothed_leave_one_hold_out(fitted, SEED + 1, exact=True),

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_json
@@ -59,7 +59,7 @@ def fitted(task: tuple[str, int, Array]) -> dict[str, float]:
     name, number, measured = task
     test, _ = planned(name, seed_of(0, name, "truth", str(number)), 1)
     problem = with_readings(build([test]), [measured[..., None]])
-    done = fit(problem, seed_of(0, name, "fit", str(number)), policy=POLICY)
+    done = fit_problem(problem, seed_of(0, name, "fit", str(number)), policy=POLICY)
     low, high = np.quantile(done.flat, [0.05, 0.95], axis=0)
     widths = dict(zip(problem.names, (high - low).tolist(), strict=True))
     sds = {f"{c} sd": float(v) for c, v in zip(problem.names, done.flat.std(axis=0), strict=True)}

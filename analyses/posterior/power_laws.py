@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.io.arrays import from_arrays
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_json
@@ -104,7 +104,7 @@ TESTS = (
 
 def row(test: Test) -> dict[str, float | str | bool]:
     """What the fit of a test cost."""
-    done = fit(build([test.experiment()]))
+    done = fit_problem(build([test.experiment()]))
     at = done.problem.names.index("N")
     return {
         "test": test.name,

@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.inference.sampler import ensemble
@@ -31,9 +31,11 @@ TAILS = (0.05, 0.95)
 
 def run(seed: int, wire: int, effect: str | None, likelihood: Likelihood, ess: float):
     """Whether one run converged, its draws (n, d), positive parameters as logarithms, and effective draws (d,)."""
-    problem = build([experiments()[wire]], [named(effect)] if effect else [], spec=ModelSpec(likelihood=likelihood))
+    problem = build(
+        [experiments()[wire]], [effect_named(effect)] if effect else [], spec=ModelSpec(likelihood=likelihood)
+    )
     target = LogPosterior(problem)
-    chains = ensemble.sample(target, seed, Policy(ess=ess))
+    chains = ensemble.sample_posterior(target, seed, Policy(ess=ess))
     theta = target.coordinates.to_natural(chains.z.reshape(-1, chains.z.shape[-1]))
     logs = [name in problem.prior.logarithmic for name in problem.names]
     theta[:, logs] = np.log(theta[:, logs])

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from wirebayes.effects import named
-from wirebayes.inference.fit import Fit, fit, seed_of
+from wirebayes.effects import effect_named
+from wirebayes.inference.fit import Fit, fit_problem, seed_of
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.problem import Problem
@@ -38,7 +38,7 @@ def joined(parts: Sequence[LeftOutHolds]) -> LeftOutHolds:
 
 
 def fitted(problem: Problem, name: str) -> Fit:
-    result = fit(problem, seed_of(SEED, "together", name))
+    result = fit_problem(problem, seed_of(SEED, "together", name))
     print(f"{name}: {len(problem.names)} parameters, {'converged' if result.chains.converged else 'NOT CONVERGED'} "
           f"{result.chains.why}", flush=True)  # fmt: skip
     return result
@@ -56,7 +56,9 @@ def main() -> None:
     }
     for which in ("k1", "U", "N"):
         name = f"together, B as L0^p, {which} by length"
-        result = fitted(build(wires, [named(f"length_dependence@{which}")], spec=ModelSpec(length_exponent=free)), name)
+        result = fitted(
+            build(wires, [effect_named(f"length_dependence@{which}")], spec=ModelSpec(length_exponent=free)), name
+        )
         models[name] = smoothed_leave_one_hold_out(result)
         print(f"  {which} as L0^p, p {interval(result.flat[:, result.problem.names.index('length_dependence.p')])}")
 

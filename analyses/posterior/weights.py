@@ -11,7 +11,7 @@ import numpy as np
 
 from analyses.posterior.any_scale import POLICY, SHARES, Line, line, measured, under_steps, under_weights
 from analyses.resumable import study
-from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.model.build import build
 from wirebayes.numeric.typing import Array
 
@@ -35,7 +35,7 @@ def one(seed: int, index: int) -> dict[str, Any]:
     exact = log_creep(made, *(np.array(made.truth[name]) for name in ("B", "U", "k2", "N")))
     row: dict[str, Any] = {"index": index}
     for kind, chosen in zip(KINDS, ([tests[0]], [tests[1]], tests), strict=True):
-        done = fit(build(chosen), own_seed, policy=POLICY)
+        done = fit_problem(build(chosen), own_seed, policy=POLICY)
         draws = (done.flat[:, done.problem.names.index(name)] for name in ("B", "U", "k2", "N"))
         low, high = np.quantile(log_creep(made, *draws), [0.05, 0.95])
         row[kind] = {"width": float(high - low), "inside": bool(low <= exact <= high), "converged": done.converged}

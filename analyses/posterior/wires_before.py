@@ -25,7 +25,7 @@ WANTED = 20_000  # effective draws, as where docs/speed.rst counts what they cos
 
 def fits_here(seed: int) -> dict[str, Any]:
     """All fits by this process's package."""
-    from wirebayes.inference.fit import fit
+    from wirebayes.inference.fit import fit_problem
     from wirebayes.io.paper import experiments
 
     out = {}
@@ -33,7 +33,7 @@ def fits_here(seed: int) -> dict[str, Any]:
         for likelihood in LIKELIHOODS:
             for words, holds in HOLDS.items():
                 trained = experiment if holds is None else experiment.train(holds)
-                done = fit(problem_of(trained, likelihood), seed)
+                done = fit_problem(problem_of(trained, likelihood), seed)
                 out[f"{experiment.name}, {likelihood}, {words}"] = kept(done)
     return out
 

@@ -42,7 +42,7 @@ def softest(robot, c, found):
 def compare(robot, make, law, count, rng):
     c = make(robot, law, count, rng)
     start, turn = c.position_m + 0.02 * rng.normal(size=c.position_m.shape), np.eye(3)
-    blind = forward.solve(robot, c.wires, c.zero_m, c.offset_m, start, turn)
+    blind = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, turn)
     found = cases.solved(robot, c)
     begin, begin_R = nearby(robot, found, rng)
     soft = softest(robot, c, found)
@@ -80,9 +80,9 @@ def main():
     total, solved, slack, worst, trips = 0, 0.0, 0, 0.0, 0.0
     over, unheld = 0, 0
     for name in schema.shipped():
-        if schema.read(name).plane is not None:  # the other program, or the proof, knows no plane
+        if schema.read_robot_file(name).plane is not None:  # the other program, or the proof, knows no plane
             continue
-        robot = schema.read(name)
+        robot = schema.read_robot_file(name)
         for law in ("hooke", "modified"):
             for make in (cases.commanded, cases.disturbed):
                 n, ok, blind, loose, calm, errors, there, free = compare(robot, make, law, count, rng)

@@ -75,7 +75,7 @@ def case(index: int) -> dict[str, Any]:
     low, high = line.tension_range_N or (1.0, 1.0)
     figures = []
     for name in ROBOTS:
-        robot = at_tension(schema.read(name), float(np.sqrt(max(low, 0.1) * high)))
+        robot = at_tension(schema.read_robot_file(name), float(np.sqrt(max(low, 0.1) * high)))
         times = np.concatenate([[0.0], TIMES_S])
         course = drift.from_command(robot, for_robot(robot, line), robot.home_m, np.eye(3), times)
         distance = 1e3 * np.linalg.norm(course.position_m[:, 1:] - robot.home_m, axis=-1)

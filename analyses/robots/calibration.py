@@ -18,7 +18,7 @@ from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.estimate import corrected_joints, length_posterior
-from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 TENSION_SD_N, REFERENCE_SD_M, SPREAD, LOWEST_N = 0.02, 5e-3, 0.05, 2.5
@@ -67,13 +67,13 @@ def pose_error(robot, prior, truth, reached, joints, x, R):
     """Distance, mm, from where each true robot ends up when told joint values."""
     wires, error = prior.wires(robot, truth)
     bare, offset = inverse.lengths(robot, np.broadcast_to(joints, error.shape))
-    found = forward.solve(robot, wires, (bare + error) * (1 + reached.creep), offset, x, R)
+    found = forward.solve_equilibrium(robot, wires, (bare + error) * (1 + reached.creep), offset, x, R)
     return 1e3 * np.linalg.norm(found.position_m - x, axis=1)
 
 
 def study(name, line, count, rng):
     print(name)
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     robot = replace(robot, rule=replace(robot.rule, lowest_N=LOWEST_N))
     session = plan(robot, line, rng)
     prior = LengthPrior(line, REFERENCE_SD_M, SPREAD)
@@ -84,7 +84,7 @@ def study(name, line, count, rng):
     for k, parameter in enumerate(prior.names):
         value = line.parameters[parameter][draw]
         truth[:, robot.legs + k] = np.log(value) if parameter in draws.CORE else value
-    real = predict(robot, prior, session, truth, longest_step=0.35)
+    real = predict_session(robot, prior, session, truth, longest_step=0.35)
     readings = np.maximum(real.readings + rng.normal(size=real.readings.shape), 0.0)
     print(f"  readings of slack wires: {(real.readings == 0).mean():.3f} of all")
     results = {"creep model": (prior, length_posterior(robot, prior, session, readings)),
@@ -102,7 +102,7 @@ def study(name, line, count, rng):
     labels = "before, Hooke", "before, creep foreseen", "after, Hooke only", "after, creep model"
     errors = {label: [] for label in labels}
     centre = mean[None]
-    foreseen = predict(robot, prior, session, centre)
+    foreseen = predict_session(robot, prior, session, centre)
     for x in tests:
         R = np.eye(3)
         tau = inverse.tensions(robot, x[None], R[None])

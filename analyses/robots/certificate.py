@@ -24,9 +24,9 @@ from wirebayes.robot.proof.certificate import certify
 def shares(poses, rng):
     print(f"{'robot':14s} {'law':8s} lengths    poses proved  ms each  enclosure, m  alone within, mm (median)")
     for name in schema.shipped():
-        if schema.read(name).plane is not None:  # the other program, or the proof, knows no plane
+        if schema.read_robot_file(name).plane is not None:  # the other program, or the proof, knows no plane
             continue
-        robot = schema.read(name)
+        robot = schema.read_robot_file(name)
         for law in ("hooke", "modified"):
             for make in (cases.commanded, cases.disturbed):
                 c = make(robot, law, poses, rng)
@@ -57,7 +57,7 @@ def enclosures(folder):
     print("sampled 90 % band of a shared draw; guaranteed for all lengths between those of the two quantiles,")
     print("all wires together; and each wire on its own (share: how much of the band about its middle was proved)")
     for name in ("cogiro-desk", "linear-6", "linear-7", "segesta-8", "hangprinter-4"):
-        robot = schema.read(name)
+        robot = schema.read_robot_file(name)
         wires = draws.for_robot(robot, line)
         x, R = robot.home_m, np.eye(3)
         course = drift.from_command(robot, wires, x, R, np.array([60.0]))

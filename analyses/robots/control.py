@@ -29,7 +29,7 @@ def errors(fits, count):
         line = read_wires(fits / line_name, count)
         others = {p.name: read_wires(p, count) for p in sorted(fits.glob(f"{line_name}+*"))}
         for name in ROBOTS:
-            robot = schema.read(name)
+            robot = schema.read_robot_file(name)
             x, R = robot.home_m, np.eye(3)
             for truth_name, truth in {line_name: line, **others}.items():
                 wires = draws.for_robot(robot, truth, 0.05, rng)
@@ -59,7 +59,7 @@ def intervals(fits, count):
     for line_name in LINES:
         line = read_wires(fits / line_name, count)
         for name in ROBOTS:
-            robot = schema.read(name)
+            robot = schema.read_robot_file(name)
             x, R = robot.home_m, np.eye(3)
             wires = draws.for_robot(robot, line, 0.05, rng)
             tau = inverse.tensions(robot, x[None], R[None])

@@ -63,7 +63,7 @@ def enclose(
     stiff = np.full(robot.legs, k1_N)
     pieces, low, high = [(0.0, 1.0)], np.full(3, np.inf), np.full(3, -np.inf)
     nothing = np.full(3, np.nan)
-    begun = forward.solve(robot, wires, zero_low_m[None], offset_m, start_m, start_rotation)
+    begun = forward.solve_equilibrium(robot, wires, zero_low_m[None], offset_m, start_m, start_rotation)
     here = _upright(begun)
     tried = proved = 0
     while pieces:
@@ -72,14 +72,14 @@ def enclose(
         if tried > most:
             return Enclosure(False, nothing, nothing, proved)
         first, last = (zero_low_m + s * (zero_high_m - zero_low_m) for s in (a, b))
-        middle = _upright(forward.solve(robot, wires, 0.5 * (first + last)[None], offset_m, *here))
+        middle = _upright(forward.solve_equilibrium(robot, wires, 0.5 * (first + last)[None], offset_m, *here))
         bounds = np.minimum(first, last), np.maximum(first, last)
         proof = certify(robot, law, (stiff, stiff), bounds, offset_m, *middle)
         if not (proof.proved and _inside(robot, proof, here)):
             # the earlier half next, so that each solution starts from its neighbour
             pieces += [(0.5 * (a + b), b), (a, 0.5 * (a + b))]
             continue
-        here = _upright(forward.solve(robot, wires, last[None], offset_m, *middle))
+        here = _upright(forward.solve_equilibrium(robot, wires, last[None], offset_m, *middle))
         if not _inside(robot, proof, here):
             return Enclosure(False, nothing, nothing, proved)
         proved += 1

@@ -39,7 +39,7 @@ def drawn(rng):
         exits[:, 1] = points[:, 1] = centre[1] = position[1] = 0.0
         exits[:, 0], points[:, 0] = span * np.array([-0.5, 0.5]), reach * span * np.array([-1.0, 1.0])
     mass = np.exp(rng.uniform(np.log(0.05), np.log(50.0)))
-    base = schema.read("cogiro")
+    base = schema.read_robot_file("cogiro")
     drum: Actuator = "drum"
     robot = replace(
         base, exit_m=exits, platform_m=points, lines=np.ones(legs), beyond_m=np.zeros(legs), mass_kg=mass,

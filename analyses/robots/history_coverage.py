@@ -63,7 +63,7 @@ def errors_of(kind: str, sd: float, shape: tuple[int, ...], rng: np.random.Gener
 
 def case(name: str, index: int, draws: int) -> dict[str, Any]:
     """One truth: where it lies among the draws from joint values alone and among those with readings."""
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     moves, start = history(robot), (robot.home_m, np.eye(3))
     seed = seed_of(11, "history coverage", name, str(index))
     rng = np.random.default_rng(seed)

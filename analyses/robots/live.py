@@ -126,7 +126,7 @@ if __name__ == "__main__":
     options.add_argument("--steps", type=int, default=2000)
     options.add_argument("--rate", type=float, default=20.0, help="of the hour, Hz")
     given = options.parse_args()
-    machine, posterior = schema.read(given.robot), line(given.draws, np.random.default_rng(0))
+    machine, posterior = schema.read_robot_file(given.robot), line(given.draws, np.random.default_rng(0))
     for with_readings in (False, True):
         speed(machine, posterior, with_readings, given.steps, 500.0)
     hour(machine, posterior, given.rate)

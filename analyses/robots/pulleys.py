@@ -48,7 +48,7 @@ def ignored(robot, wires, radius_m):
     length = np.stack([statics.geometry(r, x.T, np.moveaxis(R, 0, -1)).distance_m for r in (real, robot)])
     raw = np.abs(length[0] - length[1]) / length[0]
     change = length[0] - length[1] - (length[0] - length[1])[:, :1]
-    there = forward.solve(real, wires, *inverse.lengths(real, zeroed), x, R)
+    there = forward.solve_equilibrium(real, wires, *inverse.lengths(real, zeroed), x, R)
     off = 1e3 * np.linalg.norm(there.position_m - x, axis=1)[1:]
     slack = (there.tension_N[1:] <= 0).any(1).mean()
     return raw[:, 1:], np.abs(change[:, 1:]), (np.abs(change) / length[0])[:, 1:], off, slack
@@ -70,7 +70,7 @@ def main():
     print(".. list-table::\n   :header-rows: 1\n   :widths: 16 10 16 18 16 12 10 10\n")
     rows = [head]
     for name in ROBOTS:
-        robot = schema.read(name)
+        robot = schema.read_robot_file(name)
         wires = draws.for_robot(robot, line.centre())
         drift = creep(robot, line)
         for radius in RADII_M:

@@ -80,7 +80,7 @@ def speed():
     print(f"{'robot':14s} {'batch':>10s} {'root hybr':>10s} {'root lm':>10s} {'times':>7s} {'same pose':>10s} found")
     rng = np.random.default_rng(0)
     for name in ("cogiro-desk", "segesta-8", "ipanema-1", "linear-6", "linear-7"):
-        robot = schema.read(name)
+        robot = schema.read_robot_file(name)
         line = draws.WireDraws({"k1": rng.normal(800 * max(1, robot.mass_kg), 20, SOLVES)} | {
             k: np.ones(SOLVES) for k in ("B", "U", "k2", "N")}, 1000.0)  # fmt: skip
         wires = draws.for_robot(robot, line)
@@ -93,7 +93,7 @@ def speed():
         ours_s, rates, same = np.inf, {"hybr": np.inf, "lm": np.inf}, 0.0
         for _ in range(REPEATS):  # the best of a few: other work on the machine only ever slows
             began = time.perf_counter()
-            ours = forward.solve(robot, wires, zero, commands.offset_m, start, R)
+            ours = forward.solve_equilibrium(robot, wires, zero, commands.offset_m, start, R)
             ours_s = min(ours_s, (time.perf_counter() - began) / SOLVES)
             for method in rates:
                 answers = []
@@ -111,7 +111,7 @@ def speed():
 
 
 def large():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     rng = np.random.default_rng(1)
     n = 10_000
     line = draws.WireDraws({"k1": rng.normal(800, 20, n), "B": rng.normal(0.3, 0.03, n), "U": rng.normal(1, 0.03, n),

@@ -23,7 +23,7 @@ DRAWS, REPEATS = 4, 2
 
 def seconds(k1_N: float) -> tuple[float, float]:
     """Processor time of following the log, s, the least of some, and the share of the rows at which it is held."""
-    robot = schema.read(FIELD / "ua.toml")
+    robot = schema.read_robot_file(FIELD / "ua.toml")
     rows = np.loadtxt(FIELD / "ua-j2.csv", delimiter=",", skiprows=1)
     still, middle = np.zeros(len(rows)), np.tile(robot.centre_of_mass_m, (len(rows), 1))
     fine, _ = follow.refined_joints(robot, History(rows[:, 0], rows[:, 1:], None, None, still, middle))

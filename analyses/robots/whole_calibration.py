@@ -2,7 +2,7 @@
 
 A robot stands at poses with tensions drawn anew for each; its anchors, reference lengths, wires and specimens are off
 from what the estimator is told, and its encoders read the true lengths with an error that it is not told. Sessions come
-from the forward statics with creep (`predicted.predict`), which the estimator does not use.
+from the forward statics with creep (`predicted.predict_session`), which the estimator does not use.
 
     python -m analyses.robots.whole_calibration coverage 200
     python -m analyses.robots.whole_calibration exact 120
@@ -98,7 +98,7 @@ def case(
     if log is None:
         return None
     with np.errstate(all="ignore"):
-        real = predicted.predict(true, prior, log, values)
+        real = predicted.predict_session(true, prior, log, values)
     if not real.solved[0] or not np.isfinite(real.readings).all():
         return None
     pull_N = real.readings[0].reshape(stops, robot.legs) * log.tension_sd_N

@@ -47,7 +47,7 @@ def learned(experiment: Any) -> tuple[list[float], Any, np.ndarray, np.ndarray]:
         shares.append(share(target(z) - log_density))
         if isinstance(state, Sampling):
             break
-        state = burn_in.step(target, state, DEFAULT)
+        state = burn_in.burn_in_round(target, state, DEFAULT)
     start = state.learned.start  # as wide as the modes, but for a factor that all tests have in common
     best = int(np.argmax(target(start.centres)))
     return shares, state.learned.proposal, start.centres[best], start.factors[best]

@@ -23,13 +23,12 @@ def cost_of(name: str, seed: int, simulations: int) -> dict[str, Any]:
 
     from wirebayes.discovery.search import investigate
     from wirebayes.discovery.settings import Settings
-    from wirebayes.effects import CATALOGUE
     from wirebayes.io import paper
     from wirebayes.io.experiment_file import read_experiments
 
     experiments = [paper.experiments()[int(name)]] if name.isdigit() else read_experiments(Path(name))
     begin = time.process_time()
-    found = investigate(experiments, Settings(kinds=CATALOGUE, simulations=simulations), seed)
+    found = investigate(experiments, Settings(simulations=simulations), seed)
     cpu = time.process_time() - begin
     first = next(iter(found.report["experiments"].values()))
     return {"cpu_s": cpu, "p": first["p_global"], "verdict": first["verdict"], "effects": first["effects"]}

@@ -15,7 +15,7 @@ import numpy as np
 import wirebayes as wb
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 HERE = Path(__file__).parent
@@ -67,7 +67,7 @@ def main() -> None:
     joint, count = np.vstack([jogged, sent]), len(marks) + STOPS
     near, turn = np.vstack([marks, places]), np.repeat(level, count, 0)
     log = Session(near, turn, joint, np.full(count, HELD_S), np.ones(count, bool), 1.0)
-    real = predict(true, prior, log, values)
+    real = predict_session(true, prior, log, values)
     assert real.solved.all()
 
     between = (joint - told.beyond_m + told.beyond_joint_m) / told.lines  # from exit to platform point

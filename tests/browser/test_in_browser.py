@@ -18,7 +18,7 @@ import pytest
 
 from tests import light
 from tests.browser import chromium
-from wirebayes.report.page import write
+from wirebayes.report.page import write_page
 from wirebayes.report.pages.predict import write_beside
 
 WIDTHS = (360, 820, 1400)
@@ -111,7 +111,7 @@ def commands_of(folder: Path) -> None:
     shutil.copytree(RESULTS / "calibrate", folder / "calibrate")
     for name in KINDS[1:]:
         if name != "predict":
-            write(folder / name)
+            write_page(folder / name)
     (folder / "predict").mkdir()
     later = {"hold": [7, 7, 8, 8], "displacement_mm": [5, 5, 6, 6], "time_s": [0, 60, 0, 60]}
     table = folder / "predict" / "report.csv"

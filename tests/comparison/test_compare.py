@@ -11,7 +11,7 @@ from wirebayes import cli
 from wirebayes.comparison import compare
 from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates, effects_of, problem_of
 from wirebayes.comparison.compare import Task, judge, side_by_side, stacking
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
@@ -150,7 +150,7 @@ def test_every_candidate_differs_from_the_base_in_its_one_thing() -> None:
 
 def test_an_event_is_put_where_the_readings_say() -> None:
     experiment = experiments()[1]
-    slip = named("grip_slip@7")
+    slip = effect_named("grip_slip@7")
     problem = build([experiment], [slip])
     truth = {"k1": 700.0, "B": 0.25, "U": 0.7, "k2": 0.05, "N": 0.8, "preload": 0.3, "grip_slip.w": 0.6}
     rng = np.random.default_rng(4)

@@ -14,7 +14,7 @@ from wirebayes.comparison import candidates as module
 from wirebayes.comparison import compare
 from wirebayes.comparison.candidates import BASE, ModelToCompare
 from wirebayes.comparison.compare import Task, judge, side_by_side, stacking
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
@@ -136,7 +136,7 @@ def test_the_last_third_is_predicted_from_a_posterior_of_the_others(
                                refitted=np.array([False, True]), converged=False)  # fmt: skip
 
     monkeypatch.setattr(compare, "weighted_posterior", weighted)
-    monkeypatch.setattr(compare, "fit", fit)
+    monkeypatch.setattr(compare, "fit_problem", fit)
     monkeypatch.setattr(compare, "smoothed_leave_one_hold_out", leave)
     monkeypatch.setattr(compare, "held_out", lambda early, whole, rng: (early.holds, len(whole.recorded_holds)))
     monkeypatch.setattr(compare, "_held_out", lambda result, trained: {"found": result})
@@ -290,7 +290,7 @@ def scored(elpd: list[float]) -> Scores:
 
 
 def test_held_out_holds_as_plain_values() -> None:
-    fit = SimpleNamespace(problem=build([experiments()[1]], [named("superposition")]))
+    fit = SimpleNamespace(problem=build([experiments()[1]], [effect_named("superposition")]))
     found = compare._held_out(HeldOutPrediction("wire", 8, scored([1.0, 2.5]), scored([4.0])), fit)  # type: ignore[arg-type]
     assert found["trained_on"] == 8 and found["holds"].tolist() == [2, 3] and found["effects"] == ["superposition"]
     free, given = found["free"], found["given_first"]

@@ -13,7 +13,7 @@ from tests.crash.small import PAIR
 from tests.test_damage import HASTY
 from wirebayes.cli import main
 from wirebayes.errors import InputError
-from wirebayes.inference.fit import Fit, fit
+from wirebayes.inference.fit import Fit, fit_problem
 from wirebayes.io.run_folder import open_run
 from wirebayes.model.build import build
 from wirebayes.results import store
@@ -36,13 +36,13 @@ def room(size: int) -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def fitted() -> Fit:
-    return fit(build([PAIR[1]]), 1, policy=HASTY)
+    return fit_problem(build([PAIR[1]]), 1, policy=HASTY)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.05, 0.3, 0.6, 0.9, 0.99])
 def test_a_posterior_that_does_not_fit(fitted: Fit, share: float, tmp_path: Path) -> None:
     """HDF5, left to write by itself, ends in a segmentation fault at some of these."""
-    store.save(fitted, tmp_path, {})
+    store.save_posterior(fitted, tmp_path, {})
     whole = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     size = int(share * len(whole["posterior.nc"]))
     (tmp_path / "out").mkdir()
@@ -51,10 +51,10 @@ def test_a_posterior_that_does_not_fit(fitted: Fit, share: float, tmp_path: Path
         open_run(tmp_path / "out", {}),
         room(size),
     ):
-        store.save(fitted, tmp_path / "out", {})
+        store.save_posterior(fitted, tmp_path / "out", {})
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"configuration.json"}
     with room(size), pytest.raises(InputError, match=FULL):
-        store.save(fitted, tmp_path, {})
+        store.save_posterior(fitted, tmp_path, {})
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == whole
 
 

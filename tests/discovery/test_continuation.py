@@ -19,7 +19,7 @@ from wirebayes.discovery.noise_integral import RATIOS
 from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import GlobalTest, Scale
 from wirebayes.discovery.tangent import Tangent, moving_columns
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.likelihoods import reading_variance
@@ -52,7 +52,7 @@ def test_a_ladder_finds_what_refits_of_the_whole_density_find(tmp_path: Path, na
 
     To a quarter: a path knows an amplitude's prior at its best amplitude alone, and says only what is worth a refit.
     """
-    effect = named(name)
+    effect = effect_named(name)
     block = block_of(tmp_path, {effect.columns()[0]: size}, [effect], 1)
     trials, candidates, data = scanned(block, {name: CATALOGUE[name]})
     ways = ladders([block], trials, candidates, [data])
@@ -102,7 +102,7 @@ def test_rows_climb_alone(tmp_path: Path) -> None:
 
 def test_a_large_effect_that_the_plain_fit_took_in_is_seen_further_out(tmp_path: Path) -> None:
     kinds = {name: CATALOGUE[name] for name in ("creep_threshold", "permanent_creep", "strain_stiffening")}
-    block = block_of(tmp_path, {"creep_threshold.tau_c": 16.0}, [named("creep_threshold")], 1)
+    block = block_of(tmp_path, {"creep_threshold.tau_c": 16.0}, [effect_named("creep_threshold")], 1)
     trials, candidates, data = scanned(block, kinds)
     drawn = screening.replicated(block, trials, 199, np.random.default_rng(1))
     near = screening.global_test(candidates, [data], [drawn.scan])
@@ -190,7 +190,7 @@ def test_what_a_smooth_process_takes_is_its_determinant_and_its_part_of_the_squa
 def test_simulations_that_come_later_are_climbed_and_the_others_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    block = block_of(tmp_path, {"strain_stiffening.c": 12.0}, [named("strain_stiffening")], 1)
+    block = block_of(tmp_path, {"strain_stiffening.c": 12.0}, [effect_named("strain_stiffening")], 1)
     trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
     drawn = [screening.replicated(block, trials, 40, np.random.default_rng(i)) for i in (0, 1)]
     both = screening.joined_replicates(drawn)
@@ -287,7 +287,7 @@ def test_no_setting_error_of_several_steps_explains_a_clamp_transient(tmp_path: 
     times = (0.0, *np.geomspace(1.0, 600.0, 24).round(1).tolist())
     bench = Bench(length_mm=1272.0, resolution_N=0.0, displacements_mm=tuple(range(1, 8)), times_s=times)
     wire = {"k1": 500.0, "B": 0.04, "U": 0.75, "k2": 0.008, "N": 0.5, "sensor_sd": 0.007, "setting_sd": 0.026}
-    effect = named("clamp_transient")
+    effect = effect_named("clamp_transient")
     write_tests(tmp_path, [bench], Truth(wire | {"clamp_transient.a": -0.05, "clamp_transient.T": 31.0}, [effect]), 0)
     experiments = read_experiments(tmp_path / "experiments.toml")
     block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
@@ -364,5 +364,9 @@ def test_a_path_surprises_as_much_as_both_the_line_and_the_count_say() -> None:
     rng = np.random.default_rng(0)
     short, long = rng.exponential(size=999), rng.standard_cauchy(size=999)
     few = np.minimum(short, 4.0)  # by chance, none of some eighteen that should exceed it
-    assert continuation._surprise(4.5, few) == Scale.of(few).surprise(4.5) < screening.counted(4.5, few)
-    assert continuation._surprise(100.0, long) == screening.counted(100.0, long) < Scale.of(long).surprise(100.0)
+    assert continuation._surprise(4.5, few) == Scale.of(few).surprise(4.5) < screening.empirical_surprise(4.5, few)
+    assert (
+        continuation._surprise(100.0, long)
+        == screening.empirical_surprise(100.0, long)
+        < Scale.of(long).surprise(100.0)
+    )

@@ -7,10 +7,10 @@ import pytest
 
 from tests.simulated import simulated_tests
 from wirebayes.discovery import screening
-from wirebayes.discovery.families import block_ratio, called, families_of, grouped, refitted_probe, sentence
+from wirebayes.discovery.families import block_ratio, called, families_of, family_sentence, grouped, refitted_probe
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.sentences import families_said, said_beside, undecided
@@ -46,8 +46,10 @@ def test_a_family_is_called_by_what_its_members_have_in_common() -> None:
 
 def test_a_family_is_said_as_a_person_who_tests_lines_would() -> None:
     found = {"strain_stiffening": 0.83, "sensor_nonlinearity": 0.08, "toe": 0.06, "power_strain": 0.004}
-    assert sentence(found) == "the elastic curve is bent: strain stiffening 83 %, sensor nonlinearity 8 %, toe 6 %"
-    assert sentence({"screw_wobble": 0.9}) == "there is screw wobble: screw wobble 90 %"
+    assert (
+        family_sentence(found) == "the elastic curve is bent: strain stiffening 83 %, sensor nonlinearity 8 %, toe 6 %"
+    )
+    assert family_sentence({"screw_wobble": 0.9}) == "there is screw wobble: screw wobble 90 %"
 
 
 def test_only_established_families_of_several_are_said_and_a_remainder_that_does_not_count() -> None:
@@ -69,7 +71,7 @@ def test_without_an_established_family_the_likely_names_are_said() -> None:
 
 def test_a_bent_line_and_a_bent_sensor_are_one_family_and_a_delay_is_another() -> None:
     """Refitted on the paper's protocol, where the two differ by a few degrees."""
-    effect = named("strain_stiffening")
+    effect = effect_named("strain_stiffening")
     experiments = simulated_tests([Bench()], Truth(WIRE | {"strain_stiffening.c": 12.0}, [effect]), seed=3)
     plain = [fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))]
     kinds = {name: CATALOGUE[name] for name in ("strain_stiffening", "sensor_nonlinearity", "reading_delay")}

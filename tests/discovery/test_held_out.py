@@ -12,7 +12,7 @@ from scipy import stats
 from tests.model.dense import jacobian, normal
 from tests.simulated import simulated_tests
 from wirebayes.discovery import held_out
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.scales import Scales
@@ -142,7 +142,7 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
 ) -> None:
     """On the first holds of each experiment, with the laws of the block and five hundred draws."""
     pair = simulated_tests([Bench("a"), Bench("b", displacements_mm=(1, 2, 3, 4))], Truth(WIRE), seed=2)
-    effects = (named("superposition"),)
+    effects = (effect_named("superposition"),)
     problem = build([e.train(k) for e, k in zip(pair, (7, 3), strict=True)], effects, spec=ModelSpec(law="modified"))
     given: list[tuple[object, ...]] = []
 

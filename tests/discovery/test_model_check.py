@@ -13,9 +13,9 @@ from scipy import stats
 from wirebayes import cli
 from wirebayes.discovery import global_test, model_check, screening
 from wirebayes.discovery.model_check import ModelCheck, check_model, level
-from wirebayes.discovery.search import discover
-from wirebayes.discovery.settings import ALPHA
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.discovery.search import investigate
+from wirebayes.discovery.settings import ALPHA, Settings
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
@@ -30,7 +30,7 @@ BENCH = Bench(displacements_mm=tuple(range(1, 8)))
 def simulated(folder: Path, truth: dict[str, float] | None = None, effects: tuple[str, ...] = ()) -> Experiment:
     """One test of seven holds, read back from its files."""
     folder.mkdir(exist_ok=True)
-    write_tests(folder, [BENCH], Truth(WIRE | (truth or {}), [named(key) for key in effects]), seed=2)
+    write_tests(folder, [BENCH], Truth(WIRE | (truth or {}), [effect_named(key) for key in effects]), seed=2)
     return read_experiments(folder / "experiments.toml")[0]
 
 
@@ -77,7 +77,7 @@ def test_the_level_of_several_fits_keeps_the_risk_of_the_command() -> None:
 def test_one_experiment_gets_the_p_that_discover_reports(tmp_path: Path) -> None:
     experiment = simulated(tmp_path)
     check = check_model(Job("", (experiment,)), seed=5, simulations=19)
-    report = discover([experiment], seed=5, simulations=19)["experiments"][experiment.name]
+    report = investigate([experiment], Settings(simulations=19), 5).report["experiments"][experiment.name]
     assert check.p == report["p_global"] and check.passed == (report["verdict"] == "nothing-missing")
 
 

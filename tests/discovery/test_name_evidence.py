@@ -13,8 +13,9 @@ from wirebayes.discovery.power import amplitude_80
 from wirebayes.discovery.probes import Probe, probes
 from wirebayes.discovery.scans import Pieces, Scan
 from wirebayes.discovery.screening import Candidate
-from wirebayes.discovery.search import discover
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.discovery.search import investigate
+from wirebayes.discovery.settings import Settings
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.climb import Optimum
 from wirebayes.simulation.synthetic import Bench, Truth
 
@@ -47,7 +48,7 @@ def test_an_alarm_is_raised_below_four_per_cent_and_not_above(monkeypatch: pytes
     kinds = {"strain_stiffening": CATALOGUE["strain_stiffening"]}
     for exceeding, alarm in ((9, False), (6, True)):  # of 199 simulations
         monkeypatch.setattr(screening.GlobalTest, "p", (1 + exceeding) / 200)
-        found = discover(experiments, simulations=19, kinds=kinds)["experiments"]["simulated"]
+        found = investigate(experiments, Settings(kinds=kinds, simulations=19)).report["experiments"]["simulated"]
         assert (found["verdict"] != "nothing-missing") == alarm, found["p_global"]
 
 
@@ -65,7 +66,7 @@ def test_evidence_is_the_likelihood_averaged_over_the_prior(one_sided: bool) -> 
 @pytest.mark.parametrize("name", ["toe", "strain_stiffening"])
 def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The likelihood by amplitude is replaced by a normal curve, whose average is known."""
-    effect = named(name)
+    effect = effect_named(name)
     per_delta = 0.1 * float(effect.amplitudes[0].prior.std())
     top = 9.0 * per_delta
 
@@ -102,7 +103,7 @@ def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch)
 
 def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> None:
     """Twelve holds at which a grip may have slipped are one name: its evidence is their mean, not their sum."""
-    trials = [p for hold in range(1, 13) for p in probes(named(f"grip_slip@{hold}"))[:1]]
+    trials = [p for hold in range(1, 13) for p in probes(effect_named(f"grip_slip@{hold}"))[:1]]
     candidates = [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
 
     def refitted(
@@ -139,7 +140,7 @@ def test_a_value_of_the_scan_takes_no_name_off_the_list(
     been refitted before is not once more where it promises less than toe's 7 allows: 7 less 5 and half of it.
     """
     names = ("sensor_drift", "toe", "superposition")
-    trials = [probes(named(name))[0] for name in names]
+    trials = [probes(effect_named(name))[0] for name in names]
     candidates = [Candidate(k, name, (0,), True) for k, name in enumerate(names)]
     own = {"sensor_drift": -3.0, "toe": 7.0, "superposition": 12.0}
     asked: list[str] = []
@@ -165,7 +166,7 @@ def test_a_value_of_the_scan_takes_no_name_off_the_list(
 
 def test_a_form_that_was_not_refitted_counts_for_no_more_than_one_that_was(monkeypatch: pytest.MonkeyPatch) -> None:
     """Twelve holds, each 30 nats by the scan; three are refitted and come to 2."""
-    trials = [p for hold in range(1, 13) for p in probes(named(f"grip_slip@{hold}"))[:1]]
+    trials = [p for hold in range(1, 13) for p in probes(effect_named(f"grip_slip@{hold}"))[:1]]
     candidates = [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
     monkeypatch.setattr(name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(
         effect, tuple(which), 2.0, 8.0, 1.0, ()))  # fmt: skip
@@ -182,7 +183,7 @@ def test_a_name_whose_climbs_all_failed_is_impossible_and_not_a_number(monkeypat
     """Its probability is zero; as something that is no number, it made every other probability none either."""
     monkeypatch.setattr(name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(
         effect, tuple(which), -np.inf, 0.0, 1.0, ()))  # fmt: skip
-    data, trials = scan_of(np.array([8.0]), True), probes(named("toe"))[:1]
+    data, trials = scan_of(np.array([8.0]), True), probes(effect_named("toe"))[:1]
     candidates = [Candidate(0, "toe", (0,), True)]
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
     assert found.log_bayes["toe"] == -np.inf and found.presence["toe"] == pytest.approx([0.0])
@@ -192,7 +193,7 @@ def test_a_name_whose_climbs_all_failed_is_impossible_and_not_a_number(monkeypat
 def test_the_amplitude_that_four_tests_in_five_would_show(one_sided: bool) -> None:
     """Known noise: z is normal about δ with sd 1, and an effect passes where z²/2 and the prior beat the threshold."""
     z = stats.norm.ppf((np.arange(300) + 0.5) / 300)
-    trial = Probe(named("toe"), {}, 1.0, one_sided)
+    trial = Probe(effect_named("toe"), {}, 1.0, one_sided)
     for threshold in (0.5, 3.0):
         found = amplitude_80(scan_of(z, one_sided), trial, 0, threshold)
         assert found is not None
@@ -203,4 +204,6 @@ def test_the_amplitude_that_four_tests_in_five_would_show(one_sided: bool) -> No
 
 
 def test_an_effect_that_hardly_shows_has_no_such_amplitude() -> None:
-    assert amplitude_80(scan_of(np.zeros(10), True), Probe(named("toe"), {}, 1.0, True), 0, threshold=900.0) is None
+    assert (
+        amplitude_80(scan_of(np.zeros(10), True), Probe(effect_named("toe"), {}, 1.0, True), 0, threshold=900.0) is None
+    )

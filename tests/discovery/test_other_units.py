@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.rescaled import Drawn, drawn, factors, likelihood_of
-from wirebayes.discovery.search import discover
-from wirebayes.discovery.settings import ALPHA
+from wirebayes.discovery.search import investigate
+from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.scales import NATURAL, Units
 
@@ -29,7 +29,7 @@ def misread(experiment: Experiment) -> Experiment:
 def found(case: Drawn, by: Units, *, disturbed: bool) -> dict[str, object]:
     """What `discover` reports of the first test in other units."""
     tests = [misread(test) if disturbed else test for test in case.rewritten(by)]
-    report = discover(tests, seed=1, simulations=SIMULATIONS)
+    report = investigate(tests, Settings(simulations=SIMULATIONS), 1).report
     return dict(next(iter(report["experiments"].values())))
 
 

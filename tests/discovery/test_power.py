@@ -11,7 +11,7 @@ from wirebayes.discovery.power import group_of, similarity
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.scans import Pieces, Scan, joined
 from wirebayes.discovery.screening import Candidate
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 
 
 def probe(name: str, scope: str = "instrument") -> Any:
@@ -101,7 +101,7 @@ def test_probes_of_the_bench_do_what_they_say() -> None:
         assert getattr(power, name)().apply(value, own, hold) == pytest.approx(wanted)
     # a wire of 500 N / 1000 mm and a fixture of 1e-3 mm/N in series: half a thousandth of the strain is the bench's
     assert power._Compliance().apply(value, own, hold) == pytest.approx(4.0 / (1.0 + 0.5e-3))
-    assert isinstance(Probe(named("superposition"), {}, 1.0, False), Probe)
+    assert isinstance(Probe(effect_named("superposition"), {}, 1.0, False), Probe)
 
 
 def test_a_group_takes_no_one_who_is_exactly_at_its_bound() -> None:

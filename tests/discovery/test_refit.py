@@ -11,10 +11,10 @@ from scipy import stats
 from wirebayes.discovery import refit
 from wirebayes.discovery.profile import Profile
 from wirebayes.discovery.refit import occam
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.inference.climb import Optimum
 
-TWO_SIDED = named("strain_stiffening")
+TWO_SIDED = effect_named("strain_stiffening")
 
 
 class Flat:
@@ -138,11 +138,11 @@ def test_blocks_that_share_an_amplitude_add_their_evidence(monkeypatch: pytest.M
 
 
 def test_an_amplitude_that_cannot_be_negative_ends_at_zero(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = refitted(monkeypatch, [-3.0], named("toe"))
+    found = refitted(monkeypatch, [-3.0], effect_named("toe"))
     assert 0.0 <= found.amplitude < 0.2e-3
     tail = 0.5 * 3.0**2 + 0.5 * np.log(2 * np.pi) + stats.norm.logcdf(-3.0) - np.log(40.0)  # what lies above zero
     assert found.log_bayes == pytest.approx(tail, abs=0.1)
-    assert refitted(monkeypatch, [9.0], named("toe")).log_bayes == pytest.approx(40.5 + occam(True), abs=0.05)
+    assert refitted(monkeypatch, [9.0], effect_named("toe")).log_bayes == pytest.approx(40.5 + occam(True), abs=0.05)
 
 
 @pytest.mark.parametrize("sd", [0.5, 5.0, 500.0])
@@ -198,9 +198,9 @@ def test_amplitudes_from_a_half_to_forty_and_the_scan_s_guess_are_tried_first(mo
     steps = [0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 40.0]
     assert tried(monkeypatch, 9.0)[0] == pytest.approx([-s for s in reversed(steps)] + steps)
     assert tried(monkeypatch, 9.0, guess=-3.0)[0] == pytest.approx([-s for s in reversed(steps)] + steps)
-    assert tried(monkeypatch, 9.0, named("toe"))[0] == pytest.approx(steps)
+    assert tried(monkeypatch, 9.0, effect_named("toe"))[0] == pytest.approx(steps)
     small = [0.3, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0]
-    assert tried(monkeypatch, 9.0, named("toe"), guess=0.1)[0] == pytest.approx(small)
+    assert tried(monkeypatch, 9.0, effect_named("toe"), guess=0.1)[0] == pytest.approx(small)
     # no farther than the prior reaches
     bounded = SimpleNamespace(amplitudes=[SimpleNamespace(prior=stats.uniform(-0.004, 0.016), neutral=0.0)])
     assert tried(monkeypatch, 9.0, bounded)[0] == pytest.approx(
@@ -210,11 +210,11 @@ def test_amplitudes_from_a_half_to_forty_and_the_scan_s_guess_are_tried_first(mo
 
 def test_a_top_within_is_tried_where_a_parabola_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """Through what is known at 5, 10 and 20; a standard deviation apart, they need not be looked at more closely."""
-    first, _, second = tried(monkeypatch, 9.0, named("toe"))
+    first, _, second = tried(monkeypatch, 9.0, effect_named("toe"))
     assert 5.0 in first and 10.0 in first and 20.0 in first
     assert second == pytest.approx([7.0, 8.0, 9.0, 10.0, 11.0])
     # what would lie beyond the neighbours is left out
-    *_, second = tried(monkeypatch, 9.0, named("toe"), guess=8.0)
+    *_, second = tried(monkeypatch, 9.0, effect_named("toe"), guess=8.0)
     assert second == pytest.approx([7.0, 8.0, 9.0, 10.0])
 
 

@@ -20,7 +20,7 @@ from wirebayes.discovery.remainder_evidence import (
     remainder_evidence,
 )
 from wirebayes.discovery.tangent import moving_columns, residuals
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.spec import PLAIN_SPEC
@@ -88,7 +88,7 @@ def weighed(fit: LaplaceFit) -> tuple[float, float, float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("hidden", [{"strain_stiffening.c": 6.0}, {"toe.w": 1.0}, {"sensor_drift.a": 5e-4}])
 def test_a_remainder_has_the_evidence_of_an_integral(hidden: dict[str, float]) -> None:
-    effects = [named(name.split(".")[0]) for name in hidden]
+    effects = [effect_named(name.split(".")[0]) for name in hidden]
     experiments = simulated_tests([Bench()], Truth(WIRE | hidden, effects), seed=3)
     _, found, exact = weighed(fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0)))
     assert found == pytest.approx(exact, abs=1.0)
@@ -107,7 +107,7 @@ def test_what_bends_the_parameters_is_weighed_beside_others(tmp_path: Path) -> N
 def test_a_mode_at_the_edge_of_a_prior_lends_a_remainder_nothing() -> None:
     """There the prior falls without a bend; as a parabola it would have its top anywhere, and any height."""
     experiments = simulated_tests([Bench(displacements_mm=(*range(1, 8), *range(6, 0, -1)))], Truth(WIRE), seed=3)
-    block = fitted(experiments, (named("superposition"),), PLAIN_SPEC, np.random.default_rng(0))
+    block = fitted(experiments, (effect_named("superposition"),), PLAIN_SPEC, np.random.default_rng(0))
     edge = block.modes.z[:1].copy()
     edge[0, block.target.problem.names.index("superposition.omega")] = 6.0
     assert float(expand(block.target, edge, []).prior_square[0]) < 20.0

@@ -62,7 +62,7 @@ def test_p_depends_less_on_the_simulations_drawn_than_by_counting(monkeypatch: p
 
     def by_counting(chance: dict[str, np.ndarray]) -> float:
         null = np.max([np.log(999) - np.log(stats.rankdata(-v)) for v in chance.values()], axis=0)
-        return float((1 + (null >= screening.counted(data["0"], chance["0"])).sum()) / 1000)
+        return float((1 + (null >= screening.empirical_surprise(data["0"], chance["0"])).sum()) / 1000)
 
     counts = np.array([by_counting(chance) for chance in drawn])
     share = 1.0 - (1.0 - 0.004) ** 15

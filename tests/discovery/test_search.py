@@ -11,12 +11,11 @@ from wirebayes import cli
 from wirebayes.discovery import held_out, linear_scan, next_measurement, noise_integral, power, screening
 from wirebayes.discovery.investigation import final_models
 from wirebayes.discovery.probes import probes
-from wirebayes.discovery.search import discover, investigate
+from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import REMAINS, Settings
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import fitted
-from wirebayes.io import paper
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.spec import PLAIN_SPEC
@@ -38,8 +37,8 @@ def made(
     return read_experiments(folder / "experiments.toml")
 
 
-def answer(experiments: list[Experiment], **options: object) -> dict:
-    return discover(experiments, simulations=FEW, **options)["experiments"][experiments[0].name]
+def answer(experiments: list[Experiment]) -> dict:
+    return investigate(experiments, Settings(simulations=FEW)).report["experiments"][experiments[0].name]
 
 
 def test_nothing_is_missing_from_clean_data(tmp_path: Path) -> None:
@@ -54,7 +53,7 @@ def test_nothing_is_missing_from_clean_data(tmp_path: Path) -> None:
 @pytest.mark.parametrize("holds", [2, 3])
 def test_fewer_than_three_holds_establish_nothing_and_say_so(tmp_path: Path, holds: int) -> None:
     (test,) = made(tmp_path, [Bench(resolution_N=0.01)], {}, [])
-    found = discover([test.first(holds)], simulations=19)["experiments"][test.name]
+    found = investigate([test.first(holds)], Settings(simulations=19)).report["experiments"][test.name]
     few = [w["text"] for w in found["warnings"] if w["kind"] == "few-holds"]
     assert found["held_out"]["holds"] == ([] if holds == 2 else [3])
     assert found["effects"] == [] and found["verdict"] in ("nothing-missing", "unknown")
@@ -77,7 +76,7 @@ def test_false_alarms_are_as_rare_as_said(tmp_path: Path) -> None:
 
 
 def test_a_toe_is_named_added_and_closes_the_gap(tmp_path: Path) -> None:
-    experiments = made(tmp_path, [Bench()], {"toe.w": 1.5}, [named("toe")])
+    experiments = made(tmp_path, [Bench()], {"toe.w": 1.5}, [effect_named("toe")])
     found = answer(experiments)
     assert found["best"] == "toe" and found["effects"][0] == "toe" and "toe" in found["set"]
     size = found["amplitudes"]["toe"]
@@ -93,7 +92,7 @@ def test_a_toe_is_named_added_and_closes_the_gap(tmp_path: Path) -> None:
 
 
 def test_what_has_no_name_is_unknown_and_the_smooth_discrepancy_is_held_out(tmp_path: Path) -> None:
-    experiments = made(tmp_path, [Bench()], {"creep_threshold.tau_c": 2.5}, [named("creep_threshold")])
+    experiments = made(tmp_path, [Bench()], {"creep_threshold.tau_c": 2.5}, [effect_named("creep_threshold")])
     found = answer(experiments, kinds={name: CATALOGUE[name] for name in ("steady_creep", "guide_friction", "toe")})
     assert found["verdict"] == "unknown" and found["best"] == "unknown" and found["accepted"] == []
     held = found["held_out"]
@@ -104,7 +103,7 @@ def test_what_has_no_name_is_unknown_and_the_smooth_discrepancy_is_held_out(tmp_
 
 
 def test_two_effects_are_both_named_and_each_step_closes_some_of_the_gap(tmp_path: Path) -> None:
-    effects = [named("toe"), named("lost_motion")]
+    effects = [effect_named("toe"), effect_named("lost_motion")]
     bench = Bench(displacements_mm=UP_AND_DOWN)
     found = answer(made(tmp_path, [bench], {"toe.w": 1.5, "lost_motion.w": 0.08}, effects))
     assert found["verdict"] == "named" and found["effects"] == found["accepted"] == ["toe", "lost_motion"]
@@ -124,7 +123,7 @@ def test_a_remainder_that_predicts_nothing_is_said_beside_a_name_and_not_added(t
     spec = Spec("two", "uneven", ("late_clock", "sensor_nonlinearity"), 10.0, 11, 5001)
     assert seal(spec, tmp_path / "cases", tmp_path / "sealed")
     experiments = read_experiments(tmp_path / "cases" / spec.key / "experiment.toml")
-    found = investigate(experiments, Settings(kinds=CATALOGUE, simulations=FEW))
+    found = investigate(experiments, Settings(simulations=FEW))
     report = found.report["experiments"][experiments[0].name]
     assert found.report["version"] == 3
     assert report["verdict"] == "ambiguous" and report["accepted"] == ["late_clock"]
@@ -137,7 +136,7 @@ def test_a_remainder_that_predicts_nothing_is_said_beside_a_name_and_not_added(t
 def test_findings_do_not_depend_on_how_many_processes_there_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    experiments = made(tmp_path, [Bench()], {"toe.w": 1.5}, [named("toe")])
+    experiments = made(tmp_path, [Bench()], {"toe.w": 1.5}, [effect_named("toe")])
     kinds = {name: CATALOGUE[name] for name in ("toe", "superposition", "steady_creep")}
     reports = []
     for cores in (1, 2):
@@ -150,13 +149,13 @@ def test_findings_do_not_depend_on_how_many_processes_there_are(
 
 
 def test_a_slip_names_its_hold(tmp_path: Path) -> None:
-    found = answer(made(tmp_path, [Bench()], {"grip_slip.w": 0.15}, [named("grip_slip@7")]))
+    found = answer(made(tmp_path, [Bench()], {"grip_slip.w": 0.15}, [effect_named("grip_slip@7")]))
     assert found["best"] == "grip_slip" and found["amplitudes"]["grip_slip"]["hold"] == 7
 
 
 def test_play_shows_on_the_way_back(tmp_path: Path) -> None:
     bench = Bench(displacements_mm=UP_AND_DOWN)
-    found = answer(made(tmp_path, [bench], {"lost_motion.w": 0.08}, [named("lost_motion")]))
+    found = answer(made(tmp_path, [bench], {"lost_motion.w": 0.08}, [effect_named("lost_motion")]))
     assert found["best"] == "lost_motion"
 
 
@@ -176,8 +175,8 @@ def test_two_lengths_tell_the_fixture(tmp_path: Path) -> None:
         Bench(name="long", length_mm=1800.0, displacements_mm=tuple(range(2, 22, 2))),
     ]
     # In the files of seed 2 the test with the name inside has p = .03, as in one right answer of 33.
-    experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3)
-    findings = investigate(experiments, Settings(kinds=CATALOGUE, simulations=199))
+    experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [effect_named("fixture_compliance")], seed=3)
+    findings = investigate(experiments, Settings(simulations=199))
     found = findings.report["experiments"]["short"]
     assert found["best"] == "fixture_compliance" and found["shared_with"] == []
     assert "length_dependence" in found["power"]
@@ -192,7 +191,7 @@ def test_what_two_lengths_leave_open_a_third_one_tells(tmp_path: Path) -> None:
         Bench(name="short", length_mm=600.0),
         Bench(name="long", length_mm=1800.0, displacements_mm=tuple(range(2, 22, 2))),
     ]
-    experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [named("fixture_compliance")], seed=3)
+    experiments = made(tmp_path, benches, {"fixture_compliance.c": 0.05}, [effect_named("fixture_compliance")], seed=3)
     block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
     probes = {p.effect.name: p for p in screening.candidate_probes([block], CATALOGUE)[0]}
     proposal = next_measurement.next_measurement(
@@ -254,13 +253,15 @@ class ScrewWobble(Effect):
 
 def test_an_unknown_name_is_refused() -> None:
     with pytest.raises(InputError, match="--without tow: no such effect"):
-        discover(paper.experiments()[:1], without=["tow"])
+        catalogue_without(["tow"])
 
 
 def test_the_linear_scan_sees_what_a_regression_on_the_dense_covariance_sees(tmp_path: Path) -> None:
     """Projected length at the fitted noise, against generalised least squares written out."""
-    block = fitted(made(tmp_path, [Bench()], {"toe.w": 1.0}, [named("toe")]), (), PLAIN_SPEC, np.random.default_rng(0))
-    trials = probes(named("strain_stiffening"))
+    block = fitted(
+        made(tmp_path, [Bench()], {"toe.w": 1.0}, [effect_named("toe")]), (), PLAIN_SPEC, np.random.default_rng(0)
+    )
+    trials = probes(effect_named("strain_stiffening"))
     x = linear_scan.expand(block.target, block.modes.z[:1], trials)
     whitened = noise_integral.projected(x, float(x.ratio[0]))[:, 0]
     k = np.sqrt(float(x.ratio[0])) * x.left[0] * x.singular[0]

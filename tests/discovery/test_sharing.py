@@ -9,7 +9,7 @@ from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.discovery.screening import candidate_probes
 from wirebayes.discovery.sharing import _known, _table, alike, informed
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.effects.instrument import ScrewError
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
@@ -22,7 +22,7 @@ WIRE = {"U": 0.6, "B": 0.08, "k2": 0.02, "N": 0.7, "preload": 0.5, "sensor_sd": 
 
 
 def fit(experiments: list[Experiment], effect: str) -> LaplaceFit:
-    return fitted(experiments, [named(effect)], PLAIN_SPEC, np.random.default_rng(0))
+    return fitted(experiments, [effect_named(effect)], PLAIN_SPEC, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(
@@ -31,26 +31,29 @@ def fit(experiments: list[Experiment], effect: str) -> LaplaceFit:
 def test_each_material_knows_what_a_fit_of_all_at_once_knows(tmp_path: Path, name: str, size: float) -> None:
     steps = (1, 2, 3, 4, 5, 6, 5, 4, 3, 4, 5, 6)
     benches = [Bench(name=f"on-{m}", material=m, displacements_mm=steps) for m in ("soft", "stiff")]
-    amplitude = named(name).columns()[0]
+    amplitude = effect_named(name).columns()[0]
     write_tests(
-        tmp_path, benches, Truth(WIRE | {"k1[soft]": 700.0, "k1[stiff]": 2500.0, amplitude: size}, [named(name)]), 0
+        tmp_path,
+        benches,
+        Truth(WIRE | {"k1[soft]": 700.0, "k1[stiff]": 2500.0, amplitude: size}, [effect_named(name)]),
+        0,
     )
     experiments = read_experiments(tmp_path / "experiments.toml")
     alone = [fit([e], name) for e in experiments]
-    mean, sd = _known(fit(experiments, name), named(name))
-    shared = informed(alone, dict.fromkeys((0, 1), named(name)), np.random.default_rng(1))
-    after = [_known(b, named(name)) for b in shared]
-    assert max(_known(b, named(name))[1] for b in alone) > 1.15 * sd  # there is something to be told
+    mean, sd = _known(fit(experiments, name), effect_named(name))
+    shared = informed(alone, dict.fromkeys((0, 1), effect_named(name)), np.random.default_rng(1))
+    after = [_known(b, effect_named(name)) for b in shared]
+    assert max(_known(b, effect_named(name))[1] for b in alone) > 1.15 * sd  # there is something to be told
     for own_mean, own_sd in after:
         assert own_mean == pytest.approx(mean, abs=0.2 * sd)
         assert own_sd == pytest.approx(sd, rel=0.1)
 
 
 def test_what_is_hardly_known_of_a_one_sided_amplitude_is_not_handed_on() -> None:
-    assert _table(named("lost_motion").amplitudes[0], 0.01, 0.01) is None
-    known = _table(named("lost_motion").amplitudes[0], 0.5, 0.125)
+    assert _table(effect_named("lost_motion").amplitudes[0], 0.01, 0.01) is None
+    known = _table(effect_named("lost_motion").amplitudes[0], 0.5, 0.125)
     assert known == {"distribution": "log-normal", "median": 0.5, "sd_log": 0.25}
-    assert _table(named("sensor_drift").amplitudes[0], 0.01, 0.01) == {
+    assert _table(effect_named("sensor_drift").amplitudes[0], 0.01, 0.01) == {
         "distribution": "normal",
         "mean": 0.01,
         "sd": 0.01,

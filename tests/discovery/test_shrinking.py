@@ -10,7 +10,7 @@ import pytest
 from wirebayes.discovery import held_out, shrinking
 from wirebayes.discovery.held_out import HeldOut, gap_closed, last_third
 from wirebayes.discovery.shrinking import _compared, _Gain
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
@@ -90,8 +90,8 @@ def test_a_report_compares_the_final_model_with_the_plain_one() -> None:
 
 def test_an_event_of_another_test_and_a_comparison_of_lengths_do_not_act_on_one_alone() -> None:
     one = experiments()[0]
-    slip = replace(named("grip_slip@4"), test=one.name)  # type: ignore[type-var]
-    elsewhere, anywhere = replace(slip, test="another"), named("superposition")
+    slip = replace(effect_named("grip_slip@4"), test=one.name)  # type: ignore[type-var]
+    elsewhere, anywhere = replace(slip, test="another"), effect_named("superposition")
     lengths = SimpleNamespace(compares_lengths=True)
     assert shrinking.acting_alone([slip, elsewhere, anywhere, lengths], one) == (slip, anywhere)  # type: ignore[list-item]
 
@@ -211,7 +211,7 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
     for e in (one, other):
         mask = e.protocol().mask
         left = (e.tension() - simulate(e.protocol(), theta)[..., 0])[mask]
-        assert shrinking.left_over(block, e.name) == pytest.approx(np.sqrt((left**2).mean()))
+        assert shrinking.residual_rms(block, e.name) == pytest.approx(np.sqrt((left**2).mean()))
 
     asked: list[Any] = []
 
@@ -220,19 +220,19 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
         return block
 
     monkeypatch.setattr(shrinking, "fitted", fitted)
-    slip = replace(named("grip_slip@4"), test="another")  # type: ignore[type-var]
+    slip = replace(effect_named("grip_slip@4"), test="another")  # type: ignore[type-var]
     whole: Any = SimpleNamespace(
-        effects=(slip, named("superposition")), spec=ModelSpec(history="additive"), names=(one.name, other.name),
+        effects=(slip, effect_named("superposition")), spec=ModelSpec(history="additive"), names=(one.name, other.name),
         experiments=(one, other), scales="scales",
     )  # fmt: skip
     memory, smooth = shrinking.with_discrepancy(whole, other, "rng")  # type: ignore[arg-type]
     assert memory is whole.effects[1] and asked == [([other], (memory,), whole.spec, "rng", "scales")]
-    assert smooth == shrinking.discrepancy(other, shrinking.left_over(block, other.name))
+    assert smooth == shrinking.discrepancy(other, shrinking.residual_rms(block, other.name))
     # a block that is this experiment alone has been fitted, its first holds have not
     block.effects, block.experiments, block.names = (memory,), (other,), (other.name,)
     block.spec, block.scales = ModelSpec(history="additive"), "scales"
     first = other.train(3)
-    monkeypatch.setattr(shrinking, "left_over", lambda fit, name: 0.5 if fit is block else np.nan)
+    monkeypatch.setattr(shrinking, "residual_rms", lambda fit, name: 0.5 if fit is block else np.nan)
     _, smooth = shrinking.with_discrepancy(block, other, "rng")  # type: ignore[arg-type]
     assert smooth == shrinking.discrepancy(other, 0.5) and len(asked) == 1
     shrinking.with_discrepancy(block, first, "rng")  # type: ignore[arg-type]

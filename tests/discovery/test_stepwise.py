@@ -11,7 +11,7 @@ from wirebayes.discovery.name_evidence import reaches, weigh_names
 from wirebayes.discovery.remainder_evidence import reference_of
 from wirebayes.discovery.settings import SAME_EVIDENCE, Settings
 from wirebayes.discovery.smooth_credit import beside_smooth
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.simulation.synthetic import Bench, Truth
@@ -21,7 +21,7 @@ UP_AND_DOWN = (*range(1, 11), *range(9, 0, -1))
 
 
 def plain_fit(bench: Bench, truth: dict[str, float], names: tuple[str, ...]) -> list[LaplaceFit]:
-    experiments = simulated_tests([bench], Truth(WIRE | truth, [named(n) for n in names]), seed=3)
+    experiments = simulated_tests([bench], Truth(WIRE | truth, [effect_named(n) for n in names]), seed=3)
     return [fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))]
 
 

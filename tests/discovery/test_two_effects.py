@@ -10,7 +10,7 @@ from tests.simulated import simulated_tests
 from wirebayes.discovery import noise_integral, screening, two_effects
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.noise_integral import Expansion
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.numeric.typing import Array
@@ -21,7 +21,7 @@ NAMES = ("toe", "unrecorded_hold", "steady_creep")
 
 @pytest.fixture(scope="module")
 def block() -> LaplaceFit:
-    truth = Truth({"k1": 900.0, "B": 0.25, "setting_sd": 0.01, "toe.w": 0.6}, [named("toe")])
+    truth = Truth({"k1": 900.0, "B": 0.25, "setting_sd": 0.01, "toe.w": 0.6}, [effect_named("toe")])
     experiments = simulated_tests([Bench(displacements_mm=tuple(range(1, 8)))], truth, seed=3)
     return fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.wire.protocols import PLAIN, columns, protocol
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.errors import InputError
 from wirebayes.wire.effect import Amplitude, Effect
 from wirebayes.wire.model import Model
@@ -23,7 +23,7 @@ def bench(unrecorded=()):
 
 
 def model_of(*keys, history="saturating"):
-    effects = tuple(named(key) if isinstance(key, str) else key for key in keys)
+    effects = tuple(effect_named(key) if isinstance(key, str) else key for key in keys)
     return Model("hooke", history, effects, REFERENCE, LENGTH_REF)
 
 
@@ -39,14 +39,14 @@ def plain(**changed):
 @pytest.mark.parametrize("key", KEYS)
 @pytest.mark.parametrize("unrecorded", [(), (1,)])
 def test_the_neutral_value_is_the_plain_model_to_the_last_bit(key, unrecorded):
-    effect = named(key)
+    effect = effect_named(key)
     neutral = {c: a.neutral for c, a in zip(effect.columns(), effect.amplitudes, strict=True)}
     p = bench(unrecorded)
     assert readings(neutral, key, p=p).tobytes() == readings({}, p=p).tobytes()
 
 
 def test_all_effects_together_at_their_neutral_values_are_the_plain_model_to_the_last_bit():
-    effects = [named(key) for key in KEYS]
+    effects = [effect_named(key) for key in KEYS]
     neutral = {c: a.neutral for e in effects for c, a in zip(e.columns(), e.amplitudes, strict=True)}
     assert readings(neutral, *KEYS).tobytes() == plain().tobytes()
 
@@ -256,7 +256,7 @@ def test_every_effect_says_what_it_is():
 def test_unknown_names_are_refused_with_what_there_is():
     for key, message in (("slip", "no such effect"), ("grip_slip", "grip_slip@7"), ("toe@3", "takes no '@'")):
         with pytest.raises(InputError, match=message):
-            named(key)
+            effect_named(key)
 
 
 class Softening(Effect):

@@ -110,14 +110,14 @@ def bench(path: Path) -> None:
 
 
 def session(path: Path) -> None:
-    session_file.read_session(path, schema.read("linear-7"), 1.0, 0.01)
+    session_file.read_session(path, schema.read_robot_file("linear-7"), 1.0, 0.01)
 
 
 def robot(path: Path) -> None:
     """A robot of CASPR; damage that leaves one makes a robot file that is read."""
     written = path.with_suffix(".toml")
     written.unlink(missing_ok=True)
-    schema.read(import_robot(path, written))
+    schema.read_robot_file(import_robot(path, written))
 
 
 def _example(name: str) -> bytes:
@@ -130,10 +130,10 @@ READERS = {
     "warm readings": Reader("a.csv", WARM.encode(), {"e.toml": TOML.encode()}, beside),
     "plan": Reader("plan.toml", PLAN.encode(), {}, lambda path: plan_file.read_plan(path, ("superposition", "toe"))),
     "protocol": Reader("protocol.csv", PROTOCOL.encode(), {}, protocol),
-    "robot": Reader("robot.toml", (ROOT / "data/robots/linear-7.toml").read_bytes(), {}, schema.read),
-    "drums": Reader("robot.toml", (ROOT / "data/robots/hangprinter-4.toml").read_bytes(), {}, schema.read),
+    "robot": Reader("robot.toml", (ROOT / "data/robots/linear-7.toml").read_bytes(), {}, schema.read_robot_file),
+    "drums": Reader("robot.toml", (ROOT / "data/robots/hangprinter-4.toml").read_bytes(), {}, schema.read_robot_file),
     "session": Reader("session.csv", (ROOT / "docs/example/linear-7-session.csv").read_bytes(), {}, session),
-    "pulleys": Reader("robot.toml", ROLLING.encode(), {}, schema.read),
+    "pulleys": Reader("robot.toml", ROLLING.encode(), {}, schema.read_robot_file),
     "caspr": Reader(
         "desk_cables.xml", _example("desk_cables.xml"), {"desk_bodies.xml": _example("desk_bodies.xml")}, robot
     ),

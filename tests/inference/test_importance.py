@@ -8,10 +8,10 @@ import pytest
 from scipy import stats
 
 from wirebayes.inference import importance
-from wirebayes.inference.importance import Weighted, effective, expected, from_draws, sample, tail
+from wirebayes.inference.importance import Weighted, effective, expected, from_draws, importance_sample, tail
 from wirebayes.inference.sampler import proposal
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES, SHARES
 
 D = 4
@@ -37,7 +37,7 @@ def three(z: np.ndarray) -> np.ndarray:
 
 def pool(densities: object, seed: int, *centres: float, ess: float = 500.0) -> Weighted:
     rng = np.random.default_rng(seed)
-    return sample(densities, start(*centres), rng.normal(size=(1000, D)), ORDER, rng, ess)  # type: ignore[arg-type]
+    return importance_sample(densities, start(*centres), rng.normal(size=(1000, D)), ORDER, rng, ess)  # type: ignore[arg-type]
 
 
 def test_integrals_are_found_within_the_error_of_the_effective_draws() -> None:
@@ -324,7 +324,7 @@ def test_a_proposal_is_learned_as_a_close_one_of_few_points(monkeypatch: pytest.
         return new
 
     monkeypatch.setattr(proposal, "fit_proposal", fit)
-    begin, z, rng = start(0.0), Points.equal(np.zeros((4, D))), np.random.default_rng(0)
+    begin, z, rng = start(0.0), WeightedPoints.equal(np.zeros((4, D))), np.random.default_rng(0)
     before = proposal.Proposal(SHARES, None, begin, begin, begin, begin)  # type: ignore[arg-type]
     assert importance._learned(z, z, begin, ORDER, rng, begin) is new
     assert importance._learned(z, z, begin, ORDER, rng, before) is new
@@ -365,7 +365,7 @@ def test_climbs_begin_at_the_highest_draws_and_at_some_that_are_far_apart(monkey
 
 def test_modes_are_widened_and_rough_draws_handed_on(monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[tuple[object, ...]] = []
-    monkeypatch.setattr(importance, "sample", lambda *arguments: given.append(arguments))
+    monkeypatch.setattr(importance, "importance_sample", lambda *arguments: given.append(arguments))
     draws = np.random.default_rng(0).normal(size=(200, D))
     rng = np.random.default_rng(1)
     from_draws(lambda z: normal(z, 0.0, 2.0, 0.0)[:, None], draws, ORDER, rng, 77.0)

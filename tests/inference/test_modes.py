@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.statistical.targets import Silent
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.inference import climb as climbing
 from wirebayes.inference import modes
 from wirebayes.inference.climb import climb
@@ -31,7 +31,7 @@ def test_rows_are_spread_and_never_repeated():
 
 def simulated(*effects, likelihood="chain"):
     made = draw([Bench()], Truth({"k1": 900.0, "B": 0.4, "U": 0.7, "k2": 0.03, "N": 0.6}), seed=4)
-    problem = build([Bench().experiment()], [named(e) for e in effects], spec=ModelSpec(likelihood=likelihood))
+    problem = build([Bench().experiment()], [effect_named(e) for e in effects], spec=ModelSpec(likelihood=likelihood))
     return LogPosterior(integrated(with_readings(problem, [s.readings for s in made.problem.samples])))
 
 
@@ -156,7 +156,7 @@ def test_the_curvature_at_the_end_is_that_of_the_density_whatever_the_residuals_
 @pytest.mark.parametrize("effects", [(), ("toe", "thermal_expansion", "superposition", "clamp_transient")])
 def test_the_residuals_of_the_prior_have_its_curvature(effects):
     """At the middle of the prior, where no residual is left to bend."""
-    built = build([Bench().experiment()], [named(e) for e in effects])
+    built = build([Bench().experiment()], [effect_named(e) for e in effects])
     built = built.in_units(built.own_units)
     target = LogPosterior(Silent(built.samples, built.prior, built.likelihood))
     density, residuals = target.rowwise()
@@ -177,7 +177,9 @@ def _one_time_constant(data):
         return replace(problem, prior=_with_n_fixed(problem.prior))
     bench = Bench(length_mm=1500.0)
     truth = {"k1": 1550.0, "B": 0.56, "U": 1.1, "k2": 0.032, "N": 0.58, "toe.w": 2.85, "preload": 3.2}
-    made = draw([bench], Truth(truth | {"setting_sd": 0.015, "sensor_sd": 0.0057}, effects=(named("toe"),)), seed=data)
+    made = draw(
+        [bench], Truth(truth | {"setting_sd": 0.015, "sensor_sd": 0.0057}, effects=(effect_named("toe"),)), seed=data
+    )
     problem = build([bench.experiment()])
     seen = with_readings(problem, [s.readings for s in made.problem.samples])
     return replace(seen, prior=_with_n_fixed(seen.prior))
@@ -270,7 +272,9 @@ def test_a_search_finds_a_narrow_mode_that_matters_where_a_hold_is_left_out(wire
     A climb from near that mode tells how high it is."""
     whole = experiments()[wire]
     problem = build(
-        [whole.train(len(whole.recorded_holds))], [named(key) for key in effects], spec=ModelSpec(history=history)
+        [whole.train(len(whole.recorded_holds))],
+        [effect_named(key) for key in effects],
+        spec=ModelSpec(history=history),
     )
     [sample] = problem.samples
     target = LogPosterior(integrated(without_hold(problem, 0, int(np.flatnonzero(sample.protocol.recorded)[hold]))))

@@ -6,7 +6,7 @@ What one hold leaves open, stiffness against preload against setting error, is f
 import numpy as np
 import pytest
 
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.arrays import from_arrays
 from wirebayes.model.build import build
@@ -27,7 +27,7 @@ RELAXED = (1.0 + TIME_S / 60.0) ** -0.2
 def test_a_power_law_of_one_hold_is_sampled_in_bounded_time(control, stretch_mm, tension_N):
     ones = np.ones(40, int)
     test = from_arrays(ones, stretch_mm, TIME_S, tension_N, length_mm=1e3, name="w", material="w", control=control)
-    done = fit(build([test]), policy=FEW)
+    done = fit_problem(build([test]), policy=FEW)
     assert done.converged
     assert done.chains.modes == 1
     assert done.chains.evaluations < 200_000  # with the coordinates of several holds the creep had no end

@@ -62,7 +62,7 @@ def test_weights_that_cannot_be_trusted_leave_it_to_the_sampler(
         runs.append(policy)
         return SimpleNamespace(z=np.full((4, 500, 3), 9.0))
 
-    monkeypatch.setattr(rough_draws, "sample", sample)
+    monkeypatch.setattr(rough_draws, "sample_posterior", sample)
     monkeypatch.setattr(rough_draws, "tail", lambda log_weight: k)
     monkeypatch.setattr(rough_draws, "effective", lambda log_weight: np.array([float(effective)]))
     target = two_hills(0.3)

@@ -11,7 +11,7 @@ from scipy import stats
 from wirebayes.inference import importance
 from wirebayes.inference import weighted_posterior as module
 from wirebayes.inference.climb import Optimum
-from wirebayes.inference.weighted_posterior import overlooked, weighted_posterior, witnessed
+from wirebayes.inference.weighted_posterior import overlooked_share, weighted_posterior, witnessed
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 
@@ -57,7 +57,7 @@ def searching(monkeypatch: pytest.MonkeyPatch, *found: tuple[int, ...]) -> Calla
 
 def test_importance_sampling_alone_loses_a_hill_in_silence(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the witness is for: the weights are good, and a tenth of the mass is missing."""
-    monkeypatch.setattr(module, "overlooked", lambda *given: 0.0)
+    monkeypatch.setattr(module, "overlooked_share", lambda *given: 0.0)
     searching(monkeypatch, (0,))
     pool = witnessed(target(), np.random.default_rng(0), 1000.0)  # type: ignore[arg-type]
     assert pool.settled[0] and pool.log_integral[0] == pytest.approx(np.log(0.9), abs=0.03)
@@ -79,7 +79,7 @@ def test_what_searches_contradict_again_and_again_is_refused(monkeypatch: pytest
     made = searching(monkeypatch, (0,), (0, 1))
     monkeypatch.setattr(importance, "widened", lambda found, widened=importance.widened: widened(modes(0)))
     looked = [1.0, -0.051, 0.051]
-    monkeypatch.setattr(module, "overlooked", lambda *given: looked.pop(0))
+    monkeypatch.setattr(module, "overlooked_share", lambda *given: looked.pop(0))
     assert not witnessed(target(), np.random.default_rng(0), 1000.0).settled[0]  # type: ignore[arg-type]
     assert made() == 4 and not looked
 
@@ -96,7 +96,7 @@ def test_what_weights_do_not_settle_is_learned_twice_more(
     heavy: int, settled: bool, searches: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = searching(monkeypatch, (0, 1))
-    learned = importance.sample
+    learned = importance.importance_sample
     tries: list[int] = []
 
     def sample(*given: object) -> importance.Weighted:
@@ -104,7 +104,7 @@ def test_what_weights_do_not_settle_is_learned_twice_more(
         pool = learned(*given)  # type: ignore[arg-type]
         return replace(pool, settled=np.array([len(tries) > heavy]))
 
-    monkeypatch.setattr(importance, "sample", sample)
+    monkeypatch.setattr(importance, "importance_sample", sample)
     assert witnessed(target(), np.random.default_rng(0), 1000.0).settled[0] == settled  # type: ignore[arg-type]
     assert made() == searches and tries == [0, 4000, 4000][: len(tries)]
 
@@ -118,7 +118,7 @@ def test_the_share_overlooked_is_the_mass_of_places_that_are_hardly_drawn() -> N
             lambda z: two_hills(z)[:, None], importance.widened(modes(*drawn)), 20_000, 1000.0, rng, np.zeros(1, bool)
         )
         known = importance.widened(modes(*others))
-        return overlooked(target(), pool, 0, float(pool.log_integral[0]), known, rng)  # type: ignore[arg-type]
+        return overlooked_share(target(), pool, 0, float(pool.log_integral[0]), known, rng)  # type: ignore[arg-type]
 
     assert share((0,), (0, 1)) == pytest.approx(1.0 / 9.0, rel=0.3)
     assert share((0, 1), (0, 1)) < 0.01 and share((0,), (0,)) < 0.01
@@ -134,7 +134,7 @@ def test_what_few_draws_of_great_weight_made_of_a_hill_is_not_overlooked() -> No
         share = np.exp(pool.log_weight[:, 0])[pool.z[:, 0] > 5.0].sum() / 20_000
         of_hill.append(share)
         integral = float(pool.log_integral[0])
-        missing.append(overlooked(target(), pool, 0, integral, importance.widened(modes(1)), rng))  # type: ignore[arg-type]
+        missing.append(overlooked_share(target(), pool, 0, integral, importance.widened(modes(1)), rng))  # type: ignore[arg-type]
     assert np.std(of_hill) > 0.01
     assert np.array(of_hill) + missing * (0.9 + np.array(of_hill)) == pytest.approx(np.full(12, 0.1), abs=0.01)
 

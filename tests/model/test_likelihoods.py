@@ -15,7 +15,7 @@ from tests.model.dense import (
     relative_spectrum,
 )
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.wire import compiled
 from wirebayes.wire.model import Model
@@ -73,7 +73,7 @@ STRONG = {
 
 @pytest.mark.parametrize("key", SINGLE_STATE)
 def test_the_chain_with_an_effect_is_the_dense_normal(key):
-    model, theta = Model(effects=(named(key),), tension_ref_N=2.0), PLAIN | ERRORS | STRONG
+    model, theta = Model(effects=(effect_named(key),), tension_ref_N=2.0), PLAIN | ERRORS | STRONG
     y = measured(LOADING, theta, model)
     r, covariance, _ = normal(LOADING, theta, model, y, 0.01)
     found = filtered(LOADING, theta, y, model, 0.01).log_likelihood.sum()
@@ -83,7 +83,7 @@ def test_the_chain_with_an_effect_is_the_dense_normal(key):
 @pytest.mark.parametrize("key", ["superposition", "second_relaxation", "steady_creep"])
 def test_effects_that_carry_a_state_of_their_own_are_close_to_the_dense_normal(key):
     """Their state is held at its nominal value in the derivatives; how much that costs, over data sets of the model."""
-    model, theta = Model(effects=(named(key),), tension_ref_N=2.0), PLAIN | ERRORS | STRONG
+    model, theta = Model(effects=(effect_named(key),), tension_ref_N=2.0), PLAIN | ERRORS | STRONG
     gaps, depth = [], []
     for seed in range(20):
         y = measured(LOADING, theta, model, seed)
@@ -205,7 +205,7 @@ def test_hold_by_hold_is_the_limit_of_a_wide_setting_error_given_the_first_readi
 
 @pytest.mark.parametrize("key", ["superposition", "second_relaxation", "steady_creep", "toe"])
 def test_with_an_effect_too_every_hold_is_a_test_of_its_own_through_its_first_reading(key):
-    model = Model(effects=(named(key),))
+    model = Model(effects=(effect_named(key),))
     theta = columns(PLAIN | STRONG)
     first = np.linspace(1.0, 6.0, len(LOADING.setting))[:, None]
     for j, course in enumerate(single_holds.hold_courses(LOADING, theta, model, first)):
@@ -280,7 +280,7 @@ def test_absurd_parameters_are_not_likely():
 @pytest.mark.parametrize("key", [None, "toe"])
 def test_the_jacobian_is_the_derivative_of_every_reading_by_every_setting_error(key):
     """Against a complex step through all that follows."""
-    model = Model(effects=(named(key),) if key else (), tension_ref_N=2.0)
+    model = Model(effects=(effect_named(key),) if key else (), tension_ref_N=2.0)
     theta = PLAIN | ERRORS | STRONG
     found = likelihoods.setting_jacobian(linearise(LOADING, columns(theta), model))
     expected = jacobian(LOADING, theta, model)[1]

@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 from tests.model import dense
-from wirebayes.effects import named
-from wirebayes.inference.fit import fit
+from wirebayes.effects import effect_named
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
 from wirebayes.model.build import build
@@ -19,7 +19,7 @@ UNNAMED = "discrepancy@13:0.08:120.0"
 
 
 def problem_of(name: str, *effects: str):
-    return build([WIRES[name]], [named(key) for key in (*effects, UNNAMED)])
+    return build([WIRES[name]], [effect_named(key) for key in (*effects, UNNAMED)])
 
 
 def likely(problem, n: int):
@@ -102,12 +102,12 @@ def test_absurd_parameters_have_no_density_and_stop_nobody():
 
 
 def test_only_what_is_linear_to_the_end_is_integrated_out():
-    assert integrated(build([WIRES["roc-line-1m"]], [named("sensor_drift")])).names[-1] == "setting_sd"
-    plain = build([WIRES["roc-line-1m"]], [named("toe")])
+    assert integrated(build([WIRES["roc-line-1m"]], [effect_named("sensor_drift")])).names[-1] == "setting_sd"
+    plain = build([WIRES["roc-line-1m"]], [effect_named("toe")])
     assert integrated(plain) is plain
     before = problem_of("roc-line-1m", "sensor_nonlinearity")
     assert isinstance(integrated(before), MarginalisedProblem)
-    after = build([WIRES["roc-line-1m"]], [named(UNNAMED), named("sensor_nonlinearity")])
+    after = build([WIRES["roc-line-1m"]], [effect_named(UNNAMED), effect_named("sensor_nonlinearity")])
     assert integrated(after) is after
     wide = before.prior.distributions | {"discrepancy.level0": stats.uniform(-1.0, 2.0)}
     uniform = replace(before, prior=replace(before.prior, distributions=wide))
@@ -116,7 +116,7 @@ def test_only_what_is_linear_to_the_end_is_integrated_out():
 
 def test_a_fit_has_all_parameters_and_what_no_reading_shows_keeps_its_prior():
     whole = problem_of("roc-line-1m")
-    fitted = fit(whole, 1, policy=Policy(walkers=64, ess=1000.0))
+    fitted = fit_problem(whole, 1, policy=Policy(walkers=64, ess=1000.0))
     assert fitted.theta.shape[-1] == len(whole.names)
     beyond = fitted.flat[:, whole.names.index("discrepancy.level5")]
     sd = whole.prior.distributions["discrepancy.level5"].std()

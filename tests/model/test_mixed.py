@@ -8,8 +8,9 @@ import pytest
 import wirebayes as wb
 from wirebayes.discovery.probes import forms
 from wirebayes.discovery.screening import candidate_probes
-from wirebayes.discovery.search import discover
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.discovery.search import investigate
+from wirebayes.discovery.settings import Settings
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.arrays import from_arrays
@@ -52,7 +53,7 @@ def pair() -> list[Experiment]:
 
 
 def test_an_instrument_belongs_to_the_tests_that_it_reads(pair):
-    problem = build([*pair, test_of("force", "again", 0.0, 3)], [named("sensor_drift"), named("toe")])
+    problem = build([*pair, test_of("force", "again", 0.0, 3)], [effect_named("sensor_drift"), effect_named("toe")])
     of_effects = [name for name in problem.names if "." in name]
     assert of_effects == ["toe.w", "sensor_drift.a[displacement]", "sensor_drift.a[force]"]
     assert [problem.column("sensor_drift.a", s) for s in problem.samples] == [
@@ -63,12 +64,12 @@ def test_an_instrument_belongs_to_the_tests_that_it_reads(pair):
 
 
 def test_tests_of_one_kind_share_the_amplitude_as_before(pair):
-    names = build([pair[0], test_of("displacement", "more", 0.0, 4)], [named("sensor_drift")]).names
+    names = build([pair[0], test_of("displacement", "more", 0.0, 4)], [effect_named("sensor_drift")]).names
     assert "sensor_drift.a" in names
 
 
 def test_the_likelihood_is_that_of_each_test_with_its_own_drift(pair):
-    effect = named("sensor_drift")
+    effect = effect_named("sensor_drift")
     both, alone = build(pair, [effect]), [build([test], [effect]) for test in pair]
     theta = both.prior.rvs(20, np.random.default_rng(0))
     columns = dict(zip(both.names, theta.T, strict=True))
@@ -80,7 +81,7 @@ def test_the_likelihood_is_that_of_each_test_with_its_own_drift(pair):
 
 
 def test_an_effect_of_one_kind_of_test_is_in_no_other(pair):
-    gauge = named("sensor_drift@force")
+    gauge = effect_named("sensor_drift@force")
     problem = build(pair, [gauge])
     assert [name for name in problem.names if "." in name] == ["sensor_drift.a[force]"]
     assert [[e.key for e in s.model.effects] for s in problem.samples] == [[], ["sensor_drift@force"]]
@@ -88,7 +89,7 @@ def test_an_effect_of_one_kind_of_test_is_in_no_other(pair):
         "sensor_drift@force", True, False
     )  # fmt: skip
     with pytest.raises(InputError, match="toe takes no '@'"):  # the wire is the same under both
-        named("toe@force")
+        effect_named("toe@force")
 
 
 def test_a_search_looks_for_the_fault_of_each_instrument_apart(pair):
@@ -114,7 +115,7 @@ def test_tests_of_one_kind_are_searched_as_one(pair):
 @pytest.mark.slow
 def test_a_gauge_that_drifts_is_named_where_it_reads():
     tests = [test_of("displacement", "steps", 0.0, 1), test_of("force", "hung", 8.0 * DRIFT_MM, 2)]
-    steps, hung = discover(tests, simulations=199)["experiments"].values()
+    steps, hung = investigate(tests, Settings(simulations=199)).report["experiments"].values()
     assert (hung["verdict"], hung["effects"]) == ("named", ["sensor_drift"])
     size = hung["amplitudes"]["sensor_drift"]
     assert size["unit"] == "mm/s" and size["q05"] < 8.0 * DRIFT_MM < size["q95"]
@@ -135,5 +136,5 @@ def test_both_drifts_and_the_wire_are_found_together(pair):
 
 def test_a_prior_in_one_file_is_of_its_own_instrument(pair):
     stated = replace(pair[1], priors={"sensor_drift.a": {"fixed": 0.0}})
-    problem = build([pair[0], stated], [named("sensor_drift")])
+    problem = build([pair[0], stated], [effect_named("sensor_drift")])
     assert "sensor_drift.a[displacement]" in problem.names and problem.prior.fixed == {"sensor_drift.a[force]": 0.0}

@@ -9,7 +9,7 @@ from scipy import stats
 
 from tests.model.dense import columns, log_density, normal
 from tests.simulated import simulated_tests
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.effects.event import GripSlip
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
@@ -53,7 +53,7 @@ def test_rounding_is_part_of_the_error_of_every_reading():
 @pytest.mark.parametrize("exponent", [0.4, 1.0, 1.7])
 def test_creep_grows_with_length_to_the_fitted_power(exponent):
     """Two lengths fitted together are two wires of their own, the creep amount scaled by hand."""
-    effects = (named("grip_slip@4"), named("lost_motion"))
+    effects = (effect_named("grip_slip@4"), effect_named("lost_motion"))
     values = WIRE | {"grip_slip.w": 0.1, "lost_motion.w": 0.05}
     benches = [Bench("short", "line", 500.0), Bench("long", "line", 2000.0)]
     experiments = simulated_tests(benches, Truth(values, effects), seed=3)
@@ -100,7 +100,7 @@ def test_a_parameter_is_that_of_the_sample_or_of_the_material_or_of_all() -> Non
 def test_parameters_are_named_by_what_shares_them(likelihood: Likelihood) -> None:
     """Of one test plainly; of several by sample and by material, where there are several; amplitudes by their scope."""
     own = ["preload", "sensor_sd", "setting_sd"] if likelihood == "chain" else ["sensor_sd"]
-    wire, effects = ["k1", "B", "U", "k2", "N"], (named("superposition"), named("sensor_drift"))
+    wire, effects = ["k1", "B", "U", "k2", "N"], (effect_named("superposition"), effect_named("sensor_drift"))
     assert build([short()], spec=ModelSpec(likelihood=likelihood)).names == (*wire, *own)
     two = build([short("a"), short("b")], effects, spec=ModelSpec(likelihood=likelihood))
     assert two.names == (*wire, "superposition.omega", "sensor_drift.a", *(f"{n}[{s}]" for s in "ab" for n in own))
@@ -115,7 +115,7 @@ def test_parameters_are_named_by_what_shares_them(likelihood: Likelihood) -> Non
 
 def test_what_is_positive_is_sampled_by_its_logarithm() -> None:
     """Lengths of time among the amplitudes too; not what a prior of the file lets be negative."""
-    drift = named("second_relaxation")
+    drift = effect_named("second_relaxation")
     assert build([short()], [drift]).prior.logarithmic == {
         "k1", "B", "U", "k2", "N", "sensor_sd", "setting_sd", "second_relaxation.T2"
     }  # fmt: skip
@@ -179,7 +179,7 @@ def test_samples_of_one_material_refer_to_one_length_and_one_tension() -> None:
 
 def test_an_event_acts_in_its_own_test_alone() -> None:
     here, anywhere = GripSlip(hold=3, test="b"), GripSlip(hold=3)
-    problem = build([short("a"), short("b")], [here, anywhere, named("superposition")])
+    problem = build([short("a"), short("b")], [here, anywhere, effect_named("superposition")])
     keys = [[e.key for e in s.model.effects] for s in problem.samples]
     assert keys == [["grip_slip@3", "superposition"], ["grip_slip@b:3", "grip_slip@3", "superposition"]]
 

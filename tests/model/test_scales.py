@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.rescaled import FACTORS, KINDS, drawn, factors, rewritten
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.io.arrays import from_arrays
@@ -102,7 +102,7 @@ def test_for_other_factors_the_log_posterior_is_the_same_at_mapped_parameters(in
 @pytest.mark.parametrize("index", [1, 4, *(pytest.param(index, marks=pytest.mark.slow) for index in range(5, NUMBER))])
 def test_for_powers_of_two_the_draws_are_the_same_to_the_last_bit(index):
     case, by = drawn(index), factors(index, powers_of_two=True)
-    one, other = (fit(case.problem(units), 3, policy=HASTY).chains for units in (NATURAL, by))
+    one, other = (fit_problem(case.problem(units), 3, policy=HASTY).chains for units in (NATURAL, by))
     np.testing.assert_array_equal(one.z, other.z)
     assert one.evaluations == other.evaluations
 
@@ -110,7 +110,7 @@ def test_for_powers_of_two_the_draws_are_the_same_to_the_last_bit(index):
 def draws(case, by, policy):
     """Parameters of a fit of the tests in other units, each in the units that the tests have of their own."""
     problem = case.problem(by)
-    z = fit(problem, 3, policy=policy).chains.z
+    z = fit_problem(problem, 3, policy=policy).chains.z
     target = LogPosterior(problem.in_units(problem.own_units))
     return target.coordinates.to_natural(z.reshape(-1, z.shape[-1]))
 
@@ -132,7 +132,7 @@ def test_for_other_factors_means_and_quantiles_are_the_same(index):
 def test_a_fit_in_other_units_has_the_same_draws():
     (experiment,) = simulated(7)
     by = Units(2.0**7, 2.0**-10, 2.0**6)
-    one, other = (fit(build([e]), 3, policy=HASTY) for e in (experiment, rewritten(experiment, by)))
+    one, other = (fit_problem(build([e]), 3, policy=HASTY) for e in (experiment, rewritten(experiment, by)))
     U, N = (one.flat[:, one.problem.names.index(name)] for name in ("U", "N"))
     units = {"k1": by.tension_N, "B": by.length_mm * by.tension_N**-U, "U": 1.0, "k2": by.time_s**-N, "N": 1.0,
              "preload": by.length_mm, "sensor_sd": by.tension_N, "setting_sd": by.length_mm}  # fmt: skip

@@ -9,7 +9,7 @@ from scipy import stats
 from tests.model.dense import log_density, normal
 from tests.model.test_likelihoods import SINGLE_STATE, STRONG, filtered, measured, models, noises
 from tests.wire.protocols import PLAIN, columns, parameters, protocol, protocols
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.model import single_holds
 from wirebayes.wire.model import Model
 
@@ -31,7 +31,7 @@ def test_the_chain_is_the_dense_normal(p, theta, errors, model, resolution, seed
 
 @pytest.mark.parametrize("key", SINGLE_STATE)
 def test_the_chain_with_an_effect_is_the_dense_normal(key):
-    model, theta = Model(effects=(named(key),), tension_ref_N=2.0), PLAIN | ERRORS | STRONG
+    model, theta = Model(effects=(effect_named(key),), tension_ref_N=2.0), PLAIN | ERRORS | STRONG
     y = measured(WEIGHTS, theta, model)
     r, covariance, _ = normal(WEIGHTS, theta, model, y, 0.01)
     found = filtered(WEIGHTS, theta, y, model, 0.01).log_likelihood.sum()

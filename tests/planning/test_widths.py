@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wirebayes.inference.climb import climb
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.model.build import build
@@ -51,7 +51,7 @@ def planned_over_sampled(bench):
     draws, weight = widths._weighted(target, found.z, found.covariance, y, np.random.default_rng(4))
     ours = np.array([widths._row_widths(column[None], weight)[0, 1] for column in draws.T])
     policy = Policy(ensembles=2, walkers=64, ess=800, rounds=3, most_rounds=5, round_draws=2048, most_steps=200)
-    low, high = np.quantile(fit(with_readings(problem, [y]), 5, policy=policy).flat, [0.05, 0.95], axis=0)
+    low, high = np.quantile(fit_problem(with_readings(problem, [y]), 5, policy=policy).flat, [0.05, 0.95], axis=0)
     return ours / (high - low)
 
 

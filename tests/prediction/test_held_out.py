@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wirebayes.inference.fit import Fit, fit
+from wirebayes.inference.fit import Fit, fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
@@ -21,7 +21,7 @@ QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
 
 @pytest.fixture(scope="module")
 def fitted() -> Fit:
-    return fit(build([experiments()[1].train(8)]), 1, policy=QUICK)
+    return fit_problem(build([experiments()[1].train(8)]), 1, policy=QUICK)
 
 
 def at_one_point(fitted: Fit) -> Fit:
@@ -90,7 +90,7 @@ def test_central_intervals_hold_the_share_they_name() -> None:
 
 def test_hold_by_hold_has_no_free_prediction() -> None:
     experiment = experiments()[1]
-    fitted = fit(build([experiment.train(8)], spec=ModelSpec(likelihood="hold")), 1, policy=QUICK)
+    fitted = fit_problem(build([experiment.train(8)], spec=ModelSpec(likelihood="hold")), 1, policy=QUICK)
     result = held_out(fitted, experiment, np.random.default_rng(0))
     assert result.free is None
     assert result.given.rmse_N < 0.05

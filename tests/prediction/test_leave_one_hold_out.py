@@ -51,7 +51,7 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
         return SimpleNamespace(flat=np.zeros((500, 8)), converged=converging)
 
     fitted: list[int] = []
-    monkeypatch.setattr(module, "fit", fit_without)
+    monkeypatch.setattr(module, "fit_problem", fit_without)
     monkeypatch.setattr(module, "log_mean", lambda low, high: (7.0, shared))
     monkeypatch.setattr(module, "log_densities", ratios)
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
@@ -103,7 +103,7 @@ def test_with_exact_every_hold_is_fitted_without(monkeypatch: pytest.MonkeyPatch
         asked.append(int(np.flatnonzero(~problem.samples[0].protocol.mask.any(axis=1))[-1]))
         return SimpleNamespace(flat=np.zeros((500, 8)), converged=len(asked) != 2)
 
-    monkeypatch.setattr(module, "fit", fit_without)
+    monkeypatch.setattr(module, "fit_problem", fit_without)
     monkeypatch.setattr(module, "log_mean", lambda low, high: (2.0, 1e3))
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     shares: list[float] = []
@@ -241,7 +241,7 @@ def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.
         return SimpleNamespace(flat=np.zeros((500, 8)), converged=True)
 
     monkeypatch.setattr(module, "log_densities", together)
-    monkeypatch.setattr(module, "fit", alone)
+    monkeypatch.setattr(module, "fit_problem", alone)
     stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
     for given in ({}, {"seed": 0}, {"seed": 1}):
         smoothed_leave_one_hold_out(stub, **given)  # type: ignore[arg-type]

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.inference import importance
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import ensemble
@@ -95,7 +95,7 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[int]:
             problem=problem, coordinates=identity, log_prior=lambda theta: np.zeros(len(theta))
         ),
     )
-    sampled, true = [], importance.sample
+    sampled, true = [], importance.importance_sample
 
     def counted(*given: object) -> importance.Weighted:
         assert np.sqrt(2.0 / given[-1]) == pytest.approx(0.07, abs=0.001)  # type: ignore[operator]  # error of a ratio
@@ -103,7 +103,7 @@ def pools(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         sampled.append(len(found.settled))
         return found
 
-    monkeypatch.setattr(importance, "sample", counted)
+    monkeypatch.setattr(importance, "importance_sample", counted)
     return sampled
 
 
@@ -125,7 +125,7 @@ def by_themselves(monkeypatch: pytest.MonkeyPatch, converged: bool = True) -> li
     monkeypatch.setattr(module, "searches", lambda target, rng, n, readings: [SimpleNamespace(modes=None)] * n)
     monkeypatch.setattr(module, "without_holds", lambda problem, holds: None)
     monkeypatch.setattr(importance, "widened", lambda modes: None)
-    monkeypatch.setattr(module, "overlooked", lambda *given: 0.0)
+    monkeypatch.setattr(module, "overlooked_share", lambda *given: 0.0)
     monkeypatch.setattr(module, "without_hold", lambda problem, sample, hold: hold)
     monkeypatch.setattr(module, "weighted_posterior", alone)
     return asked
@@ -165,19 +165,19 @@ def test_what_a_further_search_contradicts_is_sampled_by_itself(
         seen.append(log_integral)
         return share if len(seen) == 2 else 0.0
 
-    monkeypatch.setattr(module, "overlooked", overlooked)
+    monkeypatch.setattr(module, "overlooked_share", overlooked)
     elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7, ALL[:3])  # type: ignore[arg-type]
     assert asked == apart and settled.all() and elpd == pytest.approx(Normals.elpd, abs=0.15)
     assert seen == pytest.approx(np.log(2.0 * np.pi) - np.array(Normals.elpd), abs=0.15)
 
 
 def test_what_is_given_up_is_sampled_by_itself(pools: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
-    counted = importance.sample
+    counted = importance.importance_sample
 
     def given_up(*given: object) -> importance.Weighted:
         return replace(counted(*given), settled=np.array([True, True, False, False]))  # type: ignore[arg-type]
 
-    monkeypatch.setattr(importance, "sample", given_up)
+    monkeypatch.setattr(importance, "importance_sample", given_up)
     for converged in (True, False):
         asked = by_themselves(monkeypatch, converged)
         elpd, settled = log_densities(Normals(), [(0, 0), (0, 1), (0, 2)], DRAWS, 7, ALL[:3])  # type: ignore[arg-type]
@@ -224,18 +224,18 @@ def test_a_hold_that_is_apart_agrees_with_thermodynamic_integration(effects: tup
     With a toe the posterior without it has a mode that draws with it never see: five nats.
     """
     policy = Policy(walkers=64, round_draws=2048, ess=4000.0)
-    problem = build([experiments()[3]], [named(name) for name in effects])
+    problem = build([experiments()[3]], [effect_named(name) for name in effects])
     powers = [0.0, 0.003, 0.01, 0.03, 0.1, 0.3, 0.6, 1.0]
     log_p = []
     for power in powers:
         same = {f.name: getattr(problem, f.name) for f in fields(Problem)}
         target = LogPosterior(Between(**same, power=power))
-        z = ensemble.sample(target, 1, policy).z
+        z = ensemble.sample_posterior(target, 1, policy).z
         theta = target.coordinates.to_natural(z.reshape(-1, z.shape[-1]))
         log_p.append(problem.leave_one_hold_out(theta)[0][0])
     steps = zip(np.diff(powers), log_p[:-1], log_p[1:], strict=True)
     expected = sum(log_mean(step * low, step * high)[0] for step, low, high in steps)
-    fitted = fit(problem, 1, policy=Policy(walkers=64, round_draws=2048, ess=2000.0))
+    fitted = fit_problem(problem, 1, policy=Policy(walkers=64, round_draws=2048, ess=2000.0))
     found = [smoothed_leave_one_hold_out(fitted, seed).elpd[0] for seed in (1, 2, 3)]
     print(f"log density of the hold: {expected:.2f} by integration, {np.round(found, 2).tolist()} found")
     # draws of both ways know the density to some 0.15

@@ -12,13 +12,13 @@ import pytest
 
 from wirebayes import cli
 from wirebayes.commands.wires import read_robot, wire_draws
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments
 from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
-from wirebayes.results.read_back import load
-from wirebayes.results.store import save
+from wirebayes.results.read_back import load_posterior
+from wirebayes.results.store import save_posterior
 from wirebayes.robot.mechanics.draws import wire_warnings
 
 QUICK = Policy(ensembles=2, walkers=64, ess=300.0, r_hat=1.1, most_steps=80)
@@ -31,10 +31,12 @@ def fits(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("fits")
     for likelihood in ("chain", "hold"):
         for experiment in experiments()[1:3]:
-            result = fit(build([experiment.train(TRAINED)], spec=ModelSpec(likelihood=likelihood)), 1, policy=QUICK)
+            result = fit_problem(
+                build([experiment.train(TRAINED)], spec=ModelSpec(likelihood=likelihood)), 1, policy=QUICK
+            )
             place = folder / likelihood / experiment.name
             place.mkdir(parents=True)
-            save(result, place, {})
+            save_posterior(result, place, {})
     return folder
 
 
@@ -219,7 +221,7 @@ def test_what_speaks_against_the_fit_is_said_again(
     shown = capsys.readouterr().err
     assert "warning: the fit of roc-line-1.71m has not converged" in shown
     assert "warning: the model fitted to roc-line-1.71m does not describe its readings (p = 0.0031)" in shown
-    line = wire_draws(load(folder), 10)
+    line = wire_draws(load_posterior(folder), 10)
     assert len(line.doubts) == 2
     use = np.ones(7), 1.0, np.full(7, 1e-3 * line.length_mm)
     assert wire_warnings(read_robot("linear-7"), line, *use)[:2] == [*line.doubts]

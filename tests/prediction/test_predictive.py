@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tests.model.dense import jacobian, normal
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.paper import experiments
 from wirebayes.model import single_holds
 from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction import predictive
-from wirebayes.prediction.predictive import PredictionRequest, _regressed, predict, settings_given_readings
+from wirebayes.prediction.predictive import PredictionRequest, _regressed, draw_predictive, settings_given_readings
 from wirebayes.wire.staircase import simulate
 
 TRUTH = {"k1": 700.0, "B": 0.21, "U": 0.6, "k2": 0.03, "N": 0.7, "preload": 0.4, "sensor_sd": 0.006, "setting_sd": 0.02}
@@ -53,7 +53,7 @@ def test_holds_to_come_follow_the_dense_conditional_normal() -> None:
     experiment, train = wire(), 8
     trained = experiment.train(train)
     problem = build([trained])
-    drawn = predict(problem, rows(TRUTH, problem.names), problem.samples[0], question_of(experiment, train),
+    drawn = draw_predictive(problem, rows(TRUTH, problem.names), problem.samples[0], question_of(experiment, train),
                     np.random.default_rng(1))  # fmt: skip
     nominal, jacobian = dense(experiment, TRUTH)
     past = np.zeros(nominal.shape, bool)
@@ -79,7 +79,7 @@ def test_holds_to_come_follow_the_dense_conditional_normal() -> None:
 def test_replicates_have_new_noise_and_new_setting_error() -> None:
     experiment, train = wire(), 8
     problem = build([experiment.train(train)])
-    drawn = predict(problem, rows(TRUTH, problem.names), problem.samples[0], question_of(experiment, train),
+    drawn = draw_predictive(problem, rows(TRUTH, problem.names), problem.samples[0], question_of(experiment, train),
                     np.random.default_rng(2))  # fmt: skip
     nominal, jacobian = dense(experiment, TRUTH)
     trained = np.flatnonzero(experiment.protocol().recorded)[:train]
@@ -103,9 +103,9 @@ def test_given_first_reading_agrees_with_importance_weights() -> None:
         theta[:, problem.names.index(name)] += sd * rng.normal(size=n)
     free = question_of(experiment, train)
     row = len(experiment.train(train).holds)
-    drawn = predict(problem, theta, problem.samples[0], free, rng)
+    drawn = draw_predictive(problem, theta, problem.samples[0], free, rng)
     observed = float(drawn[row, 0].mean() + 1.0 * drawn[row, 0].std())
-    given = predict(problem, theta, problem.samples[0], question_of(experiment, train, {row: observed}), rng)
+    given = draw_predictive(problem, theta, problem.samples[0], question_of(experiment, train, {row: observed}), rng)
     # the same by keeping the free draws whose first reading comes out near the given one
     near = np.abs(drawn[row, 0] - observed) < 0.1 * drawn[row, 0].std()
     kept = drawn[row:, :, near]
@@ -124,7 +124,9 @@ def test_a_later_given_reading_leaves_earlier_holds_alone() -> None:
     theta = rows(TRUTH | {"k1": 690.0}, problem.names, 200)
     row = len(experiment.train(train).holds)
     free, given = (
-        predict(problem, theta, problem.samples[0], question_of(experiment, train, first), np.random.default_rng(4))
+        draw_predictive(
+            problem, theta, problem.samples[0], question_of(experiment, train, first), np.random.default_rng(4)
+        )
         for first in ({}, {row + 2: 3.3})
     )
     assert np.array_equal(free[: row + 2], given[: row + 2])
@@ -134,7 +136,7 @@ def test_a_later_given_reading_leaves_earlier_holds_alone() -> None:
 @pytest.mark.parametrize("key", ["second_relaxation", "superposition", "permanent_creep", "sensor_drift", "ageing"])
 def test_what_effects_carry_goes_on_from_the_training(key: str) -> None:
     experiment, train = wire("nylon-1.5m"), 5
-    effect = named(key)
+    effect = effect_named(key)
     problem = build([experiment.train(train)], [effect])
     values = TRUTH | {"sensor_sd": 1e-7, "setting_sd": 1e-13} | {
         c: a.neutral + (0.0 if a.is_shape else 0.3 if a.unit == "-" else 1e-3)
@@ -142,7 +144,7 @@ def test_what_effects_carry_goes_on_from_the_training(key: str) -> None:
     }  # fmt: skip
     sample = replace(problem.samples[0], resolution=1e-9)
     theta = rows(values, problem.names, 3)
-    drawn = predict(problem, theta, sample, question_of(experiment, train), np.random.default_rng(5))
+    drawn = draw_predictive(problem, theta, sample, question_of(experiment, train), np.random.default_rng(5))
     whole = simulate(experiment.protocol(), {n: np.array([values[n]]) for n in problem.names}, sample.model)
     assert np.allclose(drawn, whole, atol=1e-6)
 
@@ -154,7 +156,7 @@ def test_hold_by_hold_spreads_the_first_readings_own_error() -> None:
     theta = rows(TRUTH, problem.names, 20000)
     protocol = experiment.protocol()
     question = PredictionRequest(protocol, len(protocol.number), protocol.recorded, experiment.tension()[:, 0])
-    drawn = predict(problem, theta, problem.samples[0], question, np.random.default_rng(6))
+    drawn = draw_predictive(problem, theta, problem.samples[0], question, np.random.default_rng(6))
     assert np.all(drawn[:, 0] == experiment.tension()[:, :1])
     # with no creep left to matter both readings' errors add: slopes by length are nearly equal
     expected = np.sqrt(2 * (TRUTH["sensor_sd"] ** 2 + 0.01**2 / 12))
@@ -211,7 +213,7 @@ def test_a_replicate_has_an_error_of_its_own_and_the_past_goes_on_as_the_reading
 ) -> None:
     """Holds to come and trained ones that nobody asks for follow the past; a replicate differs in its own hold."""
     experiment, train = wire("nylon-1.5m"), 4
-    effects = [named(key)] if key else []
+    effects = [effect_named(key)] if key else []
     sample = build([experiment.train(train)], effects).samples[0]
     protocol = experiment.protocol()
     requested = protocol.recorded.copy()
@@ -249,7 +251,7 @@ def test_readings_are_rounded_evenly_within_half_a_step_and_only_requested_holds
     still = TRUTH | {"sensor_sd": 1e-9, "setting_sd": 1e-9}
     for values, sd in ((still, 0.0), (still | {"sensor_sd": 0.2}, 0.2)):
         theta = rows(values, problem.names, 1001)
-        drawn = predict(problem, theta, sample, request, np.random.default_rng(0))
+        drawn = draw_predictive(problem, theta, sample, request, np.random.default_rng(0))
         assert drawn.shape == (*protocol.time_s.shape, 1001) and not drawn[~requested].any()
         clean = simulate(protocol, {name: np.array([value]) for name, value in values.items()}, sample.model)
         error = (drawn - clean)[requested]
@@ -298,7 +300,7 @@ def test_hold_by_hold_each_hold_follows_from_its_own_first_reading() -> None:
     first = np.where(protocol.number == 3, -1.0, experiment.tension()[:, 0])
     theta = rows(TRUTH | {"sensor_sd": 1e-12}, problem.names, 3)
     request = PredictionRequest(protocol, 0, requested, first)
-    drawn = predict(problem, theta, sample, request, np.random.default_rng(0))
+    drawn = draw_predictive(problem, theta, sample, request, np.random.default_rng(0))
     own = {name: np.array([value]) for name, value in TRUTH.items()}
     courses = single_holds.hold_courses(protocol, own, sample.model, first[:, None])
     for j, course in enumerate(courses):

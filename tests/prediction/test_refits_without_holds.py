@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wirebayes.inference.fit import Fit, fit
+from wirebayes.inference.fit import Fit, fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
@@ -17,7 +17,7 @@ QUICK = Policy(ensembles=2, walkers=64, ess=500.0, r_hat=1.05, most_steps=200)
 def fitted() -> Fit:
     # of this wire some holds are easy and some are not, whatever the draws; with few of them, the shape of the
     # importance ratios' tail is anybody's guess
-    return fit(build([experiments()[1]]), 2)
+    return fit_problem(build([experiments()[1]]), 2)
 
 
 @pytest.mark.statistical

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.errors import InputError
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.readings import protocol_table
@@ -34,7 +34,7 @@ unrecorded_holds = [{ before_hold = 3, displacement_mm = 1.5, duration_s = 30.0 
 def stored(tmp_path: Path) -> Stored:
     (tmp_path / "warm.csv").write_text(TRAINED)
     (tmp_path / "warm.toml").write_text(TOML)
-    effects = [named("thermal_expansion"), named("grip_slip@3")]
+    effects = [effect_named("thermal_expansion"), effect_named("grip_slip@3")]
     (experiment,) = read_experiments(tmp_path / "warm.toml")
     sample = build([experiment.train(2)], effects).samples[0]
     return Stored({"k1": np.ones(3)}, sample, "chain")

@@ -122,7 +122,7 @@ def test_four_thousand_draws_are_shared_by_probability_and_an_improbable_model_h
         asked.append(theta[:, 0])
         return np.zeros((*protocol.time_s.shape, len(theta)))
 
-    monkeypatch.setattr(module, "predict", predict)
+    monkeypatch.setattr(module, "draw_predictive", predict)
     mixture_table([(share, request) for share in shares])  # type: ignore[misc]
     assert [len(rows) for rows in asked] == used
     mixture_table([(1.0, request)])  # type: ignore[arg-type]
@@ -146,7 +146,7 @@ def test_figures_are_those_of_the_draws_to_the_last_bit_where_a_reading_is_given
     request = SimpleNamespace(stored=stored, prediction=question, holds=holds)
     drawn = np.random.default_rng(0).normal(size=(3, 3, 9))
     drawn[1, 0] = 0.1  # the sum of nine is not nine times as much
-    monkeypatch.setattr(module, "predict", lambda *given: drawn)
+    monkeypatch.setattr(module, "draw_predictive", lambda *given: drawn)
     rows = mixture_table([(1.0, request)])  # type: ignore[arg-type]
     where = [(1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]
     assert [row[:4] for row in rows] == [

@@ -28,7 +28,7 @@ from wirebayes.report.blocks import (
     svg,
     unit_text,
 )
-from wirebayes.report.page import render, write
+from wirebayes.report.page import render, write_page
 from wirebayes.results.jobs import Job, run
 
 MOST_BYTES = 1_500_000
@@ -181,7 +181,7 @@ def fitted(tmp_path_factory) -> Path:
 
 
 def test_the_page_of_a_fit_tells_known_from_unknown(fitted):
-    page = read(write(fitted))
+    page = read(write_page(fitted))
     assert "8 holds and 1 not recorded, 40 readings." in page.words
     assert "Tensions from 1.21 to 15.9 N." in page.words
     assert len(page.images) == 2 * (3 + 1) + 1  # readings, residuals, creep; all pairs; the curve of the chain
@@ -204,14 +204,14 @@ def test_a_fit_that_did_not_converge_says_so_first(fitted, tmp_path):
         unsure = [] if converged else [{"kind": "not-converged", "text": "the chains stand apart"}]
         content = summary | {"converged": converged, "warnings": unsure}
         (copy / "chain" / "summary.json").write_text(json.dumps(content))
-        first = read(write(copy)).words.split("What was measured")[0]
+        first = read(write_page(copy)).words.split("What was measured")[0]
         assert ("The chains stand apart." in first) is not converged
     for passed, sentence in ((True, "Good."), (False, "Bad.")):
         check = {"passed": passed, "sentence": sentence, "gross_errors": []}
         failed = [] if passed else [{"kind": "model-check", "text": "bad"}]
         content = summary | {"model_check": check, "warnings": failed}
         (copy / "chain" / "summary.json").write_text(json.dumps(content))
-        words = read(write(copy)).words
+        words = read(write_page(copy)).words
         assert check["sentence"] in words.split("What was measured")[0]
         for claim in ("What the readings determine (90", summary["extrapolation"]["sentence"]):
             assert (claim in words) is check["passed"]
@@ -223,7 +223,7 @@ def test_a_fit_with_effects_of_the_users_own_runs_none_of_their_code(fitted, tmp
     (copy / "configuration.json").write_text(json.dumps({"command": "fit", "own_effects": "raise SystemExit(7)"}))
     (copy / "chain").mkdir()
     (copy / "chain" / "summary.json").write_bytes((fitted / "chain" / "summary.json").read_bytes())
-    assert "shows summary.json alone" in read(write(copy)).words
+    assert "shows summary.json alone" in read(write_page(copy)).words
 
 
 def test_the_table_of_creep_names_its_tension_and_what_it_includes(fitted, tmp_path):
@@ -233,7 +233,7 @@ def test_the_table_of_creep_names_its_tension_and_what_it_includes(fitted, tmp_p
     (copy / "chain").mkdir()
     (copy / "chain" / "posterior.nc").write_bytes((fitted / "chain" / "posterior.nc").read_bytes())
     (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"derived": derived}))
-    words = read(write(copy)).words
+    words = read(write_page(copy)).words
     assert "A fresh sample under a constant 4.25 N, with all fitted effects of the wire" in words
     assert "grows without end" in words and "stiffness there, N per unit strain" in words
 
@@ -300,7 +300,7 @@ DISCOVERY = {
 )
 def test_the_page_of_a_discovery_says_the_verdict_and_what_to_measure_next(changes, message, tmp_path):
     content = {"version": 2, "experiments": {"wire-a": DISCOVERY | changes, "wire-b": DISCOVERY}, "warnings": []}
-    page = read(write(folder_of(tmp_path / "out", "discover", discovery=content)))
+    page = read(write_page(folder_of(tmp_path / "out", "discover", discovery=content)))
     assert message in page.words
     assert "Unload in steps of 2 mm." in page.words
     assert "On the unused holds 9 and 10 the rms error goes from 0.10 to 0.030 N" in page.words
@@ -324,7 +324,7 @@ CHECKED = {
 
 def test_the_page_of_a_check_says_what_is_odd_and_what_the_test_cannot_tell(tmp_path):
     content = {"experiments": {"wire-a": CHECKED}}
-    page = read(write(folder_of(tmp_path / "out", "check", check=content)))
+    page = read(write_page(folder_of(tmp_path / "out", "check", check=content)))
     assert "Hold 2 repeats hold 1." in page.words and "0.00123" in page.words
     assert "it does not determine k1, it would show" in page.words and "k1 is about" not in page.words
     assert (
@@ -344,14 +344,14 @@ def test_the_page_of_an_import_says_what_was_done(tmp_path):
         "warnings": [],
     }
     content = {"experiments": {"wire-a": about}}
-    page = read(write(folder_of(tmp_path / "out", "import", **{"import": content})))
+    page = read(write_page(folder_of(tmp_path / "out", "import", **{"import": content})))
     assert "wire-a: 3 holds, 9 readings, 1000 mm of line." in page.words
     assert "From bench.xlsx." in page.words and "Decimal comma." in page.words
 
 
 def test_a_gap_below_the_floor_is_a_dash(tmp_path):
     content = DISCOVERY | {"held_out": DISCOVERY["held_out"] | {"gap_closed": None}, "p_global": None}
-    page = read(write(folder_of(tmp_path / "out", "discover", discovery={"experiments": {"wire-a": content}})))
+    page = read(write_page(folder_of(tmp_path / "out", "discover", discovery={"experiments": {"wire-a": content}})))
     above = page.words.rpartition("What the words and symbols mean")[0]
     assert "–" in above and "90 %" not in above.replace("readings in 90 % bands", "")
 
@@ -368,7 +368,7 @@ def test_the_page_of_a_pose_that_cannot_be_held_says_so(tmp_path):
             {"kind": "unheld", "text": "no tensions within the bounds hold the platform at this pose"},
         ],
     }
-    page = read(write(folder_of(tmp_path / "out", "pose", pose=pose)))
+    page = read(write_page(folder_of(tmp_path / "out", "pose", pose=pose)))
     assert "No tensions within the bounds hold the platform" in page.words
     assert "Wire 3 is slack." in page.words
 
@@ -378,7 +378,7 @@ def test_the_page_of_a_comparison_lists_models_and_failures(tmp_path):
     bad = {"name": "toe", "failed": "no finite start", "meaning": ""}
     models = [good | {"meaning": "the base"}, bad]
     content = {"experiments": {"wire-a": {"base": "plain", "models": models, "warnings": []}}}
-    page = read(write(folder_of(tmp_path / "out", "compare", comparison=content)))
+    page = read(write_page(folder_of(tmp_path / "out", "compare", comparison=content)))
     assert "no finite start" in page.words
     assert "0.75" in page.words and "the base" in page.words
 
@@ -390,7 +390,7 @@ def test_the_page_of_an_export_shows_the_creep_and_leads_to_the_files(tmp_path):
     (out / "klipper.cfg").write_text("[printer]\n")
     left_out = [{"kind": "left-out", "text": "no firmware settings"}]
     (out / "export.json").write_text(json.dumps({"files": [], "creep_table": [], "warnings": left_out}))
-    page = read(write(out))
+    page = read(write_page(out))
     assert "1.53" in page.words and "1.40 … 1.60" in page.words
     assert {"creep-table.csv", "klipper.cfg"} <= set(page.anchors)
     assert "robot.xml" not in page.anchors
@@ -400,7 +400,7 @@ def test_the_page_of_an_export_shows_the_creep_and_leads_to_the_files(tmp_path):
 def test_the_page_of_a_simulation_tells_the_truth(tmp_path):
     out = tmp_path / "out"
     assert main(["simulate", "--effect", "toe.w=2", "--parameter", "k1=712", "--output", str(out)]) == 0
-    page = read(write(out))
+    page = read(write_page(out))
     assert "Beyond the plain model: toe." in page.words
     assert "712" in page.words and "2.00" in page.words
     assert "truth.json" in page.anchors
@@ -433,7 +433,7 @@ def test_an_unfinished_reproduction_shows_what_there_is(tmp_path):
         "holds": 3, "unrecorded_holds": 0, "readings": 15,
         "smallest_tension_N": 1.0, "largest_tension_N": 2.0, "median_loss_percent": 5.0,
     }  # fmt: skip
-    page = read(write(folder_of(tmp_path / "out", "reproduce", measured=[row])))
+    page = read(write_page(folder_of(tmp_path / "out", "reproduce", measured=[row])))
     assert "wire-a" in page.words and "Table 4, again" not in page.words
 
 

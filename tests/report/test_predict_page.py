@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from wirebayes.prediction.table import dataset
-from wirebayes.report.pages.predict import in_a_sentence, page, write_beside
+from wirebayes.report.pages.predict import in_a_sentence, predict_page, write_beside
 from wirebayes.wire.protocol import Control
 
 ABOUT = {"prediction": "hold 8 predicted as a continuation", "seed": 3}
@@ -54,6 +54,6 @@ def test_a_table_that_is_called_as_a_page_keeps_its_name(tmp_path: Path) -> None
 
 
 def test_a_long_prediction_shows_its_first_rows_and_says_how_many_there_are() -> None:
-    long = page(dataset(rows(150), ABOUT), Path("next.csv"))
+    long = predict_page(dataset(rows(150), ABOUT), Path("next.csv"))
     table = long.sections[0].blocks[-1]
     assert len(table.rows) == 200 and table.caption == "The file has 100 more rows."  # type: ignore[union-attr]

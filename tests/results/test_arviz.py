@@ -12,9 +12,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.errors import InputError
-from wirebayes.inference.fit import Fit, fit
+from wirebayes.inference.fit import Fit, fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
@@ -89,19 +89,21 @@ def experiments(tmp_path_factory: pytest.TempPathFactory) -> list[Experiment]:
 def stored(experiments: list[Experiment], tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, Fit]]:
     """Kind of result -> folder of its posterior.nc, and the fit."""
     short, both = experiments[:1], experiments
-    joint = fit(build(both), 1, policy=HASTY)
+    joint = fit_problem(build(both), 1, policy=HASTY)
     fits = {
-        "chain": fit(build(short), 1, policy=HASTY),
-        "hold": fit(build(short, spec=ModelSpec(likelihood="hold")), 1, policy=HASTY),
+        "chain": fit_problem(build(short), 1, policy=HASTY),
+        "hold": fit_problem(build(short, spec=ModelSpec(likelihood="hold")), 1, policy=HASTY),
         "together": joint,
         "apart": joint,
-        "effects": fit(build(short, [named("thermal_expansion"), named("grip_slip@4")]), 1, policy=LESS_HASTY),
-        "unknown": fit(build(short, [named("discrepancy@8:0.3:70.0")]), 1, policy=HASTY),
+        "effects": fit_problem(
+            build(short, [effect_named("thermal_expansion"), effect_named("grip_slip@4")]), 1, policy=LESS_HASTY
+        ),
+        "unknown": fit_problem(build(short, [effect_named("discrepancy@8:0.3:70.0")]), 1, policy=HASTY),
     }
     out = {}
     for kind, done in fits.items():
         folder = tmp_path_factory.mktemp(kind)
-        store.save(done, folder, {}, sample=done.problem.samples[0] if kind == "apart" else None)
+        store.save_posterior(done, folder, {}, sample=done.problem.samples[0] if kind == "apart" else None)
         out[kind] = (folder, done)
     return out
 
@@ -166,7 +168,7 @@ def test_a_protocol_comes_back_as_it_was(
     stored: dict[str, tuple[Path, Fit]], experiments: list[Experiment], kind: str
 ) -> None:
     for experiment in experiments if kind == "together" else experiments[:1]:
-        sample = read_back.load(stored[kind][0], experiment.name).sample
+        sample = read_back.load_posterior(stored[kind][0], experiment.name).sample
         expected = experiment.protocol()
         for name, value in vars(expected).items():
             assert np.array_equal(getattr(sample.protocol, name), value), name
@@ -292,4 +294,4 @@ def test_a_reading_without_its_time_is_refused(stored: dict[str, tuple[Path, Fit
     with h5py.File(copy, "a") as file:
         file["constant_data/time_s"][0, 1] = np.nan
     with pytest.raises(InputError, match="readings and times that do not belong together"):
-        read_back.load(tmp_path)
+        read_back.load_posterior(tmp_path)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.model.build import build
 from wirebayes.results import hold_ends
 from wirebayes.simulation.synthetic import Bench, Truth, draw
@@ -35,7 +35,7 @@ def near(problem, truth):
 
 @pytest.mark.parametrize(("key", "truth"), [(None, {}), ("lost_motion", {"lost_motion.w": 0.1})])
 def test_the_shift_is_the_distance_to_the_fit_that_knows_the_ends(key, truth):
-    effects = [named(key)] if key else []
+    effects = [effect_named(key)] if key else []
     unknown, known = (lasting(effects, truth, recorded=r) for r in (False, True))
     best, one = near(unknown, truth), np.ones(len(unknown.names))
     told = hold_ends.cost(unknown, best, one)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.prior import Prior
@@ -95,7 +95,7 @@ def test_extrapolation_says_whose_work_the_band_is() -> None:
 
 
 def test_extrapolation_of_draws_that_do_not_creep_says_so() -> None:
-    problem = build([experiments()[0]], [named("creep_threshold")])
+    problem = build([experiments()[0]], [effect_named("creep_threshold")])
     rows = problem.prior.rvs(1000, np.random.default_rng(3))
     rows[:200, problem.names.index("creep_threshold.tau_c")] = 2.5
     band = extrapolation(SimpleNamespace(problem=problem, flat=rows), 2.0)  # type: ignore[arg-type]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from wirebayes.results.netcdf import Group, Variable, content, read
+from wirebayes.results.netcdf import Group, Variable, content, read_groups
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_what_was_written_is_read_back_whoever_wrote_it(group, writer, tmp_path)
             tree.load()
         tree.to_netcdf(tmp_path / "again.nc", engine="h5netcdf")
         path = tmp_path / "again.nc"
-    found = read(path, ["one"])["one"]
+    found = read_groups(path, ["one"])["one"]
     assert list(found.variables) == list(group.variables) and set(found.coordinates) == set(group.coordinates)
     for name in group.variables | group.coordinates:
         assert (found.variables | found.coordinates)[name].dims == (group.variables | group.coordinates)[name].dims
@@ -74,4 +74,4 @@ def test_a_group_that_is_not_there_is_an_error(group, tmp_path):
     path = tmp_path / "some.nc"
     path.write_bytes(content({"one": group}, {}))
     with pytest.raises(KeyError):
-        read(path, ["prior"])
+        read_groups(path, ["prior"])

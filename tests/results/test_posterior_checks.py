@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.model.build import FINEST, build
 from wirebayes.model.problem import with_readings
@@ -25,10 +25,10 @@ def simulated():
 
 def test_a_sound_test_gets_no_warning_and_a_gross_one_is_first_in_summary_and_page(simulated, tmp_path):
     problem = simulated.problem
-    sound = store.save(fit(problem, 1, policy=HASTY), tmp_path, {})
+    sound = store.save_posterior(fit_problem(problem, 1, policy=HASTY), tmp_path, {})
     assert [notice for notice in sound["warnings"] if notice["kind"] != "not-converged"] == []
     mixed = problem.samples[0].readings[np.random.default_rng(0).permutation(12)]
-    store.save(fit(with_readings(problem, [mixed]), 1, policy=HASTY), tmp_path, {})
+    store.save_posterior(fit_problem(with_readings(problem, [mixed]), 1, policy=HASTY), tmp_path, {})
     summary = json.loads((tmp_path / "summary.json").read_text())
     texts = [notice["text"] for notice in summary["warnings"] if notice["kind"] == "data"]
     assert any("setting_sd is at least" in text and "steps by 1 mm" in text for text in texts)
@@ -89,7 +89,7 @@ def test_readings_without_noise_have_a_floor_and_say_so(simulated):
     problem = build([read])
     assert problem.samples[0].resolution == pytest.approx(FINEST * np.max(bare.problem.samples[0].readings))
     assert build([with_tensions(Bench().experiment(), sample.readings[..., 0])]).samples[0].resolution == 0.01
-    quiet = fit(problem, 1, policy=HASTY)
+    quiet = fit_problem(problem, 1, policy=HASTY)
     assert any(
         "carry no noise" in notice.text for notice in posterior_checks.posterior_warnings(quiet, problem.samples[0])
     )

@@ -7,7 +7,7 @@ import pytest
 
 from wirebayes.effects.creep import SecondRelaxation, SteadyCreep
 from wirebayes.effects.elastic import LengthDependence
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.build import build
@@ -25,7 +25,7 @@ BENCHES = [Bench("short", "line", 800.0), Bench("long", "line", 1700.0)]
 def fitted():
     effects = [SecondRelaxation(), SteadyCreep(), LengthDependence("k1")]
     joint = draw(BENCHES, Truth({"length_dependence.p": 0.4}, effects), seed=3).problem
-    return fit(joint, 1, policy=HASTY)
+    return fit_problem(joint, 1, policy=HASTY)
 
 
 @pytest.mark.parametrize("sample", [0, 1])
@@ -33,8 +33,8 @@ def fitted():
 def test_what_is_read_back_predicts_as_the_joint_fit_does(fitted, sample, apart, tmp_path):
     joint = fitted.problem
     here = joint.samples[sample]
-    store.save(fitted, tmp_path, {}, sample=here if apart else None)
-    stored = read_back.load(tmp_path, here.name)
+    store.save_posterior(fitted, tmp_path, {}, sample=here if apart else None)
+    stored = read_back.load_posterior(tmp_path, here.name)
     theta = np.concatenate(list(fitted.theta))[:20]
     read = {name: values[:20] for name, values in stored.draws.items()}
     expected = simulate(here.protocol, joint.parameters(theta, here), here.model)
@@ -45,7 +45,7 @@ def test_the_summary_s_figures_of_a_fresh_sample_include_all_effects_of_the_wire
     """Each written out here, for the sample at its own length."""
     joint = fitted.problem
     here = joint.samples[1]
-    summary = store.save(fitted, tmp_path, {}, sample=here)
+    summary = store.save_posterior(fitted, tmp_path, {}, sample=here)
     derived, load = summary["derived"], summary["derived"]["tension_N"]
 
     def creep(own, t):
@@ -98,8 +98,8 @@ def test_the_reference_temperature_is_stored_for_each_sample(tmp_path):
     logged = [table[0] + ",temperature_C", *(f"{row},{21.5 + 0.1 * i}" for i, row in enumerate(table[1:]))]
     (tmp_path / "long.csv").write_text("\n".join(logged) + "\n")
     experiments = read_experiments(tmp_path / "experiments.toml")
-    store.save(fit(build(experiments), 1, policy=HASTY), tmp_path, {})
-    short, long = (read_back.load(tmp_path, e.name).sample.protocol for e in experiments)
+    store.save_posterior(fit_problem(build(experiments), 1, policy=HASTY), tmp_path, {})
+    short, long = (read_back.load_posterior(tmp_path, e.name).sample.protocol for e in experiments)
     assert short.reference_C is None and short.warming_K is None
     assert long.reference_C == 21.5
     assert np.array_equal(long.warming_K, experiments[1].protocol().warming_K)

@@ -10,7 +10,7 @@ from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
 
 # shipped robots that hang on their wires alone: what no plane carries
-HANGING = [name for name in schema.shipped() if schema.read(name).plane is None]
+HANGING = [name for name in schema.shipped() if schema.read_robot_file(name).plane is None]
 
 
 @dataclass
@@ -39,7 +39,9 @@ def commanded(robot, law, count, rng):
 def in_a_plane():
     """A weight on four wires of 5 m, 250 N each, in a plane: robot, k1, zero, offset, x, R."""
     exits = np.array([[3.0, 0.0, 4.0], [-3.0, 0.0, 4.0], [4.0, 0.0, 3.0], [-4.0, 0.0, 3.0]])
-    robot = replace(schema.read("hangprinter-4"), exit_m=exits, lines=np.ones(4), beyond_m=np.zeros(4), mass_kg=1.0)
+    robot = replace(
+        schema.read_robot_file("hangprinter-4"), exit_m=exits, lines=np.ones(4), beyond_m=np.zeros(4), mass_kg=1.0
+    )
     one_kg_N = -statics.weight(robot, np.eye(3)[..., None])[2, 0]
     robot = replace(robot, mass_kg=2 * 250.0 * (0.8 + 0.6) / one_kg_N)
     return robot, np.full(4, 1000.0), np.full(4, 4.0), np.zeros(4), np.zeros(3), np.eye(3)
@@ -54,7 +56,7 @@ def disturbed(robot, law, count, rng, amount=0.01):
 
 def solved(robot, cases):
     """Forward kinematics from the commanded pose."""
-    return forward.solve(robot, cases.wires, cases.zero_m, cases.offset_m, cases.position_m, cases.rotation)
+    return forward.solve_equilibrium(robot, cases.wires, cases.zero_m, cases.offset_m, cases.position_m, cases.rotation)
 
 
 def energy_minimum(robot, law, k1, zero_m, offset_m, start_m, start_rotation):
@@ -136,7 +138,7 @@ def ball_joint(rng):
         0.3 * np.column_stack([-ring[:, 1], ring[:, 0], ring[:, 2]]) * np.where(np.arange(legs) % 2, 1, -1)[:, None]
     )
     points = 0.3 * ring + across + np.array([0.0, 0.0, 1.0]) + 0.05 * rng.normal(size=(legs, 3))
-    plain = schema.read("sled-4")
+    plain = schema.read_robot_file("sled-4")
     zeros = np.zeros(legs)
     return replace(
         plain, name="mast", freedom="orientation", plane=None, mass_kg=2.0, centre_of_mass_m=np.array([0.02, 0.0, 0.8]),

@@ -18,7 +18,7 @@ def _line(n, k1, law="hooke"):
 
 def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):
     # law (3) pulls with k1 at most: 3 N a wire cannot hold a platform that asks for five
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     request = PoseRequest(robot.home_m, np.eye(3), TIMES)
     found = pose_report(robot, _line(40, 3.0, "modified"), request)
     content = found.content
@@ -31,7 +31,7 @@ def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):
 
 @pytest.mark.slow
 def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     weak, strong = _line(20, 3.0, "modified"), _line(20, 800.0, "modified")
     both = {k: np.concatenate([weak.parameters[k], strong.parameters[k]]) for k in strong.parameters}
     request = PoseRequest(robot.home_m, np.eye(3), TIMES)
@@ -48,14 +48,14 @@ def test_some_draws_too_weak_are_counted_and_left_out(tmp_path):
 
 
 def test_one_draw_is_enough():
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     content = pose_report(robot, _line(1, 5000.0), PoseRequest(robot.home_m, np.eye(3), TIMES)).content
     assert content["forward"]["solved"] == 1.0
     assert "sentence" in content["variance_shares"]
 
 
 def test_given_wires_have_no_uncertainty_and_keep_their_leg():
-    robot = schema.read("linear-6")
+    robot = schema.read_robot_file("linear-6")
     given = schema.GivenWire({"k1": 5e4, "B": 1e-3, "U": 1.0, "k2": 0.01, "N": 1.0}, 1000.0)
     from dataclasses import replace
 
@@ -77,7 +77,7 @@ def test_bands_leave_lost_draws_out():
 @pytest.mark.parametrize(("name", "leg"), [("linear-6", 3.0), ("hangprinter-4", 4.0 * (2.29983 - 0.3))])
 def test_creep_grows_with_the_length_as_the_joint_fit_says(name, leg):
     """A leg's wire of known length: B per length^exponent, by hand on the last leg."""
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     line = _line(30, 800.0)
     exponent = np.linspace(0.5, 1.5, 30)
     scaled = draws.WireDraws({**line.parameters, draws.LENGTH_EXPONENT: exponent}, 1000.0)
@@ -94,7 +94,7 @@ def test_what_a_fit_could_not_name_is_said_to_be_missing():
     from wirebayes.effects.unknown import Discrepancy
 
     line = draws.WireDraws(_line(3, 800.0).parameters, 1000.0, effects=(Discrepancy(5, 0.1, 120.0),))
-    message = draws.wire_warnings(schema.read("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
+    message = draws.wire_warnings(schema.read_robot_file("linear-6"), line, np.ones((1, 6)), 1.0, np.ones((1, 6)))
     assert len(message) == 1
     assert "could not name" in message[0].text and message[0].kind == "left-out"
 
@@ -102,7 +102,7 @@ def test_what_a_fit_could_not_name_is_said_to_be_missing():
 def test_tilt_is_measured_against_the_commanded_normal_and_against_the_vertical():
     from wirebayes.robot.mechanics.rotation import matrix
 
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     leaning = matrix(np.array([0.05, 0.0, 0.3]))
     drift = pose_report(robot, _line(40, 800.0), PoseRequest(robot.home_m, leaning, TIMES)).content["drift"][0]
     away = np.degrees(np.arccos(leaning[2, 2]))

@@ -46,12 +46,12 @@ def test_the_equilibrium_is_that_of_an_energy_in_three_angles(seed):
     assert np.isfinite(tau).all()
     wires = Wires("hooke", "saturating", {"k1": np.array([[K1]])}, np.full((robot.legs, 1), 1000.0))
     commands = inverse.commands(robot, wires, robot.home_m[None], turn[None], tau)
-    back = forward.solve(robot, wires, commands.zero_m, commands.offset_m, robot.home_m, np.eye(3))
+    back = forward.solve_equilibrium(robot, wires, commands.zero_m, commands.offset_m, robot.home_m, np.eye(3))
     assert back.found[0]
     np.testing.assert_array_equal(back.position_m[0], robot.home_m)
     np.testing.assert_allclose(back.rotation[0], turn, atol=1e-9)
     zero = commands.zero_m[0] - 2e-3 * rng.random(robot.legs)
-    found = forward.solve(robot, wires, zero[None], commands.offset_m, robot.home_m, turn)
+    found = forward.solve_equilibrium(robot, wires, zero[None], commands.offset_m, robot.home_m, turn)
     best = minimize(lambda q: _energy(robot, zero, q), rotation.vector(turn[None])[0], method="Nelder-Mead",
                     options={"xatol": 1e-10, "fatol": 1e-15, "maxiter": 4000})  # fmt: skip
     np.testing.assert_allclose(rotation.vector(found.rotation)[0], best.x, atol=1e-6)

@@ -38,7 +38,7 @@ ERRORS = Uncertain(4e-3, 0.05, 0.01)
 @pytest.fixture(scope="module")
 def case():
     """A robot with lengths and wires of its own, its session read with noise, and what it did afterwards."""
-    robot, line = schema.read("hangprinter-4"), _line(60)
+    robot, line = schema.read_robot_file("hangprinter-4"), _line(60)
     rng = np.random.default_rng(5)
     places = robot.home_m + 0.12 * robot.span_m * rng.uniform(-1, 1, (9, 3))
     begins = np.arange(len(places)) * (HOLD_S + SOON_S)
@@ -127,7 +127,7 @@ def test_what_is_stored_is_what_is_known(case):
     for one, other in zip(case.start.carried(points).creep_mm, back.carried(points).creep_mm, strict=True):
         np.testing.assert_allclose(other, one, rtol=1e-12)
     with pytest.raises(ValueError, match="other unknowns"):
-        from_dict(plain(to_dict(case.start)), schema.read("linear-7"), case.line)
+        from_dict(plain(to_dict(case.start)), schema.read_robot_file("linear-7"), case.line)
 
 
 def test_biases_are_averaged_over(case):

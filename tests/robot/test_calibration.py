@@ -8,7 +8,7 @@ from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
 from wirebayes.robot.self_calibration.estimate import corrected_joints, length_posterior
-from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.start import starting_references
 
@@ -35,18 +35,18 @@ def _session(robot, line, poses, rng, tilt_sd=None):
 
 
 def test_sensitivity_is_the_derivative_of_the_equilibrium():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     rng = np.random.default_rng(0)
     session = _session(robot, _line(), 4, rng)
     wires = draws.for_robot(robot, _line().centre())
     zero, offset = inverse.lengths(robot, session.joint_m)
-    at = forward.solve(robot, wires, zero, offset, session.position_m, session.rotation)
+    at = forward.solve_equilibrium(robot, wires, zero, offset, session.position_m, session.rotation)
     motion, change = observability.length_sensitivity(robot, wires, at.position_m, at.rotation, zero, offset)
     h = 1e-6
     for i in range(robot.legs):
         step = h * np.eye(robot.legs)[i]
-        up = forward.solve(robot, wires, zero + step, offset, at.position_m, at.rotation)
-        down = forward.solve(robot, wires, zero - step, offset, at.position_m, at.rotation)
+        up = forward.solve_equilibrium(robot, wires, zero + step, offset, at.position_m, at.rotation)
+        down = forward.solve_equilibrium(robot, wires, zero - step, offset, at.position_m, at.rotation)
         pull = (up.tension_N - down.tension_N) / (2 * h)
         np.testing.assert_allclose(change[:, :, i], pull, atol=1e-4 * np.abs(change).max())
         shift = (up.position_m - down.position_m) / (2 * h)
@@ -55,7 +55,7 @@ def test_sensitivity_is_the_derivative_of_the_equilibrium():
 
 @pytest.mark.parametrize("rolling", [False, True])
 def test_exact_readings_bring_back_the_lengths(rolling):
-    robot = schema.read("segesta-8")
+    robot = schema.read_robot_file("segesta-8")
     if rolling:
         robot = cases.with_pulleys(robot, np.random.default_rng(0))
     rng = np.random.default_rng(2)
@@ -65,7 +65,7 @@ def test_exact_readings_bring_back_the_lengths(rolling):
     mean, _ = prior.moments(robot.legs)
     truth = mean[None].copy()
     truth[:, : robot.legs] = 5e-3 * rng.normal(size=(1, robot.legs))
-    real = predict(robot, prior, session, truth)
+    real = predict_session(robot, prior, session, truth)
     known = length_posterior(robot, prior, session, real.readings)
     assert known.converged.all()
     np.testing.assert_allclose(known.length_m, real.length_m, atol=5e-6)
@@ -73,7 +73,7 @@ def test_exact_readings_bring_back_the_lengths(rolling):
 
 
 def test_slack_wires_do_not_mislead_the_calibration():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     rng = np.random.default_rng(3)
     line = _line()
     session = _session(robot, line, 6, rng)
@@ -81,7 +81,7 @@ def test_slack_wires_do_not_mislead_the_calibration():
     mean, _ = prior.moments(robot.legs)
     truth = np.tile(mean, (4, 1))
     truth[:, : robot.legs] = 14e-3 * rng.normal(size=(4, robot.legs))
-    real = predict(robot, prior, session, truth)
+    real = predict_session(robot, prior, session, truth)
     slack = (real.readings == 0).any(1)
     assert slack.any()
     guess = starting_references(robot, prior, session, real.readings)
@@ -94,7 +94,7 @@ def test_slack_wires_do_not_mislead_the_calibration():
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_biases_of_the_sensors_are_estimated_where_a_prior_allows_them(moving):
-    robot, rng, line = schema.read("hangprinter-4"), np.random.default_rng(8), _line()
+    robot, rng, line = schema.read_robot_file("hangprinter-4"), np.random.default_rng(8), _line()
     session = _session(robot, line, 10, rng)
     if moving:
         session = replace(session, motion=rng.choice([-1.0, 1.0], session.joint_m.shape))
@@ -102,8 +102,8 @@ def test_biases_of_the_sensors_are_estimated_where_a_prior_allows_them(moving):
     mean, cov = prior.moments(robot.legs)
     truth = rng.multivariate_normal(mean, cov, 6)
     bias = truth[:, -robot.legs :]
-    real = predict(robot, prior, session, truth)
-    still = predict(robot, replace(prior, bias_sd_N=0.0), session, truth[:, : -robot.legs])
+    real = predict_session(robot, prior, session, truth)
+    still = predict_session(robot, replace(prior, bias_sd_N=0.0), session, truth[:, : -robot.legs])
     off = (real.readings - still.readings).reshape(6, -1, robot.legs) * session.tension_sd_N
     np.testing.assert_allclose(off, bias[:, None] * session.bias_sign, atol=1e-9)
     readings = real.readings + rng.normal(size=real.readings.shape)
@@ -135,7 +135,7 @@ def test_a_bias_hides_what_readings_show():
 @pytest.mark.slow
 @pytest.mark.statistical
 def test_intervals_cover_and_hooke_alone_does_not():
-    robot = schema.read("segesta-8")
+    robot = schema.read_robot_file("segesta-8")
     # well taut, as one would calibrate: on the edge of slackness a mode need not have zero slope
     robot = replace(robot, rule=replace(robot.rule, lowest_N=2.5))
     rng = np.random.default_rng(4)
@@ -144,7 +144,7 @@ def test_intervals_cover_and_hooke_alone_does_not():
     prior = LengthPrior(line, 5e-3, spread=0.05)
     mean, cov = prior.moments(robot.legs)
     truth = rng.multivariate_normal(mean, cov, 40)
-    real = predict(robot, prior, session, truth)
+    real = predict_session(robot, prior, session, truth)
     readings = np.maximum(real.readings + rng.normal(size=real.readings.shape), 0)
     covered, error = {}, {}
     for creeps in (True, False):
@@ -158,7 +158,7 @@ def test_intervals_cover_and_hooke_alone_does_not():
             joint = corrected_joints(robot, prior, known, x, np.eye(3))
             wires, reference = prior.wires(robot, truth)
             bare, offset = inverse.lengths(robot, joint)
-            there = forward.solve(robot, wires, (bare + reference) * (1 + real.creep), offset, x, np.eye(3))
+            there = forward.solve_equilibrium(robot, wires, (bare + reference) * (1 + real.creep), offset, x, np.eye(3))
             assert np.median(np.linalg.norm(there.position_m - x, axis=1)) < 5e-4
     # 320 intervals, the 8 of a robot correlated: twenty repeats of this test scatter by 0.02
     assert 0.83 < covered[True] < 0.97
@@ -167,14 +167,14 @@ def test_intervals_cover_and_hooke_alone_does_not():
 
 
 def test_an_inclinometer_helps():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     line = _line()
     prior = LengthPrior(line, 5e-3)
     sd = []
     for tilt in (None, 1e-4):
         session = _session(robot, line, 5, np.random.default_rng(6), tilt)
         mean, _ = prior.moments(robot.legs)
-        real = predict(robot, prior, session, mean[None])
+        real = predict_session(robot, prior, session, mean[None])
         known = length_posterior(robot, prior, session, real.readings)
         sd.append(known.length_sd_m.mean())
     assert sd[1] < 0.95 * sd[0]
@@ -194,7 +194,7 @@ def test_observability_names_what_cannot_be_seen():
 
 
 def test_chosen_poses_say_more_than_the_first_ones():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     rng = np.random.default_rng(9)
     wires = draws.for_robot(robot, _line().centre())
     x = rng.uniform(robot.lower_m, robot.upper_m, (60, 3))

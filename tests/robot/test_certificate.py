@@ -15,7 +15,7 @@ from . import cases
 
 
 def _case(name, law, make=cases.commanded, seed=0):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     c = make(robot, law, 2, np.random.default_rng(seed))
     found = cases.solved(robot, c)
     return robot, c.wires.theta["k1"][0, 0], c.zero_m[0], c.offset_m[0], found.position_m[0], found.rotation[0]
@@ -46,7 +46,7 @@ def test_every_sampled_pose_lies_in_the_guaranteed_enclosure(name):
     inside = rng.random((2, n, w))
     share = np.where(np.arange(n)[:, None] < n // 2, corners, inside)
     wires = Wires("hooke", "saturating", {"k1": (low + (high - low) * share[0]).T}, np.full((w, 1), 1000.0))
-    found = forward.solve(robot, wires, zero + half * (2 * share[1] - 1), offset, x, R)
+    found = forward.solve_equilibrium(robot, wires, zero + half * (2 * share[1] - 1), offset, x, R)
     assert found.found.all()
     reach = np.abs(found.position_m - x).max(0)
     assert (reach <= proof.radius_m[:3]).all()
@@ -115,7 +115,7 @@ def test_lengths_that_change_together_are_enclosed_piece_by_piece(name):
     assert box.proofs > 1
     share = np.linspace(0, 1, 101)[:, None]
     wires = Wires("hooke", "saturating", {"k1": np.full((1, 1), k1)}, np.full((robot.legs, 1), 1000.0))
-    found = forward.solve(robot, wires, zero + share * (longer - zero), offset, x, R).position_m
+    found = forward.solve_equilibrium(robot, wires, zero + share * (longer - zero), offset, x, R).position_m
     assert (box.low_m <= found.min(0)).all()
     assert (found.max(0) <= box.high_m).all()
     assert (box.high_m - box.low_m).max() < 2 * np.ptp(found, axis=0).max()
@@ -158,7 +158,7 @@ class Image:
 
 
 def test_a_box_grows_until_its_image_lies_within_and_then_shrinks(monkeypatch):
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     first = 1e-10 * robot.span_m
     images = Image(monkeypatch, 10.0, 2.0, 0.9, 0.8, 1.5, 0.5)
     proof = certify(robot, "hooke", None, None, None, "x", "R", how_alone=False)
@@ -169,7 +169,7 @@ def test_a_box_grows_until_its_image_lies_within_and_then_shrinks(monkeypatch):
 
 
 def test_a_box_must_hold_its_image_in_every_direction(monkeypatch):
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     narrow = lambda radius: radius * np.array([0.5, 0.5, 1.01])  # noqa: E731
     images = Image(monkeypatch, narrow, narrow, 0.5)
     assert certify(robot, "hooke", None, None, None, "x", "R", how_alone=False).proved
@@ -180,7 +180,7 @@ def test_a_box_must_hold_its_image_in_every_direction(monkeypatch):
 
 def test_a_box_that_keeps_growing_is_given_up(monkeypatch):
     """After forty images, or once it is as wide as the robot in any direction."""
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     images = Image(monkeypatch, 1.0)
     assert not certify(robot, "hooke", None, None, None, "x", "R").proved and len(images.boxes) == 40
     images = Image(monkeypatch, 1e5)
@@ -192,7 +192,7 @@ def test_a_box_that_keeps_growing_is_given_up(monkeypatch):
 
 def test_a_box_holds_no_second_equilibrium_only_if_its_image_lies_within(monkeypatch):
     """Not at its edge, and not as far as the robot's size: the last width that held is the answer."""
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     for edge in (1.0, 1.5):
         images = Image(monkeypatch, 0.9, 0.5, 0.5, 0.5, 0.5, 0.5, edge)
         proof = certify(robot, "hooke", None, None, None, "x", "R")

@@ -32,7 +32,9 @@ def fitted(tmp_path, monkeypatch):
         Sample("made-up", "made up", PROTOCOL, np.array([[0.85, 0.8], [7.65, 7.3]])[..., None], 0.01, Model()),
         "chain",
     )
-    monkeypatch.setattr("wirebayes.results.read_back.load", lambda folder, experiment=None, own_effects=None: stored)
+    monkeypatch.setattr(
+        "wirebayes.results.read_back.load_posterior", lambda folder, experiment=None, own_effects=None: stored
+    )
     folder = tmp_path / "fit"
     folder.mkdir()
     (folder / "posterior.nc").write_bytes(b"made up")
@@ -124,7 +126,7 @@ def test_bad_input_is_one_plain_line_and_writes_nothing(fitted, tmp_path, capsys
 
 @pytest.mark.parametrize("leg", [0, 3])
 def test_a_platform_point_on_an_exit_point_is_no_pose(leg, fitted, tmp_path, capsys):
-    robot = schema.read("linear-6")
+    robot = schema.read_robot_file("linear-6")
     there = ",".join(map(str, robot.exit_m[leg] - robot.platform_m[leg]))
     assert (
         main(["pose", "linear-6", f"--position={there}", "--wires", str(fitted), "--output", str(tmp_path / "out")])
@@ -155,8 +157,10 @@ def test_a_fit_hold_by_hold_is_refused_for_it_leaves_k1_open(fitted, tmp_path, m
 
     from wirebayes.results import read_back
 
-    stored = replace(read_back.load(fitted), likelihood="hold")
-    monkeypatch.setattr("wirebayes.results.read_back.load", lambda folder, experiment=None, own_effects=None: stored)
+    stored = replace(read_back.load_posterior(fitted), likelihood="hold")
+    monkeypatch.setattr(
+        "wirebayes.results.read_back.load_posterior", lambda folder, experiment=None, own_effects=None: stored
+    )
     assert main([*command, "--wires", str(fitted), "--output", str(tmp_path / "o")]) == 2
     line = capsys.readouterr().err.strip()
     assert "does not determine the stiffness k1" in line
@@ -207,10 +211,10 @@ def session_csv(tmp_path):
     from wirebayes.robot.mechanics import draws, rotation, schema
     from wirebayes.robot.motion import inverse
     from wirebayes.robot.self_calibration import session_file
-    from wirebayes.robot.self_calibration.predicted import predict
+    from wirebayes.robot.self_calibration.predicted import predict_session
     from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     line = draws.WireDraws({k: np.full(3, v) for k, v in
                             {"k1": 803.0, "B": 0.31, "U": 1.0, "k2": 0.03, "N": 0.64}.items()}, 1000.0)  # fmt: skip
     x = robot.home_m + np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0.05], [-0.1, -0.1, -0.05], [0.05, -0.15, 0.1]])
@@ -222,7 +226,7 @@ def session_csv(tmp_path):
     prior = LengthPrior(line, 5e-3, 1e-6)
     truth = prior.moments(robot.legs)[0][None].copy()
     truth[0, : robot.legs] = 1e-3 * np.array([3, -2, 1, 4, -5, 0, 2])
-    real = predict(robot, prior, session, truth)
+    real = predict_session(robot, prior, session, truth)
     tension = iter(real.readings.reshape(-1, robot.legs) * 0.02)
     rows = [[*session_file.columns(robot).required]]
     for k in range(len(x)):
@@ -277,7 +281,9 @@ def test_the_documented_session_is_one():
     from wirebayes.robot.mechanics import schema
     from wirebayes.robot.self_calibration import session_file
 
-    session, readings = session_file.read_session(DOCS / "linear-7-session.csv", schema.read("linear-7"), 0.02, 1e-3)
+    session, readings = session_file.read_session(
+        DOCS / "linear-7-session.csv", schema.read_robot_file("linear-7"), 0.02, 1e-3
+    )
     assert session.read.tolist() == [False] + [True] * 8
     assert len(readings) == 8 * 7
 

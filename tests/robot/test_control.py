@@ -18,7 +18,7 @@ def _line(n=50, sd=0.05, seed=0):
 
 @pytest.mark.parametrize("name", ["cogiro-desk", "linear-7", "hangprinter-4"])
 def test_a_controller_that_knows_everything_holds_the_pose(name):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     wires = draws.for_robot(robot, _line(1, 0.0))
     x, R = robot.home_m, np.eye(3)
     times = np.array([0.0, 60.0, 3600.0])
@@ -31,7 +31,7 @@ def test_a_controller_that_knows_everything_holds_the_pose(name):
 
 
 def test_foreseeing_creep_helps_uncertain_wires():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     wires = draws.for_robot(robot, _line(100), 0.05, np.random.default_rng(0))
     x, R = robot.home_m, np.eye(3)
     state = fresh(robot.legs, 100)
@@ -42,7 +42,7 @@ def test_foreseeing_creep_helps_uncertain_wires():
 
 
 def test_loaded_wires_drift_less_after_a_calibration():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     wires = draws.for_robot(robot, _line(20))
     x, R = robot.home_m, np.eye(3)
     tau = np.repeat(inverse.tensions(robot, x[None], R[None]).T, 20, 1)
@@ -66,7 +66,7 @@ def test_longest_interval_reads_the_probability():
 
 
 def test_the_workspace_agrees_with_single_poses():
-    robot = schema.read("linear-6")
+    robot = schema.read_robot_file("linear-6")
     wires = draws.for_robot(robot, _line(5))
     where = claim.grid(robot, (2, 1, 2))
     assert len(where) == 4
@@ -80,7 +80,7 @@ def test_the_workspace_agrees_with_single_poses():
 
 
 def test_poses_out_of_reach_are_left_out_of_the_workspace():
-    robot = schema.read("linear-6")
+    robot = schema.read_robot_file("linear-6")
     wires = draws.for_robot(robot, _line(2))
     out = claim.over_workspace(robot, wires, np.array([[0.0, 0.0, 0.6], [5.0, 0.0, 0.6]]))
     assert out.feasible == 0.5
@@ -89,7 +89,7 @@ def test_poses_out_of_reach_are_left_out_of_the_workspace():
 
 
 def test_a_smaller_and_lighter_robot_is_the_same_robot():
-    robot = schema.read("linear-6")
+    robot = schema.read_robot_file("linear-6")
     half = claim.scaled_robot(robot, 0.5, 0.6)
     tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
     small = inverse.tensions(half, half.home_m[None], np.eye(3)[None])
@@ -97,7 +97,7 @@ def test_a_smaller_and_lighter_robot_is_the_same_robot():
 
 
 def test_the_largest_mass_is_where_the_claim_stops_to_hold():
-    robot, line = schema.read("linear-6"), _line(8)
+    robot, line = schema.read_robot_file("linear-6"), _line(8)
     mass = claim.largest_mass(robot, line, 1.0, steps=8)
     assert 1e-3 < mass < 1.0
 

@@ -15,7 +15,7 @@ from wirebayes.robot.self_calibration.descent import Descent
 from wirebayes.robot.self_calibration.equations import Holds, Noise, State, linearised
 from wirebayes.robot.self_calibration.holds_creep import creep_of
 from wirebayes.robot.self_calibration.posterior import gaussian_posterior
-from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 
@@ -54,7 +54,7 @@ def _finely(robot, prior, session, values):
 def test_predicted_readings_are_those_of_much_finer_steps(kind, seed):
     robot, prior, session, values = _drawn(kind, seed)
     tension, length, _ = _finely(robot, prior, session, values)
-    real = predict(robot, prior, session, values)
+    real = predict_session(robot, prior, session, values)
     read = real.readings[0].reshape(tension.shape)
     np.testing.assert_allclose(read, tension / session.tension_sd_N, atol=0.05)
     stiff = prior.wires(robot, values)[0].theta["k1"].T
@@ -110,7 +110,7 @@ def test_a_search_that_ended_nowhere_leaves_what_was_known_before():
 def test_the_true_state_closes_its_loops(seed):
     robot, prior, session, rng = _session(seed, sd=1e-4)
     values = rng.multivariate_normal(*prior.moments(robot.legs), 1)
-    real = predict(robot, prior, session, values)
+    real = predict_session(robot, prior, session, values)
     assert real.solved.all()
     tension = real.readings.reshape(session.joint_m.shape) * session.tension_sd_N
     pose, stiff = (real.position_m[0], real.rotation[0]), prior.wires(robot, values)[0].theta["k1"].T

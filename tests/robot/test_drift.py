@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.wire.test_fresh import Shrinking, Waking
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.effects.rivals import Logarithmic, PowerLaw, TwoModes
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.mechanics.wires import Wires, tension
@@ -71,7 +71,7 @@ def _bench_with_the_robots_wire(line, displacement_mm, duration_s, follow):
 )
 def test_a_wire_in_the_robot_creeps_as_on_the_bench(law, history, effect):
     name, amplitudes = effect or (None, {})
-    effects = () if name is None else (named(name) if isinstance(name, str) else name,)
+    effects = () if name is None else (effect_named(name) if isinstance(name, str) else name,)
     if amplitudes is None:
         amplitudes = dict.fromkeys(effects[0].columns(), 0.5)
     line = _line(law=law, history=history, effects=effects, **amplitudes)
@@ -89,7 +89,7 @@ def test_a_wire_in_the_robot_creeps_as_on_the_bench(law, history, effect):
 
 def test_creep_under_a_steady_tension_does_not_depend_on_how_a_hold_is_stepped():
     line = _line()
-    wires = draws.for_robot(schema.read("linear-6"), line)
+    wires = draws.for_robot(schema.read_robot_file("linear-6"), line)
     load = np.full((6, 1), 3.0)
     ends = []
     for steps in ([100.0], [1.0, 7.0, 30.0, 100.0]):
@@ -104,7 +104,7 @@ def test_creep_under_a_steady_tension_does_not_depend_on_how_a_hold_is_stepped()
 
 @pytest.mark.parametrize("name", ["cogiro-desk", "linear-7", "hangprinter-4"])
 def test_drift_is_the_forward_solution_of_the_crept_lengths(name):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     wires = draws.for_robot(robot, _line(3, sd=0.05))
     course = drift.from_command(robot, wires, robot.home_m, np.eye(3), np.array([0.0, 60.0]))
     assert course.found.all()
@@ -113,14 +113,14 @@ def test_drift_is_the_forward_solution_of_the_crept_lengths(name):
     commands = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
     bare, offset = inverse.lengths(robot, commands.joint_m)
     crept = bare * (1 + course.end.strain(wires).T)
-    again = forward.solve(robot, wires, crept, offset, robot.home_m + 0.01, np.eye(3))
+    again = forward.solve_equilibrium(robot, wires, crept, offset, robot.home_m + 0.01, np.eye(3))
     np.testing.assert_allclose(again.position_m, course.position_m[:, 1], atol=1e-11)
     assert (course.position_m[:, 1, 2] < robot.home_m[2]).all()
 
 
 def test_a_hanging_platform_sinks_by_the_creep_of_its_wires():
     # Six wires of one tension and one strain: every length grows by the same factor, so does the figure they span.
-    robot = schema.read("robocrane")
+    robot = schema.read_robot_file("robocrane")
     around = np.sqrt(12.0) * robot.exit_m[:, :2] / np.linalg.norm(robot.exit_m[:, :2], axis=1, keepdims=True)
     exits = np.column_stack([around, np.full(6, 3.0)])
     robot = replace(robot, beyond_m=np.zeros(6), platform_m=np.zeros((6, 3)), mass_kg=4.0, exit_m=exits)
@@ -142,7 +142,7 @@ def test_a_hanging_platform_sinks_by_the_creep_of_its_wires():
 
 
 def test_smaller_errors_allowed_a_step_change_little():
-    robot = schema.read("segesta-8")
+    robot = schema.read_robot_file("segesta-8")
     wires = draws.for_robot(robot, _line())
     ends = []
     for allowed in (2e-4, 1e-8):
@@ -172,7 +172,7 @@ def tries(monkeypatch):
 @pytest.mark.parametrize("name", ["linear-7", "hangprinter-4"])
 def test_a_hold_after_one_in_which_all_creep_was_over_ends_where_it_began(name, tries):
     # What is left to creep is rounding in the tensions: no step makes its error small against it.
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     wires = draws.for_robot(robot, _line(40, sd=0.05, k2=0.5))
     tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
     joint = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau).joint_m
@@ -184,7 +184,7 @@ def test_a_hold_after_one_in_which_all_creep_was_over_ends_where_it_began(name, 
 
 
 def test_nothing_is_followed_where_no_draw_hangs_in_balance(tries):
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     wires = draws.for_robot(robot, _line(3))
     course = drift.hold(robot, wires, np.full((3, 7), np.nan), np.array([60.0]), robot.home_m, np.eye(3))
     assert not course.found.any() and len(tries) == 1
@@ -192,7 +192,7 @@ def test_nothing_is_followed_where_no_draw_hangs_in_balance(tries):
 
 @pytest.mark.parametrize("off", [-1e-9, 1e-9])
 def test_a_step_is_taken_whatever_its_error_where_creep_grows_by_a_ten_thousandth(off, monkeypatch):
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     walk = drift.CreepingHold(robot, draws.for_robot(robot, _line()), np.full(7, np.nan), (robot.home_m, np.eye(3)))
     walk.live[:] = True
     seen = []
@@ -213,7 +213,7 @@ def test_a_step_is_taken_whatever_its_error_where_creep_grows_by_a_ten_thousandt
 
 
 def test_shared_draws_sink_and_specimens_tilt():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     line = _line(400, sd=0.05, seed=2)
     rng = np.random.default_rng(1)
     tilt, sd = {}, {}
@@ -242,14 +242,19 @@ def test_rotation_angle_keeps_small_and_large_angles():
 def test_bench_quantities_never_enter():
     line = _line(5, sd=0.1)
     more = replace(line, parameters=dict(line.parameters) | {"preload": np.full(5, 9.0), "sensor_sd": np.ones(5)})
-    slip = replace(more, effects=(named("grip_slip@3"), named("sensor_drift")))
-    wires = draws.for_robot(schema.read("linear-6"), slip)
+    slip = replace(more, effects=(effect_named("grip_slip@3"), effect_named("sensor_drift")))
+    wires = draws.for_robot(schema.read_robot_file("linear-6"), slip)
     assert set(wires.theta) == set(CORE)
     assert wires.effects == ()
 
 
 def test_uses_outside_the_tested_range_cause_warnings():
     line = replace(_line(), tension_range_N=(1.0, 5.0), time_range_s=(0.0, 120.0))
-    message = draws.wire_warnings(schema.read("linear-6"), line, np.array([0.5, 3.0]), 3600.0, np.array([3.0]))
+    message = draws.wire_warnings(
+        schema.read_robot_file("linear-6"), line, np.array([0.5, 3.0]), 3600.0, np.array([3.0])
+    )
     assert len(message) == 3
-    assert draws.wire_warnings(schema.read("linear-6"), line, np.array([1.5, 3.0]), 100.0, np.array([1.1])) == []
+    assert (
+        draws.wire_warnings(schema.read_robot_file("linear-6"), line, np.array([1.5, 3.0]), 100.0, np.array([1.1]))
+        == []
+    )

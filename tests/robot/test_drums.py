@@ -64,7 +64,7 @@ def test_angle_and_length_are_inverse_and_the_slope_is_the_derivative():
 
 
 def _with_drums(name):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     w = robot.legs
     zeros = np.zeros(w)
     return replace(
@@ -79,7 +79,7 @@ def test_motor_angles_lead_to_the_pose_and_back():
     commands = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
     angle = drums.motor_angle(robot.drums, commands.joint_m)
     zero, offset = inverse.lengths(robot, drums.paid_out(robot.drums, angle)[0])
-    found = forward.solve(robot, wires, zero, offset, x[0] + 0.01, R[0])
+    found = forward.solve_equilibrium(robot, wires, zero, offset, x[0] + 0.01, R[0])
     assert found.found.all()
     assert np.abs(found.position_m - x).max() < 1e-9
     paid = drums.paid_out(robot.drums, angle)[1]
@@ -110,12 +110,12 @@ def test_a_session_may_give_motor_angles(tmp_path):
     assert "motor_4_rad" in session_file.columns(robot, ["motor_4_rad"]).required
     np.testing.assert_allclose(sessions[1].joint_m, sessions[0].joint_m, atol=1e-13)
     with pytest.raises(InputError, match="expected a header of hold,.*joint_1_m"):
-        session_file.read_session(tmp_path / "b", schema.read("cogiro-desk"), 0.02, 1e-3)
+        session_file.read_session(tmp_path / "b", schema.read_robot_file("cogiro-desk"), 0.02, 1e-3)
 
 
 def test_tables_may_give_the_straight_lengths_that_firmware_counts():
     """Millimetres from anchor to platform, of wires of several lines with more beyond the anchor."""
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     straight = np.array([[1650.0, 1840.0, 1630.0, 1990.0], [1660.0, 1830.0, 1640.0, 1980.0]])
     wire = robot.lines * straight / 1000 + robot.beyond_m
     given = ["straight_1_mm"]
@@ -160,4 +160,4 @@ def test_the_firmware_files_describe_the_drums():
     # Klipper counts straight millimetres: of all the wire of a turn what one line gets
     assert turns == pytest.approx(2 * np.pi * radius / robot.lines, rel=1e-4)
     assert f"winch_buildup_factor: {1e3 * growth:.5f}  # mm" in klipper
-    assert "M666 R" not in files.reprapfirmware(schema.read("hangprinter-4"), line)
+    assert "M666 R" not in files.reprapfirmware(schema.read_robot_file("hangprinter-4"), line)

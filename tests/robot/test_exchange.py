@@ -114,7 +114,7 @@ def _same(got, robot):
 @pytest.mark.parametrize("rolling", [False, True])
 @pytest.mark.parametrize("name", ["cogiro", "segesta-8", "hangprinter-4"])
 def test_a_robot_of_caspr_is_read(name, rolling, tmp_path):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     if rolling:
         robot = cases.with_pulleys(robot, np.random.default_rng(0))
     for i, reference in enumerate(("joint", "com")):
@@ -123,7 +123,7 @@ def test_a_robot_of_caspr_is_read(name, rolling, tmp_path):
         angles = (0.1, -0.2, 0.3)
         bodies = _caspr(folder, robot, reference, (0.5, -0.25, 0.125), angles)
         given = [bodies, bodies.with_name("toy_cables.xml")] if i else bodies
-        got = schema.read(import_robot(given, folder / "new" / "toy.toml"))
+        got = schema.read_robot_file(import_robot(given, folder / "new" / "toy.toml"))
         _same(got, robot)
         turn = Rotation.from_euler("XYZ", angles).as_matrix() if robot.degrees == 6 else np.eye(3)
         np.testing.assert_allclose(rotation.matrix(got.home_rotation_rad), turn, atol=1e-12)
@@ -140,13 +140,13 @@ def test_a_planar_joint_of_caspr_is_a_rail(joint, axes, tmp_path):
     first, second, normal = ("xyz".index(axis) for axis in axes)
     corners = np.zeros((4, 3))
     corners[:, [first, second]] = [[2.0, 2.0], [-2.0, 2.0], [-2.0, -2.0], [2.0, -2.0]]
-    plain = schema.read("sled-4")
+    plain = schema.read_robot_file("sled-4")
     robot = replace(plain, exit_m=corners, platform_m=0.1 * corners[[1, 0, 3, 2]], home_m=np.zeros(3), mass_kg=0.1)
     bodies = _caspr(tmp_path, robot)
     given = re.sub('type="SPATIAL_EULER_XYZ" q_initial="[^"]*"', f'type="{joint}" q_initial="0.3 -0.2 0.1"',
                    bodies.read_text())  # fmt: skip
     bodies.write_text(given)
-    got = schema.read(import_robot(bodies, tmp_path / "toy.toml"))
+    got = schema.read_robot_file(import_robot(bodies, tmp_path / "toy.toml"))
     home = np.zeros(3)
     home[[first, second]] = 0.3, -0.2
     np.testing.assert_allclose(got.home_m, home)
@@ -167,7 +167,7 @@ def test_a_spherical_joint_of_caspr_is_a_ball_joint(joint, axes, tmp_path):
     given = re.sub('type="SPATIAL_EULER_XYZ" q_initial="[^"]*"', f'type="{joint}" q_initial="0.1 -0.2 0.15"',
                    bodies.read_text())  # fmt: skip
     bodies.write_text(given)
-    got = schema.read(import_robot(bodies, tmp_path / "toy.toml"))
+    got = schema.read_robot_file(import_robot(bodies, tmp_path / "toy.toml"))
     _same(got, robot)
     assert got.freedoms == 3 and "a ball joint" in got.source
     turn = Rotation.from_euler(axes, (0.1, -0.2, 0.15)).as_matrix()
@@ -178,10 +178,10 @@ def test_a_spherical_joint_of_caspr_is_a_ball_joint(joint, axes, tmp_path):
 
 
 def test_what_is_given_beside_the_files_counts(tmp_path):
-    robot = cases.with_pulleys(schema.read("cogiro"), np.random.default_rng(0))
+    robot = cases.with_pulleys(schema.read_robot_file("cogiro"), np.random.default_rng(0))
     bodies = _caspr(tmp_path, robot)
     given = {"tension": [1, 5000], "position": "0.1,0,2", "pulleys": False}
-    got = schema.read(import_robot(str(bodies), tmp_path / "a.toml", **given))
+    got = schema.read_robot_file(import_robot(str(bodies), tmp_path / "a.toml", **given))
     assert (got.rule.lowest_N, got.rule.highest_N, got.pulleys) == (1.0, 5000.0, None)
     assert got.home_m.tolist() == [0.1, 0.0, 2.0]
     assert "Ours: the choice of tensions, the workspace, beyond_exit_m, the tension bounds, the position" in got.source
@@ -197,13 +197,13 @@ def test_what_is_given_beside_the_files_counts(tmp_path):
 
 @pytest.mark.parametrize(("name", "pattern"), [("cogiro-desk", "3R3T"), ("hangprinter-4", "3T")])
 def test_a_robot_of_wirex_is_read(name, pattern, tmp_path):
-    robot = cases.with_pulleys(schema.read(name), np.random.default_rng(0))
+    robot = cases.with_pulleys(schema.read_robot_file(name), np.random.default_rng(0))
     file = _wirex(tmp_path, robot, pattern)
     beside = {"tension": (0.5, 12.0), "position": robot.home_m}
-    got = schema.read(import_robot(file, tmp_path / "toy.toml", **beside))
+    got = schema.read_robot_file(import_robot(file, tmp_path / "toy.toml", **beside))
     _same(got, robot)
     assert "WireX writes 0.1 m where none was set" in got.source
-    bare = schema.read(import_robot(file, tmp_path / "bare.toml", pulleys=False, **beside))
+    bare = schema.read_robot_file(import_robot(file, tmp_path / "bare.toml", pulleys=False, **beside))
     assert bare.pulleys is None
     for missing, message in (("tension", "--tension LOWEST,HIGHEST"), ("position", "--position X,Y,Z")):
         with pytest.raises(InputError, match=message):
@@ -236,7 +236,7 @@ def test_a_robot_of_wirex_is_read(name, pattern, tmp_path):
     ],
 )  # fmt: skip
 def test_mistakes_name_file_and_line(file, old, new, message, tmp_path, capsys):
-    bodies = _caspr(tmp_path, schema.read("cogiro"))
+    bodies = _caspr(tmp_path, schema.read_robot_file("cogiro"))
     broken = tmp_path / f"toy_{file}.xml"
     text = broken.read_text()
     at = text.index('"original">\n    <cable') if file == "cables" else 0
@@ -252,8 +252,8 @@ def test_mistakes_name_file_and_line(file, old, new, message, tmp_path, capsys):
 
 
 def test_files_that_do_not_belong_together_are_refused(tmp_path):
-    bodies = _caspr(tmp_path, schema.read("cogiro"))
-    wirex = _wirex(tmp_path, cases.with_pulleys(schema.read("cogiro"), np.random.default_rng(0)))
+    bodies = _caspr(tmp_path, schema.read_robot_file("cogiro"))
+    wirex = _wirex(tmp_path, cases.with_pulleys(schema.read_robot_file("cogiro"), np.random.default_rng(0)))
     out = tmp_path / "out.toml"
     (tmp_path / "old.xml").write_text("<models><wireRobot/></models>")
     (tmp_path / "deep.xml").write_text("<a>" * 500 + "</a>" * 500)
@@ -272,7 +272,7 @@ def test_files_that_do_not_belong_together_are_refused(tmp_path):
 
 
 def test_the_command_says_what_it_took_and_what_is_ours(tmp_path, capsys):
-    bodies = _caspr(tmp_path, schema.read("cogiro"))
+    bodies = _caspr(tmp_path, schema.read_robot_file("cogiro"))
     out = tmp_path / "cogiro.toml"
     assert main(["import-robot", str(bodies), "--output", str(out)]) == 0
     message = capsys.readouterr().out
@@ -282,7 +282,7 @@ def test_the_command_says_what_it_took_and_what_is_ours(tmp_path, capsys):
 
 
 def test_a_pose_that_nothing_holds_is_said(tmp_path, capsys):
-    bodies = _caspr(tmp_path, schema.read("cogiro"))
+    bodies = _caspr(tmp_path, schema.read_robot_file("cogiro"))
     arguments = ["import-robot", str(bodies), "--position", "20,0,2", "--output", str(tmp_path / "far.toml")]
     assert main(arguments) == 0
     assert "no tensions within the bounds hold the platform at its home pose" in capsys.readouterr().err

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.robot import cases
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.errors import InputError
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import draws, rotation, schema
@@ -31,7 +31,7 @@ BENT = [
 def _line(law, effect, amplitudes, count=40):
     spread = np.exp(0.05 * np.random.default_rng(2).standard_normal((len(CORE) + len(amplitudes), count)))
     values = {k: v * f for (k, v), f in zip((CORE | amplitudes).items(), spread, strict=True)}
-    return draws.WireDraws(values, 1000.0, law, effects=(named(effect),) if effect else (), tension_ref_N=3.0)
+    return draws.WireDraws(values, 1000.0, law, effects=(effect_named(effect),) if effect else (), tension_ref_N=3.0)
 
 
 def _home(robot):
@@ -41,7 +41,7 @@ def _home(robot):
 
 @pytest.mark.parametrize(("law", "effect", "amplitudes"), BENT)
 def test_the_spring_constant_is_the_slope_of_the_whole_law_at_the_working_tension(law, effect, amplitudes):
-    robot, line = schema.read("hangprinter-4"), _line(law, effect, amplitudes)
+    robot, line = schema.read_robot_file("hangprinter-4"), _line(law, effect, amplitudes)
     wires = draws.for_robot(robot, line)
     load = _home(robot)[2].mean()
     low, high = np.ones((1, line.count)), np.full((1, line.count), 1.5)
@@ -66,7 +66,7 @@ def test_the_spring_constant_is_the_slope_of_the_whole_law_at_the_working_tensio
 @pytest.mark.parametrize("name", ["hangprinter-4", "linear-6"])
 @pytest.mark.parametrize(("law", "effect", "amplitudes"), BENT)
 def test_a_tendon_pulls_like_the_wire_about_the_home_pose(name, law, effect, amplitudes):
-    robot, line = schema.read(name), _line(law, effect, amplitudes)
+    robot, line = schema.read_robot_file(name), _line(law, effect, amplitudes)
     wires = draws.for_robot(robot, line.centre())
     x, R, tau = _home(robot)
     commands = inverse.commands(robot, wires, x, R, tau)
@@ -90,13 +90,13 @@ def test_a_tendon_pulls_like_the_wire_about_the_home_pose(name, law, effect, amp
 
 def test_a_line_of_one_stiffness_is_exported_as_it_is():
     amplitudes = {"second_relaxation.A": 0.05, "second_relaxation.T2": 30.0}
-    robot, line = schema.read("hangprinter-4"), _line("hooke", "second_relaxation", amplitudes)
+    robot, line = schema.read_robot_file("hangprinter-4"), _line("hooke", "second_relaxation", amplitudes)
     assert f"M666 S{line.parameters['k1'].mean():.0f} " in files.reprapfirmware(robot, line)
     assert "tangent" not in files.reprapfirmware(robot, line) + files.mujoco(robot, line)
 
 
 def test_a_line_that_cannot_carry_the_platform_has_no_spring_constant():
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     with pytest.raises(InputError, match="cannot carry"):
         files.reprapfirmware(robot, _line("hooke", "strain_stiffening", {"strain_stiffening.c": -2000.0}))
 
@@ -104,7 +104,7 @@ def test_a_line_that_cannot_carry_the_platform_has_no_spring_constant():
 @pytest.mark.parametrize("name", ["linear-7", "hangprinter-4", "cogiro-desk"])
 def test_urdf_and_sdf_put_every_frame_in_its_place(name):
     mujoco = pytest.importorskip("mujoco")
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     robot = replace(
         cases.with_pulleys(robot, np.random.default_rng(0)), name='a "name" & more',
         home_rotation_rad=np.array([0.02, -0.03, 0.05]) * (robot.degrees == 6),
@@ -145,10 +145,10 @@ def test_urdf_and_sdf_put_every_frame_in_its_place(name):
 
 def test_firmware_says_that_it_leaves_out_pulleys():
     line = _line("hooke", None, {})
-    robot = cases.with_pulleys(schema.read("hangprinter-4"), np.random.default_rng(0))
+    robot = cases.with_pulleys(schema.read_robot_file("hangprinter-4"), np.random.default_rng(0))
     for text in (files.reprapfirmware(robot, line), files.klipper(robot, line)):
         assert "Left out: the pulleys at the anchors (radii 0, " in text
-    assert "Left out" not in files.klipper(schema.read("hangprinter-4"), line)
+    assert "Left out" not in files.klipper(schema.read_robot_file("hangprinter-4"), line)
     assert "pulleys do not swivel" in files.mujoco(robot, line)
 
 
@@ -157,7 +157,7 @@ def _five(tmp_path):
     text = (Path(schema.__file__).parents[2] / "data" / "robots" / "hangprinter-4.toml").read_text()
     path = tmp_path / "five.toml"
     path.write_text(text + "\n[[leg]]\nexit_point_m = [1.5, -1.0, 2.0]\nplatform_point_m = [0, 0, 0]\n")
-    return schema.read(str(path))
+    return schema.read_robot_file(str(path))
 
 
 def test_a_fifth_anchor_has_the_letter_and_the_number_that_the_firmware_reads(tmp_path):
@@ -168,12 +168,14 @@ def test_a_fifth_anchor_has_the_letter_and_the_number_that_the_firmware_reads(tm
     assert [word[0] for word in words[3:]] == ["A", "B", "C", "D", "I"]
     assert words[-1] == "I1500.00:-1000.00:2000.00"
     assert "[stepper_e]\nanchor_x: 1500.00\n" in files.klipper(robot, line)
-    assert " N" not in files.reprapfirmware(schema.read("hangprinter-4"), line).split("M669")[1].split(";")[0]
+    assert (
+        " N" not in files.reprapfirmware(schema.read_robot_file("hangprinter-4"), line).split("M669")[1].split(";")[0]
+    )
 
 
 def _two_lines(given=None):
     """A Hangprinter whose third and fourth leg hang on a thick line, and both lines."""
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     robot = replace(robot, wire=("default", "default", "thick", "thick"), given=given or {})
     stiff = replace(_line("hooke", None, {}), name="thick", tension_range_N=(1.0, 9.0))
     stiff = replace(stiff, parameters=dict(stiff.parameters) | {"k1": 5.0 * stiff.parameters["k1"]}, length_mm=2000.0)
@@ -214,8 +216,10 @@ def test_each_line_has_its_own_rows_of_creep():
     assert header == ("wire", *files.TABLE)
     for name, one in line.each.items():
         own = [row[1:] for row in rows if row[0] == name]
-        assert own == files.creep_table(schema.read("hangprinter-4"), replace(one, others={}), [2.0], [60.0, 600.0])
-    alone = schema.read("hangprinter-4")
+        assert own == files.creep_table(
+            schema.read_robot_file("hangprinter-4"), replace(one, others={}), [2.0], [60.0, 600.0]
+        )
+    alone = schema.read_robot_file("hangprinter-4")
     header, rows = files.creep_tables(alone, _line("hooke", None, {}), [2.0], [60.0])
     assert header == files.TABLE
     assert len(rows) == 1 and len(rows[0]) == len(files.TABLE)
@@ -237,7 +241,7 @@ def test_what_is_known_of_a_fit_is_not_said_of_a_given_wire():
 @pytest.mark.parametrize("with_pulleys", [False, True])
 def test_the_mujoco_model_starts_balanced_at_its_home_pose(name, with_pulleys):
     mujoco = pytest.importorskip("mujoco")
-    robot, line = schema.read(name), _line("hooke", None, {})
+    robot, line = schema.read_robot_file(name), _line("hooke", None, {})
     turn = np.array([0.02, -0.03, 0.05]) * (robot.degrees == 6)
     # the first anchor at the world's origin, where an empty start would put the platform
     shift = robot.exit_m[0]
@@ -261,7 +265,7 @@ def test_a_platform_settles_at_a_turned_home():
     pytest.importorskip("mujoco")
 
     turn = np.array([0.02, -0.03, 0.05])
-    robot, line = replace(schema.read("linear-7"), home_rotation_rad=turn), _line("hooke", None, {}).centre()
+    robot, line = replace(schema.read_robot_file("linear-7"), home_rotation_rad=turn), _line("hooke", None, {}).centre()
     x, R, tau = _home(robot)
     commands = inverse.commands(robot, draws.for_robot(robot, line), x, R, tau)
     lengths = np.full(robot.legs, line.parameters["k1"][0]), commands.zero_m[0], commands.offset_m[0]

@@ -150,7 +150,7 @@ HUNG = [
 
 @pytest.mark.parametrize(("file", "position", "turn", "tension"), HUNG)
 def test_robots_of_few_wires_hang_as_an_energy_minimiser_has_them(file, position, turn, tension):
-    robot = schema.read(FIELD / "under-actuated" / file)
+    robot = schema.read_robot_file(FIELD / "under-actuated" / file)
     x = np.array(robot.home_m if position is None else position)
     asked = np.array([np.nan, np.nan, turn[2]]) if robot.legs == 4 else np.full(3, np.nan)
     found = balanced_orientation(robot, x, asked)

@@ -24,7 +24,7 @@ def test_what_export_writes_comes_back(fitted, tmp_path, file):  # noqa: F811
     out, back = tmp_path / "export", tmp_path / "back.toml"
     assert main(["export", "hangprinter-4", "--wires", str(fitted), "--output", str(out)]) == 0
     assert main(["import-robot", str(out / file), "--output", str(back), "--quiet"]) == 0
-    there, here = schema.read("hangprinter-4"), schema.read(back)
+    there, here = schema.read_robot_file("hangprinter-4"), schema.read_robot_file(back)
     np.testing.assert_allclose(here.exit_m, there.exit_m, atol=5e-6)
     np.testing.assert_array_equal(here.lines, there.lines)
     np.testing.assert_allclose(here.beyond_m, there.beyond_m, atol=5e-4)
@@ -34,7 +34,7 @@ def test_what_export_writes_comes_back(fitted, tmp_path, file):  # noqa: F811
 
 def test_a_config_by_hand(tmp_path):
     (tmp_path / "config.g").write_text(RRF)
-    robot = schema.read(import_robot(tmp_path / "config.g", tmp_path / "robot.toml"))
+    robot = schema.read_robot_file(import_robot(tmp_path / "config.g", tmp_path / "robot.toml"))
     np.testing.assert_allclose(robot.exit_m[1], [1.8, 0.9, -0.15])
     np.testing.assert_allclose(robot.beyond_m, [0.31, 0.32, 0.33, 0.0])
     assert (robot.rule.lowest_N, robot.rule.highest_N) == (10.0, 120.0)

@@ -9,7 +9,7 @@ import pytest
 from tests.light import POLICY
 from wirebayes.cli import main
 from wirebayes.effects import catalogue
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.io import paper
 from wirebayes.model.build import build
 from wirebayes.results import read_back, store
@@ -39,7 +39,7 @@ def fitted(tmp_path_factory):
     for name in ("plain", *EFFECTS):
         folders[name] = tmp_path_factory.mktemp(name)
         effects = [] if name == "plain" else [catalogue(EFFECTS[name][1])[name]()]
-        store.save(fit(build([nylon], effects), 1, policy=POLICY), folders[name], {})
+        store.save_posterior(fit_problem(build([nylon], effects), 1, policy=POLICY), folders[name], {})
     return folders
 
 
@@ -52,10 +52,10 @@ def test_pose_bends_the_wires_as_the_fitted_effect_does(fitted, tmp_path, effect
     assert main([*arguments, *(["--own-effects", str(own)] if own else [])]) == 0
     message = json.loads((out / "pose.json").read_text())
     assert message["wires"]["effects"] == [effect]
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     points = robot.platform_m @ rotation.matrix(robot.home_rotation_rad).T
     stretched = np.linalg.norm(robot.home_m + points - robot.exit_m, axis=1) + robot.beyond_m
-    sample = read_back.load(fitted[effect], own_effects=own).draws
+    sample = read_back.load_posterior(fitted[effect], own_effects=own).draws
     pick = np.linspace(0, len(sample["k1"]) - 1, 50).round().astype(int)
     k1, amplitude = sample["k1"][pick, None], sample[f"{effect}.{column}"][pick, None]
     zero = stretched / (1 + strain(np.array(message["inverse"]["tension_N"]) / k1, amplitude))

@@ -23,11 +23,11 @@ def _distance(robot, found, position_m, turn):
 @pytest.mark.parametrize("name", ROBOTS)
 @pytest.mark.parametrize("law", ["hooke", "modified"])
 def test_inverse_then_forward_returns_to_the_pose(name, law):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     rng = np.random.default_rng(11)
     c = cases.commanded(robot, law, 60, rng)
     start = c.position_m + 0.05 * robot.size_m * rng.normal(size=c.position_m.shape)
-    found = forward.solve(robot, c.wires, c.zero_m, c.offset_m, start, np.eye(3))
+    found = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, np.eye(3))
     assert found.found.all()
     assert _distance(robot, found, c.position_m, c.rotation).max() < 1e-9
 
@@ -36,7 +36,7 @@ def test_inverse_then_forward_returns_to_the_pose(name, law):
 def test_mujoco_settles_where_we_solve(name):
     pytest.importorskip("mujoco")
 
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     rng = np.random.default_rng(12)
     for make in (cases.commanded, cases.disturbed):
         c = make(robot, "hooke", 3, rng)
@@ -62,7 +62,7 @@ def _softest(robot, c, found):
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_least_energy_is_where_we_solve_under_law_3(name):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     rng = np.random.default_rng(13)
     c = cases.disturbed(robot, "modified", 2, rng)
     found = cases.solved(robot, c)
@@ -76,7 +76,7 @@ def test_least_energy_is_where_we_solve_under_law_3(name):
 
 
 def test_disturbed_lengths_leave_wires_slack_and_are_solved():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     c = cases.disturbed(robot, "hooke", 40, np.random.default_rng(3))
     found = cases.solved(robot, c)
     assert found.found.all()
@@ -84,47 +84,49 @@ def test_disturbed_lengths_leave_wires_slack_and_are_solved():
 
 
 def test_a_platform_dropped_with_all_wires_slack_is_caught():
-    robot = schema.read("linear-6")
+    robot = schema.read_robot_file("linear-6")
     c = cases.commanded(robot, "hooke", 10, np.random.default_rng(4))
     high = c.position_m + [0, 0, 0.1]
-    found = forward.solve(robot, c.wires, c.zero_m, c.offset_m, high, c.rotation)
+    found = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, high, c.rotation)
     assert found.found.all()
     assert _distance(robot, found, c.position_m, c.rotation).max() < 1e-9
 
 
 def test_too_few_iterations_are_reported():
-    robot = schema.read("linear-6")
+    robot = schema.read_robot_file("linear-6")
     c = cases.commanded(robot, "hooke", 5, np.random.default_rng(4))
-    found = forward.solve(robot, c.wires, c.zero_m, c.offset_m, c.position_m + 0.05, np.eye(3), max_iterations=1)
+    found = forward.solve_equilibrium(
+        robot, c.wires, c.zero_m, c.offset_m, c.position_m + 0.05, np.eye(3), max_iterations=1
+    )
     assert (found.status == forward.NOT_CONVERGED).all()
 
 
 def test_no_equilibrium_is_reported():
     # Law 3 can pull with k1 at most, however far it is stretched: three wires of 1 N cannot hold 2 kg.
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     wires = Wires("modified", "saturating", {"k1": np.array([[1.0]])}, np.full((4, 1), 1000.0))
     zero = 2.0 * np.ones((1, 4)) + robot.beyond_m
-    found = forward.solve(robot, wires, zero, robot.beyond_m, robot.home_m, np.eye(3), 2000)
+    found = forward.solve_equilibrium(robot, wires, zero, robot.beyond_m, robot.home_m, np.eye(3), 2000)
     assert (found.status == forward.NO_EQUILIBRIUM).all()
 
 
 def test_a_platform_on_two_points_in_line_with_its_weight_is_not_held():
     # Wires to two opposite corners only: nothing keeps the plate from turning about the line between them.
-    robot = schema.read("ipanema-1")
+    robot = schema.read_robot_file("ipanema-1")
     wires = Wires("hooke", "saturating", {"k1": np.array([[50000.0]])}, np.full((8, 1), 1000.0))
     tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
     commands = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
-    held = forward.solve(robot, wires, commands.zero_m, commands.offset_m, robot.home_m, np.eye(3))
+    held = forward.solve_equilibrium(robot, wires, commands.zero_m, commands.offset_m, robot.home_m, np.eye(3))
     assert held.found.all()
     loose = commands.zero_m + np.array([1.0, 0, 1, 0, 1, 0, 1, 0])
     turned = rotation.matrix(np.array([[0.02, 0.01, 0.03]]))
-    found = forward.solve(robot, wires, loose, commands.offset_m, robot.home_m + 0.01, turned)
+    found = forward.solve_equilibrium(robot, wires, loose, commands.offset_m, robot.home_m + 0.01, turned)
     assert found.status.tolist() == [forward.NOT_HELD]
     assert found.residual_N[0] < 1e-6
 
 
 def test_several_equilibria_are_found_distinguished_and_ordered():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     c = cases.commanded(robot, "hooke", 1, np.random.default_rng(8))
     every = equilibria.equilibria(robot, c.wires, c.zero_m[0], c.offset_m[0], np.random.default_rng(0))
     assert len(every.position_m) >= 2
@@ -136,17 +138,17 @@ def test_several_equilibria_are_found_distinguished_and_ordered():
 
 
 def test_a_row_does_not_depend_on_its_neighbours():
-    robot = schema.read("segesta-8")
+    robot = schema.read_robot_file("segesta-8")
     c = cases.disturbed(robot, "hooke", 30, np.random.default_rng(5))
     whole = cases.solved(robot, c)
     wire = c.wires.part(slice(7, 8))
-    one = forward.solve(robot, wire, c.zero_m[7:8], c.offset_m[7:8], c.position_m[7], c.rotation[7])
+    one = forward.solve_equilibrium(robot, wire, c.zero_m[7:8], c.offset_m[7:8], c.position_m[7], c.rotation[7])
     np.testing.assert_allclose(one.position_m[0], whole.position_m[7], rtol=0, atol=1e-13)
     assert one.iterations[0] == whole.iterations[7]
 
 
 def test_linear_actuator_keeps_its_wire_and_moves_through_the_ratio():
-    robot = schema.read("linear-6")
+    robot = schema.read_robot_file("linear-6")
     c = cases.commanded(robot, "hooke", 3, np.random.default_rng(6))
     tau = inverse.tensions(robot, c.position_m, c.rotation)
     commands = inverse.commands(robot, c.wires, c.position_m, c.rotation, tau)
@@ -155,20 +157,20 @@ def test_linear_actuator_keeps_its_wire_and_moves_through_the_ratio():
     doubled = replace(robot, ratio=2 * robot.ratio)
     half = inverse.commands(doubled, c.wires, c.position_m, c.rotation, tau)
     np.testing.assert_allclose(half.joint_m, 0.5 * commands.joint_m)
-    found = forward.solve(robot, c.wires, zero, offset, c.position_m + 1e-3, rotation.matrix(np.zeros(3)))
+    found = forward.solve_equilibrium(robot, c.wires, zero, offset, c.position_m + 1e-3, rotation.matrix(np.zeros(3)))
     assert _distance(robot, found, c.position_m, c.rotation).max() < 1e-9
 
 
 def test_a_tackle_of_lines_is_solved_as_one_line_of_their_stiffness():
     """m lines of k1, m times as long, pull as one of m k1: the same poses, and the same force is left to rounding."""
-    plain = schema.read("cogiro-desk")
+    plain = schema.read_robot_file("cogiro-desk")
     robot, tackle = (replace(plain, lines=np.full(8, m)) for m in (1.0, 4.0))
     c = cases.disturbed(plain, "hooke", 20, np.random.default_rng(3))
     free, n = c.zero_m - c.offset_m, len(c.zero_m)
     found, begun = [], []
     for one, m in ((robot, 1.0), (tackle, 4.0)):
         wires = replace(c.wires, theta={"k1": c.wires.theta["k1"] / m})
-        found.append(forward.solve(one, wires, m * free, np.zeros(8), c.position_m, c.rotation))
+        found.append(forward.solve_equilibrium(one, wires, m * free, np.zeros(8), c.position_m, c.rotation))
         R = np.moveaxis(c.rotation, 0, -1)
         start = m * free.T, np.zeros((8, n)), c.position_m.T, R
         begun.append(forward._begin(one, wires, *start, np.ones((6, 1))))
@@ -179,7 +181,7 @@ def test_a_tackle_of_lines_is_solved_as_one_line_of_their_stiffness():
         np.testing.assert_allclose(getattr(begun[1], name), getattr(begun[0], name))
 
 
-WEIGHED = schema.read("hangprinter-4")  # a point on four wires; what holds it does not matter to a step
+WEIGHED = schema.read_robot_file("hangprinter-4")  # a point on four wires; what holds it does not matter to a step
 
 
 def stepped(monkeypatch, *, gradient=1.0, stiffness=2.0, damping=0.0, level=4.0, gain=0.1, energy=10.0, size=5.0,
@@ -285,7 +287,7 @@ def test_a_case_ends_in_balance_far_away_or_where_no_step_helps(monkeypatch):
 @pytest.mark.parametrize("far", [1.0, 3.0])
 def test_a_case_begins_with_the_force_and_the_stiffness_that_rounding_and_damping_are_measured_by(far):
     """32 roundings of the stiffest wire's lines and of the weight, more where points lie farther out than the size."""
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     platform = robot.platform_m.copy()
     platform[0] = [0.0, 0.0, far * robot.size_m]
     robot = replace(robot, platform_m=platform, lines=np.array([1.0, 2.0, 3.0, 1.0, 1.0, 1.0, 1.0, 1.0]))
@@ -310,7 +312,7 @@ def test_a_case_begins_with_the_force_and_the_stiffness_that_rounding_and_dampin
 
 def test_a_point_has_the_energy_and_the_forces_of_its_pose():
     """Turns count in metres at the platform's edge; the centre of mass is lifted with them."""
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     robot = replace(robot, centre_of_mass_m=np.array([0.03, -0.02, 0.05]))
     c = cases.disturbed(robot, "hooke", 4, np.random.default_rng(2))
     R, n = np.moveaxis(c.rotation, 0, -1), len(c.position_m)
@@ -341,12 +343,12 @@ def test_a_point_has_the_energy_and_the_forces_of_its_pose():
 
 def test_rows_that_cannot_be_tried_are_not_found_and_do_no_harm():
     """NaN in lengths, offsets or starts; of no rows at all there is no answer."""
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     c = cases.commanded(robot, "hooke", 5, np.random.default_rng(4))
     zero, offset, start = c.zero_m.copy(), np.array(np.broadcast_to(c.offset_m, c.zero_m.shape)), c.position_m + 0.01
-    whole = forward.solve(robot, c.wires, zero, offset, start, c.rotation)
+    whole = forward.solve_equilibrium(robot, c.wires, zero, offset, start, c.rotation)
     zero[0, 3], offset[2, 0], start[3, 1] = np.nan, np.inf, np.nan
-    found = forward.solve(robot, c.wires, zero, offset, start, c.rotation)
+    found = forward.solve_equilibrium(robot, c.wires, zero, offset, start, c.rotation)
     assert found.status.tolist() == [forward.NOT_CONVERGED, 0, forward.NOT_CONVERGED, forward.NOT_CONVERGED, 0]
     lost = [0, 2, 3]
     assert np.isnan(found.position_m[lost]).all() and np.isnan(found.rotation[lost]).all()
@@ -354,54 +356,54 @@ def test_rows_that_cannot_be_tried_are_not_found_and_do_no_harm():
     assert found.iterations[lost].tolist() == [0] * 3 and found.found.tolist() == [False, True, False, False, True]
     for name in ("position_m", "rotation", "tension_N", "iterations", "residual_N"):
         np.testing.assert_array_equal(getattr(found, name)[[1, 4]], getattr(whole, name)[[1, 4]])
-    none = forward.solve(robot, c.wires.part(slice(0)), zero[:0], offset[:0], start[:0], c.rotation[:0])
+    none = forward.solve_equilibrium(robot, c.wires.part(slice(0)), zero[:0], offset[:0], start[:0], c.rotation[:0])
     assert none.position_m.shape == (0, 3) and none.tension_N.shape == (0, 8) and none.found.shape == (0,)
-    nothing = forward.solve(robot, c.wires.part(slice(1)), zero[:1], offset[:1], start[:1], c.rotation[:1])
+    nothing = forward.solve_equilibrium(robot, c.wires.part(slice(1)), zero[:1], offset[:1], start[:1], c.rotation[:1])
     assert nothing.tension_N.shape == (1, 8) and not nothing.found.any()
 
 
 def test_inside_a_pulley_there_is_no_equilibrium(monkeypatch):
-    robot = cases.with_pulleys(schema.read("cogiro-desk"), np.random.default_rng(0))
+    robot = cases.with_pulleys(schema.read_robot_file("cogiro-desk"), np.random.default_rng(0))
     c = cases.commanded(robot, "hooke", 4, np.random.default_rng(1))
-    found = forward.solve(robot, c.wires, c.zero_m, c.offset_m, c.position_m, c.rotation)
+    found = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, c.position_m, c.rotation)
     assert found.found.all()
     clear = np.array([True, False, True, False])
     monkeypatch.setattr(statics.Geometry, "clear", property(lambda shape: clear))
-    found = forward.solve(robot, c.wires, c.zero_m, c.offset_m, c.position_m, c.rotation)
+    found = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, c.position_m, c.rotation)
     assert found.status.tolist() == [forward.FOUND, forward.NOT_CONVERGED] * 2
 
 
 @pytest.mark.parametrize(("chunk", "quick"), [(3, 7), (2048, 2), (4, 1)])
 def test_how_cases_are_cut_into_lots_changes_nothing(chunk, quick, monkeypatch):
     """Few or many at once, the slow ones finished together or on their own; iterations are counted through."""
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     c = cases.commanded(robot, "hooke", 10, np.random.default_rng(4))
     start = c.position_m + 1e-3
-    whole = forward.solve(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation)
+    whole = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation)
     assert whole.found.all() and whole.iterations.min() > 2
     monkeypatch.setattr(forward, "_CHUNK", chunk)
     monkeypatch.setattr(forward, "_QUICK", quick)
-    cut = forward.solve(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation)
+    cut = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation)
     assert cut.found.all()
     np.testing.assert_allclose(cut.position_m, whole.position_m, atol=1e-12)
     np.testing.assert_allclose(cut.tension_N, whole.tension_N, atol=1e-8)
     assert cut.iterations.tolist() == whole.iterations.tolist()
-    few = forward.solve(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation, max_iterations=2)
+    few = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation, max_iterations=2)
     assert few.status.tolist() == [forward.NOT_CONVERGED] * 10 and few.iterations.tolist() == [2] * 10
 
 
 @pytest.mark.parametrize("name", ["hangprinter-4", "cogiro-desk"])
 def test_starts_lie_among_the_exits_and_below_and_the_known_pose_is_one_of_them(name, monkeypatch):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     c = cases.commanded(robot, "hooke", 1, np.random.default_rng(8))
     asked = []
-    true = forward.solve
+    true = forward.solve_equilibrium
 
     def solve(robot, wires, zero, offset, start, turn, most):
         asked.append((zero, start, np.broadcast_to(turn, (len(start), 3, 3)), most))
         return true(robot, wires, zero, offset, start, turn, most)
 
-    monkeypatch.setattr(equilibria, "solve", solve)
+    monkeypatch.setattr(equilibria, "solve_equilibrium", solve)
     known = (c.position_m[0] + 1e-3, c.rotation[0])
     given = robot, c.wires, c.zero_m[0], np.broadcast_to(c.offset_m, c.zero_m.shape)[0]
     found = equilibria.equilibria(*given, np.random.default_rng(0), 40, known)
@@ -436,7 +438,7 @@ def test_every_status_has_a_number_of_its_own_and_words():
 @pytest.mark.parametrize("aside", [1e-2, 1e-5, 1e-8])
 def test_a_saddle_is_left_in_as_many_steps_as_its_distance_has_doublings(aside):
     """A platform on six parallel wires whose centre of mass stands too high above them: it turns over."""
-    robot = schema.read("robocrane")
+    robot = schema.read_robot_file("robocrane")
     turn = np.arange(6) * np.pi / 3
     corners = 0.1 * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(6)])
     robot = replace(robot, exit_m=corners + [0.0, 0.0, 2.0], platform_m=corners, centre_of_mass_m=np.array([0, 0, 1.0]))
@@ -445,7 +447,7 @@ def test_a_saddle_is_left_in_as_many_steps_as_its_distance_has_doublings(aside):
     wires = Wires("hooke", "saturating", {"k1": np.full((1, 1), k1)}, np.full((6, 1), 1000.0))
     upright = np.array([[0.0, 0.0, 1.0 - robot.mass_kg * forward.GRAVITY / (6.0 * k1)]])
     tilted = rotation.matrix(np.array([[aside, 0.3 * aside, 0.0]]))
-    found = forward.solve(robot, wires, np.ones((1, 6)), np.zeros(6), upright, tilted)
+    found = forward.solve_equilibrium(robot, wires, np.ones((1, 6)), np.zeros(6), upright, tilted)
     assert found.found.all()
     assert found.rotation[0, 2, 2] < 0  # upside down
     assert found.iterations[0] < np.log2(1.0 / aside) + 20

@@ -18,13 +18,13 @@ FREE = np.nan
 def four():
     """Four wires, and a level platform away from the middle, which cannot be level there."""
     return replace(
-        schema.read("cogiro"),
+        schema.read_robot_file("cogiro"),
         exit_m=np.array([[-2.0, -2.0, 4.0], [-2.0, 2.0, 4.0], [2.0, 2.0, 4.0], [2.0, -2.0, 4.0]]),
         platform_m=np.array([[-0.2, -0.2, 0.0], [-0.2, 0.2, 0.0], [0.2, 0.2, 0.0], [0.2, -0.2, 0.0]]),
         lines=np.ones(4), beyond_m=np.zeros(4), actuator=("drum",) * 4, ratio=np.zeros(4), wire_m=np.zeros(4),
         wire=("default",) * 4, mass_kg=1.0, centre_of_mass_m=np.zeros(3), home_m=np.array([0.5, 0.3, 2.0]),
         home_rotation_rad=np.zeros(3), pulleys=None, drums=None, mass_kg_m=None,
-        rule=replace(schema.read("cogiro").rule, lowest_N=0.1, highest_N=100.0),
+        rule=replace(schema.read_robot_file("cogiro").rule, lowest_N=0.1, highest_N=100.0),
     )  # fmt: skip
 
 
@@ -87,7 +87,7 @@ def test_two_wires_command_two_directions_and_name_the_nearest_position(four):
 
 
 def test_a_robot_with_wires_enough_keeps_its_home_orientation():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     found = balanced_orientation(robot, robot.home_m, None)
     assert found.found is None
     np.testing.assert_array_equal(found.rotation, turning.matrix(robot.home_rotation_rad))

@@ -108,7 +108,7 @@ def _places(robot):
 
 @pytest.mark.parametrize("name", ["hangprinter-4", "cogiro-desk"])
 def test_a_history_is_followed_as_a_simulation_of_its_own_has_it(name):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     payload = 0.1 * robot.mass_kg * np.array([0, 0, 0, 1, 1, 0.0])
     history = _joint_values_for(robot, TIMES, _places(robot), HOLDS, payload)
     known = unknowns(robot, _line(2), Uncertain(2e-3, 0.05), np.random.default_rng(0))
@@ -127,7 +127,7 @@ def test_a_history_is_followed_as_a_simulation_of_its_own_has_it(name):
 
 
 def test_bands_cover_the_truth_and_readings_narrow_them():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     history = _joint_values_for(robot, TIMES, _places(robot), HOLDS)
     errors, start = Uncertain(1e-3, 0.05, 0.02, 5e-4), (robot.home_m, np.eye(3))
     line = _line(80)
@@ -155,7 +155,7 @@ def test_bands_cover_the_truth_and_readings_narrow_them():
 
 
 def test_corrected_joint_values_bring_the_platform_back():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     history = _joint_values_for(robot, TIMES, _places(robot))
     found = estimate_poses(
         robot, _line(40), history, (robot.home_m, np.eye(3)), Uncertain(1e-3), np.random.default_rng(0)
@@ -172,7 +172,7 @@ def test_corrected_joint_values_bring_the_platform_back():
 
 
 def test_clocks_start_with_a_change_of_load_and_not_with_small_corrections():
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     up = robot.home_m + np.array([0, 0, 1e-4])
     lift = robot.home_m + np.array([0.3, 0.2, 0.0])
     places = [robot.home_m, up, robot.home_m, lift, lift, lift]
@@ -189,7 +189,7 @@ def test_clocks_start_with_a_change_of_load_and_not_with_small_corrections():
 
 
 def test_when_clocks_start_does_not_depend_on_the_sampling():
-    few = replace(_joint_values_for(schema.read("hangprinter-4"), [0, 100], np.tile([0, 0, 1.0], (2, 1))))
+    few = replace(_joint_values_for(schema.read_robot_file("hangprinter-4"), [0, 100], np.tile([0, 0, 1.0], (2, 1))))
     tension = np.array([[2.0, 3.0, 1.0], [4.0, 2.5, 1.5]])
     starts = clock_starts(few, tension)
     times = np.linspace(0, 100, 7)
@@ -203,7 +203,7 @@ def test_when_clocks_start_does_not_depend_on_the_sampling():
 
 @pytest.mark.parametrize("name", ["cogiro-desk", "linear-7"])
 def test_an_even_motion_of_the_joints_needs_no_rows_between(name):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     a, b = robot.home_m, robot.home_m + 0.2 * robot.span_m * np.array([1.0, 0.3, 0.2])
     few = _joint_values_for(robot, [0, 100, 110, 400], [a, a, b, b])
     times = np.unique(np.concatenate([few.times_s, np.arange(100, 110, 0.1)]))
@@ -224,7 +224,7 @@ def test_an_even_motion_of_the_joints_needs_no_rows_between(name):
 
 
 def test_commanded_poses_need_no_rows_between():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     ends = np.array([[0.0, *robot.home_m], [300.0, *(robot.home_m + [0.1, 0.05, 0.1])], [600.0, *robot.home_m]])
     times = np.arange(0, 601, 10.0)
     tables = {n: [np.interp(t, ends[:, 0], c) for c in ends.T] for n, t in (("few", ends[:, 0]), ("many", times))}
@@ -258,7 +258,7 @@ def test_deviations_are_standard_normal_and_even(n):
 
 @pytest.mark.parametrize("n", [63, 64])
 def test_specimens_have_the_stated_spread_and_nothing_to_do_with_the_line(n):
-    robot, line = schema.read("hangprinter-4"), _line(n)
+    robot, line = schema.read_robot_file("hangprinter-4"), _line(n)
     together, spread = [], []
     for seed in range(20):
         known = unknowns(robot, line, Uncertain(2e-3, 0.05), np.random.default_rng(seed))
@@ -344,7 +344,7 @@ def test_draws_given_readings_are_those_of_a_curved_posterior(tension, read, lea
 
 
 def test_few_draws_that_agree_with_the_readings_are_said(fitted, tmp_path, capsys):  # noqa: F811
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     history = _joint_values_for(robot, TIMES[:2], _places(robot)[:2])
     rows = [[t, *j, *tau] for t, j, tau in zip(TIMES, history.joint_m, [[1.14, 1.07, 1.1, 5.28]] * 2, strict=False)]
     head = [f"{kind}_{i}_{unit}" for kind, unit in (("joint", "m"), ("tension", "N")) for i in range(1, 5)]
@@ -359,7 +359,7 @@ def test_few_draws_that_agree_with_the_readings_are_said(fitted, tmp_path, capsy
 
 
 def test_readings_that_too_few_draws_agree_with_are_not_used(monkeypatch):
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     history = _joint_values_for(robot, TIMES[:2], _places(robot)[:2])
     read = replace(history, tension_N=np.array([[1.14, 1.07, 1.1, 5.28]] * 2))
     arguments = ((robot.home_m, np.eye(3)), Uncertain(1e-3))
@@ -376,7 +376,7 @@ def test_readings_that_too_few_draws_agree_with_are_not_used(monkeypatch):
 
 def _standing_still(places=None):
     """Three rows of a robot that stands at home; its commanded poses."""
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     history = _joint_values_for(robot, [0, 60, 120], [robot.home_m] * 3)
     if places is not None:
         history = replace(history, position_m=np.array(places), rotation=np.tile(np.eye(3), (3, 1, 1)))
@@ -416,7 +416,7 @@ def test_a_row_that_some_or_all_draws_lose_takes_no_other_row_with_it(monkeypatc
 
 
 def test_commanded_poses_out_of_reach_are_named_and_take_no_other_row_with_them():
-    robot, history = _standing_still([schema.read("hangprinter-4").home_m, [9.0, 0.0, 9.0], [0.0, 0.0, 0.4]])
+    robot, history = _standing_still([schema.read_robot_file("hangprinter-4").home_m, [9.0, 0.0, 9.0], [0.0, 0.0, 0.4]])
     found = _answered(robot, history)
     named = "no tensions within the bounds hold the platform at the pose commanded at 60 s: no corrections lead there"
     assert found.content["warnings"][0] == {"kind": "unheld", "text": named}
@@ -436,7 +436,7 @@ def test_an_inclinometer_reads_what_turned_the_platform():
 
 
 def test_a_payload_moves_mass_and_centre():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     loaded = with_payload(robot, 0.9, np.array([0.1, 0.0, -0.2]))
     assert loaded.mass_kg == pytest.approx(1.8)
     np.testing.assert_allclose(loaded.centre_of_mass_m, [0.05, 0.0, -0.1])
@@ -476,7 +476,7 @@ HEAD = "time_s,joint_1_m,joint_2_m,joint_3_m,joint_4_m"
     ],
 )
 def test_a_mistake_in_a_history_is_named_by_line_and_column(text, message):
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     with pytest.raises(InputError) as caught:
         table.parse_log(csv_table(Path("log.csv"), text), robot, table.measured_columns)
     assert str(caught.value).startswith((f"log.csv, {message}", f"log.csv: {message}"))
@@ -484,7 +484,7 @@ def test_a_mistake_in_a_history_is_named_by_line_and_column(text, message):
 
 
 def test_motor_angles_may_be_negative_but_not_the_lengths_they_pay_out():
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     zeros = np.zeros(4)
     robot = replace(robot, drums=Drums(zeros + 0.05, zeros, zeros + np.inf, zeros, zeros, zeros - 1.0))
     head = ",".join(["time_s", *(f"motor_{i}_rad" for i in range(1, 5))])
@@ -499,7 +499,7 @@ def test_motor_angles_may_be_negative_but_not_the_lengths_they_pay_out():
 
 
 def test_a_linear_actuator_may_stand_at_zero_or_below():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     text = ",".join(["time_s", *(f"joint_{i}_m" for i in range(1, 8))])
     text += "\n0,-0.1,0,0.1,0.1,0.1,0.1,0.1\n9,-0.1,0,0.1,0.1,0.1,0.1,0.1\n"
     assert table.parse_log(csv_table(Path("log.csv"), text), robot, table.measured_columns).joint_m[0, :2].tolist() == [
@@ -509,7 +509,7 @@ def test_a_linear_actuator_may_stand_at_zero_or_below():
 
 
 def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  # noqa: F811
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     history = _joint_values_for(robot, TIMES, _places(robot))
     with open(tmp_path / "log.csv", "w") as file:
         writer = csv.writer(file)
@@ -559,7 +559,7 @@ def test_a_trajectory_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys)
 
 
 def test_readings_are_predicted_in_the_order_of_the_sensors():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     history = _joint_values_for(robot, TIMES[:2], _places(robot)[:2])
     wires = draws.for_robot(robot, _line(2))
     track = follow_log(robot, wires, history, history.joint_m, (robot.home_m, np.eye(3)), np.zeros(1))

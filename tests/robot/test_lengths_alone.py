@@ -13,7 +13,7 @@ from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import residuals
 from wirebayes.robot.self_calibration.equations import Holds
-from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import summarised
@@ -53,7 +53,7 @@ def _session(printer, seed):
     joint, count = np.vstack([jogged, sent]), len(MARKS) + STOPS
     near = np.vstack([MARKS, places])
     done = Session(near, level[:count], joint, np.full(count, 60.0), np.ones(count, bool), 1.0)
-    real = predict(true, prior, done, values)
+    real = predict_session(true, prior, done, values)
     assert real.solved.all()
     marks = np.arange(count)[:, None] < len(MARKS)
     place = np.where(marks, real.position_m[0] + MARK_M * rng.normal(size=near.shape), np.nan)

@@ -44,7 +44,7 @@ def _run(live, history, **more):
 
 @pytest.mark.parametrize("name", ["cogiro-desk", pytest.param("linear-7", marks=pytest.mark.slow)])
 def test_an_hour_agrees_with_the_batch(name):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     history, start, line = _history(robot), (robot.home_m, np.eye(3)), _line(32)
     batch = estimate_poses(robot, line, history, start, Uncertain(1e-3), np.random.default_rng(0)).track.position_m
     now = _run(LiveEstimator(robot, line, Uncertain(1e-3), start, reads=False), history)
@@ -58,7 +58,7 @@ def test_an_hour_agrees_with_the_batch(name):
 
 @pytest.mark.slow
 def test_with_readings_it_agrees_with_the_batch_in_the_end():
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     history, start, line, errors = _history(robot), (robot.home_m, np.eye(3)), _line(64), Uncertain(1e-3, 0.05, 0.05)
     true = unknowns(robot, _line(1, seed=3), errors, np.random.default_rng(7))
     plain = follow_log(robot, true.plain, history, history.joint_m, start, TIMES[:1]).tension_N[0]
@@ -78,7 +78,7 @@ def test_with_readings_it_agrees_with_the_batch_in_the_end():
 
 
 def test_joint_values_that_are_sent_back_bring_the_platform_back():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     line = _line(24)
     live = LiveEstimator(robot, line, Uncertain(), (robot.home_m, np.eye(3)), reads=False)
     nominal = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
@@ -96,7 +96,7 @@ def test_joint_values_that_are_sent_back_bring_the_platform_back():
 
 
 def test_a_long_step_is_as_good_as_short_ones():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     ends = []
     joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     for times in ([0.0, 600.0], np.arange(0, 601.0, 2.0)):
@@ -109,7 +109,7 @@ def test_a_long_step_is_as_good_as_short_ones():
 
 
 def test_before_anything_has_crept_corrections_do_not_depend_on_the_seed():
-    robot, line = schema.read("hangprinter-4"), _line(64)
+    robot, line = schema.read_robot_file("hangprinter-4"), _line(64)
     joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     for errors in (Uncertain(), Uncertain(2e-3)):
         ends = []
@@ -122,7 +122,7 @@ def test_before_anything_has_crept_corrections_do_not_depend_on_the_seed():
 
 
 def test_a_payload_that_is_set_starts_the_clocks_and_lowers_the_platform():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
     joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     before = live.step(0.0, joint)
@@ -137,7 +137,7 @@ def test_a_payload_that_is_set_starts_the_clocks_and_lowers_the_platform():
 
 
 def test_time_goes_on_and_readings_are_asked_for():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     live = LiveEstimator(robot, _line(2), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
     joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     live.step(1.0, joint)
@@ -148,7 +148,7 @@ def test_time_goes_on_and_readings_are_asked_for():
 
 
 def _standing(reads=False, name="hangprinter-4"):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=reads)
     return live, _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
 
@@ -240,7 +240,7 @@ def test_the_sample_for_firmware_takes_the_creep_off(monkeypatch):
     spec = importlib.util.spec_from_file_location("live_firmware", path)
     sample = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(sample)
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     live = LiveEstimator(robot, _line(8), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
     nominal = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     now, sent = [0.0], []
@@ -276,7 +276,7 @@ def test_straight_lengths_of_drawn_robots_are_wires_and_taken_for_wires_are_refu
 
 
 def test_a_step_at_a_controllers_rate_takes_one_newton_step(monkeypatch):
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     times = np.arange(20) / 500.0
     way = robot.home_m + 0.05 * robot.span_m * np.stack([np.sin(times), np.cos(times) - 1.0, 0.3 * times], 1)
     live = LiveEstimator(robot, _line(8), Uncertain(), (robot.home_m, np.eye(3)), reads=False)

@@ -12,7 +12,7 @@ from wirebayes.robot.pose import maps
 
 
 def test_a_turned_platform_drifts_in_the_map_as_it_does_alone():
-    robot, line = schema.read("linear-6"), _line(8)
+    robot, line = schema.read_robot_file("linear-6"), _line(8)
     wires, turn = draws.for_robot(robot, line), np.array([0.05, -0.03, 0.1])
     slices = maps.Slices(np.array([0.5, 0.65]), np.stack([np.zeros(3), turn]))
     level, turned = maps.map_slices(robot, line, slices)
@@ -31,7 +31,7 @@ def test_a_turned_platform_drifts_in_the_map_as_it_does_alone():
 
 
 def test_slices_and_rows_say_the_same():
-    robot, line = schema.read("linear-6"), _line(8)
+    robot, line = schema.read_robot_file("linear-6"), _line(8)
     turn = np.array([0.0, 0.9, 0.0])  # too far for some positions
     found = maps.map_slices(robot, line, maps.Slices(np.array([0.4, 0.8]), np.stack([np.zeros(3), turn])))
     table = np.array(maps.rows(found))
@@ -61,7 +61,7 @@ def test_a_workspace_in_a_plane_has_one_slice():
 
 
 def test_heights_and_rotations_that_mean_nothing_are_refused():
-    linear, printer = schema.read("linear-6"), schema.read("hangprinter-4")
+    linear, printer = schema.read_robot_file("linear-6"), schema.read_robot_file("hangprinter-4")
     assert _slices(linear, None, None) is maps.LEVEL
     assert _slices(linear, "0.8,0.5,0.5", ["0,0.1,0"]).heights_m.tolist() == [0.5, 0.8]
     for robot, heights, turns, message in (

@@ -78,8 +78,9 @@ def _symmetric():
         for x, y in ((-a, b), (a, b), (a, -b), (-a, -b))
     ])  # fmt: skip
     robot = replace(
-        schema.read("cogiro-desk"), exit_m=exits, platform_m=points, mass_kg=10.0, home_m=np.array([0.0, 0.0, 3.0]),
-        centre_of_mass_m=np.array([0.0, 0.0, 0.5]), rule=TensionRule("minimum_norm", 0.0, 200.0),
+        schema.read_robot_file("cogiro-desk"), exit_m=exits, platform_m=points, mass_kg=10.0,
+        home_m=np.array([0.0, 0.0, 3.0]), centre_of_mass_m=np.array([0.0, 0.0, 0.5]),
+        rule=TensionRule("minimum_norm", 0.0, 200.0),
         lines=np.ones(8), beyond_m=np.zeros(8), wire=("default",) * 8, drums=None, pulleys=None, mass_kg_m=None,
     )  # fmt: skip
     values = {"k1": [1800.0], "B": [0.5], "U": [0.7], "k2": [0.03], "N": [0.55]}
@@ -98,7 +99,7 @@ def test_a_symmetric_platform_is_held_by_wires_at_zero_and_tilts_as_they_part():
     stiff = one_sided.lowest_stiffness(robot, wires, pose, lengths)[0]
     probed = _probed(robot, wires, pose, lengths, np.random.default_rng(1), 1e-5)
     assert 0 < stiff <= probed.min()
-    assert forward.solve(robot, wires, *lengths, *pose).found.all()
+    assert forward.solve_equilibrium(robot, wires, *lengths, *pose).found.all()
     # without the lower wires it would topple
     alone = commands.zero_m * np.where(np.arange(8) < 4, 1.0, 1.5)
     assert one_sided.lowest_stiffness(robot, wires, pose, (alone, lengths[1]))[0] < 0

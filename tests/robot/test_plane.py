@@ -20,7 +20,7 @@ G = 9.80665
 
 @pytest.fixture(scope="module")
 def sled():
-    return schema.read("sled-4")
+    return schema.read_robot_file("sled-4")
 
 
 def _held(robot, x, R, k1=5000.0):
@@ -50,7 +50,7 @@ def test_the_equilibrium_in_the_plane_is_that_of_an_energy_in_three_coordinates(
     rng = np.random.default_rng(3)
     _, wires, commands = _held(sled, sled.home_m, np.eye(3))
     zero = commands.zero_m[0] - 2e-3 * rng.random(sled.legs)
-    found = forward.solve(sled, wires, zero[None], commands.offset_m, sled.home_m, np.eye(3))
+    found = forward.solve_equilibrium(sled, wires, zero[None], commands.offset_m, sled.home_m, np.eye(3))
 
     def energy(q):
         x, c, s = sled.home_m + [q[0], q[1], 0.0], np.cos(q[2]), np.sin(q[2])

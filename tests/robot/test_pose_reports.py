@@ -177,7 +177,7 @@ def hung() -> Any:
     rng = np.random.default_rng(0)
     wire = {"k1": 800.0, "B": 0.3, "U": 0.9, "k2": 0.03, "N": 0.64}
     line = draws.WireDraws({k: v * np.exp(0.02 * rng.standard_normal(10)) for k, v in wire.items()}, 1000.0)
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     return robot, line, PoseRequest(robot.home_m, np.eye(3), np.array([0.0, 60.0]), specimen_spread=0.1)
 
 
@@ -330,7 +330,7 @@ def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pyt
         assert lengths == (commands.zero_m, commands.offset_m)
         return np.array([10.0, 20.0, 99.0, 60.0])
 
-    monkeypatch.setattr(answer.forward, "solve", solve)
+    monkeypatch.setattr(answer.forward, "solve_equilibrium", solve)
     monkeypatch.setattr(answer.one_sided, "lowest_stiffness", stiffness)
     found = answer._round_trip(robot, None, commands, x, R)  # type: ignore[arg-type]
     assert found["solved"] == 0.5 and found["largest_round_trip_error_m"] == pytest.approx(3e-9)
@@ -375,10 +375,10 @@ def test_what_holds_the_commanded_pose_is_marked_among_all_poses(hung: Any, monk
     assert np.array_equal(last["rotation_vector_rad"], np.zeros(3))
     for shift, stable in ((0.9, True), (1.1, False)):
         here = SimpleNamespace(found=np.array([True]), position_m=x[None] - [0.0, 0.0, shift * near])
-        monkeypatch.setattr(answer.forward, "solve", lambda *given, here=here: here)
+        monkeypatch.setattr(answer.forward, "solve_equilibrium", lambda *given, here=here: here)
         assert answer._all_equilibria(robot, wires, x, R, rng)["commanded_stable"] is stable
     here = SimpleNamespace(found=np.array([False]), position_m=x[None])
-    monkeypatch.setattr(answer.forward, "solve", lambda *given: here)
+    monkeypatch.setattr(answer.forward, "solve_equilibrium", lambda *given: here)
     assert answer._all_equilibria(robot, wires, x, R, rng)["commanded_stable"] is False
     with monkeypatch.context() as patch:
         held: Any = SimpleNamespace(feasible=np.array([True]), zero_m=[0], offset_m=[0])

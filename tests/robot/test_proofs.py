@@ -23,7 +23,7 @@ def hung() -> Any:
     rng = np.random.default_rng(0)
     wire = {"k1": 5000.0, "B": 0.03, "U": 0.9, "k2": 0.03, "N": 0.64}
     line = draws.WireDraws({k: v * np.exp(0.01 * rng.standard_normal(30)) for k, v in wire.items()}, 1000.0)
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     wires = draws.for_robot(robot, line)
     return robot, wires, drift.from_command(robot, wires, robot.home_m, np.eye(3), TIMES)
 
@@ -59,7 +59,7 @@ def test_the_box_holds_every_pose_that_the_bands_allow_and_is_no_wider_than_they
     stiff, grown = (np.where(side, high, low) for side, (low, high) in zip((corners[:, :4], corners[:, 4:]),
                                                                            (k1, strain), strict=True))  # fmt: skip
     every = Wires(wires.law, "saturating", {"k1": stiff.T}, np.full((4, 1), 1000.0))
-    found = forward.solve(robot, every, bare * (1 + grown), offset, robot.home_m, np.eye(3))
+    found = forward.solve_equilibrium(robot, every, bare * (1 + grown), offset, robot.home_m, np.eye(3))
     assert found.found.all()
     shift = 1e3 * (found.position_m - robot.home_m)
     low, high = np.asarray(band["low_mm"]), np.asarray(band["high_mm"])
@@ -333,8 +333,8 @@ def test_a_pose_is_solved_with_the_lengths_that_have_crept(hung: Any, monkeypatc
     found = one._solved((robot.home_m, np.eye(3)), k1, strain)
     assert found is not None
     every = Wires("hooke", "saturating", {"k1": k1[:, None]}, np.ones((4, 1)))
-    same = forward.solve(robot, every, (one.bare * 1.001)[None], one.offset, robot.home_m, np.eye(3))
+    same = forward.solve_equilibrium(robot, every, (one.bare * 1.001)[None], one.offset, robot.home_m, np.eye(3))
     assert found[0] == pytest.approx(same.position_m[0], abs=1e-12) and found[1] == pytest.approx(np.eye(3), abs=1e-15)
     lost = SimpleNamespace(found=np.array([False]), position_m=same.position_m, rotation=same.rotation)
-    monkeypatch.setattr(proofs.forward, "solve", lambda *given: lost)
+    monkeypatch.setattr(proofs.forward, "solve_equilibrium", lambda *given: lost)
     assert one._solved((robot.home_m, np.eye(3)), k1, strain) is None

@@ -24,7 +24,7 @@ ROBOTS = HANGING
 
 
 def _robot(name, seed=1):
-    return cases.with_pulleys(schema.read(name), np.random.default_rng(seed))
+    return cases.with_pulleys(schema.read_robot_file(name), np.random.default_rng(seed))
 
 
 def _constructed(radius, axis, line):
@@ -80,7 +80,7 @@ def test_inverse_then_forward_returns_to_the_pose(name, law):
     c = cases.commanded(robot, law, 40, rng)
     assert len(c.position_m) >= 10
     start = c.position_m + 0.05 * robot.size_m * rng.normal(size=c.position_m.shape)
-    found = forward.solve(robot, c.wires, c.zero_m, c.offset_m, start, np.eye(3))
+    found = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, np.eye(3))
     assert found.found.all()
     off = np.abs(found.position_m - c.position_m).max(1), np.abs(found.rotation - c.rotation).max((1, 2))
     assert np.maximum(off[0], robot.size_m * off[1]).max() < 1e-9
@@ -120,7 +120,7 @@ def test_mujocos_tendons_wrap_as_ours(name):
 
 
 def test_without_a_pulley_nothing_changes_and_a_tiny_one_changes_little():
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     rng = np.random.default_rng(3)
     c = cases.commanded(robot, "hooke", 5, rng)
     pose = c.position_m.T, np.moveaxis(c.rotation, 0, -1)
@@ -134,7 +134,7 @@ def test_without_a_pulley_nothing_changes_and_a_tiny_one_changes_little():
 
 
 def test_a_platform_inside_a_pulley_is_not_held():
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     line = robot.home_m - robot.exit_m[3]
     wheel = Pulleys(np.array([0, 0, 0, 0.5 * np.linalg.norm(line)]), np.tile([1.0, 0.0, 0.0], (4, 1)))
     inside = replace(robot, pulleys=wheel, exit_m=robot.exit_m + [0, 0, 0.0])
@@ -171,7 +171,7 @@ def test_proofs_know_pulleys(name):
     assert got.proved
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (2, 300, robot.legs))
     wires = Wires("hooke", "saturating", {"k1": (k1 + half_k1 * signs[0]).T}, np.full((robot.legs, 1), 1000.0))
-    poses = forward.solve(robot, wires, zero + half_zero * signs[1], offset, x, R)
+    poses = forward.solve_equilibrium(robot, wires, zero + half_zero * signs[1], offset, x, R)
     moved = np.abs(poses.position_m - x).max(0)
     assert poses.found.all()
     assert (moved <= got.radius_m[:3]).all()

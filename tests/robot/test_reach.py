@@ -15,7 +15,7 @@ from wirebayes.robot.proof.reach import each_on_its_own, reach
 
 
 def _case(name, law, make=cases.commanded, seed=0):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     c = make(robot, law, 6, np.random.default_rng(seed))
     found = cases.solved(robot, c)
     i = int(np.flatnonzero(found.found)[0])
@@ -26,7 +26,7 @@ def _case(name, law, make=cases.commanded, seed=0):
 def _poses(robot, law, k1, zero, offset, x, R):
     """Forward solutions of many parameter sets, one a row."""
     wires = Wires(law, "saturating", {"k1": k1.T}, np.full((robot.legs, 1), 1000.0))
-    found = forward.solve(robot, wires, zero, offset, x, R)
+    found = forward.solve_equilibrium(robot, wires, zero, offset, x, R)
     assert found.found.all()
     return found
 
@@ -275,7 +275,7 @@ class Image:
 
 
 def asked(monkeypatch, *factors):
-    robot = schema.read("hangprinter-4")
+    robot = schema.read_robot_file("hangprinter-4")
     Y = np.array([[0.1, -0.2, 0.3, 0.0], [0.0, 0.0, 0.0, 0.0], [1e-3, 1e-3, -1e-3, 1e-3]])
     images = Image(monkeypatch, Y, *factors)
     generators = np.zeros((4, 4)), np.zeros((4, 4))

@@ -50,7 +50,7 @@ wire_length_m = 3.0
 def _read(tmp_path, text):
     file = tmp_path / "robot.toml"
     file.write_text(text, encoding="utf-8")
-    return schema.read(file)
+    return schema.read_robot_file(file)
 
 
 def test_a_good_file_is_read(tmp_path):
@@ -133,13 +133,13 @@ def test_broken_files_are_refused(tmp_path, text):
 
 def test_unknown_names_list_the_shipped_robots():
     with pytest.raises(InputError, match="cogiro"):
-        schema.read("no-such-robot")
+        schema.read_robot_file("no-such-robot")
 
 
 def test_shipped_robots_say_where_their_numbers_come_from():
     assert len(schema.shipped()) >= 5
     for name in schema.shipped():
-        robot = schema.read(name)
+        robot = schema.read_robot_file(name)
         assert robot.name == name
         assert "github.com" in robot.source or "Representative, not a published" in robot.source
 

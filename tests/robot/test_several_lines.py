@@ -11,7 +11,7 @@ from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from tests.robot.test_drift import _line
 from wirebayes.cli import main
 from wirebayes.commands.wires import draws_of, named_lines
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.errors import InputError
 from wirebayes.json_files.plain import plain
 from wirebayes.model.prior import wire_defaults
@@ -33,7 +33,7 @@ def _mixed(robot, thick_legs):
 
 
 def test_each_leg_has_the_draws_of_its_line():
-    robot = _mixed(schema.read("linear-6"), (1, 4))
+    robot = _mixed(schema.read_robot_file("linear-6"), (1, 4))
     stiff = replace(_line(5, sd=0.1, seed=2, k1=3000.0), name=THICK, length_mm=2000.0)
     line = replace(_line(5, sd=0.1, seed=1), others={THICK: stiff})
     wires = draws.for_robot(robot, line)
@@ -47,15 +47,17 @@ def test_each_leg_has_the_draws_of_its_line():
 
 
 def test_an_effect_of_one_line_is_neutral_in_the_others_and_tensions_are_by_each_ones_reference():
-    robot = _mixed(schema.read("linear-6"), (0,))
-    effects = (named("strain_stiffening"), named("tension_dependent_rate"))
+    robot = _mixed(schema.read_robot_file("linear-6"), (0,))
+    effects = (effect_named("strain_stiffening"), effect_named("tension_dependent_rate"))
     amplitudes = {"strain_stiffening.c": 8.0, "tension_dependent_rate.m": 0.4}
     bent = replace(_line(3, effects=effects, **amplitudes), name=THICK, tension_ref_N=6.0)
     line = replace(_line(3), others={THICK: bent}, tension_ref_N=3.0)
     wires = draws.for_robot(robot, line)
     stretched, zero = np.full((6, 3), 1.01), np.ones((6, 3))
     tau = tension(wires, stretched, zero)[0]
-    alone = tension(draws.for_robot(schema.read("linear-6"), replace(bent, name="default")), stretched, zero)[0]
+    alone = tension(
+        draws.for_robot(schema.read_robot_file("linear-6"), replace(bent, name="default")), stretched, zero
+    )[0]
     plain_tau = tension(
         draws.for_robot(robot, replace(_line(3), others={THICK: replace(_line(3), name=THICK)})), stretched, zero
     )[0]
@@ -68,13 +70,13 @@ def test_an_effect_of_one_line_is_neutral_in_the_others_and_tensions_are_by_each
 
 
 def test_a_leg_without_a_posterior_is_refused_in_one_line():
-    robot = _mixed(schema.read("linear-6"), (3,))
+    robot = _mixed(schema.read_robot_file("linear-6"), (3,))
     with pytest.raises(InputError, match=r"linear-6: leg\[3\].wire: found 'thick' and posteriors of default, expected"):
         draws.for_robot(robot, _line(2))
 
 
 def test_unknowns_hold_the_parameters_of_every_line():
-    robot = _mixed(schema.read("linear-6"), (1, 4))
+    robot = _mixed(schema.read_robot_file("linear-6"), (1, 4))
     stiff = replace(_line(50, sd=0.1, seed=2, k1=3000.0), name=THICK)
     line = replace(_line(50, sd=0.1, seed=1), others={THICK: stiff})
     prior = LengthPrior(line, 1e-3)
@@ -88,7 +90,7 @@ def test_unknowns_hold_the_parameters_of_every_line():
 
 
 def test_the_tested_ranges_are_each_lines_own():
-    robot = _mixed(schema.read("linear-6"), (1, 4))
+    robot = _mixed(schema.read_robot_file("linear-6"), (1, 4))
     stiff = replace(_line(2), name=THICK, tension_range_N=(0.0, 1.0))
     line = replace(_line(2), others={THICK: stiff}, tension_range_N=(0.0, 9.0))
     message = draws.wire_warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
@@ -97,7 +99,7 @@ def test_the_tested_ranges_are_each_lines_own():
 
 def test_only_lines_that_legs_hang_on_warn():
     one = GivenWire({"k1": 800.0, "B": 0.3, "U": 1.0, "k2": 0.03, "N": 0.6}, 1000.0)
-    robot = replace(_mixed(schema.read("linear-6"), range(6)), given={THICK: one})
+    robot = replace(_mixed(schema.read_robot_file("linear-6"), range(6)), given={THICK: one})
     line = replace(_line(2), tension_range_N=(0.0, 9.0), time_range_s=(0.0, 30.0))
     tau = np.array([[20.0, 5.0, 5.0, 5.0, 5.0, 5.0]])
     assert draws.wire_warnings(robot, line, tau, 60.0, np.ones((1, 6))) == []
@@ -165,11 +167,12 @@ def test_names_and_folders_are_read(tmp_path):
 def test_lines_of_two_laws_are_refused(fitted, monkeypatch):  # noqa: F811
     from wirebayes.results import read_back
 
-    hooke = read_back.load(fitted)
+    hooke = read_back.load_posterior(fitted)
     other = replace(hooke, sample=replace(hooke.sample, model=replace(hooke.sample.model, law="modified")))
     laws = {"a": hooke, "b": other}
     monkeypatch.setattr(
-        "wirebayes.results.read_back.load", lambda folder, experiment=None, own_effects=None: laws[folder.name]
+        "wirebayes.results.read_back.load_posterior",
+        lambda folder, experiment=None, own_effects=None: laws[folder.name],
     )
     with pytest.raises(InputError, match="found a fitted with --elastic-law hooke and b with modified"):
         draws_of({"a": "a", "b": "b"}, 10)
@@ -181,7 +184,7 @@ def test_lines_of_two_laws_are_refused(fitted, monkeypatch):  # noqa: F811
 
 
 def test_legs_are_new_specimens_where_several_were_tested():
-    robot = _mixed(schema.read("linear-6"), (1, 4))
+    robot = _mixed(schema.read_robot_file("linear-6"), (1, 4))
     rng, n = np.random.default_rng(0), 4000
     spread = {name: np.full(n, 0.02 * (i + 1)) for i, name in enumerate(draws.CORE)}
     line = replace(_line(n, sd=0.0), spread=spread, specimens=3, others={THICK: replace(_line(n, sd=0.0), name=THICK)})
@@ -214,8 +217,13 @@ def test_commands_take_several_tests_of_one_line(fitted, tmp_path, capsys, monke
 
 
 def test_sag_is_that_of_a_level_cable():
-    robot = replace(schema.read("linear-6"), mass_kg_m=np.full(6, 0.05), exit_m=np.tile([0.0, 0.0, 1.0], (6, 1)),
-                    platform_m=np.zeros((6, 3)), pulleys=None)  # fmt: skip
+    robot = replace(
+        schema.read_robot_file("linear-6"),
+        mass_kg_m=np.full(6, 0.05),
+        exit_m=np.tile([0.0, 0.0, 1.0], (6, 1)),
+        platform_m=np.zeros((6, 3)),
+        pulleys=None,
+    )
     share, depth, extra = sag.sag(robot, np.array([4.0, 0.0, 1.0]), np.eye(3), np.full(6, 20.0))
     weight = 0.05 * 9.80665
     a = 20.0 / weight  # catenary, horizontal tension 20 N

@@ -18,7 +18,7 @@ def _turned(R, d):
 @pytest.mark.parametrize("name", HANGING)
 @pytest.mark.parametrize("law", ["hooke", "modified"])
 def test_wrench_and_stiffness_are_derivatives_of_the_energy(name, law):
-    check_derivatives(schema.read(name), law)
+    check_derivatives(schema.read_robot_file(name), law)
 
 
 def check_derivatives(robot, law, seed=5):
@@ -59,7 +59,7 @@ def test_nothing_is_computed_with_memory_that_holds_no_numbers_yet(monkeypatch):
     numpy = SimpleNamespace(**vars(np) | {"empty": lambda shape, kind=float: np.broadcast_to(signalling, shape).copy()})
     monkeypatch.setattr(statics, "np", numpy)
     with np.errstate(all="raise"):
-        check_derivatives(schema.read("cogiro-desk"), "hooke")
+        check_derivatives(schema.read_robot_file("cogiro-desk"), "hooke")
 
 
 def test_rotation_vector_round_trip_keeps_tiny_and_large_angles():

@@ -63,7 +63,7 @@ def test_the_work_of_a_log_does_not_grow_with_stiffness(kind, seed, monkeypatch)
 
 def test_the_work_of_a_builders_log_is_alike_from_a_thousand_to_ten_million_newtons(monkeypatch):
     """Four wires and six degrees of freedom, stops far apart; read again with wires of every stiffness."""
-    robot = schema.read(FIELD / "ua.toml")
+    robot = schema.read_robot_file(FIELD / "ua.toml")
     rows = np.loadtxt(FIELD / "ua-j2.csv", delimiter=",", skiprows=1)
     still, middle = np.zeros(len(rows)), np.tile(robot.centre_of_mass_m, (len(rows), 1))
     history = History(rows[:, 0], rows[:, 1:], None, None, still, middle)

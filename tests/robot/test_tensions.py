@@ -10,7 +10,7 @@ ROBOTS = HANGING
 
 
 def _problem(name, seed=0):
-    robot = schema.read(name)
+    robot = schema.read_robot_file(name)
     x = np.random.default_rng(seed).uniform(robot.lower_m, robot.upper_m)
     shape = statics.geometry(robot, x[:, None], np.eye(3)[..., None])
     structure = (-statics.jacobian(robot, shape) * robot.lines[:, None])[..., 0]
@@ -83,13 +83,13 @@ def test_a_wire_that_gives_no_wrench_but_rounding_takes_its_reference():
 
 
 def test_a_pose_outside_the_wires_is_infeasible():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     tau = inverse.tensions(robot, np.array([[3.0, 0.0, 0.3]]), np.eye(3)[None])
     assert np.isnan(tau).all()
 
 
 def test_a_users_own_choice_is_used():
-    robot = schema.read("cogiro-desk")
+    robot = schema.read_robot_file("cogiro-desk")
     x, R = robot.home_m[None], np.eye(3)[None]
     stiffer = inverse.tensions(robot, x, R, choice=lambda s, w, lo, hi: tensions.minimum_norm(s, w, 5.85, hi))
     assert np.nanmin(stiffer) >= 5.85 - 1e-9 > inverse.tensions(robot, x, R).min()

@@ -13,7 +13,7 @@ from wirebayes.robot.mechanics.rotation import vector
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import answer, session_file
 from wirebayes.robot.self_calibration.estimate import length_posterior
-from wirebayes.robot.self_calibration.predicted import predict
+from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.trust import joint_test
 from wirebayes.strict.table import csv_table
@@ -39,7 +39,7 @@ def _session(seed, sd=0.02):
 
 def _read(robot, prior, session, rng):
     mean, cov = prior.moments(robot.legs)
-    real = predict(robot, prior, session, rng.multivariate_normal(mean, cov, 1))
+    real = predict_session(robot, prior, session, rng.multivariate_normal(mean, cov, 1))
     assert real.solved.all()
     return np.maximum(real.readings + rng.standard_normal(real.readings.shape), 0.0)
 

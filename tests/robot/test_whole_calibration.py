@@ -24,10 +24,10 @@ def test_rows_without_a_pose_and_unknown_anchors_are_estimated(fitted, session_c
     length = found["zero_tension_lengths_m"]
     assert (np.abs(np.array(length["mean"]) - truth) < 4 * np.array(length["sd"])).all()
     exits = found["exit_points_m"]
-    robot = schema.read("linear-7")
+    robot = schema.read_robot_file("linear-7")
     assert (np.abs(np.array(exits["mean"]) - robot.exit_m) < 4 * np.array(exits["sd"])).all()
     assert len(found["next_positions_m"]) == 2
-    np.testing.assert_allclose(schema.read(out / "robot.toml").exit_m, exits["mean"], atol=1e-6)
+    np.testing.assert_allclose(schema.read_robot_file(out / "robot.toml").exit_m, exits["mean"], atol=1e-6)
 
 
 def test_intervals_rest_on_as_many_degrees_of_freedom_as_follow_the_joint_error():

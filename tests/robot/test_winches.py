@@ -32,7 +32,7 @@ G = 9.80665
 
 def pairs(rng, winches, off=0.0):
     """A platform on pairs of parallel lines, each pair on one winch; the exit points are `off` spans from that."""
-    base, legs = schema.read("cogiro"), 2 * winches
+    base, legs = schema.read_robot_file("cogiro"), 2 * winches
     span = np.exp(rng.uniform(np.log(0.5), np.log(8.0)))
     turn = np.repeat(2 * np.pi * (np.arange(winches) + rng.uniform(-0.1, 0.1, winches)) / winches, 2)
     outward = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(legs)])
@@ -130,7 +130,7 @@ def test_creep_and_references_of_each_line_are_compensated_by_one_joint_value():
     assert found.feasible.all()
     np.testing.assert_array_equal(found.joint_m[:, ::2], found.joint_m[:, 1::2])
     zero = (inverse.lengths(robot, found.joint_m)[0].T + error) * (1 + creep)
-    there = forward.solve(robot, wires, zero.T, robot.beyond_m, x[0] + 0.01 * robot.size_m, level[0])
+    there = forward.solve_equilibrium(robot, wires, zero.T, robot.beyond_m, x[0] + 0.01 * robot.size_m, level[0])
     assert there.found.all()
     np.testing.assert_allclose(there.position_m, np.broadcast_to(x, (5, 3)), atol=1e-8 * robot.span_m)
 
@@ -180,7 +180,7 @@ def printer(tmp_path, freedom="pose", drum="drum_radius_m = 0.05\ngear_ratio = 1
 
 
 def test_tables_have_a_column_of_each_winch(tmp_path):
-    robot = schema.read(printer(tmp_path))
+    robot = schema.read_robot_file(printer(tmp_path))
     assert (robot.legs, robot.joints) == (7, 4)
     names = joint_columns.joint_columns(robot)
     assert names == ("joint_1_m", "joint_2_m", "joint_3_m", "joint_4_m")
@@ -200,7 +200,7 @@ def test_legs_of_one_winch_with_drums_of_two_sizes_are_refused(tmp_path):
     with pytest.raises(
         InputError, match=r"line \d+, key leg\[1\]\.drum_radius_m: found 0\.05, expected that of the first"
     ):
-        schema.read(file)
+        schema.read_robot_file(file)
 
 
 def test_firmware_gets_the_middle_of_each_pair_and_the_lines_on_each_spool(fitted, tmp_path):  # noqa: F811
@@ -209,7 +209,7 @@ def test_firmware_gets_the_middle_of_each_pair_and_the_lines_on_each_spool(fitte
     text = (out / "reprapfirmware.g").read_text()
     assert "M669 K6 A1300.00:0.00:-100.00 B-650.00:1125.80:-100.00 C-650.00:-1125.80:-100.00 D0.00:0.00:2300.00" in text
     assert "M666 O2:2:2:1" in text and "M666 U1:1:1:2" in text
-    back = schema.read(import_robot(out / "reprapfirmware.g", tmp_path / "back.toml"))
+    back = schema.read_robot_file(import_robot(out / "reprapfirmware.g", tmp_path / "back.toml"))
     assert back.winch.tolist() == [0, 0, 1, 1, 2, 2, 3]
     np.testing.assert_allclose(back.exit_m[:2], [[1.3, 0.0, -0.1]] * 2)
     (tmp_path / "odd.g").write_text(text.replace("M666 O2:2:2:1", "M666 O2:2:0:1"))
@@ -242,7 +242,7 @@ def test_pose_and_its_log_know_winches(fitted, tmp_path):  # noqa: F811
 def _calibrated(name, tmp_path):
     """The printer, or a drawn robot of pairs, and the stiffness of its lines."""
     if name == "printer":
-        return schema.read(printer(tmp_path, drum="")), 4000.0
+        return schema.read_robot_file(printer(tmp_path, drum="")), 4000.0
     robot, k1 = pairs(np.random.default_rng(2), int(name[-1]), 1e-3)
     half = 0.1 * robot.span_m
     lowest, highest = 0.02 * robot.mass_kg * G, 5.0 * robot.mass_kg * G
@@ -279,7 +279,7 @@ def test_calibration_finds_each_lines_own_length(name, tmp_path):
     assert len(kept) == stops
     x, level, joint = x[kept], level[kept], joint[kept]
     log = sessions.Session(x, level, joint, np.full(stops, 30.0), np.ones(stops, bool), 0.05 * weight)
-    real = predicted.predict(robot, prior, log, value)
+    real = predicted.predict_session(robot, prior, log, value)
     readings = real.readings[0] + rng.normal(size=real.readings.shape[1])
     encoder = 0.1 * small * rng.normal(size=(stops, robot.joints))[:, robot.winch]
     read = joint + encoder + 0.1 * small * rng.normal(size=joint.shape)

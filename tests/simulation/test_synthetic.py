@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wirebayes.cli import main
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, write_tests
 
@@ -54,7 +54,7 @@ def test_noise_and_setting_error_have_the_size_that_was_asked():
 
 def test_open_parameters_follow_the_prior_and_samples_of_a_line_share_it():
     benches = [Bench("a", "line", 1000.0), Bench("b", "line", 2000.0), Bench("c", "other", 1000.0)]
-    made = draw(benches, Truth(effects=(named("strain_stiffening"),)), seed=2)
+    made = draw(benches, Truth(effects=(effect_named("strain_stiffening"),)), seed=2)
     a, b, c = (made.problem.parameters(made.theta, s) for s in made.problem.samples)
     assert a["k1"] == b["k1"] != c["k1"]
     assert b["B"] == pytest.approx(2 * a["B"])
@@ -68,7 +68,7 @@ def test_an_effect_is_in_the_readings():
     plain = draw([Bench(resolution_N=0.0)], Truth(TRUE | {"setting_sd": 1e-9, "sensor_sd": 1e-9}), seed=3)
     slipped = draw(
         [Bench(resolution_N=0.0)],
-        Truth(TRUE | {"setting_sd": 1e-9, "sensor_sd": 1e-9, "grip_slip.w": 0.5}, (named("grip_slip@7"),)),
+        Truth(TRUE | {"setting_sd": 1e-9, "sensor_sd": 1e-9, "grip_slip.w": 0.5}, (effect_named("grip_slip@7"),)),
         seed=3,
     )
     gap = slipped.noise_free[0][:, 0] - plain.noise_free[0][:, 0]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
@@ -22,7 +22,7 @@ def test_nested_sampling_gives_the_same_posterior():
     def scaled(theta):
         return np.column_stack([np.log(theta[:, i]) if n in logs else theta[:, i] for i, n in enumerate(names)])
 
-    ours = scaled(fit(problem, 1, policy=Policy(ess=20000.0)).flat)
+    ours = scaled(fit_problem(problem, 1, policy=Policy(ess=20000.0)).flat)
     means, sds = [], []
     for seed in range(2):
         sampler = dynesty.NestedSampler(

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from analyses.calibration.simulation_based_calibration import parameters_at
 from tests.statistical.targets import Silent
-from wirebayes.effects import CATALOGUE, named
-from wirebayes.inference.fit import fit, parameters_at
+from wirebayes.effects import CATALOGUE, effect_named
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
@@ -25,12 +26,11 @@ def silent(effects=(), likelihood="chain"):
 def assert_prior(problem, seeds):
     theta = []
     for seed in seeds:
-        done = fit(problem, seed, policy=POLICY)
+        done = fit_problem(problem, seed, policy=POLICY)
         assert done.chains.converged
         last = done.problem.prior
-        z = done.chains.z[:, -1].reshape(
-            -1, done.chains.z.shape[-1]
-        )  # as good as independent: of every walker the last
+        walkers_last = done.chains.z[:, -1]  # as good as independent
+        z = walkers_last.reshape(-1, walkers_last.shape[-1])
         theta.append(last.known(parameters_at(problem, z)))
         for i, (name, distribution) in enumerate(last.distributions.items()):
             ess = done.chains.ess[i]
@@ -52,4 +52,4 @@ def test_the_prior_of_every_amplitude_comes_back():
     keys = [f"{name}@5" if name in ("grip_slip", "unrecorded_hold") else name for name in CATALOGUE]
     keys = [f"{name}@k1" if name == "length_dependence" else name for name in keys]
     for first in range(0, len(keys), 5):
-        assert_prior(silent(tuple(named(key) for key in keys[first : first + 5])), (2,))
+        assert_prior(silent(tuple(effect_named(key) for key in keys[first : first + 5])), (2,))

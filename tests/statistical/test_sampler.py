@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from tests.statistical.targets import TARGETS, Analytic, corners, funnel, gaussian, grid, sixteen_modes
-from wirebayes.effects import catalogue, named
+from wirebayes.effects import catalogue, effect_named
 from wirebayes.inference import convergence
 from wirebayes.inference.climb import Optimum
-from wirebayes.inference.fit import fit
+from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.modes import search
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, kept, moves, proposal, stop_rule
 from wirebayes.inference.sampler import state as sampler_state
-from wirebayes.inference.sampler.ensemble import sample
+from wirebayes.inference.sampler.ensemble import sample_posterior
 from wirebayes.io import paper
 from wirebayes.model.build import build
 
@@ -34,7 +34,7 @@ def worst(target_of, policy=SMALL, runs=RUNS):
     draws, promised = [], []
     for seed in range(runs):
         target = target_of()
-        chains = sample(target, 1000 + seed, policy)
+        chains = sample_posterior(target, 1000 + seed, policy)
         if chains.modes < target.hills:
             continue
         draws.append(chains.z.reshape(-1, chains.z.shape[-1]))
@@ -90,13 +90,13 @@ def test_moments_are_right_in_as_many_dimensions_as_samples_fitted_together_have
 
 
 def test_a_proposal_that_proves_poor_is_learned_once_more_before_draws_are_kept(monkeypatch):
-    again = sample(TARGETS["two_modes"](), 3, HASTY)
+    again = sample_posterior(TARGETS["two_modes"](), 3, HASTY)
     t, ratio = worst(gaussian, HASTY)
     assert t < LIMIT
     assert 0.6 < ratio < 1.7
     monkeypatch.setattr(stop_rule, "worth_a_new_start", lambda state: False)
     monkeypatch.setattr(stop_rule, "worth_refining", lambda state, policy: False)
-    stubborn = sample(TARGETS["two_modes"](), 3, HASTY)
+    stubborn = sample_posterior(TARGETS["two_modes"](), 3, HASTY)
     assert again.converged and stubborn.converged
     assert again.kept_evaluations == again.log_density.size  # none of those kept before
     assert again.ess.min() / again.kept_evaluations > 2.0 * stubborn.ess.min() / stubborn.kept_evaluations
@@ -136,7 +136,7 @@ def funnels(neck, runs):
     """Of the runs that call themselves converged, (n, 3): E[v²] / 9 and the shares of 5 % in the neck and the mouth."""
     found = []
     for seed in range(runs):
-        chains = sample(funnel(neck), seed, Policy(most_steps=800))
+        chains = sample_posterior(funnel(neck), seed, Policy(most_steps=800))
         if chains.converged:
             v = chains.z[..., neck] / 3.0
             found.append([(v**2).mean(), (v < -1.645).mean(), (v > 1.645).mean()])
@@ -183,7 +183,7 @@ def test_without_witness_excess_and_tails_the_sampler_believes_a_funnel_without_
 def test_sixteen_modes_have_their_shares_or_are_refused(centres, runs):
     converged = 0
     for seed in range(runs):
-        chains = sample(sixteen_modes(centres), seed, Policy(most_steps=800))
+        chains = sample_posterior(sixteen_modes(centres), seed, Policy(most_steps=800))
         z = chains.z.reshape(-1, centres.shape[1])
         nearest = (((z[:, None] - centres) ** 2).sum(axis=2)).argmin(axis=1)
         share = np.bincount(nearest, minlength=16) / len(z)
@@ -201,7 +201,7 @@ def test_a_tail_that_the_proposal_overlooked_at_first_comes_out_or_the_fit_is_re
     are refused; which ones depends on the last digits of the machine.
     """
     (nylon,) = (experiment for experiment in paper.experiments() if experiment.name == "nylon-1.5m")
-    found = fit(build([nylon], [named("second_relaxation", catalogue(None))]), 6)
+    found = fit_problem(build([nylon], [effect_named("second_relaxation", catalogue(None))]), 6)
     amplitude = found.flat[:, found.problem.names.index("second_relaxation.A")]
     if found.chains.converged:
         assert abs(amplitude.mean() - 0.0586) < 0.1 * 0.0622  # mean and standard deviation
@@ -285,7 +285,7 @@ def test_no_walker_is_left_in_a_far_mode_of_no_weight():
     found = Optimum(np.array([0.0 * shift, shift]), np.array([0.0, -30.0]), np.array([np.eye(8)] * 2), np.ones(2, bool))
     # a single step of burn-in has no time to bring them back by itself
     hasty = Policy(**{**SMALL.__dict__, "rounds": 1, "round_draws": 192, "most_rounds": 1})
-    runs = [sample(Analytic(density, np.zeros(8), np.ones(8)), seed, hasty, found=found) for seed in range(4)]
+    runs = [sample_posterior(Analytic(density, np.zeros(8), np.ones(8)), seed, hasty, found=found) for seed in range(4)]
     assert all(np.abs(chains.z[..., 0]).max() < 10.0 for chains in runs)
 
 
@@ -298,7 +298,7 @@ def ridge(z):
 def test_a_poor_learned_move_gives_way_to_differential_evolution_and_a_hopeless_chain_is_called_so():
     target = Analytic(ridge, np.zeros(8), np.ones(8))
     policy = Policy(**{**SMALL.__dict__, "most_steps": 72, "acceptance": 0.2})
-    chains = sample(target, 1, policy)
+    chains = sample_posterior(target, 1, policy)
     assert not chains.learned
     assert not chains.converged
     assert chains.why.startswith("not converged after 72 steps: x")
@@ -306,12 +306,12 @@ def test_a_poor_learned_move_gives_way_to_differential_evolution_and_a_hopeless_
 
 
 def test_no_answer_depends_on_what_ran_before():
-    first = sample(gaussian(), 5, SMALL)
-    sample(TARGETS["banana"](), 6, SMALL)
+    first = sample_posterior(gaussian(), 5, SMALL)
+    sample_posterior(TARGETS["banana"](), 6, SMALL)
     np.random.seed(99)  # noqa: NPY002 - a stranger's use of the global generator
-    again = sample(gaussian(), 5, SMALL)
+    again = sample_posterior(gaussian(), 5, SMALL)
     assert first.z.tobytes() == again.z.tobytes()
-    assert sample(gaussian(), 7, SMALL).z.tobytes() != first.z.tobytes()
+    assert sample_posterior(gaussian(), 7, SMALL).z.tobytes() != first.z.tobytes()
 
 
 class Killed(Exception):
@@ -323,7 +323,7 @@ PATIENT = Policy(**{**SMALL.__dict__, "ess": 12000.0})
 
 @pytest.mark.parametrize(("policy", "blow"), [(PATIENT, 1), (PATIENT, 2), (HASTY, 3), (HASTY, 4)])
 def test_a_killed_run_goes_on_to_the_same_bytes(policy, blow, tmp_path, monkeypatch):
-    whole = sample(gaussian(), 11, policy)
+    whole = sample_posterior(gaussian(), 11, policy)
     path = tmp_path / "checkpoint"
     calls = 0
 
@@ -337,11 +337,11 @@ def test_a_killed_run_goes_on_to_the_same_bytes(policy, blow, tmp_path, monkeypa
     monkeypatch.setattr(burn_in, "advance", mortal)
     monkeypatch.setattr(kept, "advance", mortal)
     with pytest.raises(Killed):
-        sample(gaussian(), 11, policy, checkpoint=path)
+        sample_posterior(gaussian(), 11, policy, checkpoint=path)
     monkeypatch.undo()
-    resumed = sample(gaussian(), 11, policy, checkpoint=path)
+    resumed = sample_posterior(gaussian(), 11, policy, checkpoint=path)
     for name in ("z", "log_density", "ess", "r_hat"):
         assert getattr(resumed, name).tobytes() == getattr(whole, name).tobytes()
     assert (resumed.evaluations, resumed.why) == (whole.evaluations, whole.why)
-    finished = sample(gaussian(), 11, policy, checkpoint=path)
+    finished = sample_posterior(gaussian(), 11, policy, checkpoint=path)
     assert finished.z.tobytes() == whole.z.tobytes()

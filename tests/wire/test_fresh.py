@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 from tests.effects.test_catalogue import HenckyStrain, strong
 from tests.wire.protocols import PLAIN, columns, protocol
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.effects.rivals import AtOnce, Logarithmic, NotInTime, PowerLaw, TwoModes
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import schema
@@ -206,13 +206,13 @@ def test_what_belongs_to_the_bench_never_enters(key):
 
 def test_a_tension_that_the_wire_cannot_carry_has_no_stiffness():
     softening = FreshSample(
-        columns(**PLAIN, **{"strain_stiffening.c": -80.0}), Model(effects=(named("strain_stiffening"),)), 1000.0
+        columns(**PLAIN, **{"strain_stiffening.c": -80.0}), Model(effects=(effect_named("strain_stiffening"),)), 1000.0
     )
     assert np.isnan(softening.stiffness_N(5.0)[0])  # at most k1 / (4 * 80) = 2.8 N
     assert softening.stiffness_N(2.0)[0] == pytest.approx(k1 * np.sqrt(1 - 4 * 80 * 2.0 / k1), rel=1e-12)
 
 
-LINEAR = schema.read("linear-6")
+LINEAR = schema.read_robot_file("linear-6")
 ROBOT = {key for key in OF_THE_WIRE if not key.startswith("length_dependence")}
 
 
@@ -231,7 +231,7 @@ def alone(given):
 @pytest.mark.parametrize("key", sorted(ROBOT))
 def test_a_robots_wire_under_a_constant_tension_is_a_fresh_sample(key, follow):
     given = line(key)
-    wires = for_robot(schema.read("linear-6"), given)
+    wires = for_robot(schema.read_robot_file("linear-6"), given)
     load = np.full((6, 3), LOAD)
     creep = HoldCreep(wires, fresh(6, 3), load, follow)
     expected = alone(given).creep_mm(LOAD, TIMES[1:])
@@ -245,13 +245,13 @@ def test_a_robots_wire_under_a_constant_tension_is_a_fresh_sample(key, follow):
 @pytest.mark.parametrize("key", sorted(ROBOT))
 def test_the_exported_creep_table_is_the_fresh_sample(key):
     given = line(key)
-    rows = files.creep_table(schema.read("hangprinter-4"), given, [2.0, LOAD], TIMES[1:])
+    rows = files.creep_table(schema.read_robot_file("hangprinter-4"), given, [2.0, LOAD], TIMES[1:])
     expected = np.concatenate([alone(given).creep_mm(load, TIMES[1:]) for load in (2.0, LOAD)])
     assert [row[2] for row in rows] == pytest.approx(expected.mean(1), rel=1e-12, abs=1e-15)
 
 
 def test_a_parameter_that_depends_on_the_length_is_that_of_the_robots_wires():
-    robot = schema.read("linear-6")
+    robot = schema.read_robot_file("linear-6")
     for which in ("k1", "B"):
         given = line(f"length_dependence@{which}")
         wires, plain = for_robot(robot, given), for_robot(robot, line("plain"))
@@ -267,7 +267,7 @@ def test_a_material_effect_of_the_bench_alone_is_said_to_be_left_out():
         sentence = "An effect that only a bench could show."
 
     given = WireDraws({name: np.array([PLAIN[name]]) for name in ("k1", "B", "U", "k2", "N")}, 1000.0,
-                      effects=(Settling(), named("thermal_expansion")))  # fmt: skip
+                      effects=(Settling(), effect_named("thermal_expansion")))  # fmt: skip
     found = wire_warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((1, 6)))
     lines = [notice.text for notice in found if notice.kind == "left-out"]
     assert any("settling has no place in the robot" in text for text in lines)

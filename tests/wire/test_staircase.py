@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.wire.protocols import PLAIN, by_hand, columns, parameters, protocol, protocols
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.wire import laws
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import linearise, simulate
@@ -207,7 +207,7 @@ def test_a_hold_goes_on_creeping_after_its_last_reading(monkeypatch, effect, com
     """As if a reading had been taken at its end."""
     if not compiled_kernel:
         monkeypatch.setattr("wirebayes.wire.compiled.kernel", None)
-    effects = (named(effect),) if effect else ()
+    effects = (effect_named(effect),) if effect else ()
     theta = columns(**PLAIN) | {c: np.array([0.05]) for e in effects for c in e.columns()}
     times = ([0.0, 30.0, 60.0], [0.0, 60.0], [0.0, 30.0])
     read = protocol([1, 2, 3], ([0.0, 30.0, 60.0, 100.0], [0.0, 60.0, 90.0], [0.0, 30.0]))

@@ -8,7 +8,7 @@ from scipy.special import lambertw
 
 from tests.wire.protocols import PLAIN, columns, parameters, protocol, protocols, weights_by_hand
 from tests.wire.test_compiled import FORMS, LAWS_OF_CREEP, by_numpy, drawn, models, same
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.wire import compiled
 from wirebayes.wire.inverse import inverse
 from wirebayes.wire.model import Model
@@ -70,7 +70,7 @@ def test_a_weight_stretches_the_wire_to_where_a_step_reads_that_weight(key, law,
     """Without creep the two kinds of test are inverse to each other, whatever bends the strain."""
     if not compiled_kernel:
         monkeypatch.setattr("wirebayes.wire.compiled.kernel", None)
-    effect = named(key)
+    effect = effect_named(key)
     model = Model(law, effects=(effect,), length_ref_mm=800.0)
     theta = columns(**(PLAIN | {"B": 1e-300}))
     theta |= {c: np.array([a.prior.ppf(0.8)]) for c, a in zip(effect.columns(), effect.amplitudes, strict=True)}
@@ -107,7 +107,7 @@ def test_the_effects_of_instruments_act_where_the_instruments_are():
 
     def with_effect(key, **own):
         theta = columns(**PLAIN) | columns(**{f"{key}.{name}": value for name, value in own.items()})
-        return simulate(UP_AND_DOWN, theta, Model(effects=(named(key),)))[..., 0]
+        return simulate(UP_AND_DOWN, theta, Model(effects=(effect_named(key),)))[..., 0]
 
     elapsed = UP_AND_DOWN.start_s[:, None] + UP_AND_DOWN.time_s
     assert with_effect("sensor_drift", a=1e-4) == pytest.approx(plain + 1e-4 * elapsed, rel=1e-12)
@@ -144,7 +144,7 @@ def test_a_wire_that_cannot_carry_the_weight_has_no_length(compiled_kernel, monk
 @given(st.floats(0.01, 40.0), st.floats(1e-3, 50.0))
 def test_a_toe_under_a_weight_is_lambert_s_w(weight, width):
     theta = columns(**(PLAIN | {"B": 1e-300, "preload": 0.0, "toe.w": width}))
-    found = simulate(protocol([weight], [TIMES], control="force"), theta, Model(effects=(named("toe"),)))
+    found = simulate(protocol([weight], [TIMES], control="force"), theta, Model(effects=(effect_named("toe"),)))
     pulls = 1000.0 * weight / PLAIN["k1"]
     expected = pulls + width * (1.0 + lambertw(-np.exp(-1.0 - pulls / width)).real)
     # W loses half the digits near its branch

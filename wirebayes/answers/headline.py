@@ -14,7 +14,7 @@ from wirebayes.json_files.comparison import ComparedModels
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.plan import PlanJson
 from wirebayes.json_files.pose import PoseJson, known_at_the_end
-from wirebayes.json_files.read_units import read, unit_read
+from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.sentences import (
@@ -97,7 +97,7 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     sizes = [quantity(a["mean"], a["q05"], a["q95"], a["unit"]) for a in report["amplitudes"].values()]
     size = f", of size {listed(sizes)}" if sizes else ""
     held = report["held_out"]
-    before, after = (read(held[model], "rmse") for model in ("plain", "final"))
+    before, after = (read_value(held[model], "rmse") for model in ("plain", "final"))
     gain = ""
     if report["effects"] and before is not None and after is not None:
         gain = f"; with {'them' if effects[1:] else 'it'} the error on unused holds goes from {number(before)} to "

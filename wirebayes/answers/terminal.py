@@ -16,7 +16,7 @@ from wirebayes.json_files.imported import ImportedExperiment
 from wirebayes.json_files.plan import JudgedProtocol
 from wirebayes.json_files.pose import PoseJson, known_at_the_end
 from wirebayes.json_files.pose_history import PoseHistoryJson
-from wirebayes.json_files.read_units import read, unit_read
+from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import Quantiles
 from wirebayes.sentences import (
@@ -74,7 +74,7 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     if like and verdict in ("named", "ambiguous"):
         lines.append(f"  hard to distinguish on this protocol: {', '.join(map(spoken, like))}")
     gain = report["held_out"]
-    before, after = (read(gain[model], "rmse") for model in ("plain", "final"))
+    before, after = (read_value(gain[model], "rmse") for model in ("plain", "final"))
     if report["effects"] and None not in (before, after):
         lines.append(f"  held-out holds: rmse {before:.3g} -> {after:.3g} {unit_read(gain['plain'])}")
     return lines
@@ -133,7 +133,7 @@ def of_check(name: str, test: CheckedExperiment) -> list[str]:
     many = f"{counted(test['recorded_holds'], 'hold')}, {counted(test['readings'], 'reading')}"
     recorded = f"{many} in {test['duration_s'] / 60.0:.3g} min"
     unit = unit_read(test, "resolution")
-    step = read(test, "resolution")
+    step = read_value(test, "resolution")
     steps = f", written in steps of {step:g} {unit}" if step else ""
     lines = [f"{name}: {recorded}{steps}; {test['length_mm']:g} mm of {test['material']}"]
     if test["temperature_C"]:
@@ -161,7 +161,7 @@ def _holds_table(test: CheckedExperiment, unit: str) -> list[str]:
     for hold in test["holds"]:
         course = "none: held, not recorded"
         if hold["number"] is not None:
-            first, last = read(hold, "first"), read(hold, "last")
+            first, last = read_value(hold, "first"), read_value(hold, "last")
             course = f"{hold['readings']} from {hold['first_s']:g} s on, {first:.4g} to {last:.4g} {unit}"
         place = f"{hold['tension_N']:g} N" if weights else f"{hold['displacement_mm']:g} mm"
         begins, lasts = (f"{hold[key]:.6g} s" for key in ("start_s", "duration_s"))

@@ -12,7 +12,7 @@ Name = Annotated[str | None, typer.Argument(metavar="[NAME]", help="Describe thi
 def effects_command(name: Name = None, own_effects: OwnEffects = None) -> None:
     """List the effects that a model may be missing; with NAME, describe one in full."""
     from wirebayes.commands.list_effects import list_effects
-    from wirebayes.effects import catalogue, named
+    from wirebayes.effects import catalogue, effect_named
 
     known = list_effects(own_effects)
     if name is None:
@@ -20,7 +20,7 @@ def effects_command(name: Name = None, own_effects: OwnEffects = None) -> None:
         for e in known:
             typer.echo(f"{e.name:{width}}  {e.scope:11}  {e.meaning}")
         return
-    wanted = named(name, catalogue(own_effects)).name  # an unknown name is refused, with those that there are
+    wanted = effect_named(name, catalogue(own_effects)).name  # an unknown name is refused, with those that there are
     (effect,) = [e for e in known if e.name == wanted]
     lines = [
         effect.name, f"  formula    {effect.formula}", f"  meaning    {effect.meaning}",

@@ -24,7 +24,7 @@ from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes,
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.model.build import build
 from wirebayes.model.sample import MATERIAL, SAMPLE
-from wirebayes.notice import Notice, from_json, named, to_json
+from wirebayes.notice import Notice, from_json, notices_by_part, to_json
 from wirebayes.processes.workers import as_finished, computing, executor
 from wirebayes.results.outliers import outliers
 from wirebayes.strict.files import PathLike
@@ -285,6 +285,6 @@ def _tabulate(rows: Sequence[Row], far: Sequence[OutlierRow], folder: Path) -> N
     write_csv(folder / TABLE, header, table)
     write_parquet(folder / PARQUET, header, table)
     failed = [Notice("failed", f"{row['name']}: {row['error']}") for row in rows if row["error"]]
-    warnings = to_json([*failed, *from_json(named({row["name"]: row for row in rows}))])
+    warnings = to_json([*failed, *from_json(notices_by_part({row["name"]: row for row in rows}))])
     content: BatchJson = {"version": 1, "experiments": list(rows), "outliers": list(far), "warnings": warnings}
     write_json(folder / Batch._content, content)

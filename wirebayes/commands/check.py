@@ -13,7 +13,7 @@ from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
 from wirebayes.json_files.read_units import in_unit
-from wirebayes.notice import named, to_json
+from wirebayes.notice import notices_by_part, to_json
 from wirebayes.processes.workers import computing
 from wirebayes.strict.files import PathLike
 from wirebayes.views.check import CHECKED, Check
@@ -97,7 +97,7 @@ def check(
                 }  # fmt: skip
                 understood(e, place.path / f"{e.name}.svg")
             report("check", len(experiments), len(experiments))
-            content: CheckJson = {"experiments": found, "warnings": named(found)}
+            content: CheckJson = {"experiments": found, "warnings": notices_by_part(found)}
             write_json(place.path / CHECKED, content)
             run.finish()
     return Check(place, own, computed=run.state != "done")

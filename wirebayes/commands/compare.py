@@ -27,7 +27,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
 from wirebayes.json_files.comparison import ComparisonJson, ModelJson
 from wirebayes.model.sample import Likelihood
-from wirebayes.notice import Notice, named
+from wirebayes.notice import Notice, notices_by_part
 from wirebayes.processes.workers import computing
 from wirebayes.sentences import counted
 from wirebayes.strict.files import PathLike
@@ -238,7 +238,7 @@ def carry_out(plan: ComparisonPlan, output: PathLike | None, progress: Progress 
                 models: list[ModelJson] = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
                 content["experiments"][one.name] = side_by_side(models, BASE, of_experiment(one))
             pictures.save_pictures(place.path / one.name, one.name, content["experiments"][one.name], models)
-        content["warnings"] = named(content["experiments"])
+        content["warnings"] = notices_by_part(content["experiments"])
         write_json(place.path / "comparison.json", content)
         opened.finish()
     return Comparison(place, plan.own_effects)

@@ -25,11 +25,11 @@ from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.json_files.discovery import IntervalJson
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.model.spec import ModelSpec
-from wirebayes.notice import from_json, named, to_json
+from wirebayes.notice import from_json, notices_by_part, to_json
 from wirebayes.processes.workers import computing, workers
 from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
-from wirebayes.results.read_back import load
+from wirebayes.results.read_back import load_posterior
 from wirebayes.strict.files import PathLike
 from wirebayes.views.findings import Findings
 from wirebayes.views.result import ResultFolder
@@ -233,7 +233,7 @@ def _warnings(found: Investigation, output: Path) -> None:
         plain, final = (from_json(summary["warnings"]) for summary in fits)
         alone = [notice.of("the final model") for notice in final if notice not in plain]
         report["warnings"] = to_json([*from_json(report["warnings"]), *plain, *alone])
-    found.report["warnings"] = named(reports)
+    found.report["warnings"] = notices_by_part(reports)
 
 
 def _pictures(found: Investigation, output: Path, own_effects: Path | None) -> None:
@@ -243,5 +243,7 @@ def _pictures(found: Investigation, output: Path, own_effects: Path | None) -> N
 
     for e in (e for block in found.final for e in block.experiments):
         verdict = found.report["experiments"][e.name]
-        plain, final = (load(output / e.name / model, own_effects=own_effects) for model in ("plain", "final"))
+        plain, final = (
+            load_posterior(output / e.name / model, own_effects=own_effects) for model in ("plain", "final")
+        )
         save_together(pictures(plain, final, verdict), output)

@@ -19,7 +19,7 @@ from wirebayes.commands.options import (
     silent,
 )
 from wirebayes.discovery.model_check import checked_meanwhile, write_checks
-from wirebayes.effects import catalogue, named, source_of
+from wirebayes.effects import catalogue, effect_named, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
@@ -150,7 +150,7 @@ def _first_holds(experiments: Sequence[Experiment], count: int | None) -> Sequen
 
 def _effects_of(keys: Sequence[str], known: Mapping[str, type[Effect]]) -> list[Effect]:
     """The effects that were asked for; each may be asked for once."""
-    added = [named(key, known) for key in keys]
+    added = [effect_named(key, known) for key in keys]
     if len({e.name for e in added}) < len(added):
         raise InputError(f"--effect: found {', '.join(keys)}, expected each effect once")
     return added

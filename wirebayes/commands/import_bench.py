@@ -17,7 +17,7 @@ from wirebayes.io.bench.undecided import Choices, Decimal, Specimens, TimeSince,
 from wirebayes.io.readings import READ
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportJson
-from wirebayes.notice import named, to_json
+from wirebayes.notice import notices_by_part, to_json
 from wirebayes.strict.files import PathLike, read_bytes
 from wirebayes.views.imported_tests import IMPORTED, ImportedTests
 from wirebayes.views.result import ResultFolder
@@ -226,5 +226,5 @@ def _write(folder: Path, tests: Sequence[tuple[Path, Converted]]) -> None:
         write_text(folder / f"{experiment.name}.toml", tables[-1])
     if len(tests) > 1:
         write_text(folder / f"{TOGETHER}.toml", "\n".join(tables))
-    content["warnings"] = named(content["experiments"])
+    content["warnings"] = notices_by_part(content["experiments"])
     write_json(folder / IMPORTED, content)

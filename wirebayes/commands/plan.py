@@ -257,7 +257,7 @@ def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: 
 def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, dict[str, Any], Sample]:
     discovered = bool(list(folder.glob("**/plain/posterior.nc")))
     which, place = find_posterior(folder, name, "plain" if discovered else None)
-    stored = read_back.load(place, which, own)
+    stored = read_back.load_posterior(place, which, own)
     if stored.likelihood == "hold":
         message = "found a fit with --likelihood hold, which knows no preload and no setting error, expected a chain"
         raise InputError(f"{folder}: {message}")

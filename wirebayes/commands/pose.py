@@ -39,7 +39,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import computing
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
-from wirebayes.robot.pose.answer import Answer, pose_report
+from wirebayes.robot.pose.answer import PoseAnswer, pose_report
 from wirebayes.robot.pose.maps import LEVEL, TABLE, Slices, rows
 from wirebayes.robot.pose.orientation import balanced_orientation
 from wirebayes.robot.pose.request import PoseRequest
@@ -274,7 +274,7 @@ def pose_at(asked: AskedPose, request: PoseRequest, other: WireDraws | None, beg
     return Pose(begun.place, asked.own_effects)
 
 
-def _write(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -> None:
+def _write(folder: Path, robot: Robot, request: PoseRequest, found: PoseAnswer) -> None:
     write_json(folder / "pose.json", found.content)
     if found.maps:
         write_csv(folder / "workspace.csv", TABLE, rows(found.maps))

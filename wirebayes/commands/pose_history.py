@@ -188,7 +188,7 @@ def _followed(asked: AskedPose, option: str, given: Any, errors: Uncertain, begu
             write_csv(opened.directory / name, header, rows)
         from wirebayes.report.pictures import robot_history as pictures  # matplotlib only where it is needed
 
-        pictures.save(opened.directory, robot, history, found)
+        pictures.save_history_pictures(opened.directory, robot, history, found)
         opened.finish()
     return Pose(begun.place, asked.own_effects)
 

@@ -178,7 +178,7 @@ def stored_posteriors(
     """
     if isinstance(posterior, str | os.PathLike):
         name, folder = find_posterior(Path(posterior), experiment, model)
-        return [(p, read_back.load(place, name, own_effects)) for p, place in members_of(folder)]
+        return [(p, read_back.load_posterior(place, name, own_effects)) for p, place in members_of(folder)]
     if isinstance(posterior, Findings):
         posteriors: Mapping[str, Posterior] = posterior.plain if model == "plain" else posterior.final
         one, experiment = one_of(posteriors, experiment), None
@@ -188,7 +188,7 @@ def stored_posteriors(
         one = posterior
     else:
         raise InputError(f"posterior: found {type(posterior).__name__}, expected a Posterior, Findings or a folder")
-    return [(p, read_back.load(place, experiment, one.own_effects)) for p, place in members_of(one.folder)]
+    return [(p, read_back.load_posterior(place, experiment, one.own_effects)) for p, place in members_of(one.folder)]
 
 
 def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Posterior:

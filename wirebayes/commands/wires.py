@@ -56,7 +56,7 @@ def read_robot(name_or_file: PathLike) -> Robot:
     >>> robot.legs, robot.degrees
     (7, 6)
     """
-    return schema.read(os.fspath(name_or_file))
+    return schema.read_robot_file(os.fspath(name_or_file))
 
 
 def robot_of(robot: RobotLike) -> Robot:
@@ -209,7 +209,7 @@ def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effec
     folders = [folder_of(line, experiment) for line in lines]
     if len(folders) < 2:
         raise InputError(f"--wires: found {len(folders)} specimen, expected two or more")
-    tests = [read_back.load(folder, experiment, own_effects) for folder in folders]
+    tests = [read_back.load_posterior(folder, experiment, own_effects) for folder in folders]
     ones = [_usable(stored, str(folder), count) for folder, stored in zip(folders, tests, strict=True)]
     first = ones[0]
     _check_plain_and_alike(folders, ones)
@@ -283,7 +283,7 @@ def read_wires(folder: Path, count: int, experiment: str | None = None, own_effe
     below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
     if below and not (folder / POSTERIOR).is_file():
         raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
-    return _usable(read_back.load(folder, experiment, own_effects), str(folder), count)
+    return _usable(read_back.load_posterior(folder, experiment, own_effects), str(folder), count)
 
 
 def _usable(stored: Stored, where: str, count: int) -> WireDraws:

@@ -31,6 +31,6 @@ def write_report(folder: PathLike | Result[Any]) -> Path:
     >>> wb.write_report(posterior).name
     'report.html'
     """
-    from wirebayes.report.page import write  # matplotlib only where it is needed
+    from wirebayes.report.page import write_page  # matplotlib only where it is needed
 
-    return write(folder.place.path if isinstance(folder, Result) else Path(folder))
+    return write_page(folder.place.path if isinstance(folder, Result) else Path(folder))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import modes
@@ -172,7 +172,7 @@ def effects_of(
         elif "@" not in key and issubclass(known[name], EventEffect):
             out.append(_most_evident(candidate, training, known[name].variants([training.protocol()]), seed))
         else:
-            out.append(named(key, known))
+            out.append(effect_named(key, known))
     return out
 
 

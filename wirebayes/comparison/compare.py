@@ -11,7 +11,7 @@ import numpy as np
 
 from wirebayes.comparison.candidates import ModelToCompare, effects_of, problem_of
 from wirebayes.effects import catalogue
-from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.weighted_posterior import Posterior, weighted_posterior
 from wirebayes.io.experiment import Experiment
@@ -28,7 +28,7 @@ from wirebayes.json_files.comparison import (
     PredictionScores,
 )
 from wirebayes.json_files.read_units import in_unit
-from wirebayes.notice import Notice, from_json, named, to_json
+from wirebayes.notice import Notice, from_json, notices_by_part, to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.held_out import HeldOutPrediction, Scores, held_out, two_thirds
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error
@@ -112,7 +112,7 @@ def _scores(task: Task, seed: int, policy: Policy) -> JudgementJson:
         own = seed_of(seed, task.experiment.name, candidate.name, str(holds))
         problem = problem_of(candidate, training, effects_of(candidate, training, known, seed))
         found = weighted_posterior(problem, own, policy.ess * _WEIGHTED)
-        return found if found.converged else fit(problem, own, policy=policy)
+        return found if found.converged else fit_problem(problem, own, policy=policy)
 
     full = sampled(task.train_holds or recorded)
     own = seed_of(seed, task.experiment.name, candidate.name, "without")
@@ -228,7 +228,7 @@ def side_by_side(models: Sequence[ModelJson], base: str, about: Sequence[Notice]
         row["meaning"] = _meaning(row, base)
         rows.append(row)
     rows.sort(key=lambda r: (r["failed"] is not None, r["weight"] is None, -(_elpd(r) if r["failed"] is None else 0.0)))
-    of_models = from_json(named({m["name"]: m for m in models}))
+    of_models = from_json(notices_by_part({m["name"]: m for m in models}))
     return {"base": base, "models": rows, "warnings": to_json([*about, *of_models])}
 
 

@@ -24,7 +24,7 @@ from wirebayes.discovery.screening import (
     Replicates,
     Scale,
     by_name,
-    counted,
+    empirical_surprise,
     shared_amplitude,
 )
 from wirebayes.discovery.settings import BY_LARGER
@@ -155,7 +155,7 @@ def _surprise(value: float, chance: Array) -> float:
     The most surprising of all names, which it is compared with, is read off lines alone, and hardly varies. A count
     varies by a factor of two, and some would by chance come out on the other side.
     """
-    return float(min(counted(value, chance), Scale.of(chance).surprise(value)))
+    return float(min(empirical_surprise(value, chance), Scale.of(chance).surprise(value)))
 
 
 def _climbs(way: AmplitudePath, blocks: Sequence[LaplaceFit], begin: Sequence[Start]) -> dict[int, PathEvidence]:

@@ -135,7 +135,7 @@ def called(family: Family) -> str:
     return _OF.get(family[0], family[0]) if len(family) > 1 else family[0]
 
 
-def sentence(members: Mapping[str, float]) -> str:
+def family_sentence(members: Mapping[str, float]) -> str:
     """What a family says of the wire, and the probability of each of its members to be what is missing.
 
     Those below one in a hundred are left out.

@@ -64,6 +64,6 @@ def _sampled(block: LaplaceFit, remains: bool) -> list[JointModel]:
     out = []
     for e in block.experiments:
         own = shrinking.acting_alone(block.effects, e)
-        smooth = (shrinking.discrepancy(e, shrinking.left_over(block, e.name)),) if remains else ()
+        smooth = (shrinking.discrepancy(e, shrinking.residual_rms(block, e.name)),) if remains else ()
         out.append(JointModel((e,), (*own, *smooth), block.parameters(e.name)))
     return out

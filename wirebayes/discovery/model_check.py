@@ -18,7 +18,7 @@ import numpy as np
 from wirebayes.discovery.global_test import Report, examine
 from wirebayes.discovery.screening import TWO
 from wirebayes.discovery.settings import ALPHA, SIMULATIONS
-from wirebayes.effects import catalogue, named
+from wirebayes.effects import catalogue, effect_named
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import fitted
@@ -142,7 +142,7 @@ def check_model(
         The built-in `map`, or one over processes.
     """
     kinds = catalogue(job.own_effects)
-    effects = [named(key, kinds) for key in job.effects]
+    effects = [effect_named(key, kinds) for key in job.effects]
     unchecked = partial(ModelCheck, None, alpha, with_effects=bool(effects))
     if job.spec.likelihood == "hold":
         return unchecked(reason="the hold-by-hold likelihood says nothing of how one hold follows from another")

@@ -250,7 +250,7 @@ def by_name(candidates: Sequence[Candidate], scans: Sequence[Scan]) -> dict[str,
     return out
 
 
-def counted(value: Any, chance: Array) -> Any:
+def empirical_surprise(value: Any, chance: Array) -> Any:
     """Minus the log share of simulated values (n,) as large; beyond the largest it goes on by the distance."""
     larger = len(chance) - np.searchsorted(np.sort(chance), value)
     return np.log1p(len(chance)) - np.log1p(larger) + np.maximum(value - chance.max(), 0.0)
@@ -288,7 +288,7 @@ class Scale:
     def surprise(self, value: Any) -> Any:
         """Of a value, or of each of an array; none where the evidence is against the name."""
         along = np.maximum((value - self.high) / self.fall - np.log(UPPER), 0.0)
-        most = counted(value, self.chance) + ABOVE_COUNT
+        most = empirical_surprise(value, self.chance) + ABOVE_COUNT
         return np.where(np.greater(value, _AGAINST), np.minimum(along, most), 0.0)
 
     def value(self, surprise: float) -> float:

@@ -9,13 +9,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import repeat
-from typing import Any
 
 import numpy as np
 
 from wirebayes.discovery import gross_errors, power, residual_patterns, shrinking
 from wirebayes.discovery.alternatives import Alternative, alternatives
-from wirebayes.discovery.families import block_ratio, called, sentence
+from wirebayes.discovery.families import block_ratio, called, family_sentence
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.investigation import Investigation
@@ -32,17 +31,16 @@ from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import (
-    Amplitude,
-    Answer,
+    AmplitudeEstimate,
     Disagreement,
-    DiscoveryJson,
     ExperimentFindings,
     FamilyReport,
     HeldOutReport,
+    SharedFindings,
 )
 from wirebayes.json_files.read_units import in_unit
 from wirebayes.model.scales import scales_of
-from wirebayes.notice import Notice, named, to_json
+from wirebayes.notice import Notice, notices_by_part, to_json
 from wirebayes.processes.workers import ParallelMap
 from wirebayes.sentences import counted
 from wirebayes.wire.control import READ_UNIT
@@ -61,29 +59,6 @@ def catalogue_without(names: Sequence[str], known: Mapping[str, type[Effect]] = 
         if name not in known:
             raise InputError(f"--without {name}: no such effect; known are {', '.join(sorted(known))}")
     return {name: kind for name, kind in known.items() if name not in names}
-
-
-def discover(
-    experiments: Sequence[Experiment], *, without: Sequence[str] = (), seed: int = 0, **settings: Any
-) -> DiscoveryJson:
-    """The content of ``discovery.json`` for the experiments of one file (see `investigate`).
-
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        Those of one material are judged jointly.
-    without : sequence of str
-        Effects taken out of the catalogue.
-    seed : int
-    **settings
-        Fields of `Settings`.
-
-    Returns
-    -------
-    dict
-    """
-    kinds = catalogue_without(without, settings.pop("kinds", CATALOGUE))
-    return investigate(experiments, Settings(kinds=kinds, **settings), seed).report
 
 
 def investigate(
@@ -139,7 +114,9 @@ def investigate(
             out[e.name] = {**common, **ahead, **own[e.name]}
     report("held-out holds", len(answers), len(answers))
     return Investigation(
-        {"version": 3, "experiments": out, "warnings": named(out)}, tuple(final), _undecided(past, answers, final)
+        {"version": 3, "experiments": out, "warnings": notices_by_part(out)},
+        tuple(final),
+        _undecided(past, answers, final),
     )
 
 
@@ -192,7 +169,7 @@ def _own_reports(
         own: HeldOutReport = {
             "steps": check.steps,
             "held_out": check.held_out,
-            "residual_rms_N": shrinking.left_over(block, e.name),
+            "residual_rms_N": shrinking.residual_rms(block, e.name),
             "gross_errors": struck,
             "warnings": to_json([*map(gross_errors.in_words, struck), *_few_holds(e)]),
         }
@@ -221,11 +198,11 @@ def _family(family: FamilyEvidence) -> FamilyReport:
         "inclusion": family.inclusion,
         "leave_one_hold_out": family.gain,
         "established": family.is_established,
-        "sentence": sentence(family.members),
+        "sentence": family_sentence(family.members),
     }
 
 
-def _amplitude(final: LaplaceFit, effect: Effect) -> Amplitude:
+def _amplitude(final: LaplaceFit, effect: Effect) -> AmplitudeEstimate:
     """Amplitude in the final model, by its normal approximation in the sampled coordinates."""
     low, mean, high = map(float, final.along(effect, (-1.645, 0.0, 1.645)))
     hold = effect.hold if isinstance(effect, EventEffect) else None
@@ -241,7 +218,7 @@ def _inclusion(found: Evidence | None) -> dict[str, float]:
 def _common(
     answers: Sequence[MaterialAnswer], i: int, e: Experiment, plain: list[LaplaceFit], test: GlobalTest,
     where: list[Disagreement], alike: dict[tuple[str, str], float],
-) -> Answer:  # fmt: skip
+) -> SharedFindings:  # fmt: skip
     """What the experiments of one block share in the report; of amplitudes those of the effects that act on `e`."""
     answer = answers[i]
     names, members = [a.name for a in answer.accepted], answer.set

@@ -4,8 +4,9 @@ docs/thresholds.rst says how each number was set.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from wirebayes.effects import CATALOGUE
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.wire.effect import Effect
 
@@ -65,11 +66,11 @@ class Settings:
     spec : ModelSpec
         The plain model.
     kinds : mapping of name to effect class
-        The catalogue searched.
+        The effects searched.
     simulations : int
         Refitted data sets behind the p-value: half of them where these decide, more where it is too close to the level.
     """
 
     spec: ModelSpec = PLAIN_SPEC
-    kinds: Mapping[str, type[Effect]] = None  # type: ignore[assignment]
+    kinds: Mapping[str, type[Effect]] = field(default_factory=lambda: CATALOGUE)
     simulations: int = SIMULATIONS

@@ -256,7 +256,7 @@ def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: np.random.G
     # two experiments of one name differ in how many of its holds they have
     same = block.names == (experiment.name,) and len(block.experiments[0].holds) == len(experiment.holds)
     fit = block if same and own == block.effects else fitted([experiment], own, block.spec, rng, scales=block.scales)
-    return (*own, discrepancy(experiment, left_over(fit, experiment.name)))
+    return (*own, discrepancy(experiment, residual_rms(fit, experiment.name)))
 
 
 def acting_alone(effects: Sequence[Effect], experiment: Experiment) -> tuple[Effect, ...]:
@@ -271,7 +271,7 @@ def discrepancy(experiment: Experiment, size_N: float) -> Discrepancy:
     return Discrepancy(len(experiment.holds), size_N, float(np.median(durations)) or 1.0)
 
 
-def left_over(block: LaplaceFit, name: str) -> float:
+def residual_rms(block: LaplaceFit, name: str) -> float:
     """Root mean square of what the best parameters leave over in an experiment's readings, N."""
     sample = block.target.problem.samples[block.names.index(name)]
     line, _, _ = block.target.problem.linearised(block.target.coordinates.to_natural(block.modes.z[:1]), sample)

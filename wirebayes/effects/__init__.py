@@ -92,7 +92,7 @@ def source_of(own: Path | None) -> str | None:
     return None if own is None else own.read_text(encoding="utf-8", errors="backslashreplace")
 
 
-def named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
+def effect_named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
     """The effect of a key: a name, ``grip_slip@7`` (or ``grip_slip@EXPERIMENT:7``) for one that belongs to a hold.
 
     Raises

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.inference.coordinates.transform import Transformation
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.inference.sampler import ensemble
@@ -54,7 +53,7 @@ class Fit:
         return self.chains.why
 
 
-def fit(
+def fit_problem(
     problem: Problem,
     seed: int = 0,
     *,
@@ -69,7 +68,7 @@ def fit(
     Parameters
     ----------
     checkpoint : Path, optional
-        See `wirebayes.inference.sampler.ensemble.sample`.
+        See `wirebayes.inference.sampler.ensemble.sample_posterior`.
     progress : function of a share between 0 and 1
     near : mapping of name to value, optional
         Parameters known to be good, where the search for modes looks too.
@@ -89,7 +88,9 @@ def fit(
     if near is not None and near.keys() >= set(walked):
         start = sampled(np.array([[near.get(name, 1.0) for name in problem.names]]))
     cloud = None if rough is None else sampled(rough)
-    chains = ensemble.sample(target, seed, policy, checkpoint=checkpoint, progress=progress, near=start, rough=cloud)
+    chains = ensemble.sample_posterior(
+        target, seed, policy, checkpoint=checkpoint, progress=progress, near=start, rough=cloud
+    )
     m, steps, walkers, d = chains.z.shape
     thin = max(1, steps * walkers // STORED_DRAWS)
     z = np.moveaxis(chains.z[:, thin - 1 :: thin], 2, 1)
@@ -98,19 +99,6 @@ def fit(
     _, theta, added = completed(target.problem, theta, np.random.default_rng(seed_of(seed, "completed")))
     theta = own.theta_in(problem.units, theta)
     return Fit(problem, theta.reshape(m, -1, theta.shape[1]), log_density + added.reshape(m, -1), chains, thin)
-
-
-def parameters_at(problem: Problem, z: Array) -> Array:
-    """(n, d) parameters, in the problem's units, of (n, d) coordinates that `fit` sampled.
-
-    Parameters
-    ----------
-    problem : Problem
-        Without amplitudes that are integrated out.
-    z : (n, d) array
-    """
-    own = problem.in_units(problem.own_units)
-    return own.theta_in(problem.units, Transformation(own).to_natural(z))
 
 
 def seed_of(seed: int, *words: str) -> int:

@@ -23,7 +23,7 @@ from wirebayes.inference.chain_statistics import pareto_smoothed
 from wirebayes.inference.climb import Optimum, climb, distinct
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES
 from wirebayes.numeric.log_sum import log_sum
@@ -99,7 +99,7 @@ class _Past:
             (*self.proposals, new.proposal), (*self.counts, len(new.z)),
         )  # fmt: skip
 
-    def points(self, wanted: NDArray[np.bool_], ess: float) -> tuple[Points, Points]:
+    def points(self, wanted: NDArray[np.bool_], ess: float) -> tuple[WeightedPoints, WeightedPoints]:
         """Points of the sum of the wanted densities to a power, and of the sum itself.
 
         Parameters
@@ -115,11 +115,11 @@ class _Past:
         share = np.clip(ess / found[known], 1.0, _MOST_SHARE)
         normalised = self.log_density[:, known] - logsumexp(log_weight[:, known], axis=0)
         together = np.logaddexp.reduce(normalised + np.log(share), axis=1)
-        hot, cold = (Points.weighted(self.z, power * together - drawn_from) for power in (_HOT, 1.0))
+        hot, cold = (WeightedPoints.weighted(self.z, power * together - drawn_from) for power in (_HOT, 1.0))
         return hot, cold
 
 
-def sample(
+def importance_sample(
     densities: Callable[[Array], Array],
     start: Mixture,
     draws: Array,
@@ -152,7 +152,7 @@ def sample(
     height = densities(witness)[:, 0] if len(witness) else np.empty(0)
     current: Mixture | Proposal = start
     if len(draws):
-        rough = Points.equal(draws)
+        rough = WeightedPoints.equal(draws)
         current = _learned(rough, rough, start, order, rng, start)
     n, past = _LEAST, None
     # broadcast to all densities by the first round
@@ -174,7 +174,9 @@ def sample(
         past = _Past.first(fresh) if past is None else past.joined(fresh)
         hot, cold = past.points(wanted, ess)
         if len(witness):
-            hot, cold = (p.joined(Points.equal(witness).worth(_REMEMBERED * p.weight.sum())) for p in (hot, cold))
+            hot, cold = (
+                p.joined(WeightedPoints.equal(witness).worth(_REMEMBERED * p.weight.sum())) for p in (hot, cold)
+            )
         current = _learned(hot, cold, start, order, rng, current)
     return replace(fresh, settled=settled, log_integral=log_integral, log_ratio=log_ratio)
 
@@ -186,7 +188,7 @@ def from_draws(
     rng: np.random.Generator,
     ess: float,
 ) -> Weighted:
-    """`sample`, begun from draws: modes are climbed to from the highest ones, those of the first also from others.
+    """`importance_sample`, begun from draws: modes are climbed to from the highest, of the first density from others too.
 
     Parameters
     ----------
@@ -206,7 +208,7 @@ def from_draws(
     )
     found = distinct([found])
     start = mixture.from_modes(found.z, _WIDER * found.covariance, np.zeros(len(found.z)))
-    return sample(densities, start, draws, order, rng, ess)
+    return importance_sample(densities, start, draws, order, rng, ess)
 
 
 def widened(modes: Optimum) -> Mixture:
@@ -280,8 +282,8 @@ def tail(log_weight: Array) -> float:
 
 
 def _learned(
-    hot: Points,
-    cold: Points,
+    hot: WeightedPoints,
+    cold: WeightedPoints,
     start: Mixture,
     order: NDArray[np.int64],
     rng: np.random.Generator,

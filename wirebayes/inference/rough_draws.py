@@ -11,8 +11,8 @@ from wirebayes.inference.importance import LARGEST_K, effective, tail
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture
-from wirebayes.inference.sampler.ensemble import sample
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.ensemble import sample_posterior
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.resampling import truncated_rows
 from wirebayes.numeric.typing import Array
@@ -38,7 +38,7 @@ def draws(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int
     """
     z = _weighted(target, found, rng, n)
     if z is None:
-        chains = sample(target, int(rng.integers(2**63)), _SHORT, found=found)
+        chains = sample_posterior(target, int(rng.integers(2**63)), _SHORT, found=found)
         z = chains.z.reshape(-1, chains.z.shape[-1])
         z = z[rng.choice(len(z), n, replace=False)]
     return target.coordinates.to_natural(z)
@@ -62,7 +62,7 @@ def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n:
         log_weight = height - drawn_from
         if effective(log_weight[:, None])[0] >= min(n, _ENOUGH) and tail(log_weight) <= LARGEST_K:
             return z[truncated_rows(log_weight, n, rng)]
-        points = Points.weighted(z, _HOT * height - drawn_from).thinned(_LEARNED, rng)
+        points = WeightedPoints.weighted(z, _HOT * height - drawn_from).thinned(_LEARNED, rng)
         try:
             proposals.append(mixture.fit_mixture(points, rng, most=components))
         except np.linalg.LinAlgError:

@@ -96,12 +96,14 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
         return target(z)[:, None]
 
     def learned(modes: Optimum, draws: Array) -> Weighted:
-        return importance.sample(density, importance.widened(modes), draws, target.coordinates.order, rng, ess)
+        return importance.importance_sample(
+            density, importance.widened(modes), draws, target.coordinates.order, rng, ess
+        )
 
     def agreed(pool: Weighted, modes: Optimum) -> bool:
         if not pool.settled[0]:
             return False
-        missing = overlooked(target, pool, 0, float(pool.log_integral[0]), importance.widened(modes), rng)
+        missing = overlooked_share(target, pool, 0, float(pool.log_integral[0]), importance.widened(modes), rng)
         return abs(missing) <= _NEXT_TO_NOTHING
 
     known, others = searches(target, rng, 2, starts=_STARTS)
@@ -135,7 +137,7 @@ def _balanced(
     return height, of_pool, np.logaddexp(of_pool, of_others)
 
 
-def overlooked(
+def overlooked_share(
     target: LogPosterior, pool: Weighted, column: int, log_integral: float, others: Mixture, rng: np.random.Generator
 ) -> float:
     """Share of a posterior that its integral by draws of a proposal lacks, as draws of another proposal tell.

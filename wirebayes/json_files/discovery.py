@@ -7,7 +7,7 @@ from wirebayes.notice import Warned
 Verdict = Literal["nothing-missing", "named", "ambiguous", "partial", "unknown"]
 
 
-class Amplitude(TypedDict):
+class AmplitudeEstimate(TypedDict):
     """The amplitude of an accepted effect; `hold` is that of an event."""
 
     mean: float
@@ -70,7 +70,7 @@ class Disagreement(TypedDict):
     sentence: str
 
 
-class Answer(TypedDict):
+class SharedFindings(TypedDict):
     """What the experiments of one material share.
 
     `p_simulations` is the number of refitted simulations that `p_global` is a share of, and `p_interval` the share's
@@ -83,7 +83,7 @@ class Answer(TypedDict):
     set: list[str]
     group: list[str]
     accepted: list[str]
-    amplitudes: dict[str, Amplitude]
+    amplitudes: dict[str, AmplitudeEstimate]
     probabilities: dict[str, float]
     probability_nothing: float | None
     inclusion: dict[str, float]
@@ -171,7 +171,7 @@ class HeldOutReport(Warned):
     gross_errors: list[GrossError]
 
 
-class ExperimentFindings(Answer, Outlook, HeldOutReport):
+class ExperimentFindings(SharedFindings, Outlook, HeldOutReport):
     """All that is said of one experiment."""
 
 

@@ -28,7 +28,7 @@ def in_unit(content: Content, unit: str) -> Content:
     return out
 
 
-def read(entry: Mapping[str, Any], name: str) -> Any:
+def read_value(entry: Mapping[str, Any], name: str) -> Any:
     """What an entry holds under a name, whatever the unit of what was read."""
     return entry[f"{name}_{unit_read(entry, name)}"]
 

@@ -42,7 +42,7 @@ def claim_step_rows(
     list of rows
         Median drift, mm, its 5 and 95 % quantiles over draws (and poses), and whether the median is within the claim.
     """
-    robot = schema.read(robot_name)
+    robot = schema.read_robot_file(robot_name)
     out = []
     for wire, line in chains.items():
         given = WireDraws({k: np.array([table_4[wire][k]]) for k in draws.CORE}, lengths_mm[wire])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.single_holds import hold_courses
 from wirebayes.numeric.typing import Array
-from wirebayes.prediction.predictive import PredictionRequest, predict
+from wirebayes.prediction.predictive import PredictionRequest, draw_predictive
 from wirebayes.results.read_back import Stored
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
@@ -69,7 +69,7 @@ def forecast_held_out(stored: Stored, experiment: Experiment, rng: np.random.Gen
     alone = stored.likelihood == "hold"
     unused = protocol.recorded & (np.arange(len(protocol.setting)) >= trained)
     request = PredictionRequest(protocol, 0 if alone else trained, unused, _first(measured, alone))
-    drawn = predict(stored.problem, some(stored.theta), stored.sample, request, rng)
+    drawn = draw_predictive(stored.problem, some(stored.theta), stored.sample, request, rng)
     wanted = protocol.mask & unused[:, None]
     if alone:
         wanted[:, 0] = False
@@ -94,7 +94,7 @@ def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng:
     """
     protocol, first = _last_alone(experiment, time_s)
     request = PredictionRequest(protocol, 0, np.array([True]), first)
-    drawn: Array = predict(stored.problem, some(stored.theta), stored.sample, request, rng)[0]
+    drawn: Array = draw_predictive(stored.problem, some(stored.theta), stored.sample, request, rng)[0]
     return drawn
 
 

@@ -26,7 +26,7 @@ _FILES = (
 _TERMS = ("hold", "90 % interval", "prior", "contraction", "held out", "rms", "drift", "tilt", "specimen spread")
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def paper_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """Assemble the page from the folder's tables and pictures; what is not there yet is left out."""
     tables = {name: read_json(folder / f"{name}.json") for name in _TABLES if (folder / f"{name}.json").is_file()}
     gallery = _gallery(folder / "figures")

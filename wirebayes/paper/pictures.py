@@ -97,7 +97,7 @@ class Gallery:
             spoken = figures.WORDS[likelihood]
             curve = _published_at(e, published, out) if likelihood == "hold" else None
             title, colour = f"{e.name}, {spoken}", figures.COLOURS[likelihood]
-            figure = figures.residuals(out.hold, out.time_s, out.measured_N, out.band_N, title, colour, curve)
+            figure = figures.residual_figure(out.hold, out.time_s, out.measured_N, out.band_N, title, colour, curve)
             alt = f"Measured minus predicted tension in the unused holds of {e.name}, {spoken}."
             caption = f"rms {number(out.rms_N, 2)} N; {100 * out.coverage:.0f} % of the readings lie in the 90 % band."
             self.add(f"unused-{likelihood}", e.name, figure, alt, caption)
@@ -125,7 +125,7 @@ class Gallery:
     ) -> None:
         mark = (published["k1"], published["B"])
         k1, B = ({kind: d[name] for kind, d in draws.items()} for name in ("k1", "B"))
-        figure = figures.joint(k1, B, figures.named("k1"), figures.named("B"), e.name, mark)
+        figure = figures.joint(k1, B, figures.axis_label("k1"), figures.axis_label("B"), e.name, mark)
         low, high = np.quantile(by_hold["k1"], [0.05, 0.95])
         caption = f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B changes with it."
         jump = stiffest_step(e)
@@ -145,7 +145,7 @@ class Gallery:
         k2 = {kind: d["k2"] for kind, d in draws.items()}
         product = {kind: d["k1"] * d["B"] for kind, d in draws.items()}
         mark = (published["k2"], published["k1"] * published["B"])
-        figure = figures.joint(k2, product, figures.named("k2"), "k1·B, N mm N⁻ᵁ", e.name, mark)
+        figure = figures.joint(k2, product, figures.axis_label("k2"), "k1·B, N mm N⁻ᵁ", e.name, mark)
         correlation = float(np.corrcoef(np.log(by_hold["k1"] * by_hold["B"]), np.log(by_hold["k2"]))[0, 1])
         time_s = e.recorded_holds[-1].duration_s
         theirs = (np.asarray(published[name]) for name in ("k2", "N"))

@@ -20,10 +20,10 @@ from wirebayes.numeric.typing import Array
 from wirebayes.paper import claim_steps, identification, pictures, section_4, verdicts
 from wirebayes.paper.held_out import Forecast, forecast_held_out
 from wirebayes.processes.workers import workers
-from wirebayes.report.page import write as write_page
+from wirebayes.report.page import write_page
 from wirebayes.results.jobs import Job
 from wirebayes.results.jobs import run as run_jobs
-from wirebayes.results.read_back import Stored, load
+from wirebayes.results.read_back import Stored, load_posterior
 
 Row = dict[str, Any]
 LIKELIHOODS: tuple[Likelihood, ...] = ("chain", "hold")
@@ -161,8 +161,8 @@ def _draw_robot(drawn: pictures.Gallery, rows: list[Row], chains: Mapping[str, S
 
 def _stored(folder: Path, training: int) -> tuple[dict[str, Stored], dict[str, Stored]]:
     """An experiment's posteriors by likelihood: of all holds, and of the first ones."""
-    full: dict[str, Stored] = {likelihood: load(folder / likelihood) for likelihood in LIKELIHOODS}
-    return full, {likelihood: load(folder / f"{likelihood}-first-{training}") for likelihood in LIKELIHOODS}
+    full: dict[str, Stored] = {likelihood: load_posterior(folder / likelihood) for likelihood in LIKELIHOODS}
+    return full, {likelihood: load_posterior(folder / f"{likelihood}-first-{training}") for likelihood in LIKELIHOODS}
 
 
 def _rows(

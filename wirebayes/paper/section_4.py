@@ -47,7 +47,7 @@ def drift_rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
     for wire, stored in chains.items():
         line = as_line(stored)
         for name in ROBOTS:
-            robot = schema.read(name)
+            robot = schema.read_robot_file(name)
             for spread, loaded_s in CASES:
                 rng = np.random.default_rng(seed_of(seed, "robot", wire, name, f"{spread} {loaded_s}"))
                 wires = draws.for_robot(robot, line, spread, rng)
@@ -62,7 +62,7 @@ def drift_rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
 
 def needed(chains: Mapping[str, Stored]) -> list[Row]:
     """Largest platform mass for which the claim holds on new wires, for each wire and size of the robot."""
-    robot = schema.read(MAPPED)
+    robot = schema.read_robot_file(MAPPED)
     return [
         {
             "experiment": wire,
@@ -78,7 +78,7 @@ def needed(chains: Mapping[str, Stored]) -> list[Row]:
 
 def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
     """A map of the workspace for each wire, new and alike."""
-    robot = schema.read(MAPPED)
+    robot = schema.read_robot_file(MAPPED)
     for wire, stored in chains.items():
         wires = draws.for_robot(robot, as_line(stored, _FEW))
         found = claim.over_workspace(robot, wires, claim.grid(robot, _MAP))
@@ -101,7 +101,7 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
     limit_mm : float
         The paper's claim, drawn as a line.
     """
-    robot = schema.read(MAPPED)
+    robot = schema.read_robot_file(MAPPED)
     x, R = robot.home_m, matrix(robot.home_rotation_rad)
     moved: dict[str, NDArray[np.float64]] = {}
     budget: dict[str, dict[str, float]] = {}

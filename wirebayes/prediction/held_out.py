@@ -15,7 +15,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.numeric.typing import Array
 from wirebayes.prediction.leave_one_hold_out import evenly_thinned
-from wirebayes.prediction.predictive import PredictionRequest, given_first, predict
+from wirebayes.prediction.predictive import PredictionRequest, draw_predictive, given_first
 from wirebayes.wire.staircase import linearise
 
 LEVELS = (0.5, 0.9, 0.99)  # half, the usual nine in ten, and nearly all: intervals whose coverage is counted
@@ -121,7 +121,7 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
     past = int(here.protocol.recorded.sum())
     free = None
     if problem.likelihood == "chain":
-        drawn = predict(problem, theta, here, PredictionRequest(whole, trained, requested, nothing), rng)
+        drawn = draw_predictive(problem, theta, here, PredictionRequest(whole, trained, requested, nothing), rng)
         elpd, elpd_given, together = _chain_scores(fitted, experiment, sample, requested)
         free = _scores(drawn, whole.mask & requested[:, None], whole.number, whole.time_s, tension, elpd, together)
         # Each hold given its own first reading alone, as the paper's figures were made.
@@ -130,7 +130,7 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
             request = PredictionRequest(whole, trained, only, np.where(only, tension[:, 0], np.nan))
             drawn = given_first(drawn, request)
     else:
-        drawn = predict(problem, theta, here, PredictionRequest(whole, trained, requested, tension[:, 0]), rng)
+        drawn = draw_predictive(problem, theta, here, PredictionRequest(whole, trained, requested, tension[:, 0]), rng)
         elpd_given = _hold_scores(fitted, experiment, sample, requested)
     later = whole.mask & requested[:, None]
     later[:, 0] = False

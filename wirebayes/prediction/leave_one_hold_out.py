@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from scipy.special import expit, logsumexp
 
 from wirebayes.inference.chain_statistics import pareto_smoothed
-from wirebayes.inference.fit import fit, seed_of
+from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.model.problem import Problem
@@ -113,7 +113,7 @@ def smoothed_leave_one_hold_out(
         progress(done / alone.sum())
         s, j = where[i]
         own = seed_of(seed, "without", str(s), str(j))
-        without = fit(without_hold(problem, s, j), own, policy=policy, rough=theta)
+        without = fit_problem(without_hold(problem, s, j), own, policy=policy, rough=theta)
         there = problem.leave_one_hold_out(evenly_thinned(without.flat))[s][j]
         bridge, shared = log_mean(there, conditional[s][j])
         if exact or shared >= _SHARED:  # else what importance sampling says, settled or not, is nearer

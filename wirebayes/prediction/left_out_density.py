@@ -17,7 +17,7 @@ from wirebayes.inference import importance
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import searches
-from wirebayes.inference.weighted_posterior import overlooked, weighted_posterior
+from wirebayes.inference.weighted_posterior import overlooked_share, weighted_posterior
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.typing import Array
 
@@ -83,7 +83,7 @@ def _bear_witness(
         left.problem = without_hold(target.problem, *holds[m])
         log_integral = float(pool.log_integral[0] + pool.log_ratio[1 + m])
         others = importance.widened(found)
-        settled[m] = abs(overlooked(left, pool, 1 + m, log_integral, others, rng)) <= _MISSED
+        settled[m] = abs(overlooked_share(left, pool, 1 + m, log_integral, others, rng)) <= _MISSED
 
 
 def _log_units(asked: Problem, own: Problem, holds: Holds) -> Array:

@@ -47,7 +47,7 @@ class PredictionRequest:
     first: Floats
 
 
-def predict(
+def draw_predictive(
     problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: np.random.Generator
 ) -> Floats:
     """Draws of the requested readings.

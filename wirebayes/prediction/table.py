@@ -12,7 +12,7 @@ from wirebayes.io.readings import READ, SET
 from wirebayes.notice import Notice
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
-from wirebayes.prediction.predictive import predict
+from wirebayes.prediction.predictive import draw_predictive
 from wirebayes.prediction.request import ProtocolRequest
 from wirebayes.results.read_back import Stored
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
@@ -116,7 +116,7 @@ def _drawn(members: Sequence[tuple[float, ProtocolRequest]], seed: int, draws: i
         stored, n = request.stored, max(round(probability * draws), 2)
         theta = stored.theta
         theta = theta[evenly(len(theta), n)]
-        parts.append(predict(stored.problem, theta, stored.sample, request.prediction, rng))
+        parts.append(draw_predictive(stored.problem, theta, stored.sample, request.prediction, rng))
     return np.concatenate(parts, axis=-1)
 
 

@@ -279,7 +279,7 @@ _COORDINATES = re.compile(r'(?<= d=")[^"]*')
 _LONG = re.compile(r"\d+\.\d+")
 
 
-def save(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure as SVG, whole or not at all."""
     write_bytes(path, svg(figure))
 
@@ -296,7 +296,7 @@ def save_together(figure_of: Mapping[str, Callable[[], Figure]], folder: Path) -
     """
 
     def saving(path: Path, figure: Callable[[], Figure]) -> Callable[[], None]:
-        return lambda: save(figure(), path)
+        return lambda: save_figure(figure(), path)
 
     in_copies([saving(folder / name, figure) for name, figure in figure_of.items()])
 
@@ -335,7 +335,7 @@ def files_beside(folder: Path, contents: Sequence[tuple[str, str]]) -> Links:
     return Links([(quote(name), holds) for name, holds in found])
 
 
-def sentence(text: str) -> str:
+def as_sentence(text: str) -> str:
     """A text as a sentence: its first letter large, a full stop at its end."""
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 

@@ -132,7 +132,7 @@ def joint(
     return figure
 
 
-def named(name: str, effects: tuple[Any, ...] = (), control: Control = "displacement") -> str:
+def axis_label(name: str, effects: tuple[Any, ...] = (), control: Control = "displacement") -> str:
     """A parameter with its unit, as an axis says it.
 
     Parameters
@@ -190,7 +190,7 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: C
         stairs = bottom + 0.92 * _SIDE * heights / heights.max()
         axes.stairs(stairs, i + _SIDE * edges, baseline=bottom, fill=True, color=CHAIN, alpha=0.75)
         ticks, labels = _few_ticks(values, is_log)
-        words = "\n".join(_narrow(line) for line in named(name, effects, control).replace(", ", ",\n").split("\n"))
+        words = "\n".join(_narrow(line) for line in axis_label(name, effects, control).replace(", ", ",\n").split("\n"))
         axes.text(i + _SIDE / 2, -0.42, words, fontsize=8, ha="center", va="top")
         _ticks(axes, [(i + _SIDE * t, 0.0) for t in ticks], (0.0, -_TICK))
         for t, label in zip(ticks, labels, strict=True):
@@ -304,7 +304,7 @@ _BLUR, _REACH = 1.0, 4  # cells: standard deviation, and where its tail is cut o
 _SMOOTHING = _smoothing(_CELLS)
 
 
-def residuals(
+def residual_figure(
     hold: Array, time_s: Array, measured_N: Array, band_N: Array, title: str, colour: str = CHAIN,
     paper_N: Array | None = None,
 ) -> Figure:  # fmt: skip

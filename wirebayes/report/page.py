@@ -10,11 +10,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from wirebayes._version import __version__
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored_results, write_text
-from wirebayes.report.blocks import Page, View, sentence
+from wirebayes.report.blocks import Page, View, as_sentence
 from wirebayes.report.pages import PAGES
 
 
-def write(folder: Path) -> Path:
+def write_page(folder: Path) -> Path:
     """Write ``report.html`` into a folder of results and return its path.
 
     Raises
@@ -38,7 +38,8 @@ def page_of_folder(folder: Path) -> Page:
     if not isinstance(command, str) or command not in PAGES:
         known = ", ".join(PAGES)
         raise InputError(f"{folder / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
-    page_of: Callable[[Path, dict[str, Any]], Page] = import_module(PAGES[command]).page
+    module, _, function = PAGES[command].partition(":")
+    page_of: Callable[[Path, dict[str, Any]], Page] = getattr(import_module(module), function)
     with stored_results(folder):
         return page_of(folder, configuration)
 
@@ -47,6 +48,6 @@ def render(page: Page) -> str:
     """The page as HTML with everything inside."""
     environment = Environment(loader=PackageLoader("wirebayes.report", "."), undefined=StrictUndefined)
     environment.autoescape = environment.trim_blocks = environment.lstrip_blocks = True
-    environment.filters["sentence"] = sentence
+    environment.filters["sentence"] = as_sentence
     views = any(isinstance(block, View) for section in page.sections for block in section.blocks)
     return environment.get_template("page.html.jinja").render(page=page, views=views, version=__version__) + "\n"

@@ -6,14 +6,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wirebayes.effects import catalogue, named
-from wirebayes.inference.fit import Fit, fit, seed_of
+from wirebayes.effects import catalogue, effect_named
+from wirebayes.inference.fit import Fit, fit_problem, seed_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.processes.workers import cores, workers
-from wirebayes.results.store import save, save_summary
+from wirebayes.results.store import save_posterior, save_summary
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Job:
     spec : ModelSpec
     provenance : dict
     near : dict, optional
-        Parameters known to be good (see `wirebayes.inference.fit.fit`).
+        Parameters known to be good (see `wirebayes.inference.fit.fit_problem`).
     apart : tuple of str
         Folders of the experiments, one each, where they are stored apart; all in one when left out.
     """
@@ -125,15 +125,15 @@ def fit_job(
     seed : int
         Of the run; the fit's own follows from it and the name of the job's folder.
     checkpoint : Path, optional
-        See `wirebayes.inference.fit.fit`; without one nothing is written meanwhile.
+        See `wirebayes.inference.fit.fit_problem`; without one nothing is written meanwhile.
     progress : callable
         Called with the share of the work that is done, from 0 to 1.
     """
     known = catalogue(job.own_effects)
-    effects = [named(key, known) for key in job.effects]
+    effects = [effect_named(key, known) for key in job.effects]
     problem = build(job.experiments, effects, job.spec)
     own_seed = seed_of(seed, job.folder)
-    return fit(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress, near=job.near)
+    return fit_problem(problem, own_seed, policy=policy, checkpoint=checkpoint, progress=progress, near=job.near)
 
 
 def store(job: Job, result: Fit, directory: Path, seed: int, policy: Policy, *, draws: bool = True) -> None:
@@ -152,6 +152,6 @@ def store(job: Job, result: Fit, directory: Path, seed: int, policy: Policy, *, 
     samples = result.problem.samples if job.apart else (None,)
     for place, sample in zip(job.folders, samples, strict=True):
         if draws:
-            save(result, directory / place, about, seed=seed_of(seed, job.folder), sample=sample)
+            save_posterior(result, directory / place, about, seed=seed_of(seed, job.folder), sample=sample)
         else:
             save_summary(result, directory / place, sample=sample)

@@ -75,7 +75,7 @@ def content(groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> bytes
     return stream.getvalue()
 
 
-def read(path: Path, names: Sequence[str]) -> dict[str, Group]:
+def read_groups(path: Path, names: Sequence[str]) -> dict[str, Group]:
     """Some groups of a file that `content` made.
 
     Parameters

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wirebayes.effects import catalogue, named
+from wirebayes.effects import catalogue, effect_named
 from wirebayes.errors import InputError
 from wirebayes.io.readings import READ, SET
 from wirebayes.io.run_folder import read_json, stored_results
@@ -87,11 +87,11 @@ def experiments_in(path: Path) -> tuple[str, ...]:
 def _opened(path: Path, *groups: str) -> Iterator[dict[str, Group]]:
     """Some groups of a ``posterior.nc``, for each costs time to read; whatever is wrong there is an `InputError`."""
     with stored_results(path):
-        yield netcdf.read(path, groups)
+        yield netcdf.read_groups(path, groups)
 
 
-def load(folder: Path, experiment: str | None = None, own_effects: Path | None = None) -> Stored:
-    """Read the posterior of one experiment from a folder that `save` wrote.
+def load_posterior(folder: Path, experiment: str | None = None, own_effects: Path | None = None) -> Stored:
+    """Read the posterior of one experiment from a folder that `save_posterior` wrote.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _doubts(groups: Mapping[str, Group], name: str, summary: Path) -> tuple[Noti
 
 
 def load_with_priors(folder: Path) -> list[tuple[Stored, dict[str, Array]]]:
-    """The posterior of each experiment in a folder that `save` wrote, beside draws of its prior, each (n,)."""
+    """The posterior of each experiment in a folder by `save_posterior`, beside draws of its prior, each (n,)."""
     path = folder / "posterior.nc"
     with _opened(path, *_MODEL, "prior") as groups:
         return [(_stored(groups, path, at), _prior(groups, at)) for at in range(len(_names_in(groups, path)))]
@@ -159,7 +159,7 @@ def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path 
     draws = _one_of(posterior, at)
     lengths = json.loads(about["lengths_mm"])
     keys, known = json.loads(about["effects"]), catalogue(own_effects)
-    model = Model(about["elastic_law"], about["history"], tuple(named(k, known) for k in keys),
+    model = Model(about["elastic_law"], about["history"], tuple(effect_named(k, known) for k in keys),
                   float(about["tension_ref_N"]))  # fmt: skip
     exponent = draws.pop(LENGTH_EXPONENT, None)
     if len(names) > 1:

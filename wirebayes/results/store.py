@@ -15,7 +15,7 @@ from wirebayes.results.content import groups_of
 from wirebayes.results.summary import summary_of
 
 
-def save(
+def save_posterior(
     fit: Fit, folder: Path, provenance: Mapping[str, Any], *, seed: int = 0, sample: Sample | None = None
 ) -> SummaryJson:
     """Write ``posterior.nc`` and ``summary.json`` into an existing folder and return the summary.
@@ -44,7 +44,7 @@ def save_summary(fit: Fit, folder: Path, *, sample: Sample | None = None) -> Sum
     Parameters
     ----------
     sample : Sample, optional
-        See `save`.
+        See `save_posterior`.
     """
     summary = summary_of(fit, _alone(fit, sample))
     write_json(folder / "summary.json", summary)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import READ, SET, Hold
@@ -248,9 +248,9 @@ def effect_option(text: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> t
     """
     left, equals, value = text.partition("=")
     if not equals:
-        return named(text, known), {}
+        return effect_named(text, known), {}
     key, _, parameter = left.rpartition(".")
-    effect = named(key or left, known)
+    effect = effect_named(key or left, known)
     own = [amplitude.name for amplitude in effect.amplitudes]
     if parameter not in own:
         raise InputError(f"--effect {text}: {effect.name} has no amplitude {parameter!r}; it has {', '.join(own)}")

@@ -89,7 +89,7 @@ class Posterior(Result[SummaryJson]):
 
     def stored(self, experiment: str | None = None) -> Stored:
         """Draws, readings and model of one experiment, as the toolkit computes with them."""
-        return read_back.load(self.folder, experiment, self.own_effects)
+        return read_back.load_posterior(self.folder, experiment, self.own_effects)
 
     def to_datatree(self) -> "xr.DataTree":
         """All groups of ``posterior.nc`` in memory, as ArviZ takes them."""

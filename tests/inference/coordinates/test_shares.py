@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.inference.coordinates import shares
 from wirebayes.inference.coordinates.transform import Transformation
 from wirebayes.inference.log_posterior import LogPosterior
@@ -18,7 +18,7 @@ from wirebayes.wire.staircase import simulate
 
 def made(*keys: str) -> Problem:
     """The 1 m line with effects."""
-    return build([experiments()[0]], [named(key) for key in keys])
+    return build([experiments()[0]], [effect_named(key) for key in keys])
 
 
 def test_scores_are_normal_for_even_shares_and_keep_their_digits_at_both_ends() -> None:
@@ -61,7 +61,7 @@ def test_an_amount_with_an_upper_end_keeps_its_own_coordinate() -> None:
 
 def test_the_elongation_beside_the_creep_is_that_of_the_simulation() -> None:
     """Tensions as measured drive it; a simulation without other creep, whose tensions barely fall, gains the same."""
-    problem = build([experiments()[0].train(4)], [named("second_relaxation")])  # every hold recorded
+    problem = build([experiments()[0].train(4)], [effect_named("second_relaxation")])  # every hold recorded
     (part,) = Transformation(problem).ridges[0].beside
     (sample,) = problem.samples
     theta = problem.prior.rvs(1, np.random.default_rng(0))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.inference.coordinates.slack_edge import slack_edge
 from wirebayes.inference.coordinates.steps import Power, Preload
 from wirebayes.inference.coordinates.transform import Transformation
@@ -18,7 +18,7 @@ TRUTH = {"k1": 4000.0, "B": 0.4, "U": 0.9, "k2": 0.04, "N": 0.4, "preload": 0.3}
 
 
 def made(law="hooke", effects=(), **truth):
-    return draw([BENCH], Truth(TRUTH | truth, law=law, effects=tuple(named(e) for e in effects)), 1)
+    return draw([BENCH], Truth(TRUTH | truth, law=law, effects=tuple(effect_named(e) for e in effects)), 1)
 
 
 def knowing(**fixed):

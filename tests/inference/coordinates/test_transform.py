@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wirebayes.effects import named
+from wirebayes.effects import effect_named
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.coordinates.transform import Transformation
 from wirebayes.inference.log_posterior import LogPosterior
@@ -21,13 +21,19 @@ LINE = [Bench("a", "line", 1000.0), Bench("b", "line", 1710.0, unrecorded=frozen
 PROBLEMS = {
     "chain": draw([Bench()], Truth({"k1": 800.0}), seed=1).problem,
     "additive": draw([Bench()], Truth({"k1": 800.0}, history="additive"), seed=1).problem,
-    "effects": draw([Bench()], Truth(effects=(named("second_relaxation"), named("grip_slip@5"))), seed=2).problem,
-    "edges": draw([Bench()], Truth(effects=(named("permanent_creep"), named("creep_threshold"))), seed=4).problem,
+    "effects": draw(
+        [Bench()], Truth(effects=(effect_named("second_relaxation"), effect_named("grip_slip@5"))), seed=2
+    ).problem,
+    "edges": draw(
+        [Bench()], Truth(effects=(effect_named("permanent_creep"), effect_named("creep_threshold"))), seed=4
+    ).problem,
     "shares": draw(
-        [Bench()], Truth(effects=tuple(map(named, ("steady_creep", "fixture_compliance", "second_relaxation")))), seed=6
+        [Bench()],
+        Truth(effects=tuple(map(effect_named, ("steady_creep", "fixture_compliance", "second_relaxation")))),
+        seed=6,
     ).problem,
     "shares, two lengths": draw(
-        LINE, Truth(effects=(named("fixture_compliance"), named("steady_creep"))), seed=7
+        LINE, Truth(effects=(effect_named("fixture_compliance"), effect_named("steady_creep"))), seed=7
     ).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
     "one hold": draw([Bench(displacements_mm=(1.0,))], Truth({"k1": 800.0}), seed=8).problem,
@@ -144,7 +150,7 @@ def test_the_ridge_is_nearly_straight_in_the_sampled_coordinates(effect, amplitu
     So do those of which an effect changes the amount.
     """
     truth = {"k1": 800.0, "B": 0.2, "U": 0.5, "k2": 0.03, "N": 0.8, "preload": 0.3}
-    effects = () if effect is None else (named(effect.split(".")[0]),)
+    effects = () if effect is None else (effect_named(effect.split(".")[0]),)
     made = draw([Bench(resolution_N=0.0)], Truth(truth | ({effect: amplitude} if effect else {}), effects=effects), 1)
     coordinates, names = Transformation(made.problem), made.problem.names
     rng, column = np.random.default_rng(0), names.index("B")

@@ -12,7 +12,7 @@ from wirebayes.inference.climb import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES, SHARES
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers
 from wirebayes.numeric.resampling import effective_number
@@ -21,7 +21,7 @@ D = 3
 NORMAL = Mixture(np.ones(1), np.zeros((1, D)), np.eye(D)[None], 1e6)
 
 
-def mean(points: Points) -> float:
+def mean(points: WeightedPoints) -> float:
     return float(np.average(points.z[:, 0], weights=points.weight))
 
 
@@ -55,7 +55,7 @@ def test_where_few_places_have_all_the_weight_they_stand_for_a_density_on_the_wa
     z = np.arange(4000.0)[:, None]
     value = np.where(z[:, 0] < share * 4000, 6.0, 0.0)
     _, cold = burn_in._weighted_twice(z, value, np.zeros(4000))
-    exact = Points.weighted(z, value)
+    exact = WeightedPoints.weighted(z, value)
     assert np.array_equal(cold.weight, exact.weight) is (power is not None)
     assert effective_number(exact.weight) == pytest.approx(4000 * share, rel=0.2)
     if power is None:
@@ -88,7 +88,7 @@ def test_what_the_proposal_overlooks_is_measured_in_nats(shift: float, witness: 
     ratios = np.linspace(-5.0, 5.0, 1001)
     left = None if witness is None else (z, base + ratios + witness)
     learned = Learned(NORMAL, NORMAL, 1, left)
-    found = burn_in.overlooked(learned, z, base + ratios + 100.0 if left is None else base + ratios)
+    found = burn_in.overlooked_nats(learned, z, base + ratios + 100.0 if left is None else base + ratios)
     assert found == pytest.approx((4.99, 0.0 if witness is None else 4.9 + shift), abs=0.011)
 
 
@@ -98,7 +98,7 @@ def test_a_place_whose_hill_can_hold_next_to_nothing_is_not_overlooked(share: fl
     z, far = np.zeros((1001, D)), np.full((1001, D), 50.0)
     top = np.log(share) + 70.0 - 0.5 * D * np.log(2.0 * np.pi / 0.3)
     learned = Learned(NORMAL, NORMAL, 1, (far, np.full(1001, top - 0.5 * D)))
-    found = burn_in.overlooked(learned, z, NORMAL.log_density(z) + 70.0)
+    found = burn_in.overlooked_nats(learned, z, NORMAL.log_density(z) + 70.0)
     assert found[1] == pytest.approx(top - 0.5 * D - NORMAL.log_density(far)[0] - 70.0 if counts else 0.0)
 
 
@@ -164,7 +164,7 @@ class Sixth:
 def test_acceptance_is_that_of_independent_draws(gap: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Half of the draws have weight 1, half e^gap: a walker stands at the heavy ones with odds e^gap."""
     monkeypatch.setattr(burn_in, "_fitted", lambda target, state, *given, **known: state)
-    state = burn_in.step(Sixth(gap), burning(), Policy(rounds=9, round_draws=40_000))  # type: ignore[arg-type]
+    state = burn_in.burn_in_round(Sixth(gap), burning(), Policy(rounds=9, round_draws=40_000))  # type: ignore[arg-type]
     heavy = np.exp(gap) / (1.0 + np.exp(gap))
     assert state.learned.acceptance == pytest.approx(1.0 - 0.5 * heavy * (1.0 - np.exp(-gap)), abs=0.02)
 
@@ -193,7 +193,7 @@ def test_burn_in_ends_when_the_proposal_leaves_out_no_tail(
     while isinstance(state, BurnIn) and count < 12:
         count += 1
         policy = Policy(ensembles=2, walkers=4, rounds=rounds, most_rounds=most, tail=tail, round_draws=4096)
-        state = burn_in.step(target, state, policy)  # type: ignore[arg-type]
+        state = burn_in.burn_in_round(target, state, policy)  # type: ignore[arg-type]
     assert count == taken
 
 
@@ -217,9 +217,9 @@ def test_kept_draws_are_learned_from_as_burn_in(
     overlooked: float, rounds_left: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One more round; four where places were overlooked, which are rare."""
-    seen: dict[str, Points] = {}
+    seen: dict[str, WeightedPoints] = {}
 
-    def fitted(target: object, state: BurnIn, policy: Policy, hot: Points, cold: Points) -> BurnIn:
+    def fitted(target: object, state: BurnIn, policy: Policy, hot: WeightedPoints, cold: WeightedPoints) -> BurnIn:
         seen.update(hot=hot, cold=cold)
         return state
 
@@ -329,14 +329,16 @@ def test_a_walk_in_burn_in_has_small_pools_of_one_ensemble(monkeypatch: pytest.M
 
 
 class Watched:
-    """What `burn_in.step` does with a round whose log weights are given, instead of doing it."""
+    """What `burn_in.burn_in_round` does with a round whose log weights are given, instead of doing it."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, weight: np.ndarray) -> None:
         self.did: list[object] = []
         z = np.arange(len(weight), dtype=float)[:, None]
         walk = np.full((4, 1), -1.0), np.zeros(4), np.zeros(4)
 
-        def fitted(target: object, state: BurnIn, policy: Policy, hot: Points, cold: Points, **more: int) -> BurnIn:
+        def fitted(
+            target: object, state: BurnIn, policy: Policy, hot: WeightedPoints, cold: WeightedPoints, **more: int
+        ) -> BurnIn:
             self.did.append(("learned from the walk" if (cold.z < 0).all() else "learned", more))
             return state
 
@@ -363,7 +365,7 @@ def test_a_walk_teaches_while_hardly_a_draw_would_be_accepted(
     acceptance: float, walks: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     watched = Watched(monkeypatch, tenth(1.0))
-    state = burn_in.step(None, burning().knowing(acceptance=acceptance), Policy(rounds=5))  # type: ignore[arg-type]
+    state = burn_in.burn_in_round(None, burning().knowing(acceptance=acceptance), Policy(rounds=5))  # type: ignore[arg-type]
     assert isinstance(state, BurnIn) and state.round == 1 and state.learned.acceptance > 0.5
     first = ["walked", ("learned from the walk", {})] if walks else []
     assert watched.did == [*first, ("learned", {"points": 4000})]
@@ -386,7 +388,7 @@ def test_after_the_last_round_walkers_have_the_steps_that_great_weights_take(
 ) -> None:
     watched = Watched(monkeypatch, tenth(gap))
     state = replace(burning(), round=round_)
-    found = burn_in.step(None, state, Policy(rounds=3, most_rounds=9, tail=1.5))  # type: ignore[arg-type]
+    found = burn_in.burn_in_round(None, state, Policy(rounds=3, most_rounds=9, tail=1.5))  # type: ignore[arg-type]
     assert watched.did == [("learned", {"points": 4000 if steps is None else 12000})]
     assert isinstance(found, BurnIn) if steps is None else found == steps
 
@@ -396,14 +398,14 @@ def test_a_quarter_must_be_accepted(share: float, ends: bool, monkeypatch: pytes
     """Of draws of which so many are worth anything, and those the same, so many are accepted."""
     weight = np.where(np.arange(5000) < share * 5000, 0.0, -200.0)
     Watched(monkeypatch, weight)
-    found = burn_in.step(None, burning(round=7), Policy(rounds=3, most_rounds=9))  # type: ignore[arg-type]
+    found = burn_in.burn_in_round(None, burning(round=7), Policy(rounds=3, most_rounds=9))  # type: ignore[arg-type]
     assert isinstance(found, BurnIn) is not ends
 
 
 def test_a_proposal_that_is_hardly_ever_accepted_does_not_teach(monkeypatch: pytest.MonkeyPatch) -> None:
     for share, learned in ((0.04, False), (0.06, True)):
         watched = Watched(monkeypatch, np.where(np.arange(5000) < share * 5000, 0.0, -200.0))
-        burn_in.step(None, burning(), Policy())  # type: ignore[arg-type]
+        burn_in.burn_in_round(None, burning(), Policy())  # type: ignore[arg-type]
         assert bool(watched.did) is learned
 
 
@@ -412,14 +414,14 @@ def test_the_proposal_is_fitted_to_this_round_and_the_one_before(monkeypatch: py
     asked: list[dict[str, object]] = []
     new = object()
 
-    def fit(hot: Points, cold: Points, *given: object, **more: object) -> object:
+    def fit(hot: WeightedPoints, cold: WeightedPoints, *given: object, **more: object) -> object:
         asked.append({"hot": hot.z.tolist(), "cold": cold.z.tolist(), "given": given, **more})
         if len(asked) == 4:
             raise np.linalg.LinAlgError("points do not span their space")
         return new
 
     monkeypatch.setattr(burn_in.proposal, "fit_proposal", fit)
-    target, rows = gaussian(1), [Points.equal(np.full((1, 1), float(i))) for i in range(6)]
+    target, rows = gaussian(1), [WeightedPoints.equal(np.full((1, 1), float(i))) for i in range(6)]
     state = burning()
     for modes, (hot, cold) in zip((7, 2, 99), zip(rows[::2], rows[1::2], strict=True), strict=True):
         state = burn_in._fitted(target, state.knowing(modes=modes), Policy(components=6), hot, cold)  # type: ignore[arg-type]
@@ -440,7 +442,7 @@ def test_known_modes_are_widened_and_rough_draws_teach_the_first_proposal(monkey
     target = gaussian(D)
     taught: list[tuple[object, ...]] = []
 
-    def fit(hot: Points, cold: Points, start: Mixture, *given: object, **more: object) -> object:
+    def fit(hot: WeightedPoints, cold: WeightedPoints, start: Mixture, *given: object, **more: object) -> object:
         taught.append((hot.z.tolist(), cold.z.tolist(), given[2]))
         return "proposal"
 

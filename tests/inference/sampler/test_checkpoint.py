@@ -17,7 +17,7 @@ from wirebayes.cli import main
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import checkpoint, resume, stop_rule
-from wirebayes.inference.sampler.ensemble import sample
+from wirebayes.inference.sampler.ensemble import sample_posterior
 from wirebayes.inference.sampler.state import BurnIn
 from wirebayes.io import paper
 from wirebayes.results import jobs
@@ -36,12 +36,12 @@ class Killed(Exception):
 def kill_once(stage: Callable[[Mapping[str, Any]], bool], patch: pytest.MonkeyPatch) -> None:
     """End the next fit right after it writes the first resume file of a stage."""
 
-    def write(*arguments: Any, whole: Callable[..., None] = checkpoint.write) -> None:
+    def write(*arguments: Any, whole: Callable[..., None] = checkpoint.write_checkpoint) -> None:
         whole(*arguments)
         if stage(arguments[2]):
             raise Killed
 
-    patch.setattr(checkpoint, "write", write)
+    patch.setattr(checkpoint, "write_checkpoint", write)
 
 
 STAGES: dict[str, Callable[[Mapping[str, Any]], bool]] = {
@@ -98,7 +98,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         kill_once(STAGES["burn-in"], patch)
         with pytest.raises(Killed):
-            sample(two_modes(), 1, policy, checkpoint=path)
+            sample_posterior(two_modes(), 1, policy, checkpoint=path)
     return path
 
 
@@ -109,10 +109,10 @@ def of_fit(path: Path) -> Any:
 
 def test_a_state_that_was_stored_is_the_same_state(written: Path, tmp_path: Path) -> None:
     about = of_fit(written)
-    state = resume.load(written, about)
+    state = resume.load_state(written, about)
     assert isinstance(state, BurnIn) and state.seen is not None and state.learned.witness is not None
-    resume.save(state, tmp_path / "again", about)
-    first, again = checkpoint.read(written, about), checkpoint.read(tmp_path / "again", about)
+    resume.save_state(state, tmp_path / "again", about)
+    first, again = checkpoint.read_checkpoint(written, about), checkpoint.read_checkpoint(tmp_path / "again", about)
     assert first is not None and again is not None
     assert first[0] == again[0]
     assert flat(first[1]) == flat(again[1])
@@ -133,12 +133,12 @@ def test_a_damaged_file_is_refused_in_one_line_or_holds_what_was_written(
     path = tmp_path / "damaged"
     path.write_bytes(content)
     try:
-        stored = checkpoint.read(path, about)
+        stored = checkpoint.read_checkpoint(path, about)
     except InputError as error:
         assert str(error).startswith(f"{path}: ") and "\n" not in str(error)
         assert checkpoint.INSTEAD in str(error)
     else:
-        whole = checkpoint.read(written, about)
+        whole = checkpoint.read_checkpoint(written, about)
         assert stored is not None and whole is not None
         assert stored[0] == whole[0]
         assert flat(stored[1]) == flat(whole[1])
@@ -149,7 +149,7 @@ def test_a_foreign_file_is_refused(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / ".checkpoint"
     path.write_bytes(content)
     with pytest.raises(InputError, match=re.escape(checkpoint.INSTEAD)):
-        checkpoint.read(path, OF_FIT)
+        checkpoint.read_checkpoint(path, OF_FIT)
 
 
 def test_another_format_is_refused_before_anything_else_is_read(
@@ -157,11 +157,11 @@ def test_another_format_is_refused_before_anything_else_is_read(
 ) -> None:
     path = tmp_path / ".checkpoint"
     monkeypatch.setattr(checkpoint, "FORMAT", 99)
-    checkpoint.write(path, {"unknown": "here"}, {}, {"x": np.zeros(2)})
+    checkpoint.write_checkpoint(path, {"unknown": "here"}, {}, {"x": np.zeros(2)})
     monkeypatch.undo()
     monkeypatch.setattr(checkpoint.np, "load", None)
     with pytest.raises(InputError, match=rf"found format 99, expected {checkpoint.FORMAT}; {checkpoint.INSTEAD}"):
-        checkpoint.read(path, OF_FIT)
+        checkpoint.read_checkpoint(path, OF_FIT)
 
 
 @pytest.mark.parametrize(
@@ -174,15 +174,15 @@ def test_another_format_is_refused_before_anything_else_is_read(
 )
 def test_the_file_of_another_fit_is_refused(changed: dict[str, Any], message: str, tmp_path: Path) -> None:
     path = tmp_path / ".checkpoint"
-    checkpoint.write(path, OF_FIT, {}, {"x": np.zeros(2)})
+    checkpoint.write_checkpoint(path, OF_FIT, {}, {"x": np.zeros(2)})
     with pytest.raises(InputError, match=re.escape(f"belongs to another fit: {message}; {checkpoint.INSTEAD}")):
-        checkpoint.read(path, OF_FIT | changed)
+        checkpoint.read_checkpoint(path, OF_FIT | changed)
 
 
 def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
     path, objects = tmp_path / ".checkpoint", np.array([{"run": "me"}], dtype=object)
     with pytest.raises(ValueError, match="Object arrays"):
-        checkpoint.write(path, OF_FIT, {}, {"x": objects})
+        checkpoint.write_checkpoint(path, OF_FIT, {}, {"x": objects})
     assert not path.exists()
     with path.open("wb") as stream:
         np.savez(stream, x=objects)
@@ -190,7 +190,7 @@ def test_arrays_of_objects_are_refused(tmp_path: Path) -> None:
         state = {"format": checkpoint.FORMAT, "fit": OF_FIT, "values": {}, "arrays": ["x"]}
         archive.writestr("state.json", json.dumps(state))
     with pytest.raises(InputError, match="Object arrays"):
-        checkpoint.read(path, OF_FIT)
+        checkpoint.read_checkpoint(path, OF_FIT)
 
 
 def test_the_command_ends_in_one_line_and_goes_on_once_the_file_is_gone(

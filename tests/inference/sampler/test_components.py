@@ -8,7 +8,7 @@ from scipy import stats
 
 from wirebayes.inference.sampler import proposal
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.proposal import Proposal, components
 
 D = 3
@@ -27,7 +27,7 @@ def learned() -> Proposal:
     """Of five parts, three of them of straightened coordinates, all with shares that matter."""
     rng = np.random.default_rng(0)
     start = Mixture(np.array([0.3, 0.7]), np.array([[0.0] * D, [6.0] * D]), np.repeat(np.eye(D)[None], 2, axis=0))
-    points = Points.equal(bent(4000, rng))
+    points = WeightedPoints.equal(bent(4000, rng))
     known = proposal.fit_proposal(points, points, start, np.arange(D), rng, (0.3, 0.2, 0.2, 0.1, 0.2), most=3)
     return replace(known, excess=Mixture(np.ones(1), np.full((1, D), 3.0), 0.5 * np.eye(D)[None]))
 

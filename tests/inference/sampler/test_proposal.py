@@ -9,7 +9,7 @@ from tests.statistical.targets import two_modes
 from wirebayes.inference import modes
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, mixture, moves, proposal, transport_map
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.settings import EXPLORING_SHARES, OUTWEIGHS, ROUGH_SHARES, SHARES
 from wirebayes.inference.sampler.state import BurnIn
 
@@ -27,7 +27,7 @@ def points():
 
 
 def test_a_crescent_becomes_a_heap_within_the_points_and_beyond(points):
-    straight = transport_map.fit_map(Points.equal(points), np.arange(3))
+    straight = transport_map.fit_map(WeightedPoints.equal(points), np.arange(3))
     u, _ = straight.forward(crescent(6000, np.random.default_rng(2)))
     assert np.abs(np.cov(u.T) - np.eye(3)).max() < 0.1
     assert abs(np.corrcoef(u[:, 2], points[:, 0] ** 2)[0, 1]) < 0.05
@@ -37,7 +37,7 @@ def test_a_crescent_becomes_a_heap_within_the_points_and_beyond(points):
 
 @pytest.mark.parametrize("order", [[0, 1, 2], [1, 0, 2], [2, 0, 1]])
 def test_the_map_has_an_inverse_and_the_jacobian_it_says(points, order):
-    straight = transport_map.fit_map(Points.equal(points), np.array(order))
+    straight = transport_map.fit_map(WeightedPoints.equal(points), np.array(order))
     x = np.vstack([points[:20], 3.0 * points[:20]])
     u, jacobian = straight.forward(x)
     assert straight.inverse(u) == pytest.approx(x, rel=1e-9, abs=1e-9)
@@ -47,7 +47,9 @@ def test_the_map_has_an_inverse_and_the_jacobian_it_says(points, order):
 
 
 def test_a_cloud_without_bends_gets_none():
-    straight = transport_map.fit_map(Points.equal(np.random.default_rng(3).normal(size=(4000, 6))), np.arange(6))
+    straight = transport_map.fit_map(
+        WeightedPoints.equal(np.random.default_rng(3).normal(size=(4000, 6))), np.arange(6)
+    )
     assert not straight.quadratic.any()
 
 
@@ -55,7 +57,7 @@ def test_what_is_skewed_becomes_even():
     rng = np.random.default_rng(6)
     own = 1.0 + 2.0 * np.sinh(np.arcsinh(rng.normal(size=20000)) + 0.7)
     x = np.column_stack([own, stats.gamma(2.0).rvs(20000, random_state=rng)])
-    u, _ = transport_map.fit_map(Points.equal(x), np.arange(2)).forward(x)
+    u, _ = transport_map.fit_map(WeightedPoints.equal(x), np.arange(2)).forward(x)
     before, after = ([stats.kstest(c, "norm").statistic for c in p.T] for p in (stats.zscore(x), u))
     assert before[0] > 0.08 and after[0] < 0.015
     assert after[1] < 0.6 * before[1]  # a gamma is not of the family, and comes nearer all the same
@@ -72,7 +74,7 @@ def test_evolution_in_straight_coordinates_keeps_the_density():
     def log_density(z):
         return -0.5 * (z[:, 0] ** 2 + ((z[:, 1] - z[:, 0] ** 2) * np.exp(-0.5 * z[:, 0])) ** 2) - 0.5 * z[:, 0]
 
-    move = moves.EvolutionMove(4, transport_map.fit_map(Points.equal(draws(4000) * [1.2, 0.8]), np.arange(2)))
+    move = moves.EvolutionMove(4, transport_map.fit_map(WeightedPoints.equal(draws(4000) * [1.2, 0.8]), np.arange(2)))
     found = []
     for seed in range(12):
         walkers = emcee.EnsembleSampler(400, 2, log_density, moves=[move], vectorize=True)
@@ -89,7 +91,7 @@ def test_evolution_in_straight_coordinates_keeps_the_density():
 def test_evolution_takes_its_differences_within_an_ensemble(mapped):
     """The second ensemble stands still wherever its own walkers do, whatever the first one does."""
     rng = np.random.default_rng(3)
-    straight = transport_map.fit_map(Points.equal(rng.normal(size=(500, 2))), np.arange(2)) if mapped else None
+    straight = transport_map.fit_map(WeightedPoints.equal(rng.normal(size=(500, 2))), np.arange(2)) if mapped else None
     spread, still = rng.normal(size=(20, 2)), np.tile([1.0, 2.0], (20, 1))
     start = np.concatenate([spread, still])
     walkers = emcee.EnsembleSampler(
@@ -102,7 +104,7 @@ def test_evolution_takes_its_differences_within_an_ensemble(mapped):
 
 def test_points_that_do_not_span_their_space_are_refused():
     with pytest.raises(np.linalg.LinAlgError):
-        transport_map.fit_map(Points.equal(np.ones((100, 2))), np.arange(2))
+        transport_map.fit_map(WeightedPoints.equal(np.ones((100, 2))), np.arange(2))
 
 
 @pytest.mark.parametrize(("wider", "along_tails", "before", "followed"), [
@@ -115,7 +117,7 @@ def test_the_map_follows_tails_that_belong_to_the_posterior(wider, along_tails, 
     cold = (cold - cold.mean(axis=0)) / cold.std(axis=0)
     hot = cold * [1.6, wider, 1.6]
     start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
-    one, other = Points.equal(hot), Points.equal(cold)
+    one, other = WeightedPoints.equal(hot), WeightedPoints.equal(cold)
     known = proposal.fit_proposal(other, other, start, np.arange(3), rng, SHARES, most=2) if before else None
     found = proposal.fit_proposal(
         one, other, start, np.arange(3), rng, SHARES, most=2, before=known, along_tails=along_tails
@@ -129,18 +131,18 @@ def test_weights_count_as_often_as_points_repeat():
     rng = np.random.default_rng(5)
     x, often = crescent(3000, rng), rng.integers(1, 4, 3000)
     repeated, order = np.repeat(x, often, axis=0), np.arange(3)
-    points = Points(x, often.astype(float))
-    assert Points.equal(repeated).weight.sum() == points.weight.sum() == often.sum()
-    one, other = (transport_map.fit_map(p, order) for p in (points, Points.equal(repeated)))
+    points = WeightedPoints(x, often.astype(float))
+    assert WeightedPoints.equal(repeated).weight.sum() == points.weight.sum() == often.sum()
+    one, other = (transport_map.fit_map(p, order) for p in (points, WeightedPoints.equal(repeated)))
     assert one.forward(x[:50])[0] == pytest.approx(other.forward(x[:50])[0], abs=1e-9)
     plain = transport_map.fit_map(
-        Points(repeated + 1e-12 * rng.normal(size=repeated.shape), np.ones(len(repeated))), order
+        WeightedPoints(repeated + 1e-12 * rng.normal(size=repeated.shape), np.ones(len(repeated))), order
     )
     assert one.forward(x[:50])[0] == pytest.approx(plain.forward(x[:50])[0], abs=0.02)  # but for quantiles
     start = mixture.Mixture(np.array([0.5, 0.5]), x[:2], np.repeat(np.eye(3)[None], 2, axis=0), 40.0)
     one, other = (
         mixture.fit_mixture(p, np.random.default_rng(1), most=2, degrees=40.0, before=start)
-        for p in (points, Points(repeated, np.ones(len(repeated))))
+        for p in (points, WeightedPoints(repeated, np.ones(len(repeated))))
     )
     assert one.log_density(x) == pytest.approx(other.log_density(x), abs=2e-3)  # in single precision
 
@@ -148,7 +150,7 @@ def test_weights_count_as_often_as_points_repeat():
 def test_a_mixture_learns_in_single_precision_what_double_precision_says():
     rng = np.random.default_rng(3)
     x = np.concatenate([rng.normal(size=(3000, 4)), 3.0 + 0.3 * rng.normal(size=(1500, 4))])
-    found = mixture.fit_mixture(Points.equal(x), rng, most=2, degrees=40.0)
+    found = mixture.fit_mixture(WeightedPoints.equal(x), rng, most=2, degrees=40.0)
     order = np.argsort(-found.weights)
     assert found.weights.sum() == pytest.approx(1.0, abs=1e-12)
     assert found.weights[order] == pytest.approx([2 / 3, 1 / 3], abs=0.01)
@@ -159,7 +161,9 @@ def test_the_density_of_a_proposal_is_that_of_its_draws(points):
     """The mean of 1/q over draws of q inside a box is the box's volume."""
     rng = np.random.default_rng(4)
     start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
-    q = proposal.fit_proposal(Points.equal(points), Points.equal(points), start, np.arange(3), rng, SHARES, most=3)
+    q = proposal.fit_proposal(
+        WeightedPoints.equal(points), WeightedPoints.equal(points), start, np.arange(3), rng, SHARES, most=3
+    )
     x = q.rvs(200000, rng)
     inside = (np.abs(x - [0.0, 0.0, 2.5]) < [1.0, 1.0, 1.0]).all(axis=1)
     weight = inside * np.exp(-q.log_density(x))
@@ -178,7 +182,7 @@ def test_a_proposal_learns_with_wider_parts_than_it_is_frozen_with():
     state, shares = burn_in.init(target, 1, policy, None, None, None), []
     while isinstance(state, BurnIn):
         shares.append(state.learned.proposal.shares)
-        state = burn_in.step(target, state, policy)
+        state = burn_in.burn_in_round(target, state, policy)
     assert shares == [ROUGH_SHARES, EXPLORING_SHARES, EXPLORING_SHARES]
     assert state.learned.proposal.shares == SHARES
 
@@ -193,7 +197,7 @@ def test_points_that_a_map_has_sent_beyond_all_numbers_are_refused():
     z = np.random.default_rng(0).normal(size=(100, 3))
     z[:, 2] = np.nan
     with np.errstate(all="ignore"), pytest.raises(np.linalg.LinAlgError):
-        mixture.fit_mixture(Points.weighted(z, np.zeros(100)), np.random.default_rng(0))
+        mixture.fit_mixture(WeightedPoints.weighted(z, np.zeros(100)), np.random.default_rng(0))
 
 
 def neck(n, rng):
@@ -205,7 +209,7 @@ def neck(n, rng):
 
 def without_excess(points, rng):
     """A proposal that knows the hill alone."""
-    hill = Points.equal(points[len(points) // 500 :])
+    hill = WeightedPoints.equal(points[len(points) // 500 :])
     start = mixture.from_modes(np.zeros((1, 3)), np.eye(3)[None], np.zeros(1))
     return proposal.fit_proposal(hill, hill, start, np.arange(3), rng, SHARES, most=2)
 
@@ -219,7 +223,7 @@ def test_what_the_proposal_makes_too_little_of_becomes_a_part_of_it():
     rng = np.random.default_rng(0)
     points = neck(20_000, rng)
     value, before = log_neck(points), without_excess(points, rng)
-    found = proposal.with_excess(before, Points(points, np.ones(len(points))), value, rng)
+    found = proposal.with_excess(before, WeightedPoints(points, np.ones(len(points))), value, rng)
     assert found.excess is not None and len(found.excess.weights) <= 4
 
     def over(q):
@@ -241,7 +245,7 @@ def test_weights_say_how_much_mass_a_place_of_excess_has():
     every = np.concatenate([points, other])
     weight = np.append(np.ones(len(points)), np.full(len(other), 20.0))
     value = np.append(log_neck(points), np.full(len(other), 0.0))
-    found = proposal.with_excess(without_excess(points, rng), Points(every, weight), value, rng)
+    found = proposal.with_excess(without_excess(points, rng), WeightedPoints(every, weight), value, rng)
     largest = np.argmax(found.excess.weights)
     assert found.straight.inverse(found.excess.centres)[largest, 0] == pytest.approx(-9.0, abs=1.0)
 
@@ -255,7 +259,7 @@ def test_there_is_excess_from_one_nat_and_five_places_on(above, places, part):
     q = without_excess(points, rng)
     value = q.log_density(points)
     value[:places] += above
-    found = proposal.with_excess(q, Points(points, np.ones(len(points))), value, rng)
+    found = proposal.with_excess(q, WeightedPoints(points, np.ones(len(points))), value, rng)
     assert (found.excess is not None) is part
 
 
@@ -266,7 +270,7 @@ def test_excess_far_away_has_a_part_as_long_as_there_are_digits(away, part):
     hill, far = rng.normal(size=(4000, 3)), away + rng.normal(size=(40, 3))
     q, points = without_excess(hill, rng), np.concatenate([hill, far])
     value = np.append(q.log_density(hill), np.zeros(len(far)))
-    found = proposal.with_excess(q, Points(points, np.ones(len(points))), value, rng)
+    found = proposal.with_excess(q, WeightedPoints(points, np.ones(len(points))), value, rng)
     assert (found.excess is not None) is part
     if found.excess is not None:
         assert found.excess.moments[0] == pytest.approx(q.straight.forward(far)[0].mean(axis=0), rel=1e-3)
@@ -291,10 +295,12 @@ def test_a_mixture_of_few_points_leans_on_what_they_lie_around():
     drawn = around.rvs(400_000, rng)
     assert mean == pytest.approx(drawn.mean(axis=0), abs=0.02)
     assert covariance == pytest.approx(np.cov(drawn.T), abs=0.05)
-    one = mixture.fit_around(Points(np.array([[7.0, 7.0]]), np.ones(1)), around, rng, most=4, wider=1.5)
+    one = mixture.fit_around(WeightedPoints(np.array([[7.0, 7.0]]), np.ones(1)), around, rng, most=4, wider=1.5)
     assert one.centres == pytest.approx(np.array([[7.0, 7.0]]))
     expected = 1.5 * covariance * 2.0 / 3.0  # two points' worth of it, and one point without a width
     assert one.factors[0] @ one.factors[0].T == pytest.approx(expected, rel=0.05)
-    many = mixture.fit_around(Points.equal(rng.normal(size=(4000, 2)) * [0.1, 3.0]), around, rng, most=1, wider=1.5)
+    many = mixture.fit_around(
+        WeightedPoints.equal(rng.normal(size=(4000, 2)) * [0.1, 3.0]), around, rng, most=1, wider=1.5
+    )
     # a Student-t fitted to normal points has a third more variance
     assert many.moments[1] == pytest.approx(np.diag([0.013, 12.0]), rel=0.1, abs=0.02)

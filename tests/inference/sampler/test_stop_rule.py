@@ -45,7 +45,7 @@ def looked(
     state = Sampling(Walkers(z[-1], np.zeros(len(z[-1])), None), learned, None, 0)  # type: ignore[arg-type]
     state = replace(state, kept=Kept(blocks, tuple(np.zeros(block.shape[:2]) for block in blocks)))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(burn_in, "overlooked", lambda *given: (overlooked, lost))
+        patch.setattr(burn_in, "overlooked_nats", lambda *given: (overlooked, lost))
         found = stop_rule.apply(gaussian(D), state, Policy(**(EASY | policy)))  # type: ignore[arg-type]
     assert found.diagnostics is not None
     return found, found.diagnostics
@@ -223,7 +223,7 @@ def test_a_first_block_stays_where_enough_of_its_draws_are_effective(
     monkeypatch.setattr(stop_rule, "apply", lambda target, state, policy: state)
     monkeypatch.setattr(burn_in, "refined", lambda target, state, policy, draws_stay: draws_stay)
     overlooking = replace(state, learned=replace(state.learned, overlooked=9.0))
-    assert kept.step(None, overlooking, policy) is not slow  # type: ignore[arg-type]
+    assert kept.keep_block(None, overlooking, policy) is not slow  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -244,8 +244,8 @@ def test_a_proposal_is_learned_again_three_times_and_five_more_for_what_it_overl
     monkeypatch.setattr(stop_rule, "apply", lambda target, state, policy: state)
     monkeypatch.setattr(burn_in, "again", lambda target, state, policy: "anew")
     monkeypatch.setattr(burn_in, "refined", lambda target, state, policy, draws_stay: "refined")
-    found = kept.step(None, state, Policy())  # type: ignore[arg-type]
-    lost = kept.step(None, replace(state, learned=replace(state.learned, lost=True)), Policy())  # type: ignore[arg-type]
+    found = kept.keep_block(None, state, Policy())  # type: ignore[arg-type]
+    lost = kept.keep_block(None, replace(state, learned=replace(state.learned, lost=True)), Policy())  # type: ignore[arg-type]
     assert (lost == "anew") is (again < 8 and not finished)
     assert (found if isinstance(found, str) else "on") == expected
 
@@ -347,7 +347,7 @@ def test_the_last_look_decides_which_draws_are_weighed(monkeypatch: pytest.Monke
         given.append((z, value))
         return 0.0, 0.0
 
-    monkeypatch.setattr(burn_in, "overlooked", overlooked)
+    monkeypatch.setattr(burn_in, "overlooked_nats", overlooked)
     learned = Learned(None, None, 1, trusted=True)  # type: ignore[arg-type]
     for steps in (127, 256):
         z = draws(steps)
@@ -436,13 +436,13 @@ def test_a_run_goes_from_burn_in_to_kept_draws_until_it_is_finished(
         assert not stored and given == (target, 7, policy, "found", "near", "rough")
         return begun
 
-    monkeypatch.setattr(ensemble.resume, "load", load)
-    monkeypatch.setattr(ensemble.resume, "save", lambda state, path, of_fit: saved.append((state, path, of_fit)))
+    monkeypatch.setattr(ensemble.resume, "load_state", load)
+    monkeypatch.setattr(ensemble.resume, "save_state", lambda state, path, of_fit: saved.append((state, path, of_fit)))
     monkeypatch.setattr(burn_in, "init", init)
-    monkeypatch.setattr(burn_in, "step", lambda target, state, policy: next(ways["burn"]))
-    monkeypatch.setattr(kept, "step", lambda target, state, policy: next(ways["keep"]))
+    monkeypatch.setattr(burn_in, "burn_in_round", lambda target, state, policy: next(ways["burn"]))
+    monkeypatch.setattr(kept, "keep_block", lambda target, state, policy: next(ways["keep"]))
     target = gaussian(2)
-    found = ensemble.sample(
+    found = ensemble.sample_posterior(
         target, 7, policy, checkpoint="file", progress=told.append, found="found", near="near", rough="rough"  # type: ignore[arg-type]
     )  # fmt: skip
     states = [begun, replace(begun, round=1), walking, replace(begun, round=2), walking, done]
@@ -454,5 +454,5 @@ def test_a_run_goes_from_burn_in_to_kept_draws_until_it_is_finished(
     assert np.array_equal(found.z, sampler_state.by_ensemble([z], policy)) and found.log_density.shape == (2, 3, 2)
     assert (found.autocorrelation_steps, found.ess, found.r_hat) == (about.autocorrelation, about.ess, about.r_hat)
     still = replace(done, kept=replace(done.kept, accepted=0, proposed=0))
-    monkeypatch.setattr(ensemble.resume, "load", lambda path, of_fit: still)
-    assert ensemble.sample(target, 7, policy).acceptance == 0.0
+    monkeypatch.setattr(ensemble.resume, "load_state", lambda path, of_fit: still)
+    assert ensemble.sample_posterior(target, 7, policy).acceptance == 0.0

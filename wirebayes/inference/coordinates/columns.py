@@ -16,7 +16,7 @@ ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a norm
 
 
 @dataclass(frozen=True)
-class Columns:
+class ColumnMap:
     """The map of the columns of ``(n, d)`` parameters, one by one.
 
     Attributes
@@ -91,7 +91,7 @@ class Columns:
         return np.asarray(total)
 
 
-def columns_of(problem: Problem) -> Columns:
+def columns_of(problem: Problem) -> ColumnMap:
     """How each parameter of a problem is measured."""
     distributions = list(problem.prior.distributions.values())
     positive = np.array([name in problem.prior.logarithmic for name in problem.names], dtype=bool)
@@ -100,7 +100,7 @@ def columns_of(problem: Problem) -> Columns:
     most = [d.most if isinstance(d, LogitNormal) else np.inf for d in distributions]
     scale = [_spread(d) if own else 1.0 for d, own in zip(distributions, linear, strict=True)]
     spread = [_log_spread(d, m) if p else 1.0 for d, m, p in zip(distributions, most, positive, strict=True)]
-    return Columns(positive, np.array(most), edges, np.array(scale), np.array(spread))
+    return ColumnMap(positive, np.array(most), edges, np.array(scale), np.array(spread))
 
 
 def _log_odds(value: Any, most: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.inference.coordinates.columns import ONE_SD, Columns
+from wirebayes.inference.coordinates.columns import ONE_SD, ColumnMap
 from wirebayes.inference.coordinates.power_of_tension import suiting_powers
 from wirebayes.inference.coordinates.shares import Elongation
 from wirebayes.model.problem import Problem
@@ -116,7 +116,7 @@ class Ridge:
         return square
 
 
-def ridges_of(problem: Problem, columns: Columns, for_draws: bool) -> list[Ridge]:
+def ridges_of(problem: Problem, columns: ColumnMap, for_draws: bool) -> list[Ridge]:
     """The ridges of a problem's materials; a column that several samples share follows the first of them.
 
     Parameters
@@ -143,7 +143,7 @@ def ridges_of(problem: Problem, columns: Columns, for_draws: bool) -> list[Ridge
     return found
 
 
-def _parameters(problem: Problem, sample: Sample, columns: Columns) -> tuple[dict[str, int], dict[str, float]]:
+def _parameters(problem: Problem, sample: Sample, columns: ColumnMap) -> tuple[dict[str, int], dict[str, float]]:
     """Columns of a sample's positive creep parameters, and what others are fixed at."""
     names, mark = problem.names, _mark(problem, sample.material)
     own = {name: f"{name}[{sample.name}]" for name in MATERIAL}
@@ -242,7 +242,7 @@ def _powers(problem: Problem, sample: Sample, log_tension: Array, relative_s: Ar
     return suiting_powers(lost, log_tension, relative_s, float(N), float(middle), 0.5 * float(high - low))
 
 
-def _with_shares(ridge: Ridge, problem: Problem, sample: Sample, columns: Columns, owned: Collection[int]) -> Ridge:
+def _with_shares(ridge: Ridge, problem: Problem, sample: Sample, columns: ColumnMap, owned: Collection[int]) -> Ridge:
     """The ridge with what is to be sampled by its share: amounts that are half-normal under the prior.
 
     Of these any sum and any share is possible. What other ridges own stays there.

@@ -38,7 +38,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.inference.coordinates.columns import Columns, columns_of
+from wirebayes.inference.coordinates.columns import ColumnMap, columns_of
 from wirebayes.inference.coordinates.displacement_level import displacement_level
 from wirebayes.inference.coordinates.ridge import Ridge, ridges_of
 from wirebayes.inference.coordinates.slack_edge import SlackEdge, slack_edge
@@ -198,13 +198,13 @@ def _steps(ridges: Sequence[Ridge], levels: Sequence[Level | WeightLevel], prelo
     ]
 
 
-def _slack_edges(problem: Problem, columns: Columns) -> list[SlackEdge]:
+def _slack_edges(problem: Problem, columns: ColumnMap) -> list[SlackEdge]:
     """Coordinates of the samples' preloads, where these have none of their own already."""
     found = [slack_edge(problem, sample) for sample in problem.samples]
     return [edge for edge in found if edge is not None and columns.is_linear(edge.preload)]
 
 
-def _is_usual(problem: Problem, columns: Columns, ridges: Sequence[Ridge]) -> bool:
+def _is_usual(problem: Problem, columns: ColumnMap, ridges: Sequence[Ridge]) -> bool:
     """Whether stiffness, preload and creep of a problem of one sample have the usual coordinates."""
     if problem.likelihood != "chain" or len(problem.samples) != 1:
         return False
@@ -216,7 +216,7 @@ def _is_usual(problem: Problem, columns: Columns, ridges: Sequence[Ridge]) -> bo
     return preload in problem.prior.fixed or columns.is_linear(problem.names.index(preload))
 
 
-def _noises(problem: Problem, columns: Columns) -> tuple[Noises, ...]:
+def _noises(problem: Problem, columns: ColumnMap) -> tuple[Noises, ...]:
     """Of every sample of which neither noise is fixed; holds by themselves have no setting errors."""
     out = []
     for sample in problem.samples if problem.likelihood == "chain" else ():
@@ -229,7 +229,7 @@ def _noises(problem: Problem, columns: Columns) -> tuple[Noises, ...]:
     return tuple(out)
 
 
-def _positive(kind: str, names: Sequence[str], columns: Columns) -> list[int]:
+def _positive(kind: str, names: Sequence[str], columns: ColumnMap) -> list[int]:
     """Columns of a positive parameter, of every sample that has its own."""
     return [i for i, name in enumerate(names) if columns.positive[i] and name.split("[")[0] == kind]
 

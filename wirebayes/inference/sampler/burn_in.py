@@ -23,7 +23,7 @@ from wirebayes.inference.modes import search
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, net, proposal
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.settings import (
     CLIMBS,
@@ -66,7 +66,7 @@ def init(
     seed : int
         Of everything that is random in this run.
     policy : Policy
-        See `wirebayes.inference.sampler.ensemble.sample`.
+        See `wirebayes.inference.sampler.ensemble.sample_posterior`.
     found : Optimum or None
         Modes that are known already; None searches for them.
     near : (m, d) array or None
@@ -82,11 +82,11 @@ def init(
     spawned = np.random.SeedSequence(seed).spawn(2)
     rng = np.random.default_rng(spawned[0])
     before = target.evaluations
-    seen = None if rough is None else (Points.equal(rough), Points.equal(rough))
+    seen = None if rough is None else (WeightedPoints.equal(rough), WeightedPoints.equal(rough))
     witness = None
     if found is None:
         searched = search(target, rng, extra=near)
-        found, seen = searched.modes, seen or (Points.equal(searched.warm), Points.equal(searched.cold))
+        found, seen = searched.modes, seen or (WeightedPoints.equal(searched.warm), WeightedPoints.equal(searched.cold))
         witness = searched.cold, searched.height
     known = _overdispersed(found)
     random = np.random.RandomState(np.random.MT19937(spawned[1]))
@@ -100,7 +100,7 @@ def init(
     return state
 
 
-def step(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampling:
+def burn_in_round(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn | Sampling:
     """Learn from a walk, as long as the proposal is not to be trusted, then from weighted draws of the proposal.
 
     Parameters
@@ -149,11 +149,11 @@ def _frozen(
 
 def _with_excess(state: BurnIn, z: Array, value: Array, log_weight: Array) -> BurnIn:
     """The proposal with a part for what it makes too little of, as these places and those of earlier rounds show."""
-    drawn = Points.weighted(np.column_stack([z, value]), log_weight)
+    drawn = WeightedPoints.weighted(np.column_stack([z, value]), log_weight)
     drawn = drawn.worth(effective_number(drawn.weight))
     if state.drawn is not None:
         drawn = state.drawn.joined(drawn)
-        drawn = Points(drawn.z[-REMEMBERED:], drawn.weight[-REMEMBERED:])
+        drawn = WeightedPoints(drawn.z[-REMEMBERED:], drawn.weight[-REMEMBERED:])
     state = replace(state, drawn=drawn)
     if not isinstance(state.learned.proposal, Proposal):
         return state
@@ -238,7 +238,7 @@ def _as_frozen(learned: Learned) -> Learned:
     return replace(learned, proposal=replace(learned.proposal, shares=SHARES))
 
 
-def overlooked(learned: Learned, z: Array, value: Array) -> tuple[float, float]:
+def overlooked_nats(learned: Learned, z: Array, value: Array) -> tuple[float, float]:
     """How far places that matter lie above what the frozen proposal makes of them, in nats.
 
     The log of posterior over proposal, less its median over the posterior, is taken at its 99.9 % quantile over kept
@@ -305,8 +305,8 @@ def _fitted(
     target: LogPosterior,
     state: BurnIn,
     policy: Policy,
-    hot: Points,
-    cold: Points,
+    hot: WeightedPoints,
+    cold: WeightedPoints,
     shares: proposal.Shares = EXPLORING_SHARES,
     points: int = POINTS,
 ) -> BurnIn:
@@ -326,7 +326,7 @@ def _fitted(
     return state.knowing(proposal=new)
 
 
-def _weighted_twice(z: Array, value: Array, base: Array) -> tuple[Points, Points]:
+def _weighted_twice(z: Array, value: Array, base: Array) -> tuple[WeightedPoints, WeightedPoints]:
     """Points of the warm density and of the density, from places whose log density of being there is `base`.
 
     Where a few of them would have all the weight, they stand for a density between the two instead, the one they came
@@ -338,7 +338,7 @@ def _weighted_twice(z: Array, value: Array, base: Array) -> tuple[Points, Points
     A. Korba and F. Portier, Adaptive importance sampling meets mirror descent: a bias-variance tradeoff, AISTATS 2022.
     """
     wanted = [power * value - base for power in (HOT, 1.0)]
-    hot, cold = (Points.weighted(z, next_power(weight, 1.0, EFFECTIVE) * weight) for weight in wanted)
+    hot, cold = (WeightedPoints.weighted(z, next_power(weight, 1.0, EFFECTIVE) * weight) for weight in wanted)
     return hot, cold
 
 

@@ -23,7 +23,7 @@ _VALUES = "state.json"
 INSTEAD = "remove this file to restart the fit"
 
 
-def write(path: Path, fit: Mapping[str, Any], values: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
+def write_checkpoint(path: Path, fit: Mapping[str, Any], values: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
     """Write the file whole, or leave the one that is there.
 
     Parameters
@@ -45,7 +45,7 @@ def write(path: Path, fit: Mapping[str, Any], values: Mapping[str, Any], arrays:
     write_bytes(path, content.getvalue())
 
 
-def read(path: Path, fit: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]] | None:
+def read_checkpoint(path: Path, fit: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """The values and the nested arrays of a file; None where there is no file.
 
     Raises

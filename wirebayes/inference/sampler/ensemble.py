@@ -8,7 +8,7 @@ block, until for every parameter
 - the kept steps span five autocorrelation times, and
 - the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`, and
 - no region of the posterior is underrated by the frozen proposal so much that one place there outweighs a pool of draws
-  (`burn_in.overlooked`),
+  (`burn_in.overlooked_nats`),
 
 or until `Policy.most_steps`: then the result says *not converged*, and why.
 
@@ -69,7 +69,7 @@ class Chains:
     modes: int
 
 
-def sample(
+def sample_posterior(
     target: LogPosterior,
     seed: int,
     policy: Policy = DEFAULT,
@@ -102,12 +102,16 @@ def sample(
         The checkpoint is damaged, of another format, or of another fit.
     """
     of_fit = {"seed": seed, "policy": describe(policy), "parameters": target.problem.names}
-    state: State = resume.load(checkpoint, of_fit) or burn_in.init(target, seed, policy, found, near, rough)
-    resume.save(state, checkpoint, of_fit)
+    state: State = resume.load_state(checkpoint, of_fit) or burn_in.init(target, seed, policy, found, near, rough)
+    resume.save_state(state, checkpoint, of_fit)
     while isinstance(state, BurnIn) or not state.finished:
-        state = burn_in.step(target, state, policy) if isinstance(state, BurnIn) else kept.step(target, state, policy)
+        state = (
+            burn_in.burn_in_round(target, state, policy)
+            if isinstance(state, BurnIn)
+            else kept.keep_block(target, state, policy)
+        )
         progress(_share(state, policy))
-        resume.save(state, checkpoint, of_fit)
+        resume.save_state(state, checkpoint, of_fit)
     assert state.diagnostics is not None
     found_, counted = state.diagnostics, state.all_kept
     z, log_density = (by_ensemble(blocks, policy) for blocks in (counted.z, counted.log_density))

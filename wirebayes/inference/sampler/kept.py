@@ -11,7 +11,7 @@ from wirebayes.inference.sampler import burn_in, stop_rule
 from wirebayes.inference.sampler.state import BurnIn, Kept, Sampling, advance, move_of
 
 
-def step(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | BurnIn:
+def keep_block(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling | BurnIn:
     """Keep another block of draws and look at all of them.
 
     Parameters

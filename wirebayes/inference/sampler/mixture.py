@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaln
 
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.settings import DEGREES, EM_GAIN, EM_STEPS, LEAST_EVIDENCE
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.spread_rows import spread_rows
@@ -99,7 +99,7 @@ def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixtur
 
 
 def fit_mixture(
-    points: Points,
+    points: WeightedPoints,
     rng: np.random.Generator,
     *,
     most: int = 8,
@@ -151,7 +151,7 @@ def fit_mixture(
     raise np.linalg.LinAlgError("the points do not span their space")
 
 
-def fit_around(points: Points, of: Mixture, rng: np.random.Generator, *, most: int, wider: float) -> Mixture:
+def fit_around(points: WeightedPoints, of: Mixture, rng: np.random.Generator, *, most: int, wider: float) -> Mixture:
     """A mixture of few points, the components of which lean on the covariance of another mixture.
 
     Parameters

@@ -14,14 +14,14 @@ from wirebayes.numeric.typing import Array
 
 
 @dataclass(frozen=True)
-class Points:
+class WeightedPoints:
     """Distinct points (n, d) and their weights (n,)."""
 
     z: Array
     weight: Array
 
     @staticmethod
-    def weighted(z: Array, log_weight: Array) -> "Points":
+    def weighted(z: Array, log_weight: Array) -> "WeightedPoints":
         """The points by their weights, none of which counts for more than the root of all rows.
 
         Parameters
@@ -34,12 +34,12 @@ class Points:
         _, first, number = np.unique(z[:, 0], return_index=True, return_inverse=True)
         weight = np.bincount(number, truncated(log_weight), len(first))
         some = weight > 0
-        return Points(z[first[some]], weight[some]).worth(len(z))
+        return WeightedPoints(z[first[some]], weight[some]).worth(len(z))
 
     @staticmethod
-    def equal(z: Array) -> "Points":
+    def equal(z: Array) -> "WeightedPoints":
         """The points (n, d) as they came: as often as they repeat."""
-        return Points.weighted(z, np.zeros(len(z)))
+        return WeightedPoints.weighted(z, np.zeros(len(z)))
 
     @property
     def spread(self) -> Array:
@@ -52,15 +52,15 @@ class Points:
         """How many different points there would be among as many draws of them as their weights sum to."""
         return float(np.minimum(self.weight, 1.0).sum())
 
-    def worth(self, total: float) -> "Points":
+    def worth(self, total: float) -> "WeightedPoints":
         """The same points, their weights summing to another number."""
         return replace(self, weight=self.weight * (total / self.weight.sum()))
 
-    def joined(self, other: "Points") -> "Points":
+    def joined(self, other: "WeightedPoints") -> "WeightedPoints":
         """Both sets as one."""
-        return Points(np.vstack([self.z, other.z]), np.append(self.weight, other.weight))
+        return WeightedPoints(np.vstack([self.z, other.z]), np.append(self.weight, other.weight))
 
-    def thinned(self, n: int, rng: np.random.Generator) -> "Points":
+    def thinned(self, n: int, rng: np.random.Generator) -> "WeightedPoints":
         """At most n of the points, their weights raised where others had to go, by `resampling.thinned`.
 
         No more than `distinct` either: where a point stands for less than a draw, it goes or counts as one.
@@ -70,4 +70,4 @@ class Points:
         rng : numpy Generator
         """
         rows, weight = thinned(self.weight, min(n, int(np.ceil(self.distinct))), rng)
-        return Points(self.z[rows], weight)
+        return WeightedPoints(self.z[rows], weight)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from wirebayes.inference.sampler import mixture, transport_map
 from wirebayes.inference.sampler.components import Components
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.settings import (
     ELSEWHERE,
     EXCESS_COMPONENTS,
@@ -115,8 +115,8 @@ def components(of: Mixture | Proposal) -> Components:
 
 
 def fit_proposal(
-    hot: Points,
-    cold: Points,
+    hot: WeightedPoints,
+    cold: WeightedPoints,
     start: Mixture,
     order: NDArray[np.int64],
     rng: np.random.Generator,
@@ -173,7 +173,7 @@ def fit_proposal(
     )  # fmt: skip
 
 
-def with_excess(of: Proposal, drawn: Points, value: Array, rng: np.random.Generator) -> Proposal:
+def with_excess(of: Proposal, drawn: WeightedPoints, value: Array, rng: np.random.Generator) -> Proposal:
     """The proposal with a part for where the posterior lies far above its other parts.
 
     A mixture fitted to all points has no component to spare for a thousandth of the mass, however far the posterior
@@ -199,7 +199,7 @@ def with_excess(of: Proposal, drawn: Points, value: Array, rng: np.random.Genera
     u = of.straight.forward(drawn.z[some])[0]
     if some.sum() < TOO_FEW or not np.isfinite(u).all():
         return of
-    points = Points(u, weight[some]).worth(effective_number(weight[some]))
+    points = WeightedPoints(u, weight[some]).worth(effective_number(weight[some]))
     try:
         return replace(of, excess=mixture.fit_around(points, of.close, rng, most=EXCESS_COMPONENTS, wider=WIDER))
     except np.linalg.LinAlgError:

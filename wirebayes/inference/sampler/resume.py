@@ -9,7 +9,7 @@ import numpy as np
 
 from wirebayes.inference.sampler import checkpoint
 from wirebayes.inference.sampler.mixture import Mixture
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.state import BurnIn, Diagnostics, Kept, Learned, Sampling, State, Walkers
 from wirebayes.io.run_folder import stored_results
@@ -21,16 +21,16 @@ _KEPT, _BLOCKS = ("kept", "earlier"), ("z", "log_density")
 _PLAIN_SAMPLING = ("finished", "converged", "why")
 
 
-def load(path: Path | None, of_fit: Mapping[str, Any]) -> State | None:
-    """The state in a resume file; None where there is none (errors: `checkpoint.read`)."""
-    stored = None if path is None else checkpoint.read(path, of_fit)
+def load_state(path: Path | None, of_fit: Mapping[str, Any]) -> State | None:
+    """The state in a resume file; None where there is none (errors: `checkpoint.read_checkpoint`)."""
+    stored = None if path is None else checkpoint.read_checkpoint(path, of_fit)
     if path is None or stored is None:
         return None
     with stored_results(path, checkpoint.INSTEAD):
         return from_stored(*stored)
 
 
-def save(state: State, path: Path | None, of_fit: Mapping[str, Any]) -> None:
+def save_state(state: State, path: Path | None, of_fit: Mapping[str, Any]) -> None:
     """Write the resume file whole.
 
     Parameters
@@ -42,7 +42,7 @@ def save(state: State, path: Path | None, of_fit: Mapping[str, Any]) -> None:
         What distinguishes this fit from others.
     """
     if path is not None:
-        checkpoint.write(path, of_fit, to_values(state), to_arrays(state))
+        checkpoint.write_checkpoint(path, of_fit, to_values(state), to_arrays(state))
 
 
 def to_values(state: State) -> dict[str, Any]:
@@ -95,8 +95,12 @@ def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
     walkers = Walkers(arrays["positions"], arrays["values"], random)
     run = walkers, learned, generator, values["evaluations"]
     if values["stage"] == "burn-in":
-        seen = (Points(**arrays["seen"]["hot"]), Points(**arrays["seen"]["cold"])) if "seen" in arrays else None
-        drawn = Points(**arrays["drawn"]) if "drawn" in arrays else None
+        seen = (
+            (WeightedPoints(**arrays["seen"]["hot"]), WeightedPoints(**arrays["seen"]["cold"]))
+            if "seen" in arrays
+            else None
+        )
+        drawn = WeightedPoints(**arrays["drawn"]) if "drawn" in arrays else None
         return BurnIn(*run, values["round"], _tuple(arrays, "walk"), seen, drawn)
     kept, earlier = (_kept(values[which], arrays.get(which, {})) for which in _KEPT)
     looked = Diagnostics(*(arrays[name] for name in ("autocorrelation", "ess", "r_hat"))) if "ess" in arrays else None

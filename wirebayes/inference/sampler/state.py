@@ -1,7 +1,7 @@
 """The states of a run: walkers in burn-in, walkers whose draws are kept, and how walkers move on.
 
-A run begins with `burn_in.init`; `burn_in.step` and `kept.step` lead from a state to the next. States do not change:
-only the random generator that a state carries goes on with every draw.
+A run begins with `burn_in.init`; `burn_in.burn_in_round` and `kept.keep_block` lead from a state to the next. States do
+not change: only the random generator that a state carries goes on with every draw.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler.emcee_core import EmceeState, EnsembleSampler, Move
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.moves import EvolutionMove, PoolMove
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.settings import POOL, POOL_IN_BURN_IN
 from wirebayes.numeric.typing import Array
@@ -59,8 +59,7 @@ class Learned:
     again : int
         So often the proposal was learned again, from kept draws.
     overlooked : float
-        The larger of what `wirebayes.inference.sampler.burn_in.overlooked` said at the last look, where that was too
-        much.
+        The larger of what `burn_in.overlooked_nats` said at the last look, where that was too much.
     lost : bool
         Whether it was too much of what the search left: a mode that walkers have lost.
     previous : Proposal or Mixture, optional
@@ -106,8 +105,8 @@ class BurnIn:
     evaluations: int
     round: int = 0
     walk: tuple[Array, Array, Array] | None = None
-    seen: tuple[Points, Points] | None = None
-    drawn: Points | None = None
+    seen: tuple[WeightedPoints, WeightedPoints] | None = None
+    drawn: WeightedPoints | None = None
 
     def knowing(self, **changes: Any) -> "BurnIn":
         """The state with something else learned."""
@@ -202,7 +201,7 @@ State = BurnIn | Sampling
 
 
 @dataclass(frozen=True)
-class Stretch:
+class AdvancedWalkers:
     """What walkers did: where they are now, emcee's record of the way, and the evaluations it took."""
 
     walkers: Walkers
@@ -210,7 +209,7 @@ class Stretch:
     evaluations: int
 
 
-def advance(target: LogPosterior, walkers: Walkers, move: Move, steps: int, power: float = 1.0) -> Stretch:
+def advance(target: LogPosterior, walkers: Walkers, move: Move, steps: int, power: float = 1.0) -> AdvancedWalkers:
     """Run walkers on.
 
     All ensembles walk side by side: a batch costs little more than one of its parts.
@@ -231,7 +230,7 @@ def advance(target: LogPosterior, walkers: Walkers, move: Move, steps: int, powe
     start = EmceeState(walkers.positions, log_prob=power * walkers.values, random_state=walkers.random)
     end = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
     now = Walkers(end.coords, end.log_prob / power, sampler.random_state)
-    return Stretch(now, sampler, target.evaluations - before)
+    return AdvancedWalkers(now, sampler, target.evaluations - before)
 
 
 def move_of(learned: Learned, ensembles: int, steps: int, *, frozen: bool) -> Move:

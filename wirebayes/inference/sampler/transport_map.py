@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from wirebayes.inference.sampler.points import Points
+from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.settings import (
     ALTERNATIONS,
     CLEAR,
@@ -113,7 +113,7 @@ class Straight:
         return x
 
 
-def fit_map(points: Points, order: NDArray[np.int64]) -> Straight:
+def fit_map(points: WeightedPoints, order: NDArray[np.int64]) -> Straight:
     """The map that straightens points: weighted regressions, coordinate by coordinate.
 
     Parameters

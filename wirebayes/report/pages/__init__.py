@@ -1,17 +1,17 @@
 """Which page shows a command's results: a new command with results adds its own here."""
 
-# each module has ``page(folder, configuration)``
+# the module, and its function of the folder and the configuration
 PAGES = {
-    "reproduce": "wirebayes.paper.page",
-    "import": "wirebayes.report.pages.check",
-    "check": "wirebayes.report.pages.check",
-    "fit": "wirebayes.report.pages.fit",
-    "batch": "wirebayes.report.pages.batch",
-    "compare": "wirebayes.report.pages.compare",
-    "discover": "wirebayes.report.pages.discover",
-    "plan": "wirebayes.report.pages.plan",
-    "pose": "wirebayes.report.pages.pose",
-    "calibrate": "wirebayes.report.pages.calibrate",
-    "export": "wirebayes.report.pages.export",
-    "simulate": "wirebayes.report.pages.simulate",
+    "reproduce": "wirebayes.paper.page:paper_page",
+    "import": "wirebayes.report.pages.check:check_page",
+    "check": "wirebayes.report.pages.check:check_page",
+    "fit": "wirebayes.report.pages.fit:fit_page",
+    "batch": "wirebayes.report.pages.batch:batch_page",
+    "compare": "wirebayes.report.pages.compare:compare_page",
+    "discover": "wirebayes.report.pages.discover:discover_page",
+    "plan": "wirebayes.report.pages.plan:plan_page",
+    "pose": "wirebayes.report.pages.pose:pose_page",
+    "calibrate": "wirebayes.report.pages.calibrate:calibrate_page",
+    "export": "wirebayes.report.pages.export:export_page",
+    "simulate": "wirebayes.report.pages.simulate:simulate_page",
 }

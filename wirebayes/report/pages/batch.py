@@ -36,7 +36,7 @@ _MOST_ROWS = 500  # a page of more takes seconds to open; the CSV holds all
 _SHOWN = ("k1", "B", "U", "k2", "N")
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def batch_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``batch.json``."""
     found: BatchJson = read_json(folder / "batch.json")
     rows, far = found["experiments"], found["outliers"]

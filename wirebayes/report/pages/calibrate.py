@@ -32,7 +32,7 @@ from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.sentences import counted
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def calibrate_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``calibration.json``."""
     found: CalibrateJson = read_json(folder / "calibration.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]

@@ -8,7 +8,7 @@ from wirebayes.answers.terminal import of_import
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson
 from wirebayes.json_files.imported import ImportedExperiment, ImportJson
-from wirebayes.json_files.read_units import read
+from wirebayes.json_files.read_units import read_value
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -18,13 +18,13 @@ from wirebayes.report.blocks import (
     Points,
     Section,
     Table,
+    as_sentence,
     before_the_answer,
     beside_the_answer,
     embedded,
     files_beside,
     number,
     picture_file,
-    sentence,
     span,
     unit_text,
 )
@@ -42,7 +42,7 @@ _MOST_SENTENCES = 3  # of experiments at the top of a page, which a first screen
 _DETERMINED_BY = {"data": "the readings", "data and prior": "readings and prior", "prior": "the prior alone"}
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def check_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``check.json`` or ``import.json``, a section for each experiment."""
     files = Section("Raw results", [files_beside(folder, _FILES)])
     if configuration["command"] == "import":
@@ -95,7 +95,7 @@ def _about(e: CheckedExperiment) -> list[str]:
         f"{number(e['duration_s'] / 60.0)} min in all.",
     ]
     if ends := e.get("hold_ends"):
-        about.append(sentence(ends["sentence"]))
+        about.append(as_sentence(ends["sentence"]))
     return about
 
 
@@ -141,7 +141,7 @@ def _holds(e: CheckedExperiment) -> Table:
     for hold in e["holds"]:
         setting = number(hold["tension_N" if weights else "displacement_mm"])
         begins, lasts = number(hold["start_s"]), number(hold["duration_s"])
-        first, last = number(read(hold, "first")), number(read(hold, "last"))
+        first, last = number(read_value(hold, "first")), number(read_value(hold, "last"))
         rows.append([str(hold["number"] or "–"), setting, begins, lasts, str(hold["readings"]), first, last])
     header = ["hold", what, "begins (s)", "lasts (s)", "readings", f"first ({unit})", f"last ({unit})"]
     return Table(header, rows, "The holds as they were read; one without a number was not recorded.")

@@ -7,7 +7,7 @@ from typing import Any
 from wirebayes.answers.headline import comparison_in_words
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.comparison import ComparedModels, ComparisonJson
-from wirebayes.json_files.read_units import read, unit_read
+from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.report.blocks import (
     Block,
     Page,
@@ -42,7 +42,7 @@ _FILES = (
 )
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def compare_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section an experiment, from ``comparison.json`` and the pictures beside it."""
     content: ComparisonJson = read_json(folder / "comparison.json")
     found = content["experiments"]
@@ -72,7 +72,7 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     for r in good:
         difference, held = r["difference"], r["held_out"]
         both = (held["free"], held["given_first"]) if held else (None, None)
-        errors = (number(s and read(s, "rmse"), 2) for s in both)
+        errors = (number(s and read_value(s, "rmse"), 2) for s in both)
         scores = (number(v, 2) for v in ((difference["elpd"], difference["se"]) if difference else (None, None)))
         lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _plain(r.get("meaning") or "")])
     blocks.append(

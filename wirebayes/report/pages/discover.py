@@ -7,8 +7,8 @@ from typing import Any
 from wirebayes.answers.headline import findings_in_a_sentence
 from wirebayes.answers.terminal import in_other_tests
 from wirebayes.io.run_folder import read_json
-from wirebayes.json_files.discovery import Amplitude, DiscoveryJson, ExperimentFindings
-from wirebayes.json_files.read_units import read, unit_read
+from wirebayes.json_files.discovery import AmplitudeEstimate, DiscoveryJson, ExperimentFindings
+from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.report.blocks import (
     Block,
@@ -36,7 +36,7 @@ from wirebayes.report.pictures.discover import waterfall
 from wirebayes.sentences import listed, p_in_words, said_beside, spoken
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def discover_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section an experiment, from ``discovery.json`` and the pictures beside it."""
     content: DiscoveryJson = read_json(folder / "discovery.json")
     found = content["experiments"]
@@ -89,7 +89,7 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     blocks.append(Columns([*columns, Points("What is not known", unknown or ["Nothing to report."])]))
     if (folder / name).is_dir() and (others := pictures_in(folder / name, _patterns(v))):
         blocks.append(Pictures(others))
-    if len(v.get("steps", [])) > 1 and read(v["steps"][0], "rmse") is not None:
+    if len(v.get("steps", [])) > 1 and read_value(v["steps"][0], "rmse") is not None:
         figure = waterfall(v)
         caption = (
             "Rms error on held-out holds: of the plain model, by how much each named effect reduces it in turn, and "
@@ -97,7 +97,7 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         )
         blocks.append(Pictures([Picture(drawn(figure), caption, caption)]))
         names = [spoken(s["model"]) if s is v["steps"][0] else f"+ {spoken(s['model'])}" for s in v["steps"]]
-        scores = [[number(k) for k in (read(s, "rmse"), s["elpd"], s["coverage_90"])] for s in v["steps"]]
+        scores = [[number(k) for k in (read_value(s, "rmse"), s["elpd"], s["coverage_90"])] for s in v["steps"]]
         lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
         caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
         blocks.append(
@@ -217,13 +217,13 @@ def _held_out(v: ExperimentFindings) -> str:
         return ""
     if not held["holds"]:
         return "No hold was held out: that needs three recorded holds of every test."
-    plain, final = (number(read(held[model], "rmse"), 2) for model in ("plain", "final"))
+    plain, final = (number(read_value(held[model], "rmse"), 2) for model in ("plain", "final"))
     holds = listed([str(h) for h in held["holds"]])
     text = f"On the unused holds {holds} the rms error goes from {plain} to {final} {unit_read(held['plain'])}"
     if v["verdict"] == "partial":
         text += " with a smooth discrepancy beside the named effects"
     if v.get("accepted") and (flexible := held.get("flexible")):
-        text += f"; a smooth curve instead of a named effect reaches {number(read(flexible, 'rmse'), 2)}"
+        text += f"; a smooth curve instead of a named effect reaches {number(read_value(flexible, 'rmse'), 2)}"
     return text + "."
 
 
@@ -233,7 +233,7 @@ def _sizes(v: ExperimentFindings) -> list[str]:
     return here + [f"{sentence}." for sentence in in_other_tests(v)]
 
 
-def _amplitude(effect: str, a: Amplitude) -> str:
+def _amplitude(effect: str, a: AmplitudeEstimate) -> str:
     unit = "" if a.get("unit") in (None, "-", "1") else f" {a['unit']}"
     at = "" if a.get("hold") is None else f", from hold {a['hold']} on"
     return f"{spoken(effect)}: {number(a['mean'])}{unit} ({span(a['q05'], a['q95'])}){at}."

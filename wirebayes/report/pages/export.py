@@ -36,7 +36,7 @@ _FILES = (
 )
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def export_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``creep-table.csv`` and links to what lies beside it."""
     with (folder / "creep-table.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))

@@ -13,7 +13,7 @@ from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
-from wirebayes.prediction.predictive import PredictionRequest, predict
+from wirebayes.prediction.predictive import PredictionRequest, draw_predictive
 from wirebayes.report import figures
 from wirebayes.report.blocks import (
     Block,
@@ -25,12 +25,12 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     Text,
+    as_sentence,
     before_the_answer,
     beside_the_answer,
     drawn_together,
     files_beside,
     number,
-    sentence,
     span,
     unit_text,
 )
@@ -51,7 +51,7 @@ _FILES = (
 )
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def fit_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section for each experiment of each fit in the folder."""
     sections, effects, sentences = [], dict[str, Effect](), list[str]()
     for file in sorted(folder.glob("*/summary.json")):
@@ -224,7 +224,7 @@ def _measured(stored: Stored, ends: HoldEnds | None) -> Points:
         f"{counted(len(read), 'reading')}.",
         f"{'Weights' if weights else 'Tensions'} from {number(tension.min())} to {number(tension.max())} N.",
         f"The longest hold lasted {protocol.duration_s.max():g} s.",
-        *([sentence(ends["sentence"])] if ends else []),
+        *([as_sentence(ends["sentence"])] if ends else []),
     ]
     return Points("What was measured", points)
 
@@ -299,7 +299,7 @@ def _residuals(stored: Stored) -> Any:
     first = readings[:, 0] if alone else np.full(len(readings), np.nan)
     request = PredictionRequest(protocol, 0 if alone else len(readings), protocol.recorded, first)
     rows = np.linspace(0, len(stored.theta) - 1, min(len(stored.theta), _DRAWS)).astype(int)
-    replicates = predict(stored.problem, stored.theta[rows], stored.sample, request, np.random.default_rng(0))
+    replicates = draw_predictive(stored.problem, stored.theta[rows], stored.sample, request, np.random.default_rng(0))
     wanted = protocol.mask.copy()
     if alone:
         wanted[:, 0] = False
@@ -307,4 +307,6 @@ def _residuals(stored: Stored) -> Any:
     number_of = np.broadcast_to(protocol.number[:, None], wanted.shape)[wanted]
     kind = stored.likelihood
     title = f"{stored.sample.name}, {figures.WORDS[kind]}"
-    return figures.residuals(number_of, protocol.time_s[wanted], readings[wanted], band, title, figures.COLOURS[kind])
+    return figures.residual_figure(
+        number_of, protocol.time_s[wanted], readings[wanted], band, title, figures.COLOURS[kind]
+    )

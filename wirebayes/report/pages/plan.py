@@ -35,7 +35,7 @@ _AIMS = {
 }
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def plan_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``plan.json``."""
     found: PlanJson = read_json(folder / "plan.json")
     rows = found["protocols"]

@@ -46,11 +46,11 @@ _CAPTIONS = {
 _TURNED = "The same with the platform turned by the rotation vector that the title names."
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def pose_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``pose.json`` and the pictures beside it."""
     content = read_json(folder / "pose.json")
     if "history" in content:
-        return pose_history.page(folder, configuration, content)
+        return pose_history.pose_history_page(folder, configuration, content)
     pose: PoseJson = content
     blocks: list[Block] = before_the_answer(pose)
     view = robot_view(folder)

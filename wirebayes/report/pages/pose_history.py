@@ -45,7 +45,7 @@ _ROWS = 12  # of the tables on the page
 _SMALLEST_MM = 1e-4  # less is shown as nothing: a tenth of what a dial gauge resolves, and often only rounding
 
 
-def page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> Page:
+def pose_history_page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> Page:
     """The content of ``pose.json`` and the pictures beside it.
 
     Parameters

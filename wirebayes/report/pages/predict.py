@@ -17,12 +17,12 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     Text,
+    as_sentence,
     before_the_answer,
     beside_the_answer,
     drawn,
     files_beside,
     number,
-    sentence,
     span,
 )
 from wirebayes.sentences import counted, quantity
@@ -45,11 +45,11 @@ def write_beside(predicted: Prediction, table: Path) -> Path:
     stem = table.name if table.suffix == ".html" else table.stem
     path = table.with_name(f"{stem}.html")
     check_file(path)
-    write_text(path, render(page(predicted, table)))
+    write_text(path, render(predict_page(predicted, table)))
     return path
 
 
-def page(predicted: Prediction, table: Path) -> Page:
+def predict_page(predicted: Prediction, table: Path) -> Page:
     """The answer for the first hold, the bands of all, and every row.
 
     Parameters
@@ -67,7 +67,7 @@ def page(predicted: Prediction, table: Path) -> Page:
         *before_the_answer(warnings),
         Pictures([Picture(drawn(figure), alt, _CAPTION)]),
         *beside_the_answer(warnings),
-        Text(sentence(about["prediction"])),
+        Text(as_sentence(about["prediction"])),
         _rows(predicted),
     ]
     beside = files_beside(table.parent, [(table.name, "every row, with mean and standard deviation")])

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from wirebayes.effects import CATALOGUE, named
+from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.run_folder import read_json
@@ -35,7 +35,7 @@ _FILES = (
 )
 
 
-def page(folder: Path, configuration: dict[str, Any]) -> Page:
+def simulate_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``truth.json`` and of the experiments beside it."""
     content: TruthJson = read_json(folder / "truth.json")
     truths = content["experiments"]
@@ -59,7 +59,7 @@ def _section(e: Experiment, truth: TrueWire) -> Section:
         f"Readings of {e.name} against what was set.",
         "Within each hold the readings go from the blue point to the red ones.",
     )
-    known = tuple(named(effect) for effect in effects if effect.split("@")[0] in CATALOGUE)
+    known = tuple(effect_named(effect) for effect in effects if effect.split("@")[0] in CATALOGUE)
     lines = [
         [
             name,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from wirebayes.io.bench.convert import Recording
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold
-from wirebayes.report.blocks import save
+from wirebayes.report.blocks import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, verbatim
 from wirebayes.wire.protocol import Control
 
@@ -53,7 +53,7 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
     )
     place: Any = "outside lower center"
     figure.legend(shown.values(), shown.keys(), loc=place, ncols=len(shown), frameon=False, fontsize=8.5)
-    save(figure, target)
+    save_figure(figure, target)
 
 
 def _draw_recording(upper: Axes, lower: Axes, recording: Recording, scale: float, control: Control) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wirebayes.json_files.comparison import ComparedModel, ComparedModels, ModelJson, PredictionScores
-from wirebayes.json_files.read_units import read, unit_read
-from wirebayes.report.blocks import save
+from wirebayes.json_files.read_units import read_value, unit_read
+from wirebayes.report.blocks import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, logarithmic, panel
 
 _SEEN = 12.0  # worse by more than this many times the best-known spread is drawn at the edge
@@ -26,16 +26,16 @@ def save_pictures(folder: Path, name: str, table: ComparedModels, models: list[M
     models : list of dict
         What `wirebayes.comparison.compare.judge` returned for each model.
     """
-    save(differences(name, table), folder / "differences.svg")
+    save_figure(elpd_differences(name, table), folder / "differences.svg")
     best = winner(table)
     held_out = next((m["held_out"] for m in models if m["name"] == best), None)
     if held_out is not None:
-        save(held_out_errors(name, table), folder / "held-out-errors.svg")
+        save_figure(held_out_errors(name, table), folder / "held-out-errors.svg")
         for way, words in WORDS.items():
             if scores := held_out[way]:
                 title = f"{name} under {best}:\n{words}"
-                save(bands(title, scores), folder / f"held-out-{way.replace('_', '-')}.svg")
-                save(pit(title, scores), folder / f"pit-{way.replace('_', '-')}.svg")
+                save_figure(bands(title, scores), folder / f"held-out-{way.replace('_', '-')}.svg")
+                save_figure(pit(title, scores), folder / f"pit-{way.replace('_', '-')}.svg")
 
 
 def winner(table: ComparedModels) -> str | None:
@@ -47,7 +47,7 @@ Way = Literal["free", "given_first"]
 WORDS: dict[Way, str] = {"free": "held out, predicted freely", "given_first": "held out, given first reading"}
 
 
-def differences(name: str, table: ComparedModels) -> Figure:
+def elpd_differences(name: str, table: ComparedModels) -> Figure:
     """Elpd difference from the base with two standard errors, one line a model."""
     rows = [(r, d) for r in table["models"] if (d := r["difference"]) is not None and r["name"] != table["base"]]
     figure, axes = panel(f"elpd − elpd of {table['base']}, all holds left out in turn", "", name,
@@ -76,7 +76,7 @@ def held_out_errors(name: str, table: ComparedModels) -> Figure:
         ("free", CHAIN, "predicted freely"), ("given_first", HOLD, "given the first reading")
     )  # fmt: skip
     for way, colour, label in drawn:
-        found = [(place, read(scores, "rmse")) for place, (_, held) in enumerate(rows) if (scores := held[way])]
+        found = [(place, read_value(scores, "rmse")) for place, (_, held) in enumerate(rows) if (scores := held[way])]
         axes.scatter([v for _, v in found], [p for p, _ in found], s=16, color=colour, label=label)
     logarithmic(axes)
     _names(axes, [row for row, _ in rows])
@@ -98,14 +98,14 @@ def bands(title: str, scores: PredictionScores) -> Figure:
     numbers = list(dict.fromkeys(r["hold"].astype(int).tolist()))
     longest = max(float(r["time_s"].max()), 1e-9)
     place = np.array([numbers.index(int(h)) for h in r["hold"]]) - 0.35 + 0.7 * r["time_s"] / longest
-    q = read(r, "quantiles")
+    q = read_value(r, "quantiles")
     for i, number in enumerate(numbers):
         here = r["hold"] == number
         for low, high, alpha, label in ((0, 6, 0.12, "99 %"), (1, 5, 0.16, "90 %"), (2, 4, 0.22, "50 %")):
             axes.fill_between(place[here], (q[low] - q[3])[here], (q[high] - q[3])[here], color=CHAIN, alpha=alpha,
                               lw=0, label=label if i == 0 else None)  # fmt: skip
     axes.axhline(0, color=CHAIN, lw=1)
-    axes.scatter(place, read(r, "observed") - q[3], s=14, color=INK, zorder=3, label="measured − median")
+    axes.scatter(place, read_value(r, "observed") - q[3], s=14, color=INK, zorder=3, label="measured − median")
     axes.set_xticks(range(len(numbers)), [str(n) for n in numbers])
     legend_below(figure, axes, 4)
     return figure

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wirebayes.discovery.residual_patterns import COVARIATES
 from wirebayes.json_files.discovery import Disagreement, ExperimentFindings
-from wirebayes.json_files.read_units import read, unit_read
+from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.model import likelihoods
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array, Floats
@@ -89,8 +89,8 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     verdict : dict
         The experiment's part of ``discovery.json``, with at least one accepted effect and holds that were held out.
     """
-    steps, floor = verdict["steps"], read(verdict["held_out"], "floor")
-    heights = [rmse for s in steps if (rmse := read(s, "rmse")) is not None]
+    steps, floor = verdict["steps"], read_value(verdict["held_out"], "floor")
+    heights = [rmse for s in steps if (rmse := read_value(s, "rmse")) is not None]
     unit = unit_read(steps[0])
     names = ["plain model", *(spoken(s["model"]) for s in steps[1:]), "left over", "noise"]
     bars = [(0.0, heights[0], _MEASURED)]

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wirebayes.json_files.plan import ExpectedWidth, PlanJson
-from wirebayes.report.blocks import save
+from wirebayes.report.blocks import save_figure
 from wirebayes.report.figures import logarithmic, verbatim
 from wirebayes.sentences import spoken
 
@@ -60,7 +60,7 @@ def widths_and_effects(plan: PlanJson, target: Path) -> None:
         axis.set_axisbelow(True)
         axis.tick_params(axis="x", labelsize=8)
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
-    save(figure, target)
+    save_figure(figure, target)
 
 
 def _share(width: ExpectedWidth) -> float:

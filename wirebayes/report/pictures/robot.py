@@ -14,13 +14,13 @@ from wirebayes.json_files.pose import ControllerError, Drift, VarianceShares
 from wirebayes.json_files.scene import SceneJson
 from wirebayes.json_files.values import Band, Numbers
 from wirebayes.numeric.typing import Floats
-from wirebayes.report.blocks import save
+from wirebayes.report.blocks import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, verbatim
 from wirebayes.report.pictures.robot_space import orientation, workspace_maps
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.pulleys import traced
 from wirebayes.robot.motion.course import Course
-from wirebayes.robot.pose.answer import Answer
+from wirebayes.robot.pose.answer import PoseAnswer
 from wirebayes.robot.pose.request import PoseRequest
 
 CONTROLLERS = {
@@ -33,7 +33,7 @@ _COLOURS = (HOLD, CHAIN, "#5d8c4a")
 Distance = Literal["distance_mm", "rotation_deg"]  # bands of a drift that are drawn over time
 
 
-def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -> None:
+def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: PoseAnswer) -> None:
     """Write the pictures that go with ``pose.json``; none when the pose cannot be held.
 
     Parameters
@@ -59,7 +59,7 @@ def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: Answer) -
         mapped = workspace_maps(one.drift, orientation(one))
         pictures |= {f"{key}-{name}": figure for name, figure in mapped.items()}
     for name, figure in pictures.items():
-        save(figure, folder / f"{name}.svg")
+        save_figure(figure, folder / f"{name}.svg")
     write_json(folder / "scene.json", scene_points(robot, request.position_m, request.rotation, found.courses[0.0]))
 
 

@@ -24,7 +24,7 @@ _PANELS, _FRAMES, _SECONDS = 5, 60, 12
 _OBLIQUE = np.array([[1.0, 0.45, 0.0], [0.0, 0.3, 1.0]])  # depth runs up to the right
 
 
-def save(folder: Path, robot: Robot, history: History, found: HistoryAnswer) -> None:
+def save_history_pictures(folder: Path, robot: Robot, history: History, found: HistoryAnswer) -> None:
     """Write the pictures that go with ``pose.json``; none when the platform cannot be held.
 
     Parameters

@@ -105,7 +105,7 @@ def error_left(
         bare, offset = inverse.lengths(robot, np.broadcast_to(joint_m[..., k, :], (n, legs)))
         zero = (bare + found.error_m) * (1.0 + found.track.strain[:, k])
         loaded = history.robot_at(robot, int(k))
-        there = forward.solve(loaded, found.wires, zero, offset, to.position_m[k], to.rotation[k])
+        there = forward.solve_equilibrium(loaded, found.wires, zero, offset, to.position_m[k], to.rotation[k])
         distance = np.linalg.norm(there.position_m - to.position_m[k], axis=1)
         out[:, i] = np.where(there.found & found.track.held[:, k], distance, np.nan)
     return out

@@ -292,7 +292,7 @@ class LiveEstimator:
         """The first pose, found from afar."""
         bare, offset = inverse.lengths(self.robot, joint_m)
         bare = (bare + self._error) * (1.0 + self._state.strain(self._wires).T)
-        here = forward.solve(self.robot, self._wires, bare, offset, *self._start)
+        here = forward.solve_equilibrium(self.robot, self._wires, bare, offset, *self._start)
         self._live = here.found
         x, R = self._start
         self._x = np.where(here.found[:, None], here.position_m, x)

@@ -21,7 +21,7 @@ from wirebayes.strict.toml_keys import LARGEST_NUMBER, Keys
 _GIVEN = {"k1_N": "k1", "B_mm": "B", "U": "U", "k2": "k2", "N": "N"}
 
 
-def read(name_or_file: str | Path) -> Robot:
+def read_robot_file(name_or_file: str | Path) -> Robot:
     """Read a robot from a TOML file, or a shipped one by its name.
 
     Parameters
@@ -54,7 +54,7 @@ def parse(text: str, where: str) -> Robot:
     Raises
     ------
     InputError
-        As `read`.
+        As `read_robot_file`.
     """
     return _robot(Keys.of_file(Path(where), text))
 

@@ -120,7 +120,7 @@ class CreepingHold:
         self.n = max(v.shape[-1] for v in wires.theta.values())
         state = carried or fresh(robot.legs, self.n)
         self.lengths = self._lengths(0.0, state)
-        self.here = forward.solve(robot, wires, *self.lengths, *start)
+        self.here = forward.solve_equilibrium(robot, wires, *self.lengths, *start)
         self.live = self.here.found
         self.creep = HoldCreep(wires, state, self.here.tension_N.T, follow)
         # steps are laid in t^power, in which creep starts straight
@@ -163,7 +163,9 @@ class CreepingHold:
         """Go on with another mass on the platform; the wires' clocks run on."""
         self.robot = robot
         zero = np.where(self.live[:, None], self.lengths[0], np.nan)
-        self.here = forward.solve(robot, self.wires, zero, self.lengths[1], self.here.position_m, self.here.rotation)
+        self.here = forward.solve_equilibrium(
+            robot, self.wires, zero, self.lengths[1], self.here.position_m, self.here.rotation
+        )
         fell = self.live & ~self.here.found
         self.fall_s[fell], self.live = self.creep.time_s, self.live & ~fell
         creep, self.slope = self.creep, None

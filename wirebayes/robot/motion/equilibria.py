@@ -8,7 +8,7 @@ from wirebayes.robot.mechanics import plane, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion.forward import Equilibria, solve
+from wirebayes.robot.motion.forward import Equilibria, solve_equilibrium
 
 
 def equilibria(
@@ -48,7 +48,7 @@ def equilibria(
         begin, turn = np.concatenate([known[0][None], begin]), np.concatenate([known[1][None], turn])
     begin, turn = plane.onto(robot, begin, turn)
     tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
-    found = solve(robot, wires, tiled, offset_m, begin, turn, 400)
+    found = solve_equilibrium(robot, wires, tiled, offset_m, begin, turn, 400)
     good = np.flatnonzero(found.found)
     height = statics.potential(
         robot, wires, found.position_m.T, np.moveaxis(found.rotation, 0, -1), zero_m[:, None], offset_m[:, None]

@@ -63,7 +63,7 @@ class Equilibria:
         return np.asarray(self.status == FOUND)
 
 
-def solve(
+def solve_equilibrium(
     robot: Robot,
     wires: Wires,
     zero_m: Floats,
@@ -96,7 +96,9 @@ def solve(
     if len(sane) < n:
         offsets = np.broadcast_to(offset_m, zero_m.shape)[sane]
         x, R = np.broadcast_to(start_m, (n, 3))[sane], np.broadcast_to(start_rotation, (n, 3, 3))[sane]
-        return put_back(solve(robot, wires.part(sane), zero_m[sane], offsets, x, R, max_iterations), sane, n)
+        return put_back(
+            solve_equilibrium(robot, wires.part(sane), zero_m[sane], offsets, x, R, max_iterations), sane, n
+        )
     if not n:
         return put_back(None, sane, 0, robot.legs)
     # Counted from the middle of the exit points, so that nothing depends on where the robot's origin is.

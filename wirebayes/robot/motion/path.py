@@ -64,7 +64,7 @@ def follow(
     start : (n, 3), (n, 3, 3) arrays
         Stable poses at the old lengths.
     old, new : pairs of (n, w) arrays
-        Zero-tension lengths and offsets, as in `forward.solve`.
+        Zero-tension lengths and offsets, as in `forward.solve_equilibrium`.
     smallest : float
         Share of the change down to which it is divided; what jumps there still counts as a fall.
 
@@ -98,7 +98,7 @@ def follow(
         fell = ~held & (step[live] < smallest)
         if fell.any():  # downhill from where they hung
             hung = [a[fell] for a in (*between, *at)]
-            caught = forward.solve(robot, part.part(np.flatnonzero(fell)), *hung)
+            caught = forward.solve_equilibrium(robot, part.part(np.flatnonzero(fell)), *hung)
             distance = np.linalg.norm(caught.position_m - hung[2], axis=1)
             lost = caught.status == forward.NOT_CONVERGED
             whole.status[live[fell]] = np.where(lost, forward.NOT_CONVERGED, forward.FELL)
@@ -120,7 +120,7 @@ def _step(
     ahead = np.where(np.isfinite(ahead), ahead, 0.0)
     close = np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
     close &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
-    there = forward.solve(robot, wires, np.where(close[:, None], lengths[0], np.nan), lengths[1], *near)
+    there = forward.solve_equilibrium(robot, wires, np.where(close[:, None], lengths[0], np.nan), lengths[1], *near)
     loose = np.flatnonzero(there.status == forward.NOT_HELD)
     if loose.size:
         _let_go(robot, wires, there, loose, lengths)
@@ -145,7 +145,7 @@ def _let_go(
     stiffness = np.moveaxis(balance_at(robot, part, *balance, *own)[1], -1, 0)
     softest = np.linalg.eigh(stiffness)[1][..., 0]
     aside = mixed.after_step(robot, balance, _ASIDE * robot.size_m * softest)
-    found = forward.solve(robot, part, *own, *aside)
+    found = forward.solve_equilibrium(robot, part, *own, *aside)
     held = np.flatnonzero(found.found)
     for field in fields(forward.Equilibria):
         getattr(there, field.name)[loose[held]] = getattr(found, field.name)[held]
@@ -179,7 +179,9 @@ def settle(
     # the error left is of the order of the step's square over a wire's length
     far = np.flatnonzero(~(np.linalg.norm(step, axis=1) < small * robot.size_m))
     if far.size:
-        rest = forward.solve(robot, wires.part(far), lengths[0][far], lengths[1][far], near[0][far], near[1][far])
+        rest = forward.solve_equilibrium(
+            robot, wires.part(far), lengths[0][far], lengths[1][far], near[0][far], near[1][far]
+        )
         for field in fields(forward.Equilibria):
             getattr(out, field.name)[far] = getattr(rest, field.name)
     return out

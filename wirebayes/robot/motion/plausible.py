@@ -126,7 +126,7 @@ def _stretch(robot: Robot, joint_m: Floats, start_m: Floats) -> Floats:
     zero, offset = inverse.lengths(robot, joint_m)
     stiff = {"k1": np.full((1, 1), _RIGID * robot.mass_kg * GRAVITY)}
     rigid = Wires("hooke", "saturating", stiff, np.full((robot.legs, 1), 1000.0))
-    there = forward.solve(robot, rigid, zero, offset, start_m, matrix(robot.home_rotation_rad))
+    there = forward.solve_equilibrium(robot, rigid, zero, offset, start_m, matrix(robot.home_rotation_rad))
     shape = statics.geometry(robot, there.position_m.T, np.moveaxis(there.rotation, 0, -1))
     stretch = statics.stretched(robot, shape, np.broadcast_to(offset, zero.shape).T).T / zero
     return np.where(there.found[:, None], stretch, np.inf)

@@ -38,7 +38,7 @@ _LEVEL = 1e-6  # sine of a wire's angle to the horizontal: so little is rounding
 
 
 @dataclass(frozen=True)
-class Answer:
+class PoseAnswer:
     """What `pose` found.
 
     Attributes
@@ -56,7 +56,7 @@ class Answer:
     maps: tuple[Map, ...] = ()
 
 
-def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws | None = None) -> Answer:
+def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws | None = None) -> PoseAnswer:
     """Inverse and forward kinematics, drift, pose error and where it comes from.
 
     Parameters
@@ -108,7 +108,7 @@ class _Held:
     tension_N: Floats
 
 
-def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, content: PoseJson) -> Answer:
+def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, content: PoseJson) -> PoseAnswer:
     """What is said of a pose that can be held, besides what `content` has already."""
     robot, line, request = held.robot, held.line, held.request
     x, R = request.position_m, request.rotation
@@ -132,7 +132,7 @@ def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, cont
     reached = [one for one in spaces if len(one.drift.position_m)]
     # the first orientation as a whole, then every slice of each
     content["workspace"] = {**claim.claim_summary(reached[0].drift), "slices": summaries(spaces)} if reached else None
-    return Answer(content, courses, spaces)
+    return PoseAnswer(content, courses, spaces)
 
 
 def _courses(held: _Held, rng: np.random.Generator) -> dict[float, Course]:
@@ -155,12 +155,12 @@ def _warnings(held: _Held, courses: dict[float, Course], stable: bool, turned: O
     return out + _untested(held)
 
 
-def _unheld(content: PoseJson, sentence: str, kind: str = "unheld") -> Answer:
+def _unheld(content: PoseJson, sentence: str, kind: str = "unheld") -> PoseAnswer:
     """An answer that ends because nothing holds the platform, and why."""
     content["feasible"] = False
     content["sentence"] = sentence
     content["warnings"] = unheld(sentence, kind)
-    return Answer(content, {})
+    return PoseAnswer(content, {})
 
 
 def _why_not(robot: Robot, x: Floats, turned: Orientation) -> tuple[str, str]:
@@ -260,7 +260,7 @@ def _by_leg(values: Floats) -> Band:
 def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Floats, R: Floats) -> ForwardKinematics:
     """Forward kinematics of the commands, from a start beside the pose, must return to it."""
     beside = plane.onto(robot, (x + 0.01 * robot.size_m)[None], R[None])
-    back = forward.solve(robot, wires, commands.zero_m, commands.offset_m, beside[0][0], beside[1][0])
+    back = forward.solve_equilibrium(robot, wires, commands.zero_m, commands.offset_m, beside[0][0], beside[1][0])
     n = len(commands.zero_m)
     pose = np.repeat(x[None], n, 0), commands.rotation
     stiff = one_sided.lowest_stiffness(robot, wires, pose, (commands.zero_m, commands.offset_m))[commands.feasible]
@@ -283,7 +283,7 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.ra
         R = commands.rotation[0]
     if not commands.feasible[0]:  # some draws are strong enough, their mean is not
         return {"stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []}
-    here = forward.solve(robot, mean, commands.zero_m, commands.offset_m, x, R)
+    here = forward.solve_equilibrium(robot, mean, commands.zero_m, commands.offset_m, x, R)
     near_m = 1e-6 * robot.span_m
     stable = bool(here.found[0]) and bool(np.abs(here.position_m[0] - x).max() < near_m)
     found = equilibria.equilibria(robot, mean, *lengths, rng, known=(x, R))

@@ -55,7 +55,7 @@ def certify(
     k1_N, zero_m : pairs of (w,) arrays
         Bounds of stiffness and zero-tension length; equal bounds for known values.
     offset_m : (w,) array
-        As in `forward.solve`.
+        As in `forward.solve_equilibrium`.
     position_m, rotation : (3,), (3, 3) arrays
         Approximate solution for the middle of the bounds.
     how_alone : bool

@@ -176,7 +176,7 @@ class _Way:
 
     def _solved(self, near: tuple[Floats, Floats], k1_N: Floats, strain: Floats) -> tuple[Floats, Floats] | None:
         wires = Wires(self.law, "saturating", {"k1": k1_N[:, None]}, np.full((self.robot.legs, 1), 1000.0))
-        found = forward.solve(self.robot, wires, (self.bare * (1 + strain))[None], self.offset, *near)
+        found = forward.solve_equilibrium(self.robot, wires, (self.bare * (1 + strain))[None], self.offset, *near)
         left, _, right = np.linalg.svd(found.rotation[0])
         return (found.position_m[0], left @ right) if found.found[0] else None
 

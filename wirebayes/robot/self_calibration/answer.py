@@ -43,7 +43,7 @@ def lengths_report(
     prior : LengthPrior
     session : Session
     readings : (r,) array
-        Standardised, as `predicted.Prediction.readings`.
+        Standardised, as `predicted.PredictedSession.readings`.
     seed : int
     visits : int
         Number of poses to propose.

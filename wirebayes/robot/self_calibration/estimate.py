@@ -16,7 +16,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.predicted import Prediction, predict
+from wirebayes.robot.self_calibration.predicted import PredictedSession, predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.start import starting_references
 from wirebayes.robot.self_calibration.trust import joint_test
@@ -131,15 +131,15 @@ class _Target:
     mean: Floats
     root: Floats
 
-    def predicted(self, white: Floats, near: tuple[Floats, Floats] | None = None) -> Prediction:
+    def predicted(self, white: Floats, near: tuple[Floats, Floats] | None = None) -> PredictedSession:
         """What unknowns ``(m, d)`` lead to; `near` are poses at the beginning of every hold."""
-        return predict(self.robot, self.prior, self.session, self.mean + white @ self.root.T, near=near)
+        return predict_session(self.robot, self.prior, self.session, self.mean + white @ self.root.T, near=near)
 
-    def derivatives(self, white: Floats, at: Prediction) -> tuple[Floats, Floats, Floats]:
+    def derivatives(self, white: Floats, at: PredictedSession) -> tuple[Floats, Floats, Floats]:
         """As `derivatives`, of some of the robots."""
         return derivatives(self.robot, self.prior, self.session, self.mean, self.root, white, at)
 
-    def cost(self, at: Prediction, white: Floats) -> Floats:
+    def cost(self, at: PredictedSession, white: Floats) -> Floats:
         """(m,) minus twice the log posterior; infinite where nothing holds the platform."""
         value = ((self.readings - at.readings) ** 2).sum(1) + (white**2).sum(1)
         return np.where(at.solved, value, np.inf)
@@ -150,7 +150,7 @@ class _Mode:
     """Where the search of the modes of ``m`` posteriors ended."""
 
     white: Floats
-    here: Prediction
+    here: PredictedSession
     cost: Floats
     converged: NDArray[np.bool_]
 
@@ -218,7 +218,7 @@ def corrected_joints(
 
 
 def derivatives(
-    robot: Robot, prior: LengthPrior, session: Session, mean: Floats, root: Floats, white: Floats, at: Prediction
+    robot: Robot, prior: LengthPrior, session: Session, mean: Floats, root: Floats, white: Floats, at: PredictedSession
 ) -> tuple[Floats, Floats, Floats]:
     """Derivatives of readings, final lengths and final poses by the unknowns in units of their prior.
 
@@ -252,7 +252,7 @@ def derivatives(
     step = 1e-3
     moves = step * np.concatenate([np.eye(d), -np.eye(d)])
     near = np.repeat(at.begun_m, 2 * d, 0), np.repeat(at.begun_rotation, 2 * d, 0)
-    p = predict(robot, prior, session, mean + (white[:, None] + moves).reshape(-1, d) @ root.T, near=near)
+    p = predict_session(robot, prior, session, mean + (white[:, None] + moves).reshape(-1, d) @ root.T, near=near)
 
     def difference(values: Floats) -> Floats:
         both = values.reshape(m, 2, d, -1)
@@ -266,13 +266,13 @@ def derivatives(
     return difference(p.readings), difference(p.length_m), difference(poses)
 
 
-def _pick(first: NDArray[np.bool_], a: Prediction, b: Prediction) -> Prediction:
+def _pick(first: NDArray[np.bool_], a: PredictedSession, b: PredictedSession) -> PredictedSession:
     def choose(u: NDArray[Any], v: NDArray[Any]) -> NDArray[Any]:
         return np.where(first.reshape(-1, *[1] * (u.ndim - 1)), u, v)
 
-    both = {f.name: choose(getattr(a, f.name), getattr(b, f.name)) for f in fields(Prediction)}
-    return Prediction(**both)
+    both = {f.name: choose(getattr(a, f.name), getattr(b, f.name)) for f in fields(PredictedSession)}
+    return PredictedSession(**both)
 
 
-def _part(p: Prediction, rows: NDArray[np.intp]) -> Prediction:
-    return Prediction(**{f.name: getattr(p, f.name)[rows] for f in fields(Prediction)})
+def _part(p: PredictedSession, rows: NDArray[np.intp]) -> PredictedSession:
+    return PredictedSession(**{f.name: getattr(p, f.name)[rows] for f in fields(PredictedSession)})

@@ -25,7 +25,7 @@ _POWERS = 0.1, 3.0  # of time, between which a first step is shortened; unknowns
 
 
 @dataclass(frozen=True)
-class Hold:
+class SessionHold:
     """A hold of the session: the poses at its beginning and end, lengths before creep, and what is carried out."""
 
     begun: forward.Equilibria
@@ -50,7 +50,7 @@ def holds(
     resolved_N: float,
     longest_step: float = LONGEST,
     near: tuple[Floats, Floats] | None = None,
-) -> Iterator[Hold]:
+) -> Iterator[SessionHold]:
     """Every hold of a session, in order.
 
     Parameters
@@ -77,7 +77,7 @@ def holds(
         begun = walk.here
         walk.through(float(duration), pace, longest_step)
         state = walk.creep.state()
-        yield Hold(begun, walk.here, walk.bare, state)
+        yield SessionHold(begun, walk.here, walk.bare, state)
 
 
 class _Walk:
@@ -109,7 +109,7 @@ class _Walk:
         self.bare, self.offset = lengths
         self.size = robot.size_m if robot.degrees == 6 else robot.span_m  # what small motions are small beside
         zero = self._zero(carried)
-        self.here = forward.solve(robot, wires, zero, self.offset, *start)
+        self.here = forward.solve_equilibrium(robot, wires, zero, self.offset, *start)
         self.creep = HoldCreep(wires, carried, self.here.tension_N.T)
         self.slope: Floats | None = None  # of the amount by creep's clock
         self.before: Floats = np.zeros(1)  # length of the step that it comes from

@@ -83,7 +83,9 @@ class _Here:
         state, each = self.state, np.repeat(np.arange(p), t)
         zero = (self.zero[:, None] * (1 + ahead)).reshape(-1, w)
         pose = state.position_m[each], state.rotation[each]
-        found = forward.solve(self.robot, self.wires.part(np.zeros(p * t, int)), zero, self.offset[each], *pose)
+        found = forward.solve_equilibrium(
+            self.robot, self.wires.part(np.zeros(p * t, int)), zero, self.offset[each], *pose
+        )
         tension = np.where(found.found[:, None], found.tension_N, np.nan).reshape(p, t, w)
         bend = tension - tension[:, -1:] - ahead @ self.response.swapaxes(1, 2)
         pull = np.maximum(state.pull_N, 0.0)

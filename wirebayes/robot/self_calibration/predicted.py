@@ -17,7 +17,7 @@ _RESOLVED = 1e-3  # of the weight: tensions on the way to what wires carry, what
 
 
 @dataclass(frozen=True)
-class Prediction:
+class PredictedSession:
     """Readings and state that unknowns lead to, ``n`` rows.
 
     Attributes
@@ -50,14 +50,14 @@ class Prediction:
     solved: NDArray[np.bool_]
 
 
-def predict(
+def predict_session(
     robot: Robot,
     prior: LengthPrior,
     session: Session,
     unknowns: Floats,
     longest_step: float = LONGEST,
     near: tuple[Floats, Floats] | None = None,
-) -> Prediction:
+) -> PredictedSession:
     """Run the session for every row of unknowns ``(n, d)``: every creep step under the tensions it meets.
 
     Parameters
@@ -91,7 +91,7 @@ def predict(
         normals = turn[:, :, :2, 2].reshape(n, -1)
         readings = np.concatenate([readings, normals / session.tilt_sd_rad], 1)
     strain = np.broadcast_to(hold.state.strain(wires).T, length.shape)
-    return Prediction(
+    return PredictedSession(
         readings, length, strain, position, turn, *_poses(begun), *_poses(ended), np.stack(lengths, 1), solved
     )
 

@@ -14,7 +14,7 @@ from wirebayes.robot.mechanics import rotation, statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import stretched_length
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.predicted import Prediction, predict
+from wirebayes.robot.self_calibration.predicted import PredictedSession, predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 
@@ -72,7 +72,7 @@ def starting_references(
         Gauss-Newton steps at most.
     """
     mean, _ = prior.moments(robot.legs)
-    expected = predict(robot, prior, session, mean[None])
+    expected = predict_session(robot, prior, session, mean[None])
     m, q = len(readings), expected.position_m.shape[1]
     loops = _loops(robot, prior, session, readings, expected)
     x = np.tile(expected.position_m[0], (m, 1)).T
@@ -97,7 +97,7 @@ def _scale(robot: Robot) -> Floats:
     return np.where(np.arange(robot.degrees) < 3, 1.0, 1.0 / robot.size_m)[:, None]
 
 
-def _loops(robot: Robot, prior: LengthPrior, session: Session, readings: Floats, expected: Prediction) -> _Loops:
+def _loops(robot: Robot, prior: LengthPrior, session: Session, readings: Floats, expected: PredictedSession) -> _Loops:
     wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
     m, q = len(readings), expected.position_m.shape[1]
     tau = readings[:, : q * robot.legs].reshape(m * q, robot.legs) * session.tension_sd_N

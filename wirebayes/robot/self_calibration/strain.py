@@ -12,7 +12,7 @@ import numpy as np
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.wires import Wires, stretched_length
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.robot.self_calibration.within_holds import Course, Loaded, crept
+from wirebayes.robot.self_calibration.within_holds import Loaded, TensionCourse, crept
 
 _STEP = 1e-3  # of a prior's standard deviation: differences of smooth functions
 _LOAD = 1e-2  # relative change of all tensions
@@ -36,7 +36,7 @@ class Grown:
     strain: Floats
     by_wires: Floats
     by_pull: Floats
-    course: Course | None = None
+    course: TensionCourse | None = None
 
 
 def differing_wires(unknowns: Unknowns, white: Floats) -> Wires:
@@ -81,7 +81,7 @@ def grown(
     white: Floats,
     pull_N: Floats,
     loaded: Callable[[Floats], Loaded],
-    known: Course | None = None,
+    known: TensionCourse | None = None,
 ) -> Grown:
     """Creep of every hold under tensions that ended at known values.
 

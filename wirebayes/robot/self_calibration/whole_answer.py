@@ -93,7 +93,7 @@ def calibration_report(
         Of geometry and poses.
     session : Session
     readings : (r,) array
-        Standardised, as `predicted.Prediction.readings`.
+        Standardised, as `predicted.PredictedSession.readings`.
     seed : int
     requests : bool
         Stated poses may turn out to be requests, which the robot followed as well as it could.

@@ -25,7 +25,7 @@ _POWERS = 0.1, 3.0  # of time; unknowns may have any N
 
 
 @dataclass(frozen=True)
-class Course:
+class TensionCourse:
     """How tensions went on their way to a hold's end: where the next state's search for them begins.
 
     Attributes
@@ -67,7 +67,7 @@ class Loaded:
     beyond: Callable[[Floats], Floats]
 
 
-def crept(wires: Wires, loaded: Loaded, known: Course | None = None) -> tuple[Floats, Course]:
+def crept(wires: Wires, loaded: Loaded, known: TensionCourse | None = None) -> tuple[Floats, TensionCourse]:
     """Creep strains at the holds' ends, with as many times in each hold as they need.
 
     Parameters
@@ -95,18 +95,18 @@ def crept(wires: Wires, loaded: Loaded, known: Course | None = None) -> tuple[Fl
         course = _finer(course)
 
 
-def _from_end(loaded: Loaded, count: int) -> Course:
+def _from_end(loaded: Loaded, count: int) -> TensionCourse:
     p, legs, _ = loaded.end_N.shape
     path = np.repeat(loaded.end_N[:, None], count + 1, 1)
-    return Course(path, np.zeros((p, count + 1, legs)))
+    return TensionCourse(path, np.zeros((p, count + 1, legs)))
 
 
-def _shifted(known: Course, loaded: Loaded) -> Course:
+def _shifted(known: TensionCourse, loaded: Loaded) -> TensionCourse:
     way = known.path_N - known.path_N[:, -1:]
-    return Course(np.maximum(loaded.end_N[:, None] + way, 0.0), known.bend_N)
+    return TensionCourse(np.maximum(loaded.end_N[:, None] + way, 0.0), known.bend_N)
 
 
-def _finer(course: Course) -> Course:
+def _finer(course: TensionCourse) -> TensionCourse:
     """Twice as many times."""
 
     def between(values: Floats) -> Floats:
@@ -114,16 +114,16 @@ def _finer(course: Course) -> Course:
         out[:, 1::2] = 0.5 * (values[:, :-1] + values[:, 1:])
         return out
 
-    return Course(between(course.path_N), between(course.bend_N))
+    return TensionCourse(between(course.path_N), between(course.bend_N))
 
 
-def _bent(wires: Wires, loaded: Loaded, course: Course) -> tuple["_Through", Course]:
+def _bent(wires: Wires, loaded: Loaded, course: TensionCourse) -> tuple["_Through", TensionCourse]:
     """A session's creep, and the tensions on the way corrected by equilibria."""
     for _ in range(_BENDS):
         through = _through(wires, loaded, course)
         bend = loaded.beyond(through.ahead)
         change = np.abs(bend - course.bend_N).max()
-        course = Course(through.path_N, bend)
+        course = TensionCourse(through.path_N, bend)
         if change < _ERROR * loaded.sd_N or not through.settled:
             break
     return through, course
@@ -151,7 +151,7 @@ class _Through:
     settled: bool
 
 
-def _through(wires: Wires, loaded: Loaded, course: Course) -> _Through:
+def _through(wires: Wires, loaded: Loaded, course: TensionCourse) -> _Through:
     """A session under tensions that the response says, beside a bend."""
     state = fresh(*loaded.end_N.shape[1:])
     held = []
@@ -179,7 +179,7 @@ class _Held:
     state: CreepState
 
 
-def _held(wires: Wires, carried: CreepState, loaded: Loaded, course: Course, hold: int) -> _Held:
+def _held(wires: Wires, carried: CreepState, loaded: Loaded, course: TensionCourse, hold: int) -> _Held:
     """Creep and tensions of a hold, one after the other until they agree."""
     path, bend, end = course.path_N[hold], course.bend_N[hold][..., None], loaded.end_N[hold]
     times = _times(wires, float(loaded.duration_s[hold]), len(path) - 1)
