@@ -188,7 +188,7 @@ def from_draws(
     rng: np.random.Generator,
     ess: float,
 ) -> Weighted:
-    """`importance_sample`, begun from draws: modes are climbed to from the highest, of the first density from others too.
+    """`importance_sample`, begun from draws: climbs start at the highest, and for the first density at others too.
 
     Parameters
     ----------
