@@ -1,6 +1,7 @@
 """The missing effect: found, named, added; or nothing; or something unknown."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -37,8 +38,8 @@ def made(
     return read_experiments(folder / "experiments.toml")
 
 
-def answer(experiments: list[Experiment]) -> dict:
-    return investigate(experiments, Settings(simulations=FEW)).report["experiments"][experiments[0].name]
+def answer(experiments: list[Experiment], kinds: Mapping[str, type[Effect]] = CATALOGUE) -> dict:
+    return investigate(experiments, Settings(kinds=kinds, simulations=FEW)).report["experiments"][experiments[0].name]
 
 
 def test_nothing_is_missing_from_clean_data(tmp_path: Path) -> None:
@@ -87,7 +88,7 @@ def test_a_toe_is_named_added_and_closes_the_gap(tmp_path: Path) -> None:
     assert held["plain"]["rmse_N"] > held["flexible"]["rmse_N"] > held["final"]["rmse_N"]
     assert held["leave_one_hold_out"]["elpd_difference"] > held["leave_one_hold_out"]["flexible_elpd_difference"]
     # Without it in the catalogue, no certainty about another name that does not look like it.
-    bare = answer(experiments, without=["toe"])
+    bare = answer(experiments, catalogue_without(["toe"]))
     assert bare["verdict"] != "nothing-missing" and "toe" not in bare["probabilities"]
 
 
