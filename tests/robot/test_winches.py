@@ -294,7 +294,7 @@ def test_calibration_finds_each_lines_own_length(name, tmp_path):
 
 def test_a_running_robot_is_brought_back_by_winches_whose_lines_creep_unlike(tmp_path):
     """Against a simulation of its own, which knows the lengths of lines and no winches."""
-    robot = schema.read(printer(tmp_path, drum=""))
+    robot = schema.read_robot_file(printer(tmp_path, drum=""))
     robot = replace(robot, centre_of_mass_m=np.array([0.03, 0.06, -0.05]), home_m=np.array([0.1, -0.15, 0.3]))
     home, line = (robot.home_m, np.eye(3)), WireDraws({k: np.full(2, v) for k, v in CORE.items()}, 1000.0)
     of_lines = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
