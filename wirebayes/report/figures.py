@@ -169,14 +169,7 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: C
     effects : tuple of Effect
     """
     count = len(draws)
-    # One pair of axes, on which every cell is a unit square: a pair for each cell takes seconds to draw.
-    left, below = 0.9, 0.8  # room for three lines
-    width, height = 1.1 * count + left + 0.05, 1.05 * count + below + 0.05
-    figure = Figure(figsize=(width, height))
-    axes: Any = figure.add_axes((left / width, below / height, 1.1 * count / width, 1.05 * count / height))
-    axes.set_axis_off()
-    axes.set_xlim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
-    axes.set_ylim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
+    figure, axes = _grid(count)
     scaled = {name: _straight(values) for name, values in draws.items()}
     unit = [_across(values) for values, _ in scaled.values()]
     cells = [(i, j) for i in range(count) for j in range(i)]
@@ -189,21 +182,44 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: C
         heights, edges = np.histogram(unit[i], np.linspace(0.0, 1.0, 31))
         stairs = bottom + 0.92 * _SIDE * heights / heights.max()
         axes.stairs(stairs, i + _SIDE * edges, baseline=bottom, fill=True, color=CHAIN, alpha=0.75)
-        ticks, labels = _few_ticks(values, is_log)
-        words = "\n".join(_narrow(line) for line in axis_label(name, effects, control).replace(", ", ",\n").split("\n"))
-        axes.text(i + _SIDE / 2, -0.42, words, fontsize=8, ha="center", va="top")
-        _ticks(axes, [(i + _SIDE * t, 0.0) for t in ticks], (0.0, -_TICK))
-        for t, label in zip(ticks, labels, strict=True):
-            axes.text(i + _SIDE * t, -2 * _TICK, label, fontsize=7, rotation=45, ha="center", va="top")
+        ticks = list(zip(*_few_ticks(values, is_log), strict=True))
+        lines = axis_label(name, effects, control).replace(", ", ",\n").split("\n")
+        words = "\n".join(_narrow(line) for line in lines)
+        _label_below(axes, i, words, ticks)
         if i:
-            axes.text(-0.42, bottom + _SIDE / 2, words, fontsize=8, rotation=90, ha="right", va="center",
-                      multialignment="center")  # fmt: skip
-            _ticks(axes, [(0.0, bottom + _SIDE * t) for t in ticks], (-_TICK, 0.0))
-            for t, label in zip(ticks, labels, strict=True):
-                axes.text(-2 * _TICK, bottom + _SIDE * t, label, fontsize=7, ha="right", va="center")
+            _label_beside(axes, bottom, words, ticks)
     frames = [Rectangle((j, count - 1 - i), _SIDE, _SIDE) for i in range(count) for j in range(i + 1)]
     axes.add_collection(PatchCollection(frames, facecolor="none", edgecolor=INK, linewidth=0.8))
     return figure
+
+
+def _grid(count: int) -> tuple[Figure, Any]:
+    """One pair of axes, on which every cell is a unit square: a pair for each cell takes seconds to draw."""
+    left, below = 0.9, 0.8  # room for three lines
+    width, height = 1.1 * count + left + 0.05, 1.05 * count + below + 0.05
+    figure = Figure(figsize=(width, height))
+    axes: Any = figure.add_axes((left / width, below / height, 1.1 * count / width, 1.05 * count / height))
+    axes.set_axis_off()
+    axes.set_xlim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
+    axes.set_ylim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
+    return figure, axes
+
+
+def _label_below(axes: Any, left: int, words: str, ticks: Sequence[tuple[float, str]]) -> None:
+    """Name and ticks of a column."""
+    axes.text(left + _SIDE / 2, -0.42, words, fontsize=8, ha="center", va="top")
+    _ticks(axes, [(left + _SIDE * t, 0.0) for t, _ in ticks], (0.0, -_TICK))
+    for t, label in ticks:
+        axes.text(left + _SIDE * t, -2 * _TICK, label, fontsize=7, rotation=45, ha="center", va="top")
+
+
+def _label_beside(axes: Any, bottom: int, words: str, ticks: Sequence[tuple[float, str]]) -> None:
+    """Name and ticks of a row."""
+    upright: dict[str, Any] = {"rotation": 90, "ha": "right", "va": "center", "multialignment": "center"}
+    axes.text(-0.42, bottom + _SIDE / 2, words, fontsize=8, **upright)
+    _ticks(axes, [(0.0, bottom + _SIDE * t) for t, _ in ticks], (-_TICK, 0.0))
+    for t, label in ticks:
+        axes.text(-2 * _TICK, bottom + _SIDE * t, label, fontsize=7, ha="right", va="center")
 
 
 def _narrow(line: str) -> str:

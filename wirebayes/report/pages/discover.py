@@ -71,60 +71,19 @@ _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % 
 
 
 def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
+    hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
     blocks: list[Block] = [*before_the_answer(v), *_alone(v), *beside_the_answer(v)]
-    file = picture_file(folder, name)
-    if file is not None:
-        alt = f"Readings of {name} with each model's curve through them, and what it leaves over, hold after hold."
-        blocks.append(Pictures([Picture(embedded(file), alt, _BEFORE_AND_AFTER, wide=True)]))
+    blocks += _curves(folder, name)
     if v.get("next_measurement"):
         blocks.append(Text(f"Measure next: {v['next_measurement']}"))
     blocks += _parameters(folder / name, v)
-    where = [w["sentence"] for w in v.get("where", []) if w["p"] <= _SPEAKS] or ["No pattern stands out."]
-    beside = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
-    known = [*beside, _held_out(v), *_sizes(v)]
-    hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
-    unknown = [f"Not identifiable here: {listed([spoken(what) for what, _ in hidden])}."] if hidden else []
-    known = [point for point in known if point] or ["Nothing had to be added to the plain model."]
-    columns = [Points("Where model and measurement disagree", where), Points("What is known", known)]
-    blocks.append(Columns([*columns, Points("What is not known", unknown or ["Nothing to report."])]))
+    blocks.append(_within_a_minute(v, [what for what, _ in hidden]))
     if (folder / name).is_dir() and (others := pictures_in(folder / name, _patterns(v))):
         blocks.append(Pictures(others))
     if len(v.get("steps", [])) > 1 and read_value(v["steps"][0], "rmse") is not None:
-        figure = waterfall(v)
-        caption = (
-            "Rms error on held-out holds: of the plain model, by how much each named effect reduces it in turn, and "
-            "what is left above the noise."
-        )
-        blocks.append(Pictures([Picture(drawn(figure), caption, caption)]))
-        names = [spoken(s["model"]) if s is v["steps"][0] else f"+ {spoken(s['model'])}" for s in v["steps"]]
-        scores = [[number(k) for k in (read_value(s, "rmse"), s["elpd"], s["coverage_90"])] for s in v["steps"]]
-        lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
-        caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
-        blocks.append(
-            Table(
-                ["model", f"rms error ({unit_read(v['steps'][0])})", "elpd", "readings in 90 % bands"], lines, caption
-            )
-        )
+        blocks += _steps(v)
     if v.get("probabilities"):
-        ranked = sorted(v["probabilities"].items(), key=lambda item: -item[1])
-        inclusion = v.get("inclusion", {})
-        lines = [
-            [
-                spoken(effect),
-                number(round(p, 4), 2),
-                number(round(inclusion[effect], 4), 2) if effect in inclusion else "–",
-            ]
-            for effect, p in ranked
-            if max(p, inclusion.get(effect, 0.0)) >= _LEAST
-        ]
-        rest = v.get("remainder", {}).get("probability")
-        caption = (
-            "First column: probability of having the largest share of the gap, given that something is missing. "
-            "Second: probability of being missing at all, alone or beside others."
-        )
-        if rest is not None:
-            caption += f" Something without a name remains beside them with probability {number(round(rest, 4), 2)}."
-        blocks.append(Table(["candidate", "largest share", "missing at all"], lines, caption))
+        blocks.append(_candidates(v))
     if v.get("power"):
         lines = [[spoken(e), number(p["amplitude_80"]), unit_text(p["unit"]) or "–"] for e, p in v["power"].items()]
         caption = "The smallest amplitude of each effect that this test detects with 80 % power; a dash: none."
@@ -133,6 +92,67 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         caption = "Not identifiable here: the readings would be nearly the same with or without it."
         blocks.append(Table(["what", "why"], [[spoken(what), why] for what, why in hidden], caption))
     return Section(name, blocks)
+
+
+def _curves(folder: Path, name: str) -> list[Block]:
+    file = picture_file(folder, name)
+    if file is None:
+        return []
+    alt = f"Readings of {name} with each model's curve through them, and what it leaves over, hold after hold."
+    return [Pictures([Picture(embedded(file), alt, _BEFORE_AND_AFTER, wide=True)])]
+
+
+def _within_a_minute(v: ExperimentFindings, hidden: list[str]) -> Columns:
+    """Where model and measurement disagree, what is known, and what is not."""
+    where = [w["sentence"] for w in v.get("where", []) if w["p"] <= _SPEAKS]
+    beside = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
+    known = [point for point in (*beside, _held_out(v), *_sizes(v)) if point]
+    unknown = [f"Not identifiable here: {listed([spoken(what) for what in hidden])}."] if hidden else []
+    return Columns(
+        [
+            Points("Where model and measurement disagree", where or ["No pattern stands out."]),
+            Points("What is known", known or ["Nothing had to be added to the plain model."]),
+            Points("What is not known", unknown or ["Nothing to report."]),
+        ]
+    )
+
+
+def _steps(v: ExperimentFindings) -> list[Block]:
+    """How well held-out holds are predicted, by the plain model and with each effect in turn."""
+    steps = v["steps"]
+    falling = (
+        "Rms error on held-out holds: of the plain model, by how much each named effect reduces it in turn, and "
+        "what is left above the noise."
+    )
+    names = [spoken(steps[0]["model"]), *(f"+ {spoken(step['model'])}" for step in steps[1:])]
+    scores = [[number(k) for k in (read_value(s, "rmse"), s["elpd"], s["coverage_90"])] for s in steps]
+    header = ["model", f"rms error ({unit_read(steps[0])})", "elpd", "readings in 90 % bands"]
+    lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
+    caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
+    return [Pictures([Picture(drawn(waterfall(v)), falling, falling)]), Table(header, lines, caption)]
+
+
+def _candidates(v: ExperimentFindings) -> Table:
+    """The probability of each effect to be missing, the most probable first."""
+    inclusion = v.get("inclusion", {})
+    ranked = sorted(v["probabilities"].items(), key=lambda item: -item[1])
+    lines = []
+    for effect, p in ranked:
+        if max(p, inclusion.get(effect, 0.0)) >= _LEAST:
+            included = _probability(inclusion[effect]) if effect in inclusion else "–"
+            lines.append([spoken(effect), _probability(p), included])
+    caption = (
+        "First column: probability of having the largest share of the gap, given that something is missing. "
+        "Second: probability of being missing at all, alone or beside others."
+    )
+    rest = v.get("remainder", {}).get("probability")
+    if rest is not None:
+        caption += f" Something without a name remains beside them with probability {_probability(rest)}."
+    return Table(["candidate", "largest share", "missing at all"], lines, caption)
+
+
+def _probability(p: float) -> str:
+    return number(round(p, 4), 2)
 
 
 def _p(v: ExperimentFindings) -> str:

@@ -1,6 +1,8 @@
 """The picture of a plan: how narrow each test would make each parameter, and which effects it would show."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -8,7 +10,7 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib.figure import Figure
 
-from wirebayes.json_files.plan import ExpectedWidth, PlanJson
+from wirebayes.json_files.plan import ExpectedWidth, JudgedProtocol, PlanJson
 from wirebayes.report.blocks import save_figure
 from wirebayes.report.figures import logarithmic, verbatim
 from wirebayes.sentences import spoken
@@ -32,35 +34,40 @@ def widths_and_effects(plan: PlanJson, target: Path) -> None:
     effects = sorted({effect for row in rows for effect in row["effects"]})
     figure = Figure(figsize=(9.0, 4.0 + 0.13 * len(effects)), layout="constrained")
     left, right = figure.subplots(1, 2)
-    step = 0.8 / len(rows)
     for i, row in enumerate(rows):
-        quantities = row["parameters"] | {"creep_1h_mm": row["creep"]["creep_1h_mm"]}
-        share = [_share(quantities[n]) for n in names]
-        places = np.arange(len(names)) + (i - (len(rows) - 1) / 2) * step
-        label = f"{row['rank']}. {verbatim(row['name'])}, {row['duration_min']:.3g} min"
-        left.plot(share, places, "o", color=_COLOURS[i], ms=4, label=label)
-        there = [(at, row["effects"][e]) for at, e in enumerate(effects) if e in row["effects"]]
-        seen = [(at, e["delta_prior"] / e["delta_80"]) for at, e in there if e["delta_80"]]
-        if seen:
-            at, times = zip(*seen, strict=True)
-            shift = (i - (len(rows) - 1) / 2) * step
-            right.plot(times, np.array(at) + shift, "o", color=_COLOURS[i], ms=4)
-    left.set_yticks(range(len(names)), [_words(n) for n in names], fontsize=8)
-    left.axvline(1.0, color="0.6", lw=0.8)
+        shift = (i - (len(rows) - 1) / 2) * (0.8 / len(rows))  # tests stand one below the other
+        _draw_widths(left, row, names, shift, _COLOURS[i])
+        _draw_effects(right, row, effects, shift, _COLOURS[i])
     left.set_xlabel("sd after the test (median) / sd of the guess", fontsize=9)
-    right.set_yticks(range(len(effects)), [_words(e) for e in effects], fontsize=8)
-    right.axvline(1.0, color="0.6", lw=0.8)
+    left.set_title("parameters: farther left is better known", fontsize=9, loc="left")
     right.set_xlabel("sd of its prior / amplitude seen in 80 % of tests", fontsize=9)
     right.set_title("effects: right of the line is seen", fontsize=9, loc="left")
-    left.set_title("parameters: farther left is better known", fontsize=9, loc="left")
-    for axis in (left, right):
-        logarithmic(axis)
-        axis.invert_yaxis()
-        axis.grid(axis="y", color="0.93", lw=6, zorder=0)
-        axis.set_axisbelow(True)
-        axis.tick_params(axis="x", labelsize=8)
+    for axes, what in ((left, names), (right, effects)):
+        axes.set_yticks(range(len(what)), [_words(name) for name in what], fontsize=8)
+        axes.axvline(1.0, color="0.6", lw=0.8)
+        logarithmic(axes)
+        axes.invert_yaxis()
+        axes.grid(axis="y", color="0.93", lw=6, zorder=0)
+        axes.set_axisbelow(True)
+        axes.tick_params(axis="x", labelsize=8)
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     save_figure(figure, target)
+
+
+def _draw_widths(axes: Any, row: JudgedProtocol, names: Sequence[str], shift: float, colour: str) -> None:
+    widths = row["parameters"] | {"creep_1h_mm": row["creep"]["creep_1h_mm"]}
+    label = f"{row['rank']}. {verbatim(row['name'])}, {row['duration_min']:.3g} min"
+    axes.plot(
+        [_share(widths[name]) for name in names], np.arange(len(names)) + shift, "o", color=colour, ms=4, label=label
+    )
+
+
+def _draw_effects(axes: Any, row: JudgedProtocol, effects: Sequence[str], shift: float, colour: str) -> None:
+    there = [(place, row["effects"][name]) for place, name in enumerate(effects) if name in row["effects"]]
+    seen = [(place, power["delta_prior"] / power["delta_80"]) for place, power in there if power["delta_80"]]
+    if seen:
+        places, times = zip(*seen, strict=True)
+        axes.plot(times, np.array(places) + shift, "o", color=colour, ms=4)
 
 
 def _share(width: ExpectedWidth) -> float:
