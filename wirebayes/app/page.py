@@ -162,10 +162,15 @@ class _TestPage:
                     return
                 said = [_option(line) for line in (columns.value or "").splitlines() if line.strip()]
                 said += [menu.value for menu in menus if menu.value]
-                self.test.say({
-                    "length_mm": float(length.value), "material": material.value.strip(), "control": control.value,
-                    "area_mm2": float(area.value) if area.value else None, "options": said,
-                })  # fmt: skip
+                self.test.say(
+                    {
+                        "length_mm": float(length.value),
+                        "material": material.value.strip(),
+                        "control": control.value,
+                        "area_mm2": float(area.value) if area.value else None,
+                        "options": said,
+                    }
+                )
                 self.start(READ)
 
             ui.button("Read the file", on_click=read)

@@ -60,11 +60,21 @@ def batch_command(
 
     with progress() as report:
         many = run(
-            files, discover=discover, check=check, posteriors=posteriors, keep_going=keep_going,
-            train_holds=train_holds, elastic_law=elastic_law, history=history, without=without or (),
-            own_effects=own_effects, scheduler=scheduler, seed=seed,
-            output=folder_for("batch", files[0], output), progress=report,
-        )  # fmt: skip
+            files,
+            discover=discover,
+            check=check,
+            posteriors=posteriors,
+            keep_going=keep_going,
+            train_holds=train_holds,
+            elastic_law=elastic_law,
+            history=history,
+            without=without or (),
+            own_effects=own_effects,
+            scheduler=scheduler,
+            seed=seed,
+            output=folder_for("batch", files[0], output),
+            progress=report,
+        )
     for line in many.messages:
         print(line, file=sys.stderr)
     conclude(many, Given(str(files[0])), as_json=as_json, quiet=quiet)

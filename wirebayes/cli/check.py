@@ -33,9 +33,14 @@ def check_command(
 
     with progress() as report:
         checked = run(
-            file, experiment=experiment, own_effects=own_effects, drop_breaks=drop_breaks, seed=seed, output=output,
+            file,
+            experiment=experiment,
+            own_effects=own_effects,
+            drop_breaks=drop_breaks,
+            seed=seed,
+            output=output,
             progress=report,
-        )  # fmt: skip
+        )
     for line in checked.messages:
         print(line, file=sys.stderr)
     print_answer(checked, Given(str(file)), as_json=as_json, quiet=quiet, kept=output is not None)

@@ -53,9 +53,16 @@ def compare_command(
     from wirebayes.views.result import Given
 
     planned = plan_comparison(
-        file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
-        likelihood=likelihood, only=only or (), own_effects=own_effects, seed=seed,
-    )  # fmt: skip
+        file,
+        experiment=experiment,
+        train_holds=train_holds,
+        elastic_law=elastic_law,
+        history=history,
+        likelihood=likelihood,
+        only=only or (),
+        own_effects=own_effects,
+        seed=seed,
+    )
     said = [f"warning: {notice.text}" for notice in planned.warnings]
     for line in said:  # before the work, which takes minutes
         typer.echo(line, err=True)

@@ -44,10 +44,18 @@ def discover_command(
 
     with progress() as report:
         findings = run(
-            file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
-            without=without or (), own_effects=own_effects, drop_breaks=drop_breaks, seed=seed,
-            output=folder_for("discover", file, output), progress=report,
-        )  # fmt: skip
+            file,
+            experiment=experiment,
+            train_holds=train_holds,
+            elastic_law=elastic_law,
+            history=history,
+            without=without or (),
+            own_effects=own_effects,
+            drop_breaks=drop_breaks,
+            seed=seed,
+            output=folder_for("discover", file, output),
+            progress=report,
+        )
     for line in findings.messages:
         print(line, file=sys.stderr)
     conclude(findings, Given(str(file)), as_json=as_json, quiet=quiet)

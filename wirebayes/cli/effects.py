@@ -23,9 +23,12 @@ def effects_command(name: Name = None, own_effects: OwnEffects = None) -> None:
     wanted = effect_named(name, catalogue(own_effects)).name  # an unknown name is refused, with those that there are
     (effect,) = [e for e in known if e.name == wanted]
     lines = [
-        effect.name, f"  formula    {effect.formula}", f"  meaning    {effect.meaning}",
-        f"  belongs to {effect.scope}", f"  shows as   {effect.shows}",
-    ]  # fmt: skip
+        effect.name,
+        f"  formula    {effect.formula}",
+        f"  meaning    {effect.meaning}",
+        f"  belongs to {effect.scope}",
+        f"  shows as   {effect.shows}",
+    ]
     for a in effect.amplitudes:
         neutral = "" if a.is_shape else f", neutral value {a.neutral:g}"
         lines.append(f"  parameter  {effect.name}.{a.name} in {'1' if a.unit == '-' else a.unit}{neutral}")

@@ -61,11 +61,21 @@ def fit_command(
 
     with progress() as report:
         fitted = run(
-            file, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
-            likelihood=likelihood, effects=effect or (), own_effects=own_effects, drop_breaks=drop_breaks,
-            together=together, check=check, seed=seed,
-            output=folder_for("fit", file, output), progress=report,
-        )  # fmt: skip
+            file,
+            experiment=experiment,
+            train_holds=train_holds,
+            elastic_law=elastic_law,
+            history=history,
+            likelihood=likelihood,
+            effects=effect or (),
+            own_effects=own_effects,
+            drop_breaks=drop_breaks,
+            together=together,
+            check=check,
+            seed=seed,
+            output=folder_for("fit", file, output),
+            progress=report,
+        )
     for line in fitted.messages:
         print(line, file=sys.stderr)
     conclude(fitted, Given(str(file)), as_json=as_json, quiet=quiet)

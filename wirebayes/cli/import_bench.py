@@ -80,11 +80,22 @@ def import_command(
     from wirebayes.commands.import_bench import import_bench as run
 
     imported = run(
-        raw, length_mm=length_mm, material=material, name=name, mapping=mapping or (), decimal=decimal,
-        time_since=time_since, sheet=sheet, zero_mm=zero_mm, area_mm2=area_mm2, control=control,
-        specimens=specimens, drop_breaks=drop_breaks, output=Path(raw[0].stem) if output is None else output,
+        raw,
+        length_mm=length_mm,
+        material=material,
+        name=name,
+        mapping=mapping or (),
+        decimal=decimal,
+        time_since=time_since,
+        sheet=sheet,
+        zero_mm=zero_mm,
+        area_mm2=area_mm2,
+        control=control,
+        specimens=specimens,
+        drop_breaks=drop_breaks,
+        output=Path(raw[0].stem) if output is None else output,
         ask=_ask if sys.stdin.isatty() and sys.stderr.isatty() else None,
-    )  # fmt: skip
+    )
     for line in imported.messages:
         print(line, file=sys.stderr)
     print_answer(imported, as_json=as_json, quiet=quiet)

@@ -52,10 +52,18 @@ def plan_command(
 
     with progress() as report:
         planned = run(
-            source, experiment=experiment, budget_min=budget_min, robot=robot,
-            aim=None if aim is None else aim.split(","), elastic_law=elastic_law, history=history,
-            own_effects=own_effects, seed=seed, output=folder_for("plan", source, output), progress=report,
-        )  # fmt: skip
+            source,
+            experiment=experiment,
+            budget_min=budget_min,
+            robot=robot,
+            aim=None if aim is None else aim.split(","),
+            elastic_law=elastic_law,
+            history=history,
+            own_effects=own_effects,
+            seed=seed,
+            output=folder_for("plan", source, output),
+            progress=report,
+        )
     for line in planned.messages:
         print(line, file=sys.stderr)
     conclude(planned, Given(str(source)), as_json=as_json, quiet=quiet)

@@ -58,9 +58,15 @@ def predict_command(
 
     table = protocol.with_name(f"{protocol.stem}-predicted.csv") if output is None else output
     predicted = run(
-        folder, protocol, experiment=experiment, model=model, fresh=fresh, own_effects=own_effects, seed=seed,
+        folder,
+        protocol,
+        experiment=experiment,
+        model=model,
+        fresh=fresh,
+        own_effects=own_effects,
+        seed=seed,
         output=table,
-    )  # fmt: skip
+    )
     page = write_beside(predicted, table)
     for warning in predicted.attrs.get("warnings", []):
         typer.echo(f"warning: {warning}", err=True)

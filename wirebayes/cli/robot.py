@@ -96,13 +96,32 @@ def pose_command(
 
     with progress() as report:
         found = run(
-            robot, named_lines(wires), position=position, rotation=rotation, times=times, tolerance=tolerance,
-            tolerance_tilt=tolerance_tilt, specimen_spread=spread, map_heights=map_heights,
-            map_rotations=map_rotation, other_fit=other_fit, joints=joints, trajectory=trajectory, payload=payload,
-            payload_at=payload_at, tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
-            calibration=calibration, draws=draws, experiment=experiment, own_effects=own_effects, seed=seed,
-            output=folder_for("pose", robot, output), progress=report,
-        )  # fmt: skip
+            robot,
+            named_lines(wires),
+            position=position,
+            rotation=rotation,
+            times=times,
+            tolerance=tolerance,
+            tolerance_tilt=tolerance_tilt,
+            specimen_spread=spread,
+            map_heights=map_heights,
+            map_rotations=map_rotation,
+            other_fit=other_fit,
+            joints=joints,
+            trajectory=trajectory,
+            payload=payload,
+            payload_at=payload_at,
+            tension_sd=tension_sd,
+            tilt_sd=tilt_sd,
+            reference_sd=reference_sd,
+            calibration=calibration,
+            draws=draws,
+            experiment=experiment,
+            own_effects=own_effects,
+            seed=seed,
+            output=folder_for("pose", robot, output),
+            progress=report,
+        )
     for line in found.messages:
         typer.echo(line, err=True)
     conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
@@ -164,11 +183,26 @@ def calibrate_command(
     from wirebayes.views.result import Given
 
     found = run(
-        robot, readings, named_lines(wires), tension_sd=tension_sd, tilt_sd=tilt_sd, reference_sd=reference_sd,
-        tension_bias=tension_bias, anchor_sd=anchor_sd, platform_sd=platform_sd, pose_sd=pose_sd, drum_sd=drum_sd,
-        joint_sd=joint_sd, next_poses=next_poses, specimen_spread=spread, draws=draws, experiment=experiment,
-        own_effects=own_effects, seed=seed, output=folder_for("calibrate", robot, output),
-    )  # fmt: skip
+        robot,
+        readings,
+        named_lines(wires),
+        tension_sd=tension_sd,
+        tilt_sd=tilt_sd,
+        reference_sd=reference_sd,
+        tension_bias=tension_bias,
+        anchor_sd=anchor_sd,
+        platform_sd=platform_sd,
+        pose_sd=pose_sd,
+        drum_sd=drum_sd,
+        joint_sd=joint_sd,
+        next_poses=next_poses,
+        specimen_spread=spread,
+        draws=draws,
+        experiment=experiment,
+        own_effects=own_effects,
+        seed=seed,
+        output=folder_for("calibrate", robot, output),
+    )
     for line in found.messages:
         typer.echo(line, err=True)
     conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
@@ -190,8 +224,15 @@ def export_command(
     from wirebayes.commands.wires import named_lines
 
     exported = run(
-        robot, named_lines(wires), tensions=tensions, times=times, draws=draws, experiment=experiment,
-        own_effects=own_effects, seed=seed, output=folder_for("export", robot, output),
-    )  # fmt: skip
+        robot,
+        named_lines(wires),
+        tensions=tensions,
+        times=times,
+        draws=draws,
+        experiment=experiment,
+        own_effects=own_effects,
+        seed=seed,
+        output=folder_for("export", robot, output),
+    )
     for line in exported.messages:
         typer.echo(line, err=True)

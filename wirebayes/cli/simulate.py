@@ -70,8 +70,20 @@ def simulate_command(
         name, _, value = text.partition("=")
         chosen[name] = finite_number(f"--parameter {text}", value)
     simulate_tests(
-        tests=tests, lengths=lengths, displacements=displacements, weights=weights, unload=unload, times=times,
-        unrecorded=unrecorded or (), temperature=temperature, resolution=resolution, parameters=chosen,
-        effects=effect or (), own_effects=own_effects, elastic_law=elastic_law, history=history, seed=seed,
+        tests=tests,
+        lengths=lengths,
+        displacements=displacements,
+        weights=weights,
+        unload=unload,
+        times=times,
+        unrecorded=unrecorded or (),
+        temperature=temperature,
+        resolution=resolution,
+        parameters=chosen,
+        effects=effect or (),
+        own_effects=own_effects,
+        elastic_law=elastic_law,
+        history=history,
+        seed=seed,
         output=Path("simulated") if output is None else output,
-    )  # fmt: skip
+    )

@@ -121,16 +121,32 @@ def batch(
     catalogue_without(left_out, catalogue(own))
     read, unreadable = _read(sources, train_holds, keep_going)
     task = BatchTask(
-        discover, check, spec, seed, policy or DEFAULT, left_out, own, simulations or SIMULATIONS,
+        discover,
+        check,
+        spec,
+        seed,
+        policy or DEFAULT,
+        left_out,
+        own,
+        simulations or SIMULATIONS,
         posteriors,
-    )  # fmt: skip
+    )
     configuration = {
-        "command": "batch", "version": __version__, "seed": seed, "discover": discover, "check": check,
-        "posteriors": posteriors, "elastic_law": elastic_law, "history": history, "without": sorted(left_out),
-        "own_effects": source_of(own), "train_holds": train_holds,
-        "priors": {e.name: e.priors for e, _ in read}, "data_sha256": {e.name: e.data_hash for e, _ in read},
+        "command": "batch",
+        "version": __version__,
+        "seed": seed,
+        "discover": discover,
+        "check": check,
+        "posteriors": posteriors,
+        "elastic_law": elastic_law,
+        "history": history,
+        "without": sorted(left_out),
+        "own_effects": source_of(own),
+        "train_holds": train_holds,
+        "priors": {e.name: e.priors for e, _ in read},
+        "data_sha256": {e.name: e.data_hash for e, _ in read},
         "unreadable": unreadable,
-    }  # fmt: skip
+    }
     configuration |= {} if policy is None else {"policy": vars(policy)}
     configuration |= {} if simulations is None else {"simulations": simulations}
     place = ResultFolder.at(output)
@@ -191,9 +207,13 @@ def _distinct(read: list[tuple[Experiment, str]]) -> list[tuple[Experiment, str]
 
 
 def _compute(
-    read: Sequence[tuple[Experiment, str]], task: BatchTask, folder: Path, configuration: Mapping[str, Any],
-    scheduler: str | None, progress: Progress,
-) -> None:  # fmt: skip
+    read: Sequence[tuple[Experiment, str]],
+    task: BatchTask,
+    folder: Path,
+    configuration: Mapping[str, Any],
+    scheduler: str | None,
+    progress: Progress,
+) -> None:
     """Do whatever has no row yet; a process that dies takes no result with it."""
     for left in reversed(range(_TRIES)):
         todo = [(e, file) for e, file in read if not (folder / e.name / _ROW).is_file()]
@@ -261,10 +281,22 @@ def _store(done: Done, folder: Path) -> None:
 def _empty(file: str, error: str) -> Row:
     """The row of a file that could not be read."""
     return {
-        "name": Path(file).stem, "material": None, "file": file, "length_mm": None, "holds": None, "readings": None,
-        "converged": None, "parameters": {}, "verdict": None, "effects": [], "best_effect": None, "p_global": None,
-        "check": None, "warnings": [], "error": error,
-    }  # fmt: skip
+        "name": Path(file).stem,
+        "material": None,
+        "file": file,
+        "length_mm": None,
+        "holds": None,
+        "readings": None,
+        "converged": None,
+        "parameters": {},
+        "verdict": None,
+        "effects": [],
+        "best_effect": None,
+        "p_global": None,
+        "check": None,
+        "warnings": [],
+        "error": error,
+    }
 
 
 def _tabulate(rows: Sequence[Row], far: Sequence[OutlierRow], folder: Path) -> None:

@@ -77,9 +77,13 @@ def check(
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     kinds = catalogue(own)
     configuration = {
-        "command": "check", "version": __version__, "seed": seed, "own_effects": source_of(own),
-        "priors": {e.name: e.priors for e in experiments}, "data_sha256": {e.name: e.data_hash for e in experiments},
-    }  # fmt: skip
+        "command": "check",
+        "version": __version__,
+        "seed": seed,
+        "own_effects": source_of(own),
+        "priors": {e.name: e.priors for e in experiments},
+        "data_sha256": {e.name: e.data_hash for e in experiments},
+    }
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as run:
         if run.state != "done":
@@ -92,9 +96,12 @@ def check(
                     previewed = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
                 warnings = to_json([*data_checks.of_experiment(e), *previewed.warnings])
                 found[e.name] = {
-                    **_understood(e), "warnings": warnings, "parameters": previewed.parameters,
-                    "effects": previewed.effects, "hold_ends": previewed.hold_ends,
-                }  # fmt: skip
+                    **_understood(e),
+                    "warnings": warnings,
+                    "parameters": previewed.parameters,
+                    "effects": previewed.effects,
+                    "hold_ends": previewed.hold_ends,
+                }
                 understood(e, place.path / f"{e.name}.svg")
             report("check", len(experiments), len(experiments))
             content: CheckJson = {"experiments": found, "warnings": notices_by_part(found)}
@@ -109,24 +116,32 @@ def _understood(e: Experiment) -> Understood:
     recorded = e.recorded_holds
     temperatures = [hold.temperature_C for hold in recorded if hold.temperature_C is not None]
     found: Understood = {
-        "material": e.material, "length_mm": e.length_mm, "control": e.control, "resolution_N": e.resolution or None,
-        "holds": holds, "recorded_holds": len(recorded), "unrecorded_holds": len(e.holds) - len(recorded),
+        "material": e.material,
+        "length_mm": e.length_mm,
+        "control": e.control,
+        "resolution_N": e.resolution or None,
+        "holds": holds,
+        "recorded_holds": len(recorded),
+        "unrecorded_holds": len(e.holds) - len(recorded),
         "readings": sum(hold.time_s.size for hold in recorded),
         "duration_s": sum(hold.duration_s for hold in e.holds),
         "temperature_C": [float(min(map(np.min, temperatures))), float(max(map(np.max, temperatures)))]
-        if temperatures else None,
-    }  # fmt: skip
+        if temperatures
+        else None,
+    }
     return in_unit(found, READ_UNIT[e.control])
 
 
 def _hold(hold: Hold) -> HoldUnderstood:
     out: HoldUnderstood = {
-        "number": hold.number, "start_s": hold.start_s,
-        "duration_s": hold.duration_s, "readings": int(hold.time_s.size),
+        "number": hold.number,
+        "start_s": hold.start_s,
+        "duration_s": hold.duration_s,
+        "readings": int(hold.time_s.size),
         "first_s": float(hold.time_s[0]) if hold.recorded else None,
         "first_N": float(hold.readings[0]) if hold.recorded else None,
         "last_N": float(hold.readings[-1]) if hold.recorded else None,
-    }  # fmt: skip
+    }
     if hold.control == "force":
         return {**out, "tension_N": hold.setting}
     return {**out, "displacement_mm": hold.setting}

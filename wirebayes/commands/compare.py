@@ -94,9 +94,17 @@ def compare(
     ['exponential', 'plain']
     """
     planned = plan_comparison(
-        source, experiment=experiment, train_holds=train_holds, elastic_law=elastic_law, history=history,
-        likelihood=likelihood, only=only, own_effects=own_effects, seed=seed, policy=policy,
-    )  # fmt: skip
+        source,
+        experiment=experiment,
+        train_holds=train_holds,
+        elastic_law=elastic_law,
+        history=history,
+        likelihood=likelihood,
+        only=only,
+        own_effects=own_effects,
+        seed=seed,
+        policy=policy,
+    )
     return carry_out(planned, output, progress)
 
 

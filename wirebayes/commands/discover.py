@@ -107,11 +107,17 @@ def discover(
         experiments = [e.first(train_holds) for e in experiments]
     kinds = catalogue_without(left_out, catalogue(own))
     configuration = {
-        "command": "discover", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
-        "without": sorted(left_out), "own_effects": source_of(own),
-        "train_holds": train_holds, "priors": {e.name: e.priors for e in experiments},
+        "command": "discover",
+        "version": __version__,
+        "seed": seed,
+        "elastic_law": elastic_law,
+        "history": history,
+        "without": sorted(left_out),
+        "own_effects": source_of(own),
+        "train_holds": train_holds,
+        "priors": {e.name: e.priors for e in experiments},
         "data_sha256": {e.name: e.data_hash for e in experiments},
-    }  # fmt: skip
+    }
     configuration |= {} if policy is None else {"policy": vars(policy)}
     configuration |= {} if simulations is None else {"simulations": simulations}
     place = ResultFolder.at(output)

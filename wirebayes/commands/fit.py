@@ -128,12 +128,20 @@ def fit(
     jobs = [Job(folder, members, keys, own, spec, _provenance(members, file)) for folder, members in groups.items()]
     fitted = [e for members in groups.values() for e in members]
     configuration = {
-        "command": "fit", "version": __version__, "seed": seed, "likelihood": likelihood, "elastic_law": elastic_law,
-        "history": history, "effects": list(keys), "own_effects": source_of(own),
-        "train_holds": train_holds, "together": together, "check": check,
+        "command": "fit",
+        "version": __version__,
+        "seed": seed,
+        "likelihood": likelihood,
+        "elastic_law": elastic_law,
+        "history": history,
+        "effects": list(keys),
+        "own_effects": source_of(own),
+        "train_holds": train_holds,
+        "together": together,
+        "check": check,
         "priors": {e.name: e.priors for e in fitted},
         "data_sha256": {e.name: e.data_hash for e in fitted},
-    }  # fmt: skip
+    }
     if policy is not None:
         configuration["policy"] = vars(policy)
     place = ResultFolder.at(output)

@@ -117,12 +117,16 @@ def import_bench(
     if drop_breaks:
         tests = [(path, _without_breaks(test)) for path, test in tests]
     configuration = {
-        "command": "import", "version": __version__,
+        "command": "import",
+        "version": __version__,
         "raw": {path.name: hashlib.sha256(read_bytes(path)).hexdigest() for path in paths},
-        "names": names, "length_mm": float(length_mm), "material": material, "area_mm2": area,
+        "names": names,
+        "length_mm": float(length_mm),
+        "material": material,
+        "area_mm2": area,
         "drop_breaks": drop_breaks,
         **vars(choices),
-    }  # fmt: skip
+    }
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as run:
         if run.state != "done":
@@ -134,8 +138,12 @@ def import_bench(
 def _check_options(
     decimal: Decimal | None, time_since: TimeSince | None, control: Control | None, specimens: Specimens | None
 ) -> None:
-    stated = {"decimal": (decimal, Decimal), "time_since": (time_since, TimeSince), "control": (control, Control),
-              "specimens": (specimens, Specimens)}  # fmt: skip
+    stated = {
+        "decimal": (decimal, Decimal),
+        "time_since": (time_since, TimeSince),
+        "control": (control, Control),
+        "specimens": (specimens, Specimens),
+    }
     for option, (value, choices) in stated.items():
         if value is not None:
             check_choice(option, value, get_args(choices))
@@ -216,13 +224,17 @@ def _write(folder: Path, tests: Sequence[tuple[Path, Converted]]) -> None:
         understood(experiment, folder / f"{experiment.name}.svg", test.recording)
         steps = experiment.control == "displacement"
         content["experiments"][experiment.name] = {
-            "raw": path.name, "length_mm": experiment.length_mm, "material": experiment.material,
+            "raw": path.name,
+            "length_mm": experiment.length_mm,
+            "material": experiment.material,
             "control": experiment.control,
             "resolution_N": (experiment.resolution or None) if steps else None,
             "resolution_mm": None if steps else (experiment.resolution or None),
-            "holds": len(experiment.recorded_holds), "readings": sum(h.time_s.size for h in experiment.holds),
-            "notes": test.notes, "warnings": to_json(data_checks.of_experiment(experiment)),
-        }  # fmt: skip
+            "holds": len(experiment.recorded_holds),
+            "readings": sum(h.time_s.size for h in experiment.holds),
+            "notes": test.notes,
+            "warnings": to_json(data_checks.of_experiment(experiment)),
+        }
         write_text(folder / f"{experiment.name}.toml", tables[-1])
     if len(tests) > 1:
         write_text(folder / f"{TOGETHER}.toml", "\n".join(tables))

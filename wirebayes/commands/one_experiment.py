@@ -118,11 +118,22 @@ def first_columns(experiment: Experiment, file: str) -> Row:
     """A row before anything is known of its posterior."""
     recorded = experiment.recorded_holds
     return {
-        "name": experiment.name, "material": experiment.material, "file": file, "length_mm": experiment.length_mm,
-        "holds": len(recorded), "readings": sum(hold.time_s.size for hold in recorded), "converged": None,
-        "parameters": {}, "verdict": None, "effects": [], "best_effect": None, "p_global": None, "check": None,
-        "warnings": [], "error": None,
-    }  # fmt: skip
+        "name": experiment.name,
+        "material": experiment.material,
+        "file": file,
+        "length_mm": experiment.length_mm,
+        "holds": len(recorded),
+        "readings": sum(hold.time_s.size for hold in recorded),
+        "converged": None,
+        "parameters": {},
+        "verdict": None,
+        "effects": [],
+        "best_effect": None,
+        "p_global": None,
+        "check": None,
+        "warnings": [],
+        "error": None,
+    }
 
 
 def _fitted(experiment: Experiment, task: BatchTask, folder: Path) -> FitColumns:
@@ -154,9 +165,11 @@ def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> Discov
     p = report["p_global"]
     return {
         **_columns(read_json(folder / experiment.name / "plain" / SUMMARY), p, p > ALPHA),
-        "verdict": report["verdict"], "effects": report["effects"], "best_effect": report["best"],
+        "verdict": report["verdict"],
+        "effects": report["effects"],
+        "best_effect": report["best"],
         "warnings": report["warnings"],
-    }  # fmt: skip
+    }
 
 
 def _columns(summary: SummaryJson, p: float | None, passed: bool | None) -> FitColumns:
@@ -184,6 +197,8 @@ def _files(folder: Path, name: str, posteriors: bool) -> dict[str, bytes]:
     kept = [path for path in paths if posteriors or path.name != POSTERIOR]
     inside = folder / name
     return {
-        (path.relative_to(inside) if path.is_relative_to(inside) else path.relative_to(folder)).as_posix():
-        path.read_bytes() for path in kept
-    }  # fmt: skip
+        (
+            path.relative_to(inside) if path.is_relative_to(inside) else path.relative_to(folder)
+        ).as_posix(): path.read_bytes()
+        for path in kept
+    }

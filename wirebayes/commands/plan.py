@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import Progress, above_zero, check_seed, model_spec, path_of, silent
+from wirebayes.commands.plan_content import PlanRequest, plan_content, protocol_content
 from wirebayes.commands.predict import find_posterior
 from wirebayes.commands.wires import RobotLike, content_hash, hash_of, robot_of
 from wirebayes.discovery.next_measurement import other_measurements
@@ -23,24 +24,17 @@ from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import open_run, read_json, write_json
 from wirebayes.json_files.discovery import DiscoveryJson
 from wirebayes.json_files.plain import plain
-from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
-from wirebayes.json_files.values import Statistics
 from wirebayes.model.build import build
-from wirebayes.model.sample import MATERIAL, SAMPLE, Sample
+from wirebayes.model.sample import Sample
 from wirebayes.model.spec import ModelSpec
-from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.frozen import frozen
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
-from wirebayes.planning.ranking import Judged, ranked, too_long
+from wirebayes.planning.ranking import Judged, ranked
 from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
-from wirebayes.planning.widths import HOUR_S, at_centre, expected_widths, middle_tension
+from wirebayes.planning.widths import at_centre, expected_widths, middle_tension
 from wirebayes.processes.workers import computing
 from wirebayes.results import read_back
-from wirebayes.robot.mechanics import draws as robot_draws
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import WireDraws
-from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.robot.motion import drift
 from wirebayes.simulation.synthetic import Bench
 from wirebayes.strict.files import PathLike
 from wirebayes.views.plan import Plan
@@ -49,22 +43,10 @@ from wirebayes.wire.effect import Effect
 from wirebayes.wire.laws import ElasticLaw, History
 
 TESTS = 120  # simulated of each protocol: a mean width is then known to some 5 %
-_ROBOT_TESTS, _ROBOT_DRAWS = 5, 60  # simulated tests whose posteriors move a robot, and draws of each
+_ROBOT_TESTS = 5  # simulated tests whose posteriors move a robot
 REPEAT = "again"
 
 Aim = Literal["parameters", "creep"] | Sequence[str]
-
-
-@dataclass(frozen=True)
-class _Request:
-    """What is to be judged."""
-
-    tests: list[tuple[Experiment, str]]
-    guess: GuessedWire
-    aim: tuple[str, ...]
-    budget_min: float | None
-    robot: RobotLike | None
-    about: dict[str, Any]
 
 
 def plan(
@@ -144,10 +126,17 @@ def plan(
     )
     machine = None if request.robot is None else robot_of(request.robot)
     configuration = {
-        "command": "plan", "version": __version__, "seed": seed, "elastic_law": elastic_law, "history": history,
-        "own_effects": source_of(own), "tests": tests, "aim": list(request.aim), "budget_min": request.budget_min,
+        "command": "plan",
+        "version": __version__,
+        "seed": seed,
+        "elastic_law": elastic_law,
+        "history": history,
+        "own_effects": source_of(own),
+        "tests": tests,
+        "aim": list(request.aim),
+        "budget_min": request.budget_min,
         "robot": _identity(request.robot),
-    } | request.about  # fmt: skip
+    } | request.about
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as opened:
         if opened.state == "done":
@@ -155,8 +144,8 @@ def plan(
         with computing():
             judged = _judged(request, kinds, spec, seed, progress or silent)
         order = ranked(judged, request.aim, request.budget_min)
-        rows = [_row(j, request, place_in, machine, spec) for place_in, j in enumerate(order, 1)]
-        summary = _summary(rows, request, machine)
+        rows = [protocol_content(j, request, place_in, machine, spec) for place_in, j in enumerate(order, 1)]
+        summary = plan_content(rows, request, machine)
         write_json(opened.directory / "plan.json", summary)
         from wirebayes.report.pictures.plan import widths_and_effects  # matplotlib only where it is needed
 
@@ -171,7 +160,7 @@ def _check_tests(tests: object) -> None:
 
 
 def _judged(
-    request: _Request, kinds: Mapping[str, type[Effect]], spec: ModelSpec, seed: int, report: Progress
+    request: PlanRequest, kinds: Mapping[str, type[Effect]], spec: ModelSpec, seed: int, report: Progress
 ) -> list[Judged]:
     """What each test would teach, and what it would show of missing effects."""
     planned = [(at_centre(test, request.guess.at(test.length_mm), spec), words) for test, words in request.tests]
@@ -202,9 +191,14 @@ def _identity(robot: RobotLike | None) -> str | None:
 
 
 def _request(
-    source: PathLike | Experiment, name: str | None, n: int, effects: list[str], spec: ModelSpec,
-    own: Path | None, rng: np.random.Generator,
-) -> _Request:  # fmt: skip
+    source: PathLike | Experiment,
+    name: str | None,
+    n: int,
+    effects: list[str],
+    spec: ModelSpec,
+    own: Path | None,
+    rng: np.random.Generator,
+) -> PlanRequest:
     """Tests and guess of whatever was given."""
     if not isinstance(source, str | os.PathLike | Experiment):
         raise InputError(f"source: found {type(source).__name__}, expected a path or an Experiment")
@@ -220,10 +214,10 @@ def _request(
     build([measured], (), spec)  # checks priors
     guess = from_readings(measured, n, rng, spec)
     about = {"data_sha256": measured.data_hash, "priors": measured.priors}
-    return _Request(_like(measured), guess, ("parameters",), None, None, about)
+    return PlanRequest(_like(measured), guess, ("parameters",), None, None, about)
 
 
-def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: np.random.Generator) -> _Request:
+def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: np.random.Generator) -> PlanRequest:
     tests = [(_experiment(test, file), "") for test in file.tests]
     for test, _ in tests:
         build([test])  # checks priors
@@ -234,13 +228,15 @@ def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: np
     else:
         guess, about, _ = _posterior(file.posterior, name, n, own)
     about |= {
-        "guess": file.guess, "priors": file.priors, "material": file.material,
+        "guess": file.guess,
+        "priors": file.priors,
+        "material": file.material,
         "protocols": [vars(test) for test in file.tests],
-    }  # fmt: skip
-    return _Request(tests, guess, file.aim, file.budget_min, file.robot, about)
+    }
+    return PlanRequest(tests, guess, file.aim, file.budget_min, file.robot, about)
 
 
-def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: Path | None) -> _Request:
+def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: Path | None) -> PlanRequest:
     """The folder of a fit or discover: the same test again, and others like it."""
     guess, about, sample = _posterior(folder, name, n, own)
     aim: tuple[str, ...] = ("parameters",)
@@ -251,7 +247,7 @@ def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: 
             found = report["experiments"][sample.name]
             rivals = list(dict.fromkeys(e for e in (*found["set"], *found["group"]) if e in effects))
             aim = tuple(rivals[:2]) if len(rivals) > 1 else aim
-    return _Request(_like(_measured(sample, folder)), guess, aim, None, None, about)
+    return PlanRequest(_like(_measured(sample, folder)), guess, aim, None, None, about)
 
 
 def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, dict[str, Any], Sample]:
@@ -297,8 +293,18 @@ def _measured(sample: Sample, folder: Path) -> Experiment:
         log = None
         if p.warming_K is not None and p.reference_C is not None and mask.any():
             log = frozen((p.warming_K[i][mask] + p.reference_C).tolist())
-        holds.append(Hold(number, float(p.setting[i]), float(p.duration_s[i]), frozen(times), frozen(read),
-                          log, float(p.start_s[i]), p.control))  # fmt: skip
+        holds.append(
+            Hold(
+                number,
+                float(p.setting[i]),
+                float(p.duration_s[i]),
+                frozen(times),
+                frozen(read),
+                log,
+                float(p.start_s[i]),
+                p.control,
+            )
+        )
     return Experiment(
         sample.name, sample.material, p.length_mm, sample.resolution, tuple(holds), folder, control=p.control
     )
@@ -310,77 +316,3 @@ def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:
         return words
     expected = "parameters, creep, or two different effects of the catalogue"
     raise InputError(f"--aim: found {', '.join(map(str, words))}, expected {expected}")
-
-
-def _row(judged: Judged, request: _Request, rank: int, machine: Robot | None, spec: ModelSpec) -> JudgedProtocol:
-    """A protocol as it stands in ``plan.json``."""
-    test, expected, seen = judged.test, judged.expected, judged.sensitivity
-    widths = expected.widths
-    cosines = {f"{a} {b}": cos for (a, b), cos in seen.cosines.items() if a < b}
-    recorded = test.recorded_holds
-    return {
-        "rank": rank, "name": test.name, "words": judged.words, "length_mm": test.length_mm, "holds": len(recorded),
-        "readings": sum(hold.time_s.size for hold in recorded), "duration_min": judged.duration_min,
-        "within_budget": not too_long(judged, request.budget_min), "score": judged.score(request.aim),
-        "information_bits": expected.information_bits, "simulated_tests": expected.tests,
-        "parameters": {n: q for n, q in widths.items() if n in (*MATERIAL, *SAMPLE)},
-        "creep": {
-            "tension_N": expected.tension_N, "length_mm": expected.length_mm,
-            "longest_hold_s": expected.longest_hold_s, "creep_longest_hold_mm": widths["creep_longest_hold_mm"],
-            "creep_1h_mm": widths["creep_1h_mm"],
-        },
-        "effects": seen.effects, "cosines": cosines, "not_identifiable": list(seen.hidden),
-        "robot": None if machine is None else _drift(judged, request.guess, machine, spec),
-    }  # fmt: skip
-
-
-def _summary(rows: list[JudgedProtocol], request: _Request, machine: Robot | None) -> PlanJson:
-    """The content of ``plan.json``."""
-    guess = request.guess
-    return {
-        "version": 1,
-        "aim": list(request.aim),
-        "budget_min": request.budget_min,
-        "best": rows[0]["name"],
-        "guess": {
-            "source": guess.source,
-            "length_mm": guess.length_mm,
-            "parameters": {n: _statistics(v) for n, v in guess.draws.items()},
-        },
-        "robot": None if machine is None else machine.name,
-        "protocols": rows,
-        "warnings": to_json([*_over_budget(rows[0], request.budget_min), *guess.doubts]),
-    }
-
-
-def _over_budget(best: JudgedProtocol, budget_min: float | None) -> list[Notice]:
-    """That no test is done within the time there is, if so."""
-    if best["within_budget"]:
-        return []
-    return [Notice("budget", f"no test is done within {budget_min:g} min")]
-
-
-def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) -> RobotDrift:
-    """How well the drift of a robot within an hour would be known, and how well it is at the guess."""
-
-    def sd(parameters: dict[str, Any], length_mm: float) -> tuple[float, float]:
-        few = {n: parameters[n][:_ROBOT_DRAWS] for n in MATERIAL}
-        wires = robot_draws.for_robot(machine, WireDraws(few, length_mm, spec.law, spec.history))
-        course = drift.from_command(
-            machine, wires, machine.home_m, matrix(machine.home_rotation_rad), np.array([0.0, HOUR_S])
-        )
-        far = 1e3 * np.linalg.norm(course.position_m[:, -1] - machine.home_m, axis=1)[course.found]
-        return (float(np.median(far)), float(far.std())) if len(far) > 1 else (np.nan, np.nan)
-
-    after = [sd(d, judged.test.length_mm) for d in judged.expected.draws]
-    return {
-        "time_s": HOUR_S, "drift_mm": float(np.nanmedian([m for m, _ in after])),
-        "drift_sd_mm": float(np.nanmedian([s for _, s in after])),
-        "drift_sd_guess_mm": sd(guess.draws, guess.length_mm)[1],
-    }  # fmt: skip
-
-
-def _statistics(values: Any) -> Statistics:
-    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
-    return {"mean": float(values.mean()), "sd": float(values.std()), "q05": float(low), "q50": float(middle),
-            "q95": float(high)}  # fmt: skip

@@ -108,13 +108,22 @@ def simulate_tests(
     benches = _benches(alike, tests, sizes)
     truth = Truth(chosen, tuple(found.values()), spec.law, spec.history)
     configuration = {
-        "command": "simulate", "version": __version__, "seed": seed, "tests": tests, "lengths_mm": sizes,
-        ("weights_N" if control == "force" else "displacements_mm"): path, "times_s": moments,
-        "unrecorded": sorted(gaps), "temperatures_C": warmth,
-        f"resolution_{READ_UNIT[control]}": float(resolution), "parameters": chosen, "effects": list(found),
+        "command": "simulate",
+        "version": __version__,
+        "seed": seed,
+        "tests": tests,
+        "lengths_mm": sizes,
+        ("weights_N" if control == "force" else "displacements_mm"): path,
+        "times_s": moments,
+        "unrecorded": sorted(gaps),
+        "temperatures_C": warmth,
+        f"resolution_{READ_UNIT[control]}": float(resolution),
+        "parameters": chosen,
+        "effects": list(found),
         "own_effects": source_of(own),
-        "elastic_law": elastic_law, "history": history,
-    }  # fmt: skip
+        "elastic_law": elastic_law,
+        "history": history,
+    }
     place = ResultFolder.at(output)
     if check_run(place.path, configuration) == "new":
         draw(benches, truth, seed)  # whatever is wrong with the truth is said before a folder is made

@@ -82,12 +82,16 @@ def judge(task: Task, seed: int, policy: Policy = POLICY) -> ModelJson:
     """
     candidate = task.candidate
     content: ModelJson = {
-        "name": candidate.name, "question": candidate.question, "sentence": candidate.sentence,
-        "elastic_law": candidate.spec.law, "history": candidate.spec.history,
+        "name": candidate.name,
+        "question": candidate.question,
+        "sentence": candidate.sentence,
+        "elastic_law": candidate.spec.law,
+        "history": candidate.spec.history,
         "likelihood": candidate.spec.likelihood,
         "scored": "all readings" if candidate.spec.likelihood == "chain" else "later readings given each hold's first",
-        "failed": None, "warnings": [],
-    }  # fmt: skip
+        "failed": None,
+        "warnings": [],
+    }
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # of proposals where the model cannot be computed
@@ -124,11 +128,15 @@ def _scores(task: Task, seed: int, policy: Policy) -> JudgementJson:
         "converged": full.converged and early.converged and left.converged,
         "convergence": full.why,
         "leave_one_hold_out": {
-            "holds": left.hold, "elpd": left.total, "se": left.se, "per_hold": left.elpd,
-            "pareto_k": left.pareto_k, "refitted": left.hold[left.refitted],
+            "holds": left.hold,
+            "elpd": left.total,
+            "se": left.se,
+            "per_hold": left.elpd,
+            "pareto_k": left.pareto_k,
+            "refitted": left.hold[left.refitted],
         },
         "held_out": None,
-    }  # fmt: skip
+    }
     if first < recorded:
         rng = np.random.default_rng(seed_of(seed, task.experiment.name, "held out"))
         content["held_out"] = _held_out(held_out(early, whole, rng), early)
@@ -152,15 +160,23 @@ def _held_out(result: HeldOutPrediction, trained: Posterior) -> HeldOutHolds:
 def scores_dict(scores: Scores) -> PredictionScores:
     """Scores as plain values, with what the pictures need."""
     return {
-        "rmse_N": scores.rmse_N, "elpd": float(scores.elpd.sum()), "per_hold": scores.elpd,
+        "rmse_N": scores.rmse_N,
+        "elpd": float(scores.elpd.sum()),
+        "per_hold": scores.elpd,
         "elpd_together": scores.elpd_together,
-        "coverage": {f"{100 * level:g}": share for level, share in scores.coverage().items()}, "pit_p": scores.pit_p,
+        "coverage": {f"{100 * level:g}": share for level, share in scores.coverage().items()},
+        "pit_p": scores.pit_p,
         "readings": {
-            "hold": scores.hold, "time_s": scores.time_s, "observed_N": scores.observed_N, "mean_N": scores.mean_N,
-            "sd_N": scores.sd_N, "quantiles_N": scores.quantiles_N, "pit": scores.pit,
+            "hold": scores.hold,
+            "time_s": scores.time_s,
+            "observed_N": scores.observed_N,
+            "mean_N": scores.mean_N,
+            "sd_N": scores.sd_N,
+            "quantiles_N": scores.quantiles_N,
+            "pit": scores.pit,
         },
         "pit_band": scores.pit_band,
-    }  # fmt: skip
+    }
 
 
 def judge_all(
@@ -220,9 +236,7 @@ def side_by_side(models: Sequence[ModelJson], base: str, about: Sequence[Notice]
         weights = dict(zip((m["name"] for m in alike), stacking(per_hold), strict=True))
     rows: list[ComparedModel] = []
     for m in models:
-        row: ComparedModel = {
-            **m, "weight": weights.get(m["name"]), **_differences(m, reference), "meaning": ""
-        }  # fmt: skip
+        row: ComparedModel = {**m, "weight": weights.get(m["name"]), **_differences(m, reference), "meaning": ""}
         if m["failed"] is None:
             row["held_out"] = _without_readings(m["held_out"])
         row["meaning"] = _meaning(row, base)

@@ -74,9 +74,13 @@ def expand(
     plain = tangent_of(target, around, points)
     processes = [block_diagonal(each) for each in zip(*functions, strict=True)]
     return Expansion(
-        **vars(plain), signatures=signatures, one_sided=one_sided, kinds=kinds,
-        flexible=np.concatenate(processes, axis=2), processes=tuple(f.shape[2] for f in processes),
-    )  # fmt: skip
+        **vars(plain),
+        signatures=signatures,
+        one_sided=one_sided,
+        kinds=kinds,
+        flexible=np.concatenate(processes, axis=2),
+        processes=tuple(f.shape[2] for f in processes),
+    )
 
 
 def _described(trials: Sequence[Probe], m: int) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:

@@ -74,9 +74,14 @@ class MaterialAnswer:
 
 
 def answer_material(
-    gate: Gate, past: Named | None, i: int, where: list[Disagreement], left_out: LeftOut,
-    rng: np.random.Generator, parallel_map: ParallelMap,
-) -> MaterialAnswer:  # fmt: skip
+    gate: Gate,
+    past: Named | None,
+    i: int,
+    where: list[Disagreement],
+    left_out: LeftOut,
+    rng: np.random.Generator,
+    parallel_map: ParallelMap,
+) -> MaterialAnswer:
     """The verdict on block `i`, and its fits with what was accepted.
 
     Parameters

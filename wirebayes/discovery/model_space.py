@@ -183,9 +183,16 @@ def posterior(
         sums.add(s, bare, more)
     shares = [_shares({name: float(value[b]) for name, value in sums.first.items()}) for b in range(blocks)]
     return ModelPosterior(
-        tuple(sets), p_without, p_beside, sums.nothing, sums.remainder, sums.inclusion, tuple(sums.together),
-        list(sums.together.values()), shares,
-    )  # fmt: skip
+        tuple(sets),
+        p_without,
+        p_beside,
+        sums.nothing,
+        sums.remainder,
+        sums.inclusion,
+        tuple(sums.together),
+        list(sums.together.values()),
+        shares,
+    )
 
 
 @dataclass(frozen=True)

@@ -84,9 +84,14 @@ def _range(draws: Array, before: Array, unit: str) -> ParameterRange:
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95])
     prior_low, prior_high = np.quantile(before, [0.05, 0.95])
     return {
-        "unit": unit, "q05": float(low), "q50": float(middle), "q95": float(high), "prior_q05": float(prior_low),
-        "prior_q95": float(prior_high), "determined_by": source(contraction(draws, before)),
-    }  # fmt: skip
+        "unit": unit,
+        "q05": float(low),
+        "q50": float(middle),
+        "q95": float(high),
+        "prior_q05": float(prior_low),
+        "prior_q95": float(prior_high),
+        "determined_by": source(contraction(draws, before)),
+    }
 
 
 def _effects(block: LaplaceFit, kinds: Mapping[str, type[Effect]], rng: np.random.Generator) -> dict[str, EffectSize]:

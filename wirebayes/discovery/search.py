@@ -216,9 +216,14 @@ def _inclusion(found: Evidence | None) -> dict[str, float]:
 
 
 def _common(
-    answers: Sequence[MaterialAnswer], i: int, e: Experiment, plain: list[LaplaceFit], test: GlobalTest,
-    where: list[Disagreement], alike: dict[tuple[str, str], float],
-) -> SharedFindings:  # fmt: skip
+    answers: Sequence[MaterialAnswer],
+    i: int,
+    e: Experiment,
+    plain: list[LaplaceFit],
+    test: GlobalTest,
+    where: list[Disagreement],
+    alike: dict[tuple[str, str], float],
+) -> SharedFindings:
     """What the experiments of one block share in the report; of amplitudes those of the effects that act on `e`."""
     answer = answers[i]
     names, members = [a.name for a in answer.accepted], answer.set

@@ -19,9 +19,12 @@ from wirebayes.wire.effect import Effect
 
 _NOTHING: ScoresJson = {"rmse_N": None, "elpd": None, "coverage_90": None}
 _NOT_HELD_OUT: HeldOutJson = {
-    "holds": [], "plain": _NOTHING, "final": {**_NOTHING, "elpd_difference_se": None}, "gap_closed": None,
+    "holds": [],
+    "plain": _NOTHING,
+    "final": {**_NOTHING, "elpd_difference_se": None},
+    "gap_closed": None,
     "shrinks": False,
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)

@@ -95,9 +95,12 @@ class _Past:
         of_old = np.vstack([self.log_proposals, new.proposal.log_density(self.z)])
         of_new = np.vstack([*(q.log_density(new.z) for q in self.proposals), new.log_proposal])
         return _Past(
-            np.vstack([self.z, new.z]), np.vstack([self.log_density, new.log_density]), np.hstack([of_old, of_new]),
-            (*self.proposals, new.proposal), (*self.counts, len(new.z)),
-        )  # fmt: skip
+            np.vstack([self.z, new.z]),
+            np.vstack([self.log_density, new.log_density]),
+            np.hstack([of_old, of_new]),
+            (*self.proposals, new.proposal),
+            (*self.counts, len(new.z)),
+        )
 
     def points(self, wanted: NDArray[np.bool_], ess: float) -> tuple[WeightedPoints, WeightedPoints]:
         """Points of the sum of the wanted densities to a power, and of the sum itself.

@@ -154,10 +154,14 @@ class _SideBySide:
         of = np.repeat(np.arange(self.n), [len(b) for b in begin])
         residuals = self.residuals
         end = climb(
-            lambda z, rows: self.density(z, of[rows]), np.vstack(begin),
+            lambda z, rows: self.density(z, of[rows]),
+            np.vstack(begin),
             None if residuals is None else lambda z, rows: residuals(z, of[rows]),
-            of=of, known=before, reach=REACH, curvature_at_end=False,
-        )  # fmt: skip
+            of=of,
+            known=before,
+            reach=REACH,
+            curvature_at_end=False,
+        )
         found = [distinct([end.rows(of == i)]) for i in range(self.n)]
         of = np.repeat(np.arange(self.n), [len(f.z) for f in found])
         every = curved(self.density, together(found), of)
@@ -212,10 +216,14 @@ class _SideBySide:
             return kept(out, rows)
 
         found = climb(
-            lambda z, rows: self.density(whole(z, rows), of[rows]), start[:, free],
+            lambda z, rows: self.density(whole(z, rows), of[rows]),
+            start[:, free],
             lambda z, rows: self.residuals(whole(z, rows), of[rows]),
-            iterations=_LED, tolerance=_LED_TO, of=of if together else None, curvature_at_end=False,
-        )  # fmt: skip
+            iterations=_LED,
+            tolerance=_LED_TO,
+            of=of if together else None,
+            curvature_at_end=False,
+        )
         curvature = np.zeros((len(of), start.shape[1], start.shape[1]))
         curvature[np.ix_(np.arange(len(of)), free, free)] = found.curvature
         found = Optimum(whole(found.z, np.arange(len(of))), found.log_density, curvature, found.converged)

@@ -19,9 +19,17 @@ from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control
 
 _KEYS = (
-    "name", "material", "length_mm", "resolution_N", "resolution_mm", "readings", "control", "preload_mm",
-    "unrecorded_holds", "prior",
-)  # fmt: skip
+    "name",
+    "material",
+    "length_mm",
+    "resolution_N",
+    "resolution_mm",
+    "readings",
+    "control",
+    "preload_mm",
+    "unrecorded_holds",
+    "prior",
+)
 # The key of the resolution of what is read, its unit, and the largest value that the readings may have.
 _RESOLUTION: dict[Control, tuple[str, str, float]] = {
     "displacement": ("resolution_N", "N", LARGEST["tension_N"]),

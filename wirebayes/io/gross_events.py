@@ -105,10 +105,15 @@ def of_readings(protocol: Protocol, readings: Floats, resolution: float) -> list
     each = [row[mask] for row, mask in zip(readings, protocol.mask, strict=True) if mask.any()]
     forces = protocol.control == "displacement"
     test = _Test(
-        np.unique(rows, return_inverse=True)[1], protocol.number[rows], protocol.setting[rows],
-        protocol.time_s[protocol.mask], readings[protocol.mask], _noise(each, resolution),
-        "tension" if forces else "displacement", "N" if forces else "mm",
-    )  # fmt: skip
+        np.unique(rows, return_inverse=True)[1],
+        protocol.number[rows],
+        protocol.setting[rows],
+        protocol.time_s[protocol.mask],
+        readings[protocol.mask],
+        _noise(each, resolution),
+        "tension" if forces else "displacement",
+        "N" if forces else "mm",
+    )
     # an elongation that returns to zero is a recovery, not a fall to nothing
     found = _falls(test) if forces else _jumps(test)
     away = [i for event in found for i in event.readings]
@@ -165,10 +170,15 @@ def without_gross_events(experiment: Experiment, events: Sequence[Event]) -> Exp
             holds.append(hold)
             continue
         temperature = None if hold.temperature_C is None else frozen(hold.temperature_C[keep])
-        holds.append(replace(
-            hold, number=hold.number if keep.any() else None, time_s=frozen(hold.time_s[keep]),
-            readings=frozen(hold.readings[keep]), temperature_C=temperature if keep.any() else None,
-        ))  # fmt: skip
+        holds.append(
+            replace(
+                hold,
+                number=hold.number if keep.any() else None,
+                time_s=frozen(hold.time_s[keep]),
+                readings=frozen(hold.readings[keep]),
+                temperature_C=temperature if keep.any() else None,
+            )
+        )
     while holds and not holds[-1].recorded:
         holds.pop()
     if holds and begin - 1 in dropped:  # how long the last one was as it should be, its last reading says

@@ -139,9 +139,18 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
     material = top.string("material", "a name", "line")
     priors = top.priors()
     return PlanFile(
-        path, tuple(tests), material, guess, {n: top.line(f"guess.{n}") for n in guess}, posterior, priors,
-        {n: top.line(f"prior.{n}") for n in priors}, budget, robot, _aim(top, effects),
-    )  # fmt: skip
+        path,
+        tuple(tests),
+        material,
+        guess,
+        {n: top.line(f"guess.{n}") for n in guess},
+        posterior,
+        priors,
+        {n: top.line(f"prior.{n}") for n in priors},
+        budget,
+        robot,
+        _aim(top, effects),
+    )
 
 
 def _planned(keys: Keys, index: int) -> PlannedTest:
@@ -167,9 +176,10 @@ def _planned(keys: Keys, index: int) -> PlannedTest:
         )
     if len(path) * len(times) > MOST_READINGS:
         raise keys.complain(
-            "times_s" if "times_s" in keys.table else "readings", f"{len(path) * len(times)} readings in all",
+            "times_s" if "times_s" in keys.table else "readings",
+            f"{len(path) * len(times)} readings in all",
             f"at most {MOST_READINGS}",
-        )  # fmt: skip
+        )
     warmth: list[float] = []
     if "temperatures_C" in keys.table:
         warmth = keys.numbers("temperatures_C", "a list of temperatures above -273.15 °C")

@@ -30,8 +30,19 @@ _PARTIAL = ".partial"
 
 
 # The disk is full or a limit reached, the folder read-only or gone, or a file stands where a folder should.
-_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO,
-               errno.ENOENT, errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG)  # fmt: skip
+_UNWRITABLE = (
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EFBIG,
+    errno.EROFS,
+    errno.EACCES,
+    errno.EPERM,
+    errno.EIO,
+    errno.ENOENT,
+    errno.ENOTDIR,
+    errno.EEXIST,
+    errno.ENAMETOOLONG,
+)
 
 
 @contextmanager

@@ -54,10 +54,17 @@ def claim_step_rows(
         for step, drift_mm in zip(STEPS, drifts, strict=True):
             low, middle, high = np.nanquantile(drift_mm, [0.05, 0.5, 0.95])
             within = bool(middle < 1e3 * claim.DISTANCE_M)
-            out.append({
-                "experiment": wire, "robot": robot_name, "step": step, "q05_drift_mm": float(low),
-                "q50_drift_mm": float(middle), "q95_drift_mm": float(high), "within_claim": within,
-            })  # fmt: skip
+            out.append(
+                {
+                    "experiment": wire,
+                    "robot": robot_name,
+                    "step": step,
+                    "q05_drift_mm": float(low),
+                    "q50_drift_mm": float(middle),
+                    "q95_drift_mm": float(high),
+                    "within_claim": within,
+                }
+            )
     return out
 
 

@@ -46,9 +46,7 @@ def intervals(rows: Sequence[Mapping[str, Any]], title: str) -> Figure:
     return figure
 
 
-def last_hold(
-    time_s: Array, drawn_N: Array, curve_N: Array, marks: tuple[Array, Array], title: str
-) -> Figure:  # fmt: skip
+def last_hold(time_s: Array, drawn_N: Array, curve_N: Array, marks: tuple[Array, Array], title: str) -> Figure:
     """A figure of the paper: one unused hold, its curve, and the posterior band.
 
     Parameters

@@ -303,6 +303,10 @@ def _width(rows: Array, before: Array, unit: str) -> ExpectedWidth:
     sd, length = rows.T
     low, middle, high = np.quantile(length, [0.05, 0.5, 0.95])
     return {
-        "sd": float(np.median(sd)), "width_90": float(middle), "width_90_low": float(low), "width_90_high": float(high),
-        "guess_sd": float(before.std()), "unit": unit,
-    }  # fmt: skip
+        "sd": float(np.median(sd)),
+        "width_90": float(middle),
+        "width_90_low": float(low),
+        "width_90_high": float(high),
+        "guess_sd": float(before.std()),
+        "unit": unit,
+    }

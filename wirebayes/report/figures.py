@@ -110,9 +110,13 @@ def measured(protocol: Protocol, readings: Array, title: str) -> Figure:
 
 
 def joint(
-    x: Mapping[str, Array], y: Mapping[str, Array], xlabel: str, ylabel: str, title: str = "",
+    x: Mapping[str, Array],
+    y: Mapping[str, Array],
+    xlabel: str,
+    ylabel: str,
+    title: str = "",
     mark: tuple[float, float] | None = None,
-) -> Figure:  # fmt: skip
+) -> Figure:
     """Draws of two positive quantities, on logarithmic axes.
 
     Parameters
@@ -321,9 +325,14 @@ _SMOOTHING = _smoothing(_CELLS)
 
 
 def residual_figure(
-    hold: Array, time_s: Array, measured_N: Array, band_N: Array, title: str, colour: str = CHAIN,
+    hold: Array,
+    time_s: Array,
+    measured_N: Array,
+    band_N: Array,
+    title: str,
+    colour: str = CHAIN,
     paper_N: Array | None = None,
-) -> Figure:  # fmt: skip
+) -> Figure:
     """Measured minus predicted, hold after hold, inside the 90 % band.
 
     Parameters
@@ -340,8 +349,9 @@ def residual_figure(
     place = np.array([numbers.index(h) for h in hold]) - 0.35 + 0.7 * time_s / longest
     last = np.flatnonzero(np.diff(hold) != 0) + 1
     low, middle, high = np.insert(band_N, last, np.nan, axis=1)  # a gap between holds
-    axes.fill_between(np.insert(place, last, np.nan), low - middle, high - middle, color=colour, alpha=0.22, lw=0,
-                      label="90 % band")  # fmt: skip
+    axes.fill_between(
+        np.insert(place, last, np.nan), low - middle, high - middle, color=colour, alpha=0.22, lw=0, label="90 % band"
+    )
     axes.axhline(0, color=colour, lw=1)
     axes.scatter(place, measured_N - band_N[1], s=14, color=colour, zorder=3, label="measured − posterior median")
     if paper_N is not None:
@@ -363,15 +373,25 @@ def creep_ahead(ahead: ExtrapolatedCreep, title: str) -> Figure:
     figure, axes = panel("time under constant tension, s", "creep, mm", f"{title}, {ahead['tension_N']:g} N")
     prior, weaker, posterior = ahead["prior_mm"], ahead["weaker_prior_mm"], ahead["posterior_mm"]
     axes.fill_between(ahead["time_s"], prior["q05"], prior["q95"], color=QUIET, alpha=0.45, lw=0, label="prior alone")
-    axes.fill_between(ahead["time_s"], posterior["q05"], posterior["q95"], color=CHAIN, alpha=0.45, lw=0,
-                      label="posterior, 90 %")  # fmt: skip
+    axes.fill_between(
+        ahead["time_s"], posterior["q05"], posterior["q95"], color=CHAIN, alpha=0.45, lw=0, label="posterior, 90 %"
+    )
     axes.plot(ahead["time_s"], posterior["q50"], color=CHAIN, lw=1.2)
     for end, label in ((weaker["q05"], "prior at half weight"), (weaker["q95"], None)):
         axes.plot(ahead["time_s"], end, color=HOLD, lw=1, ls="--", label=label)
     for t, word in ((3600.0, "1 h"), (86400.0, "1 day")):
         axes.axvline(t, color=INK, lw=0.5, alpha=0.4)
-        axes.annotate(word, (t, 1.0), xycoords=("data", "axes fraction"), ha="right", va="top", fontsize=8, color=INK,
-                      xytext=(-2, -2), textcoords="offset points")  # fmt: skip
+        axes.annotate(
+            word,
+            (t, 1.0),
+            xycoords=("data", "axes fraction"),
+            ha="right",
+            va="top",
+            fontsize=8,
+            color=INK,
+            xytext=(-2, -2),
+            textcoords="offset points",
+        )
     logarithmic(axes, "both")
     legend_below(figure, axes, 3)
     return figure

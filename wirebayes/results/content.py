@@ -205,8 +205,10 @@ def _protocols(members: Sequence[Sample]) -> dict[str, Variable]:
         "time_s": Variable(("hold", "time"), _stacked(members, times)[0]),
     }
     if any(p.warming_K is not None for p in protocols):
-        warming = {s.name: (np.nan if p.warming_K is None else p.warming_K) + 0.0 * times[s.name]
-                   for s, p in zip(members, protocols, strict=True)}  # fmt: skip
+        warming = {
+            s.name: (np.nan if p.warming_K is None else p.warming_K) + 0.0 * times[s.name]
+            for s, p in zip(members, protocols, strict=True)
+        }
         out["warming_K"] = Variable(("hold", "time"), _stacked(members, warming)[0])
     if set_as == SETTING:
         controls = np.concatenate([np.full(len(p.number), p.control) for p in protocols])

@@ -170,10 +170,17 @@ class Extrapolation:
                 f"it hardly depends on the prior: with half the prior's weight the band is {100 * share:.0f} % wider"
             )
         sentence = f"Creep after {hours:g} h at {self.tension_N:g} N: {verdict}."
-        return {"tension_N": self.tension_N, "time_s": self.time_s, "posterior_mm": _quantiles(self.posterior_mm),
-                "weaker_prior_mm": _quantiles(self.weaker_prior_mm), "prior_mm": _quantiles(self.prior_mm),
-                "prior_share": self.prior_share, "pareto_k": self.pareto_k, "sentence": sentence,
-                "warning": self.warning}  # fmt: skip
+        return {
+            "tension_N": self.tension_N,
+            "time_s": self.time_s,
+            "posterior_mm": _quantiles(self.posterior_mm),
+            "weaker_prior_mm": _quantiles(self.weaker_prior_mm),
+            "prior_mm": _quantiles(self.prior_mm),
+            "prior_share": self.prior_share,
+            "pareto_k": self.pareto_k,
+            "sentence": sentence,
+            "warning": self.warning,
+        }
 
 
 def _quantiles(values: Array) -> CreepBand:

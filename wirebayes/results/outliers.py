@@ -67,8 +67,16 @@ def _row(
         f"{experiment}: {called} is {value:.4g}, {abs(z):.1f} robust standard deviations {side} "
         f"the median of {specimens} specimens of {material}, {median:.4g}"
     )
-    return {"experiment": experiment, "material": material, "parameter": parameter, "value": value, "median": median,
-            "z": z, "specimens": specimens, "sentence": sentence}  # fmt: skip
+    return {
+        "experiment": experiment,
+        "material": material,
+        "parameter": parameter,
+        "value": value,
+        "median": median,
+        "z": z,
+        "specimens": specimens,
+        "sentence": sentence,
+    }
 
 
 _NINETY = 2 * 1.645  # standard deviations between the 5 % and the 95 % quantile

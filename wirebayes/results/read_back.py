@@ -61,15 +61,24 @@ class Stored:
     @property
     def problem(self) -> Problem:
         """A problem whose columns are the stored draws (its prior is not known any more)."""
-        model = Model(self.sample.model.law, self.sample.model.history, self.sample.model.effects,
-                      self.sample.model.tension_ref_N)  # fmt: skip
+        model = Model(
+            self.sample.model.law, self.sample.model.history, self.sample.model.effects, self.sample.model.tension_ref_N
+        )
         names: dict[str, Any] = dict.fromkeys(self.draws)
         return Problem(
-            (Sample(self.sample.name, self.sample.material, self.sample.protocol, self.sample.readings,
-                    self.sample.resolution, model),),
+            (
+                Sample(
+                    self.sample.name,
+                    self.sample.material,
+                    self.sample.protocol,
+                    self.sample.readings,
+                    self.sample.resolution,
+                    model,
+                ),
+            ),
             Prior(names, {}, frozenset()),
             self.likelihood,  # type: ignore[arg-type]
-        )  # fmt: skip
+        )
 
     @property
     def theta(self) -> Array:
@@ -159,8 +168,12 @@ def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path 
     draws = _one_of(posterior, at)
     lengths = json.loads(about["lengths_mm"])
     keys, known = json.loads(about["effects"]), catalogue(own_effects)
-    model = Model(about["elastic_law"], about["history"], tuple(effect_named(k, known) for k in keys),
-                  float(about["tension_ref_N"]))  # fmt: skip
+    model = Model(
+        about["elastic_law"],
+        about["history"],
+        tuple(effect_named(k, known) for k in keys),
+        float(about["tension_ref_N"]),
+    )
     exponent = draws.pop(LENGTH_EXPONENT, None)
     if len(names) > 1:
         reference = float(np.exp(np.mean(np.log(lengths))))

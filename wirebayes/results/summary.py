@@ -46,12 +46,15 @@ def statistics(values: Array) -> Mixed:
     q05, q50, q95 = np.quantile(values, [0.05, 0.5, 0.95])
     with np.errstate(invalid="ignore"):
         return {
-            "mean": float(values.mean()), "sd": float(values.std(ddof=1)),
-            "q05": float(q05), "q50": float(q50), "q95": float(q95),
+            "mean": float(values.mean()),
+            "sd": float(values.std(ddof=1)),
+            "q05": float(q05),
+            "q50": float(q50),
+            "q95": float(q95),
             "ess_bulk": bulk_ess(values),
             "ess_tail": tail_ess(values),
             "r_hat": r_hat(values),
-        }  # fmt: skip
+        }
 
 
 def _warnings(fit: Fit, sample: Sample | None) -> list[NoticeJson]:

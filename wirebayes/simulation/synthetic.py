@@ -118,8 +118,18 @@ class Bench:
                 # logged to a hundredth of a degree, and the wire follows the log
                 log = frozen(np.round(np.interp(starts[i] + kept, moments, self.temperatures_C), 2).tolist())
             number = i + 1 if len(kept) else None
-            holds.append(Hold(number, float(setting), float(times[-1]), frozen(kept.tolist()),
-                              frozen([0.0] * len(kept)), log, float(starts[i]), self.control))  # fmt: skip
+            holds.append(
+                Hold(
+                    number,
+                    float(setting),
+                    float(times[-1]),
+                    frozen(kept.tolist()),
+                    frozen([0.0] * len(kept)),
+                    log,
+                    float(starts[i]),
+                    self.control,
+                )
+            )
         return Experiment(
             self.name, self.material, self.length_mm, self.resolution, tuple(holds), Path(FILE), control=self.control
         )
@@ -304,8 +314,9 @@ def _table(bench: Bench) -> str:
     gaps = [
         f"{{ before_hold = {next(h.number for h in holds[i:] if h.recorded)}, "
         f"{SET[bench.control]} = {hold.setting!r}, duration_s = {hold.duration_s!r} }}"
-        for i, hold in enumerate(holds) if not hold.recorded
-    ]  # fmt: skip
+        for i, hold in enumerate(holds)
+        if not hold.recorded
+    ]
     if gaps:
         lines.append(f"unrecorded_holds = [{', '.join(gaps)}]")
     return "\n".join(lines) + "\n"

@@ -151,19 +151,21 @@ class Protocol:
         out = []
         for j, number in enumerate(self.number):
             later = self.number[j:][self.number[j:] >= 0]
-            out.append({
-                "index": j,
-                "recorded": bool(self.recorded[j]),
-                "order": float(number) if number >= 0 else (float(later[0]) - 0.5 if later.size else np.inf),
-                "displacement_mm": float(self.setting[j]) if self.control == "displacement" else np.nan,
-                "direction": int(directions[j]),
-                "first_direction": int(directions[0]),
-                "start_s": float(start[j]),
-                "duration_s": float(self.duration_s[j]),
-                "time_s": time[j][:, None],
-                "warming_K": warming[j][:, None],
-                "length_mm": self.length_mm,
-            })  # fmt: skip
+            out.append(
+                {
+                    "index": j,
+                    "recorded": bool(self.recorded[j]),
+                    "order": float(number) if number >= 0 else (float(later[0]) - 0.5 if later.size else np.inf),
+                    "displacement_mm": float(self.setting[j]) if self.control == "displacement" else np.nan,
+                    "direction": int(directions[j]),
+                    "first_direction": int(directions[0]),
+                    "start_s": float(start[j]),
+                    "duration_s": float(self.duration_s[j]),
+                    "time_s": time[j][:, None],
+                    "warming_K": warming[j][:, None],
+                    "length_mm": self.length_mm,
+                }
+            )
         return tuple(out)
 
 

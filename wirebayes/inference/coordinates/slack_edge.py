@@ -111,9 +111,14 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
         return None
     below = [column for e in sample.model.effects if (column := e.no_creep_below)]
     return SlackEdge(
-        preload, -float(protocol.setting[0]), _WIDTH * typical, protocol.length_mm,
-        sample.model.law == "modified", place("k1"), place(below[0]) if below else 0.0,
-    )  # fmt: skip
+        preload,
+        -float(protocol.setting[0]),
+        _WIDTH * typical,
+        protocol.length_mm,
+        sample.model.law == "modified",
+        place("k1"),
+        place(below[0]) if below else 0.0,
+    )
 
 
 DECADES = 7.0 * np.log(10.0)  # of widths that are told apart: with a threshold of creep the posterior spans six

@@ -317,10 +317,16 @@ def _fitted(
     components = policy.components * (MORE_COMPONENTS if learned.again else 1)
     try:
         new = proposal.fit_proposal(
-            hot, cold, learned.start, target.coordinates.order, state.generator, shares,
-            most=max(components, min(learned.modes, MOST_COMPONENTS)), points=points,
+            hot,
+            cold,
+            learned.start,
+            target.coordinates.order,
+            state.generator,
+            shares,
+            most=max(components, min(learned.modes, MOST_COMPONENTS)),
+            points=points,
             before=learned.proposal if isinstance(learned.proposal, Proposal) else None,
-        )  # fmt: skip
+        )
     except np.linalg.LinAlgError:
         return state  # too few distinct points yet: keep the proposal that made them
     return state.knowing(proposal=new)

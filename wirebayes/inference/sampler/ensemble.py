@@ -116,10 +116,19 @@ def sample_posterior(
     found_, counted = state.diagnostics, state.all_kept
     z, log_density = (by_ensemble(blocks, policy) for blocks in (counted.z, counted.log_density))
     return Chains(
-        z, log_density, found_.autocorrelation, found_.ess, found_.r_hat, state.converged, state.why,
-        state.evaluations, counted.evaluations, counted.accepted / max(counted.proposed, 1), state.learned.trusted,
+        z,
+        log_density,
+        found_.autocorrelation,
+        found_.ess,
+        found_.r_hat,
+        state.converged,
+        state.why,
+        state.evaluations,
+        counted.evaluations,
+        counted.accepted / max(counted.proposed, 1),
+        state.learned.trusted,
         state.learned.modes,
-    )  # fmt: skip
+    )
 
 
 def _share(state: State, policy: Policy) -> float:

@@ -165,12 +165,13 @@ def fit_proposal(
     near, far = (replace(each, z=straight.forward(each.z)[0]) for each in (cold, hot))
     far, plain = far.thinned(points // 2, rng), hot.thinned(points // 2, rng)
     return Proposal(
-        shares, straight,
+        shares,
+        straight,
         mixture.fit_mixture(near, rng, most=most, degrees=LIGHT_DEGREES, before=before.close if before else None),
         mixture.fit_mixture(far, rng, most=most // 2, before=before.wide if before else None),
         mixture.fit_mixture(plain, rng, most=most // 2, before=before.plain if before else None),
         start,
-    )  # fmt: skip
+    )
 
 
 def with_excess(of: Proposal, drawn: WeightedPoints, value: Array, rng: np.random.Generator) -> Proposal:

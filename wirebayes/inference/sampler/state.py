@@ -144,9 +144,12 @@ class Kept:
     def joined(self, later: "Kept") -> "Kept":
         """These draws and later ones of the same walkers."""
         return Kept(
-            self.z + later.z, self.log_density + later.log_density, self.evaluations + later.evaluations,
-            self.accepted + later.accepted, self.proposed + later.proposed,
-        )  # fmt: skip
+            self.z + later.z,
+            self.log_density + later.log_density,
+            self.evaluations + later.evaluations,
+            self.accepted + later.accepted,
+            self.proposed + later.proposed,
+        )
 
 
 @dataclass(frozen=True)

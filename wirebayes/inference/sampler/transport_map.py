@@ -159,9 +159,19 @@ def fit_map(points: WeightedPoints, order: NDArray[np.int64]) -> Straight:
     if not np.isfinite(left).all():
         raise np.linalg.LinAlgError("the points do not settle the scales")
     return Straight(
-        order, centre, scale, v.min(axis=0), v.max(axis=0), constant, linear, quadratic, log_scale,
-        spread.min(axis=0), spread.max(axis=0), _shapes(left, weight),
-    )  # fmt: skip
+        order,
+        centre,
+        scale,
+        v.min(axis=0),
+        v.max(axis=0),
+        constant,
+        linear,
+        quadratic,
+        log_scale,
+        spread.min(axis=0),
+        spread.max(axis=0),
+        _shapes(left, weight),
+    )
 
 
 def _seen_at_once(

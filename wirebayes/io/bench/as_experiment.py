@@ -53,9 +53,15 @@ def _turned(column: Column) -> str:
 
 
 def as_experiment(
-    table: RawTable, columns: dict[Role, Column], header: tuple[str, ...], rows: list[list[Any]], origin: list[int],
-    about: About, resolution: float | None, control: Control,
-) -> Experiment:  # fmt: skip
+    table: RawTable,
+    columns: dict[Role, Column],
+    header: tuple[str, ...],
+    rows: list[list[Any]],
+    origin: list[int],
+    about: About,
+    resolution: float | None,
+    control: Control,
+) -> Experiment:
     """The experiment checked as the reader of files checks its own, blaming the raw file's lines.
 
     Parameters

@@ -187,9 +187,11 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
         bracket = UNIT_IN_BRACKETS.match(header)
         if bracket and bracket[2] not in NO_UNIT and not bracket[2].isdigit():
             raise table.complain(
-                table.header_line, index, f"the unit {bracket[2]!r}", f"one of {role}{_units(role)}; or --map "
-                f'"{header}={role} [{UNITS[role]}]" if that is what it means'
-            )  # fmt: skip
+                table.header_line,
+                index,
+                f"the unit {bracket[2]!r}",
+                f'one of {role}{_units(role)}; or --map "{header}={role} [{UNITS[role]}]" if that is what it means',
+            )
         first = table.rows[0]
         if role == "time" and looks_like_a_moment(first.cell(index)):
             raise table.complain(first.line, index, shown(first.cell(index)), UNDERSTOOD)

@@ -102,6 +102,9 @@ def drift(groups: Sequence[Rows], values: Floats) -> float:
     levels = np.array([np.median(values[rows]) for rows in groups])
     steps = np.diff(levels, prepend=0.0 if len(groups) == 1 else levels[0] - np.sign(levels[-1] - levels[0]))
     size = float(np.median(np.abs(steps[1:]))) if len(groups) > 1 else abs(float(levels[0]))
-    changes = [np.mean(values[rows[-third:]]) - np.mean(values[rows[:third]])
-               for rows in groups for third in (max(1, len(rows) // THIRD),)]  # fmt: skip
+    changes = [
+        np.mean(values[rows[-third:]]) - np.mean(values[rows[:third]])
+        for rows in groups
+        for third in (max(1, len(rows) // THIRD),)
+    ]
     return abs(float(np.mean(np.sign(steps) * changes))) / size if size else 0.0

@@ -152,9 +152,7 @@ def _control(recorded: Recorded) -> Control:
     if (exact and not is_mass) or len(by_tension) < min(2, len(by_displacement)):
         return "displacement"
     place = f"{recorded.table.sheet.path}, line {recorded.table.header_line}"
-    return recognised(
-        by_tension, x, recorded.values["tension"], is_mass, place
-    )  # fmt: skip
+    return recognised(by_tension, x, recorded.values["tension"], is_mass, place)
 
 
 _NOT_READ = (

@@ -12,9 +12,12 @@ from wirebayes.errors import InputError
 from wirebayes.strict.files import read_bytes
 
 _MARKS = (
-    (codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
-    (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"),
-)  # fmt: skip
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
 _NUL_SHARE = 0.2  # of the bytes: UTF-16 of digits has a half, text none
 # What benches write where it is no Unicode: Western Europe first, then East Asia, Cyrillic, Central Europe.
 _CODE_PAGES = ("cp1252", "latin-1", "gb18030", "cp932", "cp949", "big5", "cp1251", "koi8-r", "cp866", "cp1250")

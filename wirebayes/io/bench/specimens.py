@@ -84,8 +84,9 @@ def specimen_tables(
     marks = _specimens(table, marked)
     if len(marks) > 1 and stated is None and not marked.certain and _read_alike(table, marked, marks):
         answers = {
-            "--specimens several": "specimens of their own", "--specimens one": "one specimen, read by several sensors"
-        }  # fmt: skip
+            "--specimens several": "specimens of their own",
+            "--specimens one": "one specimen, read by several sensors",
+        }
         names = " and ".join(dict.fromkeys(table.header[i] for mark in marks[:2] for i in marked.own(mark)[:1]))
         found = f"found {names} with nearly the same numbers, and the columns beside them too"
         raise Undecided(f"{table.sheet.path}, line {table.header_line}: {found}", "what they are of", answers)

@@ -28,9 +28,12 @@ from wirebayes.strict.table import LARGEST
 from wirebayes.wire.protocol import Control
 
 COLUMN_ROLES: dict[str, Role] = {
-    "hold": "hold", "displacement_mm": "displacement", "time_s": "time", "tension_N": "tension",
+    "hold": "hold",
+    "displacement_mm": "displacement",
+    "time_s": "time",
+    "tension_N": "tension",
     "temperature_C": "temperature",
-}  # fmt: skip
+}
 _SIZE: dict[Role, str] = {"displacement": "length", "tension": "area"}  # what a strain and a stress are times of
 READS: dict[Control, Role] = {"displacement": "tension", "force": "displacement"}  # by what is set
 FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
@@ -87,9 +90,16 @@ class Recorded:
         unit = self.columns[role].unit
         step = (evident_step(self.texts[role]) or 0.0) * abs(unit.factor if unit else 1.0)
         return Readings(
-            role, self.values[role], self.values[READS[control]], self.values["time"], self.hold, self.of_day, step,
-            self.columns["time"].header, self.complain,
-        )  # fmt: skip
+            role,
+            self.values[role],
+            self.values[READS[control]],
+            self.values["time"],
+            self.hold,
+            self.of_day,
+            step,
+            self.columns["time"].header,
+            self.complain,
+        )
 
 
 def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Recorded, list[str]]:
@@ -109,9 +119,10 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
     notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes]
     texts: dict[Role, list[str]] = {
-        role: _numbers(table, column, decimal) for role, column in columns.items() if role != "hold"
-        and not (role == "time" and clock.has_moments(table, column.index))
-    }  # fmt: skip
+        role: _numbers(table, column, decimal)
+        for role, column in columns.items()
+        if role != "hold" and not (role == "time" and clock.has_moments(table, column.index))
+    }
     values: dict[Role, Floats] = {role: _converted(columns[role], text) for role, text in texts.items()}
     values["time"], of_day = _times(table, columns["time"], values.get("time"), notes)
     _check_sizes(table, columns, values)

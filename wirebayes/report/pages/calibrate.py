@@ -122,13 +122,16 @@ def _done(found: CalibrateJson) -> Points:
         ("poses", prior.get("pose_sd_mm", 0.0)),
     )
     known = [f"{name} were known to {sd:g} mm" for name, sd in stated if sd]
-    return Points("What was done", [
-        f"{counted(found['holds'], 'hold')}, tensions read in {found['read']} of them.",
-        *([f"Before, {' and '.join(known)}."] if known else []),
-        f"Before, every reference length was known to {prior['reference_sd_mm']:g} mm, and specimens of one line were "
-        f"assumed to differ by {100 * prior['specimen_spread']:g} %.",
-        *biases,
-    ])  # fmt: skip
+    return Points(
+        "What was done",
+        [
+            f"{counted(found['holds'], 'hold')}, tensions read in {found['read']} of them.",
+            *([f"Before, {' and '.join(known)}."] if known else []),
+            f"Before, every reference length was known to {prior['reference_sd_mm']:g} mm, and specimens of one line "
+            f"were assumed to differ by {100 * prior['specimen_spread']:g} %.",
+            *biases,
+        ],
+    )
 
 
 def _known(found: CalibrateJson) -> Points:

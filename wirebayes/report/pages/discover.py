@@ -183,11 +183,16 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
     rows = []
     for name, after in final.items():
         before = plain.get(name)
-        rows.append([
-            name, unit_text(after["unit"]) or "–",
-            *([number(before["q50"]), span(before["q05"], before["q95"])] if before else ["–", "–"]),
-            number(after["q50"]), span(after["q05"], after["q95"]), _means(name),
-        ])  # fmt: skip
+        rows.append(
+            [
+                name,
+                unit_text(after["unit"]) or "–",
+                *([number(before["q50"]), span(before["q05"], before["q95"])] if before else ["–", "–"]),
+                number(after["q50"]),
+                span(after["q05"], after["q95"]),
+                _means(name),
+            ]
+        )
     header = ["parameter", "unit", "plain", "90 %", "with what was found", "90 %", "what it is"]
     return [Table(header, rows, "Each parameter before and after, both on all holds.")]
 

@@ -87,11 +87,14 @@ def _recommended(found: PlanJson) -> Points:
 
 def _reliability(rows: list[JudgedProtocol]) -> Points:
     least = min(row["simulated_tests"] for row in rows)
-    return Points("How far it can be trusted", [
-        f"Each test was simulated and fitted {least} times or more, with the priors of the later fit. Half of the "
-        "tests would do better than a median, half worse; the range says by how much.",
-        "They hold if the wire is as guessed and nothing is missing in the model.",
-    ])  # fmt: skip
+    return Points(
+        "How far it can be trusted",
+        [
+            f"Each test was simulated and fitted {least} times or more, with the priors of the later fit. Half of the "
+            "tests would do better than a median, half worse; the range says by how much.",
+            "They hold if the wire is as guessed and nothing is missing in the model.",
+        ],
+    )
 
 
 def _ranking(found: PlanJson) -> Table:
@@ -99,14 +102,17 @@ def _ranking(found: PlanJson) -> Table:
     robot = found["robot"] is not None
     lines = [
         [
-            str(row["rank"]), row["name"], number(row["duration_min"]), number(row["information_bits"]),
+            str(row["rank"]),
+            row["name"],
+            number(row["duration_min"]),
+            number(row["information_bits"]),
             *(number(row["parameters"][n]["sd"], 2) for n in names),
             number(row["creep"]["creep_1h_mm"]["sd"], 2),
             *([number(row["robot"] and row["robot"]["drift_sd_mm"], 2)] if robot else []),
             "yes" if row["within_budget"] else "too long",
         ]
         for row in found["protocols"]
-    ]  # fmt: skip
+    ]
     header = ["rank", "test", "minutes", "bits"]
     units = {n: unit_text(found["protocols"][0]["parameters"][n]["unit"]) for n in names}
     header += [f"sd of {n}, {units[n]}" if units[n] else f"sd of {n}" for n in names]
@@ -143,10 +149,15 @@ def _protocol(row: JudgedProtocol) -> list[Block]:
     blocks.append(Table(header, lines, caption + f"{number(creep['longest_hold_s'])} s."))
     if row["effects"]:
         shown = [
-            [_words(n), number(e["amplitude_80"], 2), unit_text(e["unit"]) or "–", number(e["delta_80"], 2),
-             ", ".join(map(_words, e["confused_with"])) or "–"]
+            [
+                _words(n),
+                number(e["amplitude_80"], 2),
+                unit_text(e["unit"]) or "–",
+                number(e["delta_80"], 2),
+                ", ".join(map(_words, e["confused_with"])) or "–",
+            ]
             for n, e in row["effects"].items()
-        ]  # fmt: skip
+        ]
         caption = "Smallest amplitude seen in 80 % of tests, its size δ in standard deviations, and what it looks like."
         blocks.append(Table(["effect", "amplitude", "unit", "δ", "hard to distinguish from"], shown, caption))
     if row["not_identifiable"]:

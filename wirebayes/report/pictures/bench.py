@@ -84,9 +84,14 @@ def _draw_holds(upper: Axes, lower: Axes, holds: Sequence[Hold], starts: Sequenc
         if row % every == 0:
             above = float(ends.mean()), 1.02
             upper.annotate(
-                str(hold.number), above, xycoords=("data", "axes fraction"), ha="center", va="bottom", fontsize=7.5,
+                str(hold.number),
+                above,
+                xycoords=("data", "axes fraction"),
+                ha="center",
+                va="bottom",
+                fontsize=7.5,
                 color=INK,
-            )  # fmt: skip
+            )
         time = (start + hold.time_s) / scale
         lower.plot(time, hold.readings, color=QUIET, lw=1.0, zorder=2)
         lower.plot(time, hold.readings, "o", color=CHAIN, ms=3.2, zorder=3, label=labels.pop("kept", None))

@@ -50,8 +50,9 @@ WORDS: dict[Way, str] = {"free": "held out, predicted freely", "given_first": "h
 def elpd_differences(name: str, table: ComparedModels) -> Figure:
     """Elpd difference from the base with two standard errors, one line a model."""
     rows = [(r, d) for r in table["models"] if (d := r["difference"]) is not None and r["name"] != table["base"]]
-    figure, axes = panel(f"elpd − elpd of {table['base']}, all holds left out in turn", "", name,
-                         (5.4, 1.2 + 0.22 * len(rows)))  # fmt: skip
+    figure, axes = panel(
+        f"elpd − elpd of {table['base']}, all holds left out in turn", "", name, (5.4, 1.2 + 0.22 * len(rows))
+    )
     axes.axvline(0, color=QUIET, lw=1)
     axes.axvspan(-4, 4, color=QUIET, alpha=0.25, lw=0)
     values = np.array([d["elpd"] for _, d in rows], float)
@@ -73,8 +74,9 @@ def held_out_errors(name: str, table: ComparedModels) -> Figure:
     unit = unit_read(rows[0][1]["given_first"] or {}) if rows else "N"
     figure, axes = panel(f"rms error on held-out holds, {unit}", "", name, (5.4, 1.2 + 0.22 * len(rows)))
     drawn: tuple[tuple[Way, str, str], ...] = (
-        ("free", CHAIN, "predicted freely"), ("given_first", HOLD, "given the first reading")
-    )  # fmt: skip
+        ("free", CHAIN, "predicted freely"),
+        ("given_first", HOLD, "given the first reading"),
+    )
     for way, colour, label in drawn:
         found = [(place, read_value(scores, "rmse")) for place, (_, held) in enumerate(rows) if (scores := held[way])]
         axes.scatter([v for _, v in found], [p for p, _ in found], s=16, color=colour, label=label)
@@ -102,8 +104,15 @@ def bands(title: str, scores: PredictionScores) -> Figure:
     for i, number in enumerate(numbers):
         here = r["hold"] == number
         for low, high, alpha, label in ((0, 6, 0.12, "99 %"), (1, 5, 0.16, "90 %"), (2, 4, 0.22, "50 %")):
-            axes.fill_between(place[here], (q[low] - q[3])[here], (q[high] - q[3])[here], color=CHAIN, alpha=alpha,
-                              lw=0, label=label if i == 0 else None)  # fmt: skip
+            axes.fill_between(
+                place[here],
+                (q[low] - q[3])[here],
+                (q[high] - q[3])[here],
+                color=CHAIN,
+                alpha=alpha,
+                lw=0,
+                label=label if i == 0 else None,
+            )
     axes.axhline(0, color=CHAIN, lw=1)
     axes.scatter(place, read_value(r, "observed") - q[3], s=14, color=INK, zorder=3, label="measured − median")
     axes.set_xticks(range(len(numbers)), [str(n) for n in numbers])

@@ -61,12 +61,19 @@ def robot_of_caspr(bodies: Element, cables: Element, cable_set: str | None = Non
     return ImportedRobot(
         link.attributes.get("name") or Path(bodies.file).stem.removesuffix("_bodies"),
         f"Imported from CASPR's {names}, cable set {chosen.attribute('id')!r}.",
-        freedom, physical.one("mass").number(), centre,
-        np.array([leg.exit_m for leg in legs]), np.array([leg.platform_m for leg in legs]),
-        np.array([leg.pulley_radius_m for leg in legs]), np.array([leg.swivel_axis for leg in legs]),
-        bounds, home, turn, _notes(own_bounds, normal is not None, freedom),
+        freedom,
+        physical.one("mass").number(),
+        centre,
+        np.array([leg.exit_m for leg in legs]),
+        np.array([leg.platform_m for leg in legs]),
+        np.array([leg.pulley_radius_m for leg in legs]),
+        np.array([leg.swivel_axis for leg in legs]),
+        bounds,
+        home,
+        turn,
+        _notes(own_bounds, normal is not None, freedom),
         normal=normal,
-    )  # fmt: skip
+    )
 
 
 def _ways(joint: Element) -> tuple[tuple[int, ...], tuple[int, ...]]:

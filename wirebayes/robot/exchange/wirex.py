@@ -48,11 +48,20 @@ def robot_of_wirex(models: Element, pulleys: bool = True) -> ImportedRobot:
     if radius.any():
         notes.append("Its pulley radii are taken as they are: WireX writes 0.1 m where none was set.")
     return ImportedRobot(
-        Path(models.file).stem, f"Imported from WireX's {Path(models.file).name}.", _PATTERNS[pattern],
-        platform.number("mass"), platform.one("centerofgravity").point(),
-        np.array([base.point() for base in bases]), np.array([chain.one("platform").point() for chain in chains]),
-        radius, np.array([_axis(base) for base in bases]), None, None, np.zeros(3), tuple(notes),
-    )  # fmt: skip
+        Path(models.file).stem,
+        f"Imported from WireX's {Path(models.file).name}.",
+        _PATTERNS[pattern],
+        platform.number("mass"),
+        platform.one("centerofgravity").point(),
+        np.array([base.point() for base in bases]),
+        np.array([chain.one("platform").point() for chain in chains]),
+        radius,
+        np.array([_axis(base) for base in bases]),
+        None,
+        None,
+        np.zeros(3),
+        tuple(notes),
+    )
 
 
 def _axis(base: Element) -> Floats:

@@ -28,27 +28,29 @@ def urdf(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> str:
     links = [f'  <link name="exit_{i}"/>' for i in _legs(robot)] + [f'  <link name="point_{i}"/>' for i in _legs(robot)]
     joints = [_fixed("world", f"exit_{i}", p) for i, p in zip(_legs(robot), robot.exit_m, strict=True)]
     joints += [_fixed("platform", f"point_{i}", p) for i, p in zip(_legs(robot), robot.platform_m, strict=True)]
-    return "\n".join([
-        '<?xml version="1.0"?>',
-        f"<robot name={quoteattr(robot.name)}>",
-        *(f"  <!-- {line} -->" for line in _left_out(robot, stiffness_N, zero_m)),
-        '  <link name="world"/>',
-        '  <link name="platform">',
-        "    <inertial>",
-        f'      <origin xyz="{_row(robot.centre_of_mass_m)}" rpy="0 0 0"/>',
-        f'      <mass value="{robot.mass_kg!r}"/>',
-        f"      <inertia {moments}/>",
-        "    </inertial>",
-        "  </link>",
-        '  <joint name="floating" type="floating">',
-        '    <parent link="world"/><child link="platform"/>',
-        f'    <origin xyz="{_row(robot.home_m)}" rpy="{_row(_roll_pitch_yaw(robot))}"/>',
-        "  </joint>",
-        *links,
-        *joints,
-        "</robot>",
-        "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            '<?xml version="1.0"?>',
+            f"<robot name={quoteattr(robot.name)}>",
+            *(f"  <!-- {line} -->" for line in _left_out(robot, stiffness_N, zero_m)),
+            '  <link name="world"/>',
+            '  <link name="platform">',
+            "    <inertial>",
+            f'      <origin xyz="{_row(robot.centre_of_mass_m)}" rpy="0 0 0"/>',
+            f'      <mass value="{robot.mass_kg!r}"/>',
+            f"      <inertia {moments}/>",
+            "    </inertial>",
+            "  </link>",
+            '  <joint name="floating" type="floating">',
+            '    <parent link="world"/><child link="platform"/>',
+            f'    <origin xyz="{_row(robot.home_m)}" rpy="{_row(_roll_pitch_yaw(robot))}"/>',
+            "  </joint>",
+            *links,
+            *joints,
+            "</robot>",
+            "",
+        ]
+    )
 
 
 def sdf(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> str:
@@ -63,24 +65,26 @@ def sdf(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> str:
     moments = "".join(f"<{key}>{value!r}</{key}>" for key, value in zip(_MOMENTS, _inertia(robot), strict=True))
     frames = [_frame("__model__", f"exit_{i}", p) for i, p in zip(_legs(robot), robot.exit_m, strict=True)]
     frames += [_frame("platform", f"point_{i}", p) for i, p in zip(_legs(robot), robot.platform_m, strict=True)]
-    return "\n".join([
-        '<?xml version="1.0"?>',
-        '<sdf version="1.9">',
-        *(f"  <!-- {line} -->" for line in _left_out(robot, stiffness_N, zero_m)),
-        f"  <model name={quoteattr(robot.name)}>",
-        '    <link name="platform">',
-        f"      <pose>{_row(robot.home_m)} {_row(_roll_pitch_yaw(robot))}</pose>",
-        "      <inertial>",
-        f"        <pose>{_row(robot.centre_of_mass_m)} 0 0 0</pose>",
-        f"        <mass>{robot.mass_kg!r}</mass>",
-        f"        <inertia>{moments}</inertia>",
-        "      </inertial>",
-        "    </link>",
-        *frames,
-        "  </model>",
-        "</sdf>",
-        "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            '<?xml version="1.0"?>',
+            '<sdf version="1.9">',
+            *(f"  <!-- {line} -->" for line in _left_out(robot, stiffness_N, zero_m)),
+            f"  <model name={quoteattr(robot.name)}>",
+            '    <link name="platform">',
+            f"      <pose>{_row(robot.home_m)} {_row(_roll_pitch_yaw(robot))}</pose>",
+            "      <inertial>",
+            f"        <pose>{_row(robot.centre_of_mass_m)} 0 0 0</pose>",
+            f"        <mass>{robot.mass_kg!r}</mass>",
+            f"        <inertia>{moments}</inertia>",
+            "      </inertial>",
+            "    </link>",
+            *frames,
+            "  </model>",
+            "</sdf>",
+            "",
+        ]
+    )
 
 
 def cut_from(robot: Robot) -> str:
@@ -109,8 +113,10 @@ def _left_out(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> list[str]:
     for i, (lines_i, beyond, k, zero) in enumerate(
         zip(robot.lines, robot.beyond_m, stiffness_N, zero_m, strict=True), 1
     ):
-        lines.append(f"wire {i}: {lines_i:g} line(s), {beyond:g} m beyond the exit; stiffness {k:.6g} N, zero-tension "
-                     f"length {zero:.6g} m at the home pose")  # fmt: skip
+        lines.append(
+            f"wire {i}: {lines_i:g} line(s), {beyond:g} m beyond the exit; stiffness {k:.6g} N, zero-tension "
+            f"length {zero:.6g} m at the home pose"
+        )
     if robot.pulleys is not None:
         radii = ", ".join(f"{1e3 * radius:g}" for radius in robot.pulleys.radius_m)
         lines.append(f"Left out: swivelling pulleys at the exit points, radii {radii} mm")

@@ -222,8 +222,11 @@ def _requested(robot: Robot, line: WireDraws, history: History, errors: Uncertai
     if history.read:
         counts = [0 if v is None else int(np.isfinite(v).sum()) for v in (history.tension_N, history.tilt_rad)]
         out["readings"] = {
-            "tensions": counts[0], "tilts": counts[1], "tension_sd_N": errors.tension_N, "tilt_sd_rad": errors.tilt_rad
-        }  # fmt: skip
+            "tensions": counts[0],
+            "tilts": counts[1],
+            "tension_sd_N": errors.tension_N,
+            "tilt_sd_rad": errors.tilt_rad,
+        }
     return out
 
 
@@ -231,8 +234,14 @@ def _course(history: History, found: Estimate, rows: NDArray[np.intp]) -> Course
     """The rows that are shown, as drift from one command is."""
     track = found.track
     status = np.where(track.held[:, rows], 0, 4)
-    return Course(history.times_s[rows], track.position_m[:, rows], track.rotation[:, rows], track.tension_N[:, rows],
-                  status, fresh(track.tension_N.shape[-1], 1))  # fmt: skip
+    return Course(
+        history.times_s[rows],
+        track.position_m[:, rows],
+        track.rotation[:, rows],
+        track.tension_N[:, rows],
+        status,
+        fresh(track.tension_N.shape[-1], 1),
+    )
 
 
 def _moved(course: Course, to: Target, rows: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
@@ -270,8 +279,13 @@ def _bands(values: Floats) -> Band:
     def over_time(key: Statistic) -> Floats:
         return np.array([empty if one[key] is None else one[key] for one in each])
 
-    return {"mean": over_time("mean"), "sd": over_time("sd"), "q05": over_time("q05"), "q50": over_time("q50"),
-            "q95": over_time("q95")}  # fmt: skip
+    return {
+        "mean": over_time("mean"),
+        "sd": over_time("sd"),
+        "q05": over_time("q05"),
+        "q50": over_time("q50"),
+        "q95": over_time("q95"),
+    }
 
 
 def _clock(line: WireDraws, run: _Again) -> ClockJson:

@@ -69,14 +69,17 @@ def drift_along(
     bad = np.flatnonzero(~np.isfinite(tau).all(1))
     if bad.size:
         raise Unheld(float(fine.times_s[bad[0]]))
-    joint = np.stack([
-        inverse.commands(fine.robot_at(robot, k), wires, x[None], R[None], t[None], strain, error.T).joint_m
-        for k, (x, R, t) in enumerate(zip(fine.position_m, fine.rotation, tau, strict=True))
-    ])  # fmt: skip
+    joint = np.stack(
+        [
+            inverse.commands(fine.robot_at(robot, k), wires, x[None], R[None], t[None], strain, error.T).joint_m
+            for k, (x, R, t) in enumerate(zip(fine.position_m, fine.rotation, tau, strict=True))
+        ]
+    )
     rows, starts = len(fine.times_s), clock_starts(fine, tau, restart)
     start = fine.position_m[0], fine.rotation[0]
-    track = follow_log(robot, wires, fine, joint, start, starts, error,
-                   lambda k: progress("poses", k + 1, rows), carried)  # fmt: skip
+    track = follow_log(
+        robot, wires, fine, joint, start, starts, error, lambda k: progress("poses", k + 1, rows), carried
+    )
     plain = Track(fine.position_m[None], fine.rotation[None], tau[None], np.zeros((1, *tau.shape)), track.hold)
     return Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error, starts), np.swapaxes(joint[kept], 0, 1)
 
@@ -96,8 +99,9 @@ def wanted_tensions(robot: Robot, history: History) -> Floats:
     loads = np.column_stack([history.payload_kg, history.payload_m])
     for load in np.unique(loads, axis=0):
         rows = np.flatnonzero((loads == load).all(1))
-        out[rows] = inverse.tensions(history.robot_at(robot, int(rows[0])), history.position_m[rows],
-                                     history.rotation[rows])  # fmt: skip
+        out[rows] = inverse.tensions(
+            history.robot_at(robot, int(rows[0])), history.position_m[rows], history.rotation[rows]
+        )
     return out
 
 

@@ -153,8 +153,15 @@ def plain_track(
     fine, kept = refined_joints(known.robot, history)
     assert fine.joint_m is not None
     rows = len(fine.times_s)
-    track = follow_log(known.robot, known.plain, fine, fine.joint_m, start, fine.times_s[:1],
-                   progress=lambda row: progress("without creep", row + 1, rows))  # fmt: skip
+    track = follow_log(
+        known.robot,
+        known.plain,
+        fine,
+        fine.joint_m,
+        start,
+        fine.times_s[:1],
+        progress=lambda row: progress("without creep", row + 1, rows),
+    )
     return track.at_rows(kept), clock_starts(fine, track.tension_N[0])
 
 
@@ -188,8 +195,17 @@ class _Way:
         """
         history, rows = self.history, len(self.history.times_s)
         assert history.joint_m is not None
-        return follow_log(self.known.robot, wires, history, history.joint_m, self.start, self.starts_s, error_m,
-                      lambda row: self.progress(name, row + 1, rows), carried)  # fmt: skip
+        return follow_log(
+            self.known.robot,
+            wires,
+            history,
+            history.joint_m,
+            self.start,
+            self.starts_s,
+            error_m,
+            lambda row: self.progress(name, row + 1, rows),
+            carried,
+        )
 
     def white(self, white: Floats, name: str, without: NDArray[np.bool_]) -> Track:
         """White unknowns followed, some wires without stiffness.

@@ -48,9 +48,12 @@ class Track:
     def part(self, index: NDArray[np.intp]) -> "Track":
         """Some of the columns."""
         return replace(
-            self, position_m=self.position_m[index], rotation=self.rotation[index],
-            tension_N=self.tension_N[index], strain=self.strain[index],
-        )  # fmt: skip
+            self,
+            position_m=self.position_m[index],
+            rotation=self.rotation[index],
+            tension_N=self.tension_N[index],
+            strain=self.strain[index],
+        )
 
     def at_rows(self, rows: NDArray[np.intp]) -> "Track":
         """Some of the rows."""
@@ -62,8 +65,9 @@ class Track:
         out = self.part(np.arange(len(at)))
         for own, new in zip(
             (out.position_m, out.rotation, out.tension_N, out.strain),
-            (other.position_m, other.rotation, other.tension_N, other.strain), strict=True,
-        ):  # fmt: skip
+            (other.position_m, other.rotation, other.tension_N, other.strain),
+            strict=True,
+        ):
             own[at] = new
         return out
 
@@ -186,9 +190,14 @@ def refined_joints(robot: Robot, history: History) -> tuple[History, NDArray[np.
 
 
 def _begin(
-    robot: Robot, wires: Wires, schedule: Callable[[float], Floats], since_s: float, start: tuple[Floats, Floats],
-    carried: CreepState, error_m: Floats | float,
-) -> CreepingHold:  # fmt: skip
+    robot: Robot,
+    wires: Wires,
+    schedule: Callable[[float], Floats],
+    since_s: float,
+    start: tuple[Floats, Floats],
+    carried: CreepState,
+    error_m: Floats | float,
+) -> CreepingHold:
     """A hold that begins at a time of the history."""
     return CreepingHold(robot, wires, lambda time_s: schedule(since_s + time_s), start, carried, error_m=error_m)
 

@@ -79,10 +79,14 @@ def divided(history: History, pieces: NDArray[np.intp]) -> tuple[History, NDArra
 
     turned = None if history.rotation is None else Slerp(index, Rotation.from_matrix(history.rotation))(at).as_matrix()
     fine = History(
-        np.interp(at, index, history.times_s), between(history.joint_m), between(history.position_m), turned,
-        history.payload_kg[before], history.payload_m[before],
+        np.interp(at, index, history.times_s),
+        between(history.joint_m),
+        between(history.position_m),
+        turned,
+        history.payload_kg[before],
+        history.payload_m[before],
         None if history.hold is None else history.hold[before],
-    )  # fmt: skip
+    )
     return fine, kept
 
 

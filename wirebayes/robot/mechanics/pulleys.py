@@ -68,8 +68,13 @@ def wire_run(pulleys: Pulleys, line_m: Floats) -> WireRun:
     wrap = np.arctan2(sine, cosine)
     wrap = np.where(wrap < -1e-9, wrap + 2 * np.pi, wrap)
     direction = sine * outward + cosine * s
-    across = np.stack([s[1] * outward[2] - s[2] * outward[1], s[2] * outward[0] - s[0] * outward[2],
-                       s[0] * outward[1] - s[1] * outward[0]])  # fmt: skip
+    across = np.stack(
+        [
+            s[1] * outward[2] - s[2] * outward[1],
+            s[2] * outward[0] - s[0] * outward[2],
+            s[0] * outward[1] - s[1] * outward[0],
+        ]
+    )
     # A leg without a pulley is a straight line, whatever its axis.
     point = rho == 0
     distance = np.sqrt(line_m[0] ** 2 + line_m[1] ** 2 + line_m[2] ** 2)

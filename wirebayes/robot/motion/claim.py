@@ -154,8 +154,11 @@ def scaled_robot(robot: Robot, factor: float, mass_kg: float) -> Robot:
     Robot
     """
     lengths = ("exit_m", "platform_m", "centre_of_mass_m", "beyond_m", "wire_m", "home_m", "lower_m", "upper_m")
-    rule = replace(robot.rule, lowest_N=robot.rule.lowest_N * mass_kg / robot.mass_kg,
-                   highest_N=robot.rule.highest_N * mass_kg / robot.mass_kg)  # fmt: skip
+    rule = replace(
+        robot.rule,
+        lowest_N=robot.rule.lowest_N * mass_kg / robot.mass_kg,
+        highest_N=robot.rule.highest_N * mass_kg / robot.mass_kg,
+    )
     pulleys = robot.pulleys and replace(robot.pulleys, radius_m=factor * robot.pulleys.radius_m)
     sizes = ("radius_m", "pitch_m", "layer_m", "wire_m")
     drums = robot.drums and replace(robot.drums, **{name: getattr(robot.drums, name) * factor for name in sizes})

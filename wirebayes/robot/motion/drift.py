@@ -233,8 +233,9 @@ class CreepingHold:
         zero = np.where(near.found[:, None], zero, np.nan)
         return path.settle(self.robot, self.wires, (near.position_m, near.rotation), (zero, offset))
 
-    def _note(self, fell: NDArray[np.bool_], there: path.Followed, here: forward.Equilibria,
-              span_s: tuple[float, float]) -> None:  # fmt: skip
+    def _note(
+        self, fell: NDArray[np.bool_], there: path.Followed, here: forward.Equilibria, span_s: tuple[float, float]
+    ) -> None:
         """Write down falls and slack wires of a step."""
         a, b = (t**self.power for t in span_s)
         share = np.where(there.share < 1, there.share, 1.0)

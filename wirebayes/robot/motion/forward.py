@@ -150,9 +150,13 @@ def put_back(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int
     if found is not None:
         legs = found.tension_N.shape[1]
     whole = Equilibria(
-        np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full((n, legs), np.nan),
-        np.full(n, NOT_CONVERGED), np.zeros(n, np.int64), np.full(n, np.inf),
-    )  # fmt: skip
+        np.full((n, 3), np.nan),
+        np.full((n, 3, 3), np.nan),
+        np.full((n, legs), np.nan),
+        np.full(n, NOT_CONVERGED),
+        np.zeros(n, np.int64),
+        np.full(n, np.inf),
+    )
     if found is not None:
         for field in fields(Equilibria):
             getattr(whole, field.name)[rows] = getattr(found, field.name)

@@ -204,11 +204,13 @@ def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible:
         "pose": {"position_m": x, "rotation_vector_rad": turning.vector(R[None])[0]},
         "wires": draws.wires_summary(robot, line),
         "tension_distribution": {
-            "choice": robot.rule.choice, "lowest_N": robot.rule.lowest_N, "highest_N": robot.rule.highest_N
+            "choice": robot.rule.choice,
+            "lowest_N": robot.rule.lowest_N,
+            "highest_N": robot.rule.highest_N,
         },
         "feasible": feasible,
         "warnings": [],
-    }  # fmt: skip
+    }
 
 
 def _inverse(robot: Robot, commands: inverse.Commands, tension_N: Floats) -> InverseKinematics:
@@ -287,17 +289,29 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.ra
     near_m = 1e-6 * robot.span_m
     stable = bool(here.found[0]) and bool(np.abs(here.position_m[0] - x).max() < near_m)
     found = equilibria.equilibria(robot, mean, *lengths, rng, known=(x, R))
-    own = np.maximum(
-        np.abs(found.position_m - x).max(1), robot.size_m * np.abs(found.rotation - R).max((1, 2))
-    ) < near_m  # fmt: skip
+    own = (
+        np.maximum(np.abs(found.position_m - x).max(1), robot.size_m * np.abs(found.rotation - R).max((1, 2))) < near_m
+    )
     poses: list[EquilibriumPose] = [
-        {"position_m": p, "rotation_vector_rad": v, "slack_wires": int((t <= 0).sum()), "commanded": bool(c),
-         "stable": True}
+        {
+            "position_m": p,
+            "rotation_vector_rad": v,
+            "slack_wires": int((t <= 0).sum()),
+            "commanded": bool(c),
+            "stable": True,
+        }
         for p, v, t, c in zip(found.position_m, turning.vector(found.rotation), found.tension_N, own, strict=True)
-    ]  # fmt: skip
+    ]
     if not own.any():
-        poses.append({"position_m": x, "rotation_vector_rad": turning.vector(R[None])[0],
-                      "slack_wires": int((tau[0] <= 0).sum()), "commanded": True, "stable": False})  # fmt: skip
+        poses.append(
+            {
+                "position_m": x,
+                "rotation_vector_rad": turning.vector(R[None])[0],
+                "slack_wires": int((tau[0] <= 0).sum()),
+                "commanded": True,
+                "stable": False,
+            }
+        )
     return {
         "stable_found": len(found.position_m),
         "starts": 65,
@@ -332,8 +346,11 @@ def _claim(courses: dict[float, Course], x: Floats, R: Floats, request: PoseRequ
             value = float(((distance < DISTANCE_M) & (turning.tilt(course.rotation[:, k[0]], R) < TILT_RAD)).mean())
         probability.append({"specimen_spread": spread, "probability": value})
     return {
-        "time_s": TIME_S, "distance_mm": 1e3 * DISTANCE_M, "tilt_deg": float(np.degrees(TILT_RAD)), "holds": probability
-    }  # fmt: skip
+        "time_s": TIME_S,
+        "distance_mm": 1e3 * DISTANCE_M,
+        "tilt_deg": float(np.degrees(TILT_RAD)),
+        "holds": probability,
+    }
 
 
 def _shares(line: WireDraws, courses: dict[float, Course], x: Floats, R: Floats) -> VarianceShares:

@@ -45,16 +45,18 @@ def errors(
         wires = draws.for_robot(robot, line, spread, rng)
         for name, schedule in schedules.items():
             error = control.error(robot, wires, schedule, request.position_m, request.rotation, request.times_s)
-            out.append({
-                "specimen_spread": spread,
-                "controller": name,
-                "times_s": error.times_s,
-                "solved": float(error.found.mean()),
-                "distance_mm": band_over_draws(1e3 * error.distance_m[error.found]),
-                "rotation_deg": band_over_draws(np.degrees(error.angle_rad[error.found])),
-                **_tolerances(request),
-                **_lasts(error, request),
-            })  # fmt: skip
+            out.append(
+                {
+                    "specimen_spread": spread,
+                    "controller": name,
+                    "times_s": error.times_s,
+                    "solved": float(error.found.mean()),
+                    "distance_mm": band_over_draws(1e3 * error.distance_m[error.found]),
+                    "rotation_deg": band_over_draws(np.degrees(error.angle_rad[error.found])),
+                    **_tolerances(request),
+                    **_lasts(error, request),
+                }
+            )
     return out
 
 
@@ -94,14 +96,16 @@ def between_calibrations(
                 control.after_calibration(robot, wires, state, x, R, _SINCE_S),
                 strict=True,
             ):
-                out.append({
-                    "specimen_spread": spread,
-                    "loaded_before_s": loaded_s,
-                    "controller": name,
-                    "solved": float(error.found.mean()),
-                    **_tolerances(request),
-                    **_lasts(error, request),
-                })  # fmt: skip
+                out.append(
+                    {
+                        "specimen_spread": spread,
+                        "loaded_before_s": loaded_s,
+                        "controller": name,
+                        "solved": float(error.found.mean()),
+                        **_tolerances(request),
+                        **_lasts(error, request),
+                    }
+                )
     return out
 
 

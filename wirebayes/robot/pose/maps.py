@@ -101,8 +101,11 @@ def summaries(found: tuple[Map, ...]) -> list[SliceOfWorkspace]:
             here = one.drift.position_m[:, through] == level
             share = float(here.sum() / (one.requested_m[:, through] == level).sum())
             where: SliceOfWorkspace = {
-                "rotation_vector_rad": one.rotation_rad, "axis": "xyz"[through], "at_m": float(level), "feasible": 0.0
-            }  # fmt: skip
+                "rotation_vector_rad": one.rotation_rad,
+                "axis": "xyz"[through],
+                "at_m": float(level),
+                "feasible": 0.0,
+            }
             out.append({**where, **claim.claim_summary(one.drift.part(here, share))} if here.any() else where)
     return out
 

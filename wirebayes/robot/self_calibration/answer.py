@@ -107,8 +107,11 @@ def _named(robot: Robot, prior: LengthPrior, session: Session, known: LengthPost
     pose = np.hstack([known.ended_m[0], turn])
     numbers = np.arange(1, len(session.duration_s) + 1) if session.number is None else session.number
     determined = int((sd < 0.5 * prior.reference_sd_m).sum())
-    open_ = [f"the reference length of wire {i + 1}: known to {1e3 * prior.reference_sd_m:.2g} mm before, to "
-             f"{1e3 * sd[i]:.2g} mm now" for i in np.flatnonzero(~(sd < 0.5 * prior.reference_sd_m))]  # fmt: skip
+    open_ = [
+        f"the reference length of wire {i + 1}: known to {1e3 * prior.reference_sd_m:.2g} mm before, to "
+        f"{1e3 * sd[i]:.2g} mm now"
+        for i in np.flatnonzero(~(sd < 0.5 * prior.reference_sd_m))
+    ]
     return {
         "exit_points_m": interval_about(robot.exit_m, zero, half),
         "platform_points_m": interval_about(robot.platform_m, zero, half),

@@ -119,9 +119,16 @@ def _step(robot: Robot, e: Equations, white: Floats, damping: float) -> tuple[Fl
 
 
 def _ahead(
-    unknowns: Unknowns, holds: Holds, noise: Noise, state: State, e: Equations, change: Floats, hold: Floats,
-    creep: Grown, since: State,
-) -> tuple[State, Equations, float]:  # fmt: skip
+    unknowns: Unknowns,
+    holds: Holds,
+    noise: Noise,
+    state: State,
+    e: Equations,
+    change: Floats,
+    hold: Floats,
+    creep: Grown,
+    since: State,
+) -> tuple[State, Equations, float]:
     """Where a step leads, the equations and the sum of squares there; led back where it gains less than foreseen."""
     cost = cost_of(e, state.white)
     there = _stepped(unknowns.robot, state, change, hold)

@@ -235,8 +235,12 @@ def _balance(
     by_hold[:, balance, :d] = np.moveaxis(H, -1, 0) * scale(robot) * scale(robot)[:, None] / force
     by_hold[:, balance, d:] = J.swapaxes(1, 2) * taut[:, None] / force
     by_exit, by_platform = _swing(here, shape, state.rotation, pull)
-    _points(by_robot[:, balance], unknowns, by_exit * scale(robot)[:, None, None] / force,
-            by_platform * scale(robot)[:, None, None] / force)  # fmt: skip
+    _points(
+        by_robot[:, balance],
+        unknowns,
+        by_exit * scale(robot)[:, None, None] / force,
+        by_platform * scale(robot)[:, None, None] / force,
+    )
 
 
 def _rows(robot: Robot, holds: Holds) -> dict[str, slice]:
@@ -253,8 +257,9 @@ def _points(out: Floats, unknowns: Unknowns, by_exit: Floats, by_platform: Float
     `by_exit` and `by_platform` are ``(p, w, 3)`` of equations that speak of one leg each, or ``(p, d, w, 3)``.
     """
     for name, slope, sd in (
-        ("exit", by_exit, unknowns.errors.exit_m), ("platform", by_platform, unknowns.errors.platform_m)
-    ):  # fmt: skip
+        ("exit", by_exit, unknowns.errors.exit_m),
+        ("platform", by_platform, unknowns.errors.platform_m),
+    ):
         at = unknowns.slices[name]
         if at.stop == at.start:
             continue

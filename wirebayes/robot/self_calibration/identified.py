@@ -79,13 +79,17 @@ def identified(found: Whole) -> Identified:
             left = float(np.sqrt(direction @ inside @ direction))
             before = 1e3 * errors.exit_m / np.sqrt(len(unknowns.robot.exit_m))
             combinations.append(Combination(name, before, before * left, left < _DETERMINED))
-    sentences = [_SAYS[one.name] + f": known to {one.before_mm:.2g} mm before, to {one.after_mm:.2g} mm now"
-                 for one in combinations if not one.determined]  # fmt: skip
+    sentences = [
+        _SAYS[one.name] + f": known to {one.before_mm:.2g} mm before, to {one.after_mm:.2g} mm now"
+        for one in combinations
+        if not one.determined
+    ]
     known = np.sqrt(np.diag(found.covariance)[unknowns.references])
     before = 1e3 * prior.reference_sd_m
     for i in np.flatnonzero(known >= _DETERMINED):
-        sentences.append(f"the reference length of wire {i + 1}: known to {before:.2g} mm before, to "
-                         f"{before * known[i]:.2g} mm now")  # fmt: skip
+        sentences.append(
+            f"the reference length of wire {i + 1}: known to {before:.2g} mm before, to {before * known[i]:.2g} mm now"
+        )
     count = int((np.sqrt(np.maximum(size, 0.0)) < _DETERMINED).sum())
     return Identified(count, len(size), combinations, sentences)
 

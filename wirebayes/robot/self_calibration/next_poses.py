@@ -96,9 +96,14 @@ def _as_read(holds: Holds, x: Floats, R: Floats, tau: Floats) -> Holds:
     read = np.isfinite(holds.tension_N).all(1).mean() >= 0.5
     placed = holds.placed.mean() >= 0.5
     there = Session(
-        x if placed else np.full_like(x, np.nan), R if placed else np.full(R.shape, np.nan), np.zeros_like(tau),
-        np.full(n, float(np.median(session.duration_s))), np.full(n, read), session.tension_sd_N, session.tilt_sd_rad,
-    )  # fmt: skip
+        x if placed else np.full_like(x, np.nan),
+        R if placed else np.full(R.shape, np.nan),
+        np.zeros_like(tau),
+        np.full(n, float(np.median(session.duration_s))),
+        np.full(n, read),
+        session.tension_sd_N,
+        session.tilt_sd_rad,
+    )
     tilt = None if holds.tilt is None else np.where(np.isfinite(holds.tilt).any(), R[:, :2, 2], np.nan)
     return Holds(there, tau if read else np.full_like(tau, np.nan), tilt)
 

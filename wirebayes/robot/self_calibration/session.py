@@ -115,11 +115,13 @@ class LengthPrior:
     @property
     def fitted(self) -> Floats:
         """(p, n) draws of all lines' parameters, logarithms of those that are positive."""
-        return np.array([
-            np.log(line.parameters[name]) if name in CORE else line.parameters[name]
-            for line in self.line.each.values()
-            for name in _own(line)
-        ])  # fmt: skip
+        return np.array(
+            [
+                np.log(line.parameters[name]) if name in CORE else line.parameters[name]
+                for line in self.line.each.values()
+                for name in _own(line)
+            ]
+        )
 
     def moments(self, legs: int) -> tuple[Floats, Floats]:
         """Mean ``(d,)`` and covariance ``(d, d)`` of the unknowns: references, (log) parameters, specimens, biases."""

@@ -1,0 +1,148 @@
+"""What ``plan.json`` says of tests that were judged."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wirebayes.commands.wires import RobotLike
+from wirebayes.io.experiment import Experiment
+from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
+from wirebayes.json_files.values import Statistics
+from wirebayes.model.sample import MATERIAL, SAMPLE
+from wirebayes.model.spec import ModelSpec
+from wirebayes.notice import Notice, to_json
+from wirebayes.planning.guess import GuessedWire
+from wirebayes.planning.ranking import Judged, too_long
+from wirebayes.planning.widths import HOUR_S
+from wirebayes.robot.mechanics import draws as robot_draws
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.motion import drift
+
+_ROBOT_DRAWS = 60  # of the posterior of each simulated test that moves a robot
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """What is to be judged."""
+
+    tests: list[tuple[Experiment, str]]
+    guess: GuessedWire
+    aim: tuple[str, ...]
+    budget_min: float | None
+    robot: RobotLike | None
+    about: dict[str, Any]
+
+
+def protocol_content(
+    judged: Judged, request: PlanRequest, rank: int, machine: Robot | None, spec: ModelSpec
+) -> JudgedProtocol:
+    """A protocol as it stands in ``plan.json``.
+
+    Parameters
+    ----------
+    judged : Judged
+    request : PlanRequest
+    rank : int
+        1 is the best.
+    machine : Robot, optional
+        Whose drift within an hour is foreseen.
+    spec : ModelSpec
+    """
+    test, expected, seen = judged.test, judged.expected, judged.sensitivity
+    widths = expected.widths
+    cosines = {f"{a} {b}": cos for (a, b), cos in seen.cosines.items() if a < b}
+    recorded = test.recorded_holds
+    return {
+        "rank": rank,
+        "name": test.name,
+        "words": judged.words,
+        "length_mm": test.length_mm,
+        "holds": len(recorded),
+        "readings": sum(hold.time_s.size for hold in recorded),
+        "duration_min": judged.duration_min,
+        "within_budget": not too_long(judged, request.budget_min),
+        "score": judged.score(request.aim),
+        "information_bits": expected.information_bits,
+        "simulated_tests": expected.tests,
+        "parameters": {n: q for n, q in widths.items() if n in (*MATERIAL, *SAMPLE)},
+        "creep": {
+            "tension_N": expected.tension_N,
+            "length_mm": expected.length_mm,
+            "longest_hold_s": expected.longest_hold_s,
+            "creep_longest_hold_mm": widths["creep_longest_hold_mm"],
+            "creep_1h_mm": widths["creep_1h_mm"],
+        },
+        "effects": seen.effects,
+        "cosines": cosines,
+        "not_identifiable": list(seen.hidden),
+        "robot": None if machine is None else _drift(judged, request.guess, machine, spec),
+    }
+
+
+def plan_content(rows: list[JudgedProtocol], request: PlanRequest, machine: Robot | None) -> PlanJson:
+    """The content of ``plan.json``.
+
+    Parameters
+    ----------
+    rows : list of dict
+        The protocols, the best first.
+    request : PlanRequest
+    machine : Robot, optional
+    """
+    guess = request.guess
+    return {
+        "version": 1,
+        "aim": list(request.aim),
+        "budget_min": request.budget_min,
+        "best": rows[0]["name"],
+        "guess": {
+            "source": guess.source,
+            "length_mm": guess.length_mm,
+            "parameters": {n: _statistics(v) for n, v in guess.draws.items()},
+        },
+        "robot": None if machine is None else machine.name,
+        "protocols": rows,
+        "warnings": to_json([*_over_budget(rows[0], request.budget_min), *guess.doubts]),
+    }
+
+
+def _over_budget(best: JudgedProtocol, budget_min: float | None) -> list[Notice]:
+    """That no test is done within the time there is, if so."""
+    if best["within_budget"]:
+        return []
+    return [Notice("budget", f"no test is done within {budget_min:g} min")]
+
+
+def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) -> RobotDrift:
+    """How well the drift of a robot within an hour would be known, and how well it is at the guess."""
+
+    def sd(parameters: dict[str, Any], length_mm: float) -> tuple[float, float]:
+        few = {n: parameters[n][:_ROBOT_DRAWS] for n in MATERIAL}
+        wires = robot_draws.for_robot(machine, WireDraws(few, length_mm, spec.law, spec.history))
+        course = drift.from_command(
+            machine, wires, machine.home_m, matrix(machine.home_rotation_rad), np.array([0.0, HOUR_S])
+        )
+        far = 1e3 * np.linalg.norm(course.position_m[:, -1] - machine.home_m, axis=1)[course.found]
+        return (float(np.median(far)), float(far.std())) if len(far) > 1 else (np.nan, np.nan)
+
+    after = [sd(d, judged.test.length_mm) for d in judged.expected.draws]
+    return {
+        "time_s": HOUR_S,
+        "drift_mm": float(np.nanmedian([m for m, _ in after])),
+        "drift_sd_mm": float(np.nanmedian([s for _, s in after])),
+        "drift_sd_guess_mm": sd(guess.draws, guess.length_mm)[1],
+    }
+
+
+def _statistics(values: Any) -> Statistics:
+    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+    return {
+        "mean": float(values.mean()),
+        "sd": float(values.std()),
+        "q05": float(low),
+        "q50": float(middle),
+        "q95": float(high),
+    }
