@@ -176,16 +176,10 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: C
     figure, axes = _grid(count)
     scaled = {name: _straight(values) for name, values in draws.items()}
     unit = [_across(values) for values, _ in scaled.values()]
-    cells = [(i, j) for i in range(count) for j in range(i)]
-    regions = [_regions(unit[j], unit[i], (j, count - 1 - i)) for i, j in cells]
-    for shaded, colour in zip(zip(*regions, strict=True), ("#b5c4d1", CHAIN), strict=True):
-        paths = [path for cell in shaded for path in cell]
-        axes.add_collection(PathCollection(paths, facecolor=colour, linewidth=0.0), autolim=False)
+    _shade_pairs(axes, unit)
     for i, (name, (values, is_log)) in enumerate(scaled.items()):
         bottom = count - 1 - i
-        heights, edges = np.histogram(unit[i], np.linspace(0.0, 1.0, 31))
-        stairs = bottom + 0.92 * _SIDE * heights / heights.max()
-        axes.stairs(stairs, i + _SIDE * edges, baseline=bottom, fill=True, color=CHAIN, alpha=0.75)
+        _histogram(axes, unit[i], (i, bottom))
         ticks = list(zip(*_few_ticks(values, is_log), strict=True))
         lines = axis_label(name, effects, control).replace(", ", ",\n").split("\n")
         words = "\n".join(_narrow(line) for line in lines)
@@ -195,6 +189,23 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: C
     frames = [Rectangle((j, count - 1 - i), _SIDE, _SIDE) for i in range(count) for j in range(i + 1)]
     axes.add_collection(PatchCollection(frames, facecolor="none", edgecolor=INK, linewidth=0.8))
     return figure
+
+
+def _shade_pairs(axes: Any, unit: Sequence[Array]) -> None:
+    """Below the diagonal, the regions of each pair, as shares of its cell."""
+    count = len(unit)
+    regions = [_regions(unit[j], unit[i], (j, count - 1 - i)) for i in range(count) for j in range(i)]
+    for shaded, colour in zip(zip(*regions, strict=True), ("#b5c4d1", CHAIN), strict=True):
+        paths = [path for cell in shaded for path in cell]
+        axes.add_collection(PathCollection(paths, facecolor=colour, linewidth=0.0), autolim=False)
+
+
+def _histogram(axes: Any, unit: Array, corner: tuple[int, int]) -> None:
+    """On the diagonal, the draws of one parameter alone."""
+    left, bottom = corner
+    heights, edges = np.histogram(unit, np.linspace(0.0, 1.0, 31))
+    stairs = bottom + 0.92 * _SIDE * heights / heights.max()
+    axes.stairs(stairs, left + _SIDE * edges, baseline=bottom, fill=True, color=CHAIN, alpha=0.75)
 
 
 def _grid(count: int) -> tuple[Figure, Any]:
