@@ -20,7 +20,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from wirebayes.report.blocks import save_figure
-from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, corner
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET
+from wirebayes.report.pictures.corner import corner
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.report.pictures.discover import left_over
 from wirebayes.results.read_back import Stored, load_posterior

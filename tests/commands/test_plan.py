@@ -7,6 +7,7 @@ import pytest
 import wirebayes as wb
 from wirebayes.cli import main
 from wirebayes.commands import plan as module
+from wirebayes.commands import plan_content
 from wirebayes.effects import CATALOGUE
 from wirebayes.io.run_folder import write_json
 
@@ -45,7 +46,7 @@ def quick(monkeypatch):
     few = {name: CATALOGUE[name] for name in ("toe", "steady_creep", "sensor_drift", "lost_motion")}
     monkeypatch.setattr(module, "SIMULATIONS", 40)
     monkeypatch.setattr(module, "_ROBOT_TESTS", 2)
-    monkeypatch.setattr(module, "_ROBOT_DRAWS", 20)
+    monkeypatch.setattr(plan_content, "_ROBOT_DRAWS", 20)
     monkeypatch.setattr(module, "catalogue", lambda own: few)
 
 

@@ -448,7 +448,7 @@ def test_bars_of_intervals_stand_where_the_numbers_are():
 
 
 def test_ticks_of_pairs_are_few_round_and_within_their_cells() -> None:
-    from wirebayes.report.figures import _few_ticks
+    from wirebayes.report.pictures.corner import _few_ticks
 
     places, labels = _few_ticks(np.linspace(-0.31, 0.31, 1000), False)
     assert labels == ["−0.2", "0", "0.2"]
@@ -475,7 +475,7 @@ def test_ticks_of_pairs_are_few_round_and_within_their_cells() -> None:
 )
 def test_a_long_name_stays_within_its_cell(name: str, lines: list[str]) -> None:
     """Seventeen letters a line, broken after underscores, nothing lost."""
-    from wirebayes.report.figures import _narrow
+    from wirebayes.report.pictures.corner import _narrow
 
     found = _narrow(name)
     assert found.split("\n") == lines and found.replace("\n", "") == name

@@ -35,6 +35,7 @@ from wirebayes.report.blocks import (
     unit_text,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning
+from wirebayes.report.pictures.corner import corner
 from wirebayes.report.pictures.curve import through_the_readings
 from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.parameters import unit_of
@@ -137,7 +138,7 @@ def _pictures(stored: Stored, sampled: dict[str, Array], summary: SummaryJson, t
     if stored.likelihood == "chain":
         figure_of["curve"] = lambda: through_the_readings(stored, name)
     if len(sampled) > 1:
-        figure_of["pairs"] = lambda: figures.corner(sampled, sample.model.effects, sample.protocol.control)
+        figure_of["pairs"] = lambda: corner(sampled, sample.model.effects, sample.protocol.control)
     figure_of["residuals"] = lambda: _residuals(stored)
     figure_of["ahead"] = lambda: figures.creep_ahead(ahead, name)
     figure_of["measured"] = lambda: figures.measured(sample.protocol, sample.readings[..., 0], name)

@@ -1,0 +1,188 @@
+"""The picture of a posterior: every pair of its parameters, and each alone."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from contourpy import FillType, contour_generator
+from matplotlib.collections import LineCollection, PatchCollection, PathCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.path import Path
+from matplotlib.ticker import MaxNLocator
+
+from wirebayes.numeric.typing import Array
+from wirebayes.report.figures import CHAIN, INK, axis_label
+from wirebayes.wire.protocol import Control
+
+
+def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: Control = "displacement") -> Figure:
+    """Every pair of parameters: the regions that hold 50 and 90 % of the draws; on the diagonal, each alone.
+
+    Parameters
+    ----------
+    draws : mapping of name to (n,) array
+        Of two parameters or more; none is the same in all draws.
+    effects : tuple of Effect
+    """
+    count = len(draws)
+    figure, axes = _grid(count)
+    scaled = {name: _straight(values) for name, values in draws.items()}
+    unit = [_across(values) for values, _ in scaled.values()]
+    _shade_pairs(axes, unit)
+    for i, (name, (values, is_log)) in enumerate(scaled.items()):
+        bottom = count - 1 - i
+        _histogram(axes, unit[i], (i, bottom))
+        ticks = list(zip(*_few_ticks(values, is_log), strict=True))
+        lines = axis_label(name, effects, control).replace(", ", ",\n").split("\n")
+        words = "\n".join(_narrow(line) for line in lines)
+        _label_below(axes, i, words, ticks)
+        if i:
+            _label_beside(axes, bottom, words, ticks)
+    frames = [Rectangle((j, count - 1 - i), _SIDE, _SIDE) for i in range(count) for j in range(i + 1)]
+    axes.add_collection(PatchCollection(frames, facecolor="none", edgecolor=INK, linewidth=0.8))
+    return figure
+
+
+def _shade_pairs(axes: Any, unit: Sequence[Array]) -> None:
+    """Below the diagonal, the regions of each pair, as shares of its cell."""
+    count = len(unit)
+    regions = [_regions(unit[j], unit[i], (j, count - 1 - i)) for i in range(count) for j in range(i)]
+    for shaded, colour in zip(zip(*regions, strict=True), ("#b5c4d1", CHAIN), strict=True):
+        paths = [path for cell in shaded for path in cell]
+        axes.add_collection(PathCollection(paths, facecolor=colour, linewidth=0.0), autolim=False)
+
+
+def _histogram(axes: Any, unit: Array, corner: tuple[int, int]) -> None:
+    """On the diagonal, the draws of one parameter alone."""
+    left, bottom = corner
+    heights, edges = np.histogram(unit, np.linspace(0.0, 1.0, 31))
+    stairs = bottom + 0.92 * _SIDE * heights / heights.max()
+    axes.stairs(stairs, left + _SIDE * edges, baseline=bottom, fill=True, color=CHAIN, alpha=0.75)
+
+
+def _grid(count: int) -> tuple[Figure, Any]:
+    """One pair of axes, on which every cell is a unit square: a pair for each cell takes seconds to draw."""
+    left, below = 0.9, 0.8  # room for three lines
+    width, height = 1.1 * count + left + 0.05, 1.05 * count + below + 0.05
+    figure = Figure(figsize=(width, height))
+    axes: Any = figure.add_axes((left / width, below / height, 1.1 * count / width, 1.05 * count / height))
+    axes.set_axis_off()
+    axes.set_xlim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
+    axes.set_ylim(-_GAP / 2, count - 1 + _SIDE + _GAP / 2)
+    return figure, axes
+
+
+def _label_below(axes: Any, left: int, words: str, ticks: Sequence[tuple[float, str]]) -> None:
+    """Name and ticks of a column."""
+    axes.text(left + _SIDE / 2, -0.42, words, fontsize=8, ha="center", va="top")
+    _ticks(axes, [(left + _SIDE * t, 0.0) for t, _ in ticks], (0.0, -_TICK))
+    for t, label in ticks:
+        axes.text(left + _SIDE * t, -2 * _TICK, label, fontsize=7, rotation=45, ha="center", va="top")
+
+
+def _label_beside(axes: Any, bottom: int, words: str, ticks: Sequence[tuple[float, str]]) -> None:
+    """Name and ticks of a row."""
+    upright: dict[str, Any] = {"rotation": 90, "ha": "right", "va": "center", "multialignment": "center"}
+    axes.text(-0.42, bottom + _SIDE / 2, words, fontsize=8, **upright)
+    _ticks(axes, [(0.0, bottom + _SIDE * t) for t, _ in ticks], (-_TICK, 0.0))
+    for t, label in ticks:
+        axes.text(-2 * _TICK, bottom + _SIDE * t, label, fontsize=7, ha="right", va="center")
+
+
+def _narrow(line: str) -> str:
+    """A name in as many lines as it takes to stay within its cell, broken after underscores."""
+    lines = [""]
+    for part in line.replace("_", "_\n").split("\n"):
+        if lines[-1] and len(lines[-1] + part) > _LONGEST:
+            lines.append("")
+        lines[-1] += part
+    return "\n".join(lines)
+
+
+def _straight(values: Array) -> tuple[Array, bool]:
+    """The values, or their decimal logarithms where they are positive and spread widely."""
+    wide = values.min() > 0 and np.quantile(values, 0.95) > 4 * np.quantile(values, 0.05)
+    return (np.log10(values), True) if wide else (values, False)
+
+
+def _ends(values: Array) -> tuple[float, float]:
+    """Where a cell begins and ends: all draws but a few at either end, and a margin."""
+    low, high = np.quantile(values, [0.002, 0.998])
+    margin = 0.05 * (high - low)
+    return float(low - margin), float(high + margin)
+
+
+def _across(values: Array) -> Array:
+    """The values as shares of their cell."""
+    low, high = _ends(values)
+    return (values - low) / (high - low)
+
+
+def _few_ticks(values: Array, is_log: bool) -> tuple[Array, list[str]]:
+    """Places of a few ticks as shares of the cell, and their labels."""
+    low, high = _ends(values)
+    first, last = low + 0.05 * (high - low), high - 0.05 * (high - low)  # labels of neighbouring cells do not touch
+    if is_log:
+        decades = np.arange(np.floor(low), np.ceil(high) + 1)
+        for within in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
+            ticks = np.sort(np.log10(within) + decades[:, None], axis=None)
+            ticks = ticks[(first <= ticks) & (ticks <= last)]
+            if len(ticks) <= _MOST_TICKS:
+                break
+        ticks = ticks[:: -(-len(ticks) // _MOST_TICKS)] if len(ticks) else ticks
+        labels = [f"{10**t:.6g}" for t in ticks]
+    else:
+        ticks = np.array(MaxNLocator(_MOST_TICKS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
+        ticks = ticks[(first <= ticks) & (ticks <= last)]
+        ticks = np.where(np.abs(ticks) < 1e-9 * (high - low), 0.0, ticks)
+        labels = [f"{t:.10g}".replace("-", "\N{MINUS SIGN}") for t in ticks]
+    return (ticks - low) / (high - low), labels
+
+
+def _ticks(axes: Any, places: Sequence[tuple[float, float]], step: tuple[float, float]) -> None:
+    """Short lines from the places outwards."""
+    lines = [(place, (place[0] + step[0], place[1] + step[1])) for place in places]
+    axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8, clip_on=False))
+
+
+def _regions(x: Array, y: Array, corner: tuple[float, float]) -> tuple[list[Path], list[Path]]:
+    """Outlines in a cell of the densest places, smoothed over neighbours: of 50 to 90 % of the draws, and of 50 %."""
+    counts, xs, ys = np.histogram2d(x, y, bins=_CELLS, range=[(0.0, 1.0), (0.0, 1.0)])
+    density = _SMOOTHING @ counts @ _SMOOTHING.T
+    ranked = np.sort(density.ravel())[::-1]
+    held = np.cumsum(ranked) / ranked.sum()
+    half, most = (float(ranked[np.searchsorted(held, share)]) for share in (0.5, 0.9))
+    if not 0 < most < half < ranked[0]:
+        return [], []
+    places = [at + _SIDE * (edges[1:] + edges[:-1]) / 2 for at, edges in zip(corner, (xs, ys), strict=True)]
+    across, upward = places
+    contours = contour_generator(across, upward, density.T, fill_type=FillType.OuterCode)
+    return _outlines(contours, most, half), _outlines(contours, half, np.inf)
+
+
+def _outlines(contours: Any, low: float, high: float) -> list[Path]:
+    """Outlines of where a density lies between two values."""
+    points, codes = contours.filled(low, high)
+    return [Path(*outline) for outline in zip(points, codes, strict=True)]
+
+
+_MOST_TICKS = 4  # so that labels do not touch
+_SIDE, _GAP, _TICK = 0.92, 0.08, 0.035  # of a cell, between cells and of a tick, in units of both together
+_LONGEST = 17  # letters of a name that fit into a cell
+_CELLS = 22  # of a region's grid along each axis: fine enough to look smooth
+
+
+def _smoothing(cells: int) -> Array:
+    """(cells, cells) weights of the neighbours of each cell along one axis: normal, and reflected at the ends."""
+    reach = np.arange(-_REACH, _REACH + 1)
+    weights = np.exp(-0.5 * (reach / _BLUR) ** 2)
+    neighbour = np.arange(cells)[:, None] + reach
+    inside = np.where(neighbour < 0, -1 - neighbour, np.minimum(neighbour, 2 * cells - 1 - neighbour))
+    matrix = np.zeros((cells, cells))
+    np.add.at(matrix, (np.arange(cells)[:, None], inside), weights / weights.sum())
+    return matrix
+
+
+_BLUR, _REACH = 1.0, 4  # cells: standard deviation, and where its tail is cut off
+_SMOOTHING = _smoothing(_CELLS)
