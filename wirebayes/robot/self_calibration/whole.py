@@ -25,8 +25,9 @@ _WHOLE_ROUNDS = 3  # before creep goes half the way only
 _STILL = 0.05  # of every unknown's standard deviation
 _STEADY = 10.0  # creep may err as many times more as unknowns move by tenths of a standard deviation
 # Where unknowns do not come to rest, it may be creep's own error that moves them: half as large after three rounds.
-_FINER, _FINEST = 0.8, 0.1
+_FINER, _FINEST = 0.8, 0.02
 _LEVEL_FIT = 0.5  # of the sum of squares, from one round to the next: more, and there is a way to go still
+_SURE = 8  # rounds from which on noises go ever smaller shares of their way
 _SETTLED = 0.02  # of a noise, relative
 _CREEPING = 0.8  # slope of what is shown over what is thought: a secant of more would leap
 _UNEVEN = 0.3  # of the weight: tensions that were read badly, at a rough pose
@@ -93,8 +94,7 @@ def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep
         cost = found.cost
         roughly = max(_FINEST, min(_STEADY * moved_on, ROUGHLY * _FINER ** len(rounds)))
         passed = onward(passed, state, sd, holds.session.tension_sd_N) if len(rounds) > _WHOLE_ROUNDS else [state]
-        joint, balance = np.exp(_ahead(rounds))
-        noise = replace(noise, joint_m=float(joint), balance=float(balance))
+        noise = _next_noise(noise, rounds)
     return replace(found, converged=False)
 
 
@@ -106,6 +106,14 @@ def _before_reading(unknowns: Unknowns, holds: Holds) -> Noise:
     usual = 0.5 * (low + high) if robot.rule.choice == "middle" else low
     finest = min(holds.session.tension_sd_N, low) if np.isfinite(holds.tension_N).any() else low
     return Noise(joint, FRICTIONLESS, _UNREAD * (high - low), usual, _SOFT * finest)
+
+
+def _next_noise(noise: Noise, rounds: list[tuple[Floats, Floats]]) -> Noise:
+    """Noises nearer to where they are what the residuals show; steps about such a place shrink to it."""
+    thought, _ = rounds[-1]
+    share = min(1.0, _SURE / len(rounds))
+    joint, balance = np.exp(thought + share * (_ahead(rounds) - thought))
+    return replace(noise, joint_m=float(joint), balance=float(balance))
 
 
 def _ahead(rounds: list[tuple[Floats, Floats]]) -> Floats:
