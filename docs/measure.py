@@ -65,15 +65,17 @@ STUDIES = {
         "scores.json",
     ),
     "robot_exact_geometry": (
-        "-m analyses.robots.whole_calibration exact 200 --seed 3001 --output {folder}/it.json",
+        "-m analyses.robots.whole_calibration exact 200 --seed 3601 --output {folder}/it.json",
         "it.json",
     ),
     "discover_hidden": (
         "-m analyses.hidden_effects --size small --answer api --simulations 199 --judge-draws 40 --kinds single "
-        "without foreign two three mixed periodic --seed 5005 --protocols paper unloading uneven dense temperature "
-        "slack --output {folder}",
+        "without foreign two three mixed periodic --seed 5006 5007 5008 --protocols paper unloading uneven dense "
+        "temperature slack --output {folder}",
         "scores.json",
     ),
+    # on a machine that does nothing else
+    "seconds": ("-m analyses.speed.seconds_of_a_fit --repeats 3 --output {folder}/seconds.json", "seconds.json"),
     "real_wires": ("analyses/discovery/real_wires.py --together --output {folder}/wires.json", "wires.json"),
 }
 REDUCED = {  # of results that hold every file's answer
@@ -133,6 +135,7 @@ def texts() -> dict[Path, str]:
         + _exact_geometry(kept["robot_exact_geometry"]),
         DOCS / "real-wires.inc": _real_wires(kept["real_wires"]),
         DOCS / "discover-clean-said.inc": _clean(kept["discover_clean"]),
+        DOCS / "seconds.inc": _seconds(kept["seconds"]),
         DOCS / "discover-hidden-said.inc": _hidden(kept["discover_hidden"]),
     }
 
@@ -449,6 +452,26 @@ def _hidden(kept: dict[str, Any]) -> str:
         f"{found['files']} files of one test each, their truth sealed until all had been answered; a file takes "
         f"{found['median_seconds']:.1f} s (median). {_version_of(kept)}.\n"
     )
+
+
+def _seconds(kept: dict[str, Any]) -> str:
+    """Sentences on whole commands, and a table of the phases of a fit."""
+    found = kept["result"]
+
+    def said(command: str) -> str:
+        *first, last = [f"{seconds:.1f}" for seconds in found["whole"][command].values()]
+        return f"{', '.join(first)} and {last} s"
+
+    lines = [
+        f"{_run_of(kept)}, the least of {found['runs']} runs each: on two cores a whole ``fit`` of the paper's wires "
+        f"takes {said('fit')} by the clock, and a whole ``discover`` {said('discover')}. What each second of the "
+        f"``fit`` of {found['wire']} is:",
+        "",
+    ]
+    lines += _head("phase", "from, s", "to, s")
+    for phase, (begin, end) in found["phases"].items():
+        lines += _row(phase, f"{max(begin, 0.0):.2f}", f"{end:.2f}")
+    return "\n".join(lines) + "\n"
 
 
 def _exact_geometry(kept: dict[str, Any]) -> str:

@@ -121,7 +121,13 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--simulations", type=int, help="refitted data sets behind a p-value instead of the usual number")
     p.add_argument("--judge-draws", type=int, help="data sets that the ideal judge sees of a case instead of 200")
     p.add_argument("--scheduler", help="address of a Dask scheduler; its workers share this checkout and --output")
-    p.add_argument("--seed", type=int, default=0, help="another seed makes other cases of the same plan")
+    p.add_argument(
+        "--seed",
+        nargs="+",
+        type=int,
+        default=[0],
+        help="another seed makes other cases of the same plan; several add up",
+    )
     return p
 
 
@@ -136,7 +142,8 @@ def chosen_specs(options: argparse.Namespace) -> list[Spec]:
     if options.repeats:
         fields["repeats"] = options.repeats
     plan = case_list.Plan(**fields)
-    return specs(plan, options.seed, tuple(options.kinds), tuple(options.protocols), tuple(options.effects))
+    parts = tuple(options.kinds), tuple(options.protocols), tuple(options.effects)
+    return [spec for seed in options.seed for spec in specs(plan, seed, *parts)]
 
 
 def main(arguments: list[str] | None = None) -> int:
