@@ -3,9 +3,12 @@
 import ast
 import re
 import tomllib
+from importlib import import_module
 from pathlib import Path
 
 import pytest
+
+from analyses.speed.seconds_of_a_fit import PHASES
 
 ROOT = Path(__file__).parents[1]
 ANALYSES = ROOT / "analyses"
@@ -60,6 +63,11 @@ def test_a_study_has_its_question_and_its_pages(row: re.Match[str]):
 @pytest.mark.parametrize("name", list(studies()))
 def test_what_no_page_cites_and_nothing_runs_goes(name: str):
     assert cited(name) or used(name)
+
+
+def test_the_phases_of_a_fit_are_functions_that_it_calls():
+    missing = [place for *place, _ in PHASES if not callable(getattr(import_module(place[0]), place[1], None))]
+    assert missing == []
 
 
 def test_the_questions_of_a_newcomer_have_answers():

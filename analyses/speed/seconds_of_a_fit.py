@@ -24,7 +24,7 @@ from wirebayes.io import paper
 DATA = paper.FOLDER / "experiments.toml"
 # Where a phase is spent: module, function, and what it does. The check runs beside the others, in another process.
 PHASES = (
-    ("wirebayes.results.jobs", "fitted", "modes and draws"),
+    ("wirebayes.results.jobs", "fit_job", "modes and draws"),
     ("wirebayes.results.jobs", "store", "posterior.nc and summary.json"),
     ("wirebayes.discovery.model_check", "check_model", "the check, beside these"),
     ("wirebayes.cli.answer", "write_report", "the page, matplotlib included"),
