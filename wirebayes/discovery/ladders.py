@@ -74,32 +74,56 @@ def ladders(
     -------
     list of AmplitudePath
     """
+    out = []
+    for shapes in _lasting_forms(trials):
+        every = [k for numbers in shapes for k in numbers]
+        here = tuple(c for c in candidates if c.probe == every[0])
+        on = sorted({b for c in here for b in c.blocks})
+        strength = {k: float(np.sqrt(sum(data[b].norm[0, k] ** 2 for b in on))) for k in every}
+        starts: list[_LadderEnds] = []
+        for numbers in shapes:
+            visible = [k for k in numbers if strength[k] > 0]
+            if visible:
+                # Of a one-sided form the probe that lies in the middle of the ladder.
+                k = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
+                starts += _both_signs(trials[k], strength[k], [blocks[b] for b in on])
+        if starts:
+            out.append(AmplitudePath(tuple(s.probe for s in starts), _rungs(starts), here))
+    return out
+
+
+def _lasting_forms(trials: Sequence[Probe]) -> list[list[list[int]]]:
+    """Numbers of the probes of each form that lasts, by their shape constants."""
     alike: dict[str, dict[tuple[float, ...], list[int]]] = {}
     for k, probe in enumerate(trials):
         if not isinstance(probe.effect, EventEffect):
             shape = tuple(probe.own[name] for name in probe.effect.columns()[1:])
             alike.setdefault(probe.effect.key, {}).setdefault(shape, []).append(k)
-    out = []
-    for shapes in alike.values():
-        every = [k for numbers in shapes.values() for k in numbers]
-        here = tuple(c for c in candidates if c.probe == every[0])
-        on = sorted({b for c in here for b in c.blocks})
-        strength = {k: float(np.sqrt(sum(data[b].norm[0, k] ** 2 for b in on))) for k in every}
-        starts: list[tuple[Probe, float, float]] = []
-        for numbers in shapes.values():
-            visible = [k for k in numbers if strength[k] > 0]
-            if visible:
-                # Of a one-sided form the probe that lies in the middle of the ladder.
-                k = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
-                raw = float(np.sqrt(sum(_raw(blocks[b], trials[k]) for b in on)))
-                ends = min(FIRST / strength[k], _RAW / raw), LAST / strength[k]
-                starts += [(trials[k], s * ends[0], s * ends[1]) for s in ((1,) if trials[k].one_sided else (1, -1))]
-        if starts:
-            probes, first, last = zip(*starts, strict=True)
-            widest = float(np.max(np.divide(last, first)))
-            rungs = min(1 + int(np.ceil(np.log(widest) / np.log(_APART))), _MOST)
-            out.append(AmplitudePath(probes, np.geomspace(first, last, rungs), here))
-    return out
+    return [list(shapes.values()) for shapes in alike.values()]
+
+
+@dataclass(frozen=True)
+class _LadderEnds:
+    """The first and the last amplitude of a start, signed."""
+
+    probe: Probe
+    first: float
+    last: float
+
+
+def _both_signs(probe: Probe, strength: float, blocks: Sequence[LaplaceFit]) -> list[_LadderEnds]:
+    """Ladders upwards and, unless the form is one-sided, downwards; δ of one unit of amplitude is its strength."""
+    raw = float(np.sqrt(sum(_raw(block, probe) for block in blocks)))
+    first, last = min(FIRST / strength, _RAW / raw), LAST / strength
+    return [_LadderEnds(probe, sign * first, sign * last) for sign in ((1,) if probe.one_sided else (1, -1))]
+
+
+def _rungs(starts: Sequence[_LadderEnds]) -> Array:
+    """(rungs, starts) amplitudes; as many for all as the widest ladder needs."""
+    first, last = [s.first for s in starts], [s.last for s in starts]
+    widest = float(np.max(np.divide(last, first)))
+    count = min(1 + int(np.ceil(np.log(widest) / np.log(_APART))), _MOST)
+    return np.geomspace(first, last, count)
 
 
 def _raw(block: LaplaceFit, probe: Probe) -> float:

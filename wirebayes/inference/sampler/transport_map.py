@@ -127,37 +127,25 @@ def fit_map(points: WeightedPoints, order: NDArray[np.int64]) -> Straight:
         If the points do not span their space.
     """
     x, weight = points.z[:, order], points.weight
-    (n, d), worth = x.shape, weight.sum()
+    d, worth = x.shape[1], weight.sum()
     centre = weight @ x / worth
     scale = np.sqrt(weight @ (x - centre) ** 2 / worth)
     if not (scale > 0).all():
         raise np.linalg.LinAlgError("the points do not span their space")
     v = (x - centre) / scale
-    constant, linear, quadratic, log_scale = np.zeros(d), np.zeros((d, d)), np.zeros((d, d, d)), np.zeros((d, d + 1))
     clear = CLEAR * np.sqrt(worth / points.distinct)  # draws that repeat know no more
     every = d**3 / 6.0 < worth / POINTS_A_TERM
-    spread, left = np.zeros((n, d)), np.zeros((n, d))
-    for j in range(d):
-        lines = np.column_stack([np.ones(n), v[:, :j]])
-        one, other = np.triu_indices(j if every or d > FEW else 0)
-        if not every and d > FEW:
-            one, other = _seen_at_once(v, lines, one, other, v[:, j], weight, clear)
-        terms = np.column_stack([lines, v[:, one] * v[:, other]])
-        of_mean, of_scale, t = _regress(terms, lines, v[:, j], weight)
-        # Far out a bend that is only noise throws everything aside: none without evidence.
-        kept = np.abs(t[j + 1 :]) > clear
-        if not kept.all():
-            one, other = one[kept], other[kept]
-            terms = terms[:, np.concatenate([np.ones(j + 1, bool), kept])]
-            of_mean, of_scale, _ = _regress(terms, lines, v[:, j], weight, of_scale)
-        constant[j], linear[j, :j] = of_mean[0], of_mean[1 : j + 1]
-        np.add.at(quadratic[j], (one, other), of_mean[j + 1 :])
-        np.add.at(quadratic[j], (other, one), of_mean[j + 1 :])
-        log_scale[j, : j + 1] = of_scale
-        spread[:, j] = lines @ of_scale
-        left[:, j] = (v[:, j] - terms @ of_mean) * np.exp(-spread[:, j])
+    found = [_straighten(v, j, weight, clear, every) for j in range(d)]
+    spread = np.column_stack([one.spread for one in found])
+    left = np.column_stack([one.left for one in found])
     if not np.isfinite(left).all():
         raise np.linalg.LinAlgError("the points do not settle the scales")
+    constant, linear, quadratic, log_scale = np.zeros(d), np.zeros((d, d)), np.zeros((d, d, d)), np.zeros((d, d + 1))
+    for j, of in enumerate(found):
+        constant[j], linear[j, :j], products = of.of_mean[0], of.of_mean[1 : j + 1], of.of_mean[j + 1 :]
+        np.add.at(quadratic[j], (of.one, of.other), products)
+        np.add.at(quadratic[j], (of.other, of.one), products)
+        log_scale[j, : j + 1] = of.of_scale
     return Straight(
         order,
         centre,
@@ -172,6 +160,48 @@ def fit_map(points: WeightedPoints, order: NDArray[np.int64]) -> Straight:
         spread.max(axis=0),
         _shapes(left, weight),
     )
+
+
+@dataclass(frozen=True)
+class _Straightened:
+    """One coordinate by those before it: coefficients of its mean and of its log scale, and what they leave.
+
+    Attributes
+    ----------
+    one, other : (k,) arrays of int
+        The coordinates whose products the mean has, after a constant and the coordinates themselves.
+    of_mean : (1 + j + k,) array
+    of_scale : (1 + j,) array
+    spread, left : (n,) arrays
+        Log scales, and deviations from the mean in units of the scale.
+    """
+
+    one: NDArray[np.int64]
+    other: NDArray[np.int64]
+    of_mean: Array
+    of_scale: Array
+    spread: Array
+    left: Array
+
+
+def _straighten(v: Array, j: int, weight: Array, clear: float, every: bool) -> _Straightened:
+    """Regress standardised coordinate j on those before it and on products of two: all, or in many dimensions a few."""
+    y = v[:, j]
+    lines = np.column_stack([np.ones(len(v)), v[:, :j]])
+    many = v.shape[1] > FEW
+    one, other = np.triu_indices(j if every or many else 0)
+    if many and not every:
+        one, other = _seen_at_once(v, lines, one, other, y, weight, clear)
+    terms = np.column_stack([lines, v[:, one] * v[:, other]])
+    of_mean, of_scale, t = _regress(terms, lines, y, weight)
+    # Far out a bend that is only noise throws everything aside: none without evidence.
+    kept = np.abs(t[j + 1 :]) > clear
+    if not kept.all():
+        one, other = one[kept], other[kept]
+        terms = terms[:, np.concatenate([np.ones(j + 1, bool), kept])]
+        of_mean, of_scale, _ = _regress(terms, lines, y, weight, of_scale)
+    spread = lines @ of_scale
+    return _Straightened(one, other, of_mean, of_scale, spread, (y - terms @ of_mean) * np.exp(-spread))
 
 
 def _seen_at_once(

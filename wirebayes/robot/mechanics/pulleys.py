@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Pulleys
+from wirebayes.robot.mechanics.vectors import cross, dot, norm
 
 _LEAST = 1e-3  # of the radius: a point nearer to the rim has no tangent worth the name, and nearer to the axis no plane
 
@@ -54,39 +55,48 @@ class WireRun:
 def wire_run(pulleys: Pulleys, line_m: Floats) -> WireRun:
     """The way of wires to platform points that lie at ``(3, w, n)`` from their exit points."""
     rho, s = pulleys.radius_m[:, None], pulleys.axis.T[:, :, None]
-    along = line_m[0] * s[0] + line_m[1] * s[1] + line_m[2] * s[2]
+    along = dot(line_m, s)
     beside = line_m - along * s
     tiny = 1e-12 * (rho + 1e-300)
-    away = np.maximum(np.sqrt(beside[0] ** 2 + beside[1] ** 2 + beside[2] ** 2), tiny)
+    away = np.maximum(norm(beside), tiny)
     outward = beside / away
-    h = away - rho
-    square = h * h + along * along - rho * rho
-    clear = ((square > (_LEAST * rho) ** 2) & (away > _LEAST * rho)) | (rho == 0)
-    straight = np.sqrt(np.maximum(square, (_LEAST * rho) ** 2 + tiny * tiny))
-    size = np.maximum(np.sqrt(h * h + along * along), tiny) * np.sqrt(straight * straight + rho * rho)
-    cosine, sine = (along * straight - h * rho) / size, (along * rho + h * straight) / size
-    wrap = np.arctan2(sine, cosine)
-    wrap = np.where(wrap < -1e-9, wrap + 2 * np.pi, wrap)
-    direction = sine * outward + cosine * s
-    across = np.stack(
-        [
-            s[1] * outward[2] - s[2] * outward[1],
-            s[2] * outward[0] - s[0] * outward[2],
-            s[0] * outward[1] - s[1] * outward[0],
-        ]
-    )
+    tangent = _tangent(away - rho, along, rho, tiny)
+    straight, wrap = tangent.straight_m, tangent.wrap_rad
     # A leg without a pulley is a straight line, whatever its axis.
     point = rho == 0
-    distance = np.sqrt(line_m[0] ** 2 + line_m[1] ** 2 + line_m[2] ** 2)
+    distance = norm(line_m)
     return WireRun(
         np.where(point, distance, rho * wrap + straight),
         np.where(point, distance, straight),
-        np.where(point, line_m / np.maximum(distance, 1e-300), direction),
-        across,
-        np.where(point, 0.0, sine / away - 1.0 / straight),
+        np.where(point, line_m / np.maximum(distance, 1e-300), tangent.sine * outward + tangent.cosine * s),
+        cross(s, outward),
+        np.where(point, 0.0, tangent.sine / away - 1.0 / straight),
         np.where(point, 0.0, wrap),
-        clear,
+        (tangent.clear & (away > _LEAST * rho)) | point,
     )
+
+
+@dataclass(frozen=True)
+class _Tangent:
+    """From a rim to a point in the pulley's plane: how long, at which angle it leaves, and whether there is one."""
+
+    straight_m: Floats
+    sine: Floats
+    cosine: Floats
+    wrap_rad: Floats
+    clear: NDArray[np.bool_]
+
+
+def _tangent(h: Floats, along: Floats, rho: Floats, tiny: Floats) -> _Tangent:
+    """The tangent to the point ``(h, along)``, seen from the pulley's centre."""
+    square = h * h + along * along - rho * rho
+    least = _LEAST * rho
+    straight = np.sqrt(np.maximum(square, least**2 + tiny * tiny))
+    size = np.maximum(np.sqrt(h * h + along * along), tiny) * np.sqrt(straight * straight + rho * rho)
+    cosine = (along * straight - h * rho) / size
+    sine = (along * rho + h * straight) / size
+    wrap = np.arctan2(sine, cosine)
+    return _Tangent(straight, sine, cosine, np.where(wrap < -1e-9, wrap + 2 * np.pi, wrap), square > least**2)
 
 
 def traced(pulleys: Pulleys | None, leg: int, line_m: Floats, points: int = 12) -> Floats:

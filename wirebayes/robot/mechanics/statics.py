@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.pulleys import WireRun, wire_run
+from wirebayes.robot.mechanics.vectors import cross, norm
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
 
 _NOWHERE = 1e-300  # m; a wire without length has no direction, and no pull
@@ -74,7 +75,7 @@ def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
     if robot.pulleys is not None:
         over = wire_run(robot.pulleys, line)
         return Geometry(over.length_m, over.direction, arm, over)
-    distance = np.sqrt(line[0] ** 2 + line[1] ** 2 + line[2] ** 2)
+    distance = norm(line)
     return Geometry(distance, line / np.maximum(distance, _NOWHERE), arm)
 
 
@@ -95,7 +96,7 @@ def _with_moments(robot: Robot, u: Floats, r: Floats) -> Floats:
         return u
     out = np.empty((6, *u.shape[1:]), u.dtype)
     out[:3] = u
-    out[3], out[4], out[5] = r[1] * u[2] - r[2] * u[1], r[2] * u[0] - r[0] * u[2], r[0] * u[1] - r[1] * u[0]
+    out[3:] = cross(r, u)
     return out
 
 
