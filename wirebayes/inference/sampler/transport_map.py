@@ -127,7 +127,8 @@ def fit_map(points: WeightedPoints, order: NDArray[np.int64]) -> Straight:
         If the points do not span their space.
     """
     x, weight = points.z[:, order], points.weight
-    d, worth = x.shape[1], weight.sum()
+    d = x.shape[1]
+    worth = weight.sum()
     centre = weight @ x / worth
     scale = np.sqrt(weight @ (x - centre) ** 2 / worth)
     if not (scale > 0).all():
@@ -140,9 +141,14 @@ def fit_map(points: WeightedPoints, order: NDArray[np.int64]) -> Straight:
     left = np.column_stack([one.left for one in found])
     if not np.isfinite(left).all():
         raise np.linalg.LinAlgError("the points do not settle the scales")
-    constant, linear, quadratic, log_scale = np.zeros(d), np.zeros((d, d)), np.zeros((d, d, d)), np.zeros((d, d + 1))
+    constant = np.zeros(d)
+    linear = np.zeros((d, d))
+    quadratic = np.zeros((d, d, d))
+    log_scale = np.zeros((d, d + 1))
     for j, of in enumerate(found):
-        constant[j], linear[j, :j], products = of.of_mean[0], of.of_mean[1 : j + 1], of.of_mean[j + 1 :]
+        constant[j] = of.of_mean[0]
+        linear[j, :j] = of.of_mean[1 : j + 1]
+        products = of.of_mean[j + 1 :]
         np.add.at(quadratic[j], (of.one, of.other), products)
         np.add.at(quadratic[j], (of.other, of.one), products)
         log_scale[j, : j + 1] = of.of_scale
