@@ -84,7 +84,7 @@ class Predicting:
         }
         if sum(larger.values()) < np.exp(-REACH) * weight:
             return False
-        fitted = sorted(larger.keys() & self.explored.fitted.keys(), key=lambda key: -larger[key])
+        fitted = sorted(larger.keys() & self.explored.fitted.keys(), key=lambda key: (-larger[key], sorted(key)))
         best = next((k for k in fitted if self.last_predicts(self.explored.fitted[k], found)), None)
         if best is None:
             return False
