@@ -30,7 +30,7 @@ def onward(passed: Sequence[State], reached: State, sd: Floats, tension_sd_N: fl
     sd : (m,) array
         Standard deviations of the robot's unknowns.
     tension_sd_N : float
-        Of a tension that is read.
+        Of a tension that is read, or of tensions where none is.
     """
     last = passed[-1]
     white, pull = 0.5 * (last.white + reached.white), 0.5 * (last.pull_N + reached.pull_N)

@@ -77,6 +77,7 @@ def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep
     passed, roughly, cost = [state], ROUGHLY, np.inf
     last = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])[0]
     usual = usual_joint(unknowns.robot, holds)
+    unit_N = holds.session.tension_sd_N if np.isfinite(holds.tension_N).any() else noise.pull_N
     for _ in range(_ROUNDS):
         since = passed[-1]
         creep = creep_of(unknowns, holds, since, creep, roughly)
@@ -93,7 +94,7 @@ def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep
             return found
         cost = found.cost
         roughly = max(_FINEST, min(_STEADY * moved_on, ROUGHLY * _FINER ** len(rounds)))
-        passed = onward(passed, state, sd, holds.session.tension_sd_N) if len(rounds) > _WHOLE_ROUNDS else [state]
+        passed = onward(passed, state, sd, unit_N) if len(rounds) > _WHOLE_ROUNDS else [state]
         noise = _next_noise(noise, rounds)
     return replace(found, converged=False)
 
