@@ -99,7 +99,7 @@ def test_the_same_bytes_within_one_process_and_without_the_draws(reference, test
     def unwanted(*args, **kwargs):
         raise AssertionError("nobody reads it")
 
-    monkeypatch.setattr("wirebayes.results.jobs.save", unwanted)
+    monkeypatch.setattr("wirebayes.results.jobs.save_posterior", unwanted)
     monkeypatch.setattr("wirebayes.inference.sampler.checkpoint.write_checkpoint", unwanted)
     wb.batch(tests[:2], **QUICK, output=tmp_path / "out", posteriors=False)
     ours, theirs = bytes_of(tmp_path / "out"), bytes_of(reference)
