@@ -6,7 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.discovery import smooth_reference
-from wirebayes.discovery.noise_integral import Expansion, Projected, project, without_and_with, without_tangent
+from wirebayes.discovery.noise_integral import (
+    Expansion,
+    Projected,
+    project,
+    with_each_signature,
+    without_and_with,
+    without_tangent,
+)
 from wirebayes.discovery.probes import Probe, forms
 from wirebayes.discovery.scans import Pieces, Scan, joined
 from wirebayes.discovery.tangent import around_points, block_diagonal, moving_columns, points_of, tangent_of
@@ -105,9 +112,7 @@ def _scan_few(x: Expansion) -> Scan:
     """Scan at once: noise of every ratio is integrated out, each amplitude is at its best."""
     found = project(x)
     b, c = found.along, found.square
-    upward = np.where(x.one_sided, np.maximum(b, 0.0), b)
-    left = np.maximum(found.rss[..., None] - upward**2 / c, x.least[:, None, None])
-    effects = found.shared[..., None] - 0.5 * x.degrees * np.log(left)
+    left, effects = with_each_signature(x, found)
     by_effect = log_sum(effects, axis=1)
     plain, beside = without_and_with(x, found)
     nothing = log_sum(plain, axis=1)

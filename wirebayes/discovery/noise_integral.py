@@ -130,6 +130,13 @@ def project(x: Expansion) -> Projected:
     )
 
 
+def with_each_signature(x: Expansion, found: Projected) -> tuple[Array, Array]:
+    """(n, k, m) sum of squares that each signature at its best amplitude leaves, and log evidence, at each ratio."""
+    upward = np.where(x.one_sided, np.maximum(found.along, 0.0), found.along)
+    left = np.maximum(found.rss[..., None] - upward**2 / found.square, x.least[:, None, None])
+    return left, found.shared[..., None] - 0.5 * x.degrees * np.log(left)
+
+
 def _slices(processes: Sequence[int]) -> list[slice]:
     """Where the functions of each process stand."""
     ends = np.cumsum(processes)

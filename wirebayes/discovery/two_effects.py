@@ -7,7 +7,7 @@ there; a setting error takes the place of a slip only until the elastic curve ha
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.discovery.noise_integral import Expansion, Projected, has_tangent, project
+from wirebayes.discovery.noise_integral import Expansion, Projected, has_tangent, project, with_each_signature
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.typing import Array
 
@@ -49,11 +49,10 @@ def log_bayes_of_each_pair(x: Expansion) -> Array:
     groups, first_row = _forms_of_each(x), x.of(np.array([0]))
     if not has_tangent(first_row)[0]:
         return np.full((len(groups), len(groups)), -np.inf)
-    found, least = project(first_row), first_row.least[:, None, None]
-    upward = np.where(x.one_sided, np.maximum(found.along, 0.0), found.along)
-    left = np.maximum(found.rss[..., None] - upward**2 / found.square, least)
-    single = log_sum(found.shared[..., None] - 0.5 * x.degrees * np.log(left), axis=1)
-    nothing = log_sum(found.shared - 0.5 * x.degrees * np.log(np.maximum(found.rss, least[..., 0])), axis=1)
+    found = project(first_row)
+    single = log_sum(with_each_signature(first_row, found)[1], axis=1)
+    plain = np.maximum(found.rss, first_row.least[:, None])
+    nothing = log_sum(found.shared - 0.5 * x.degrees * np.log(plain), axis=1)
     value = _log_evidence(first_row, found, _best_forms(single, groups), groups)[0]
     pairs = np.stack([log_sum(value[:, group], axis=1) for group in groups], axis=1)
     alone = single[0] + _log_shares(x, groups)
