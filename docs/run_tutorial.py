@@ -114,10 +114,21 @@ def _anchors(found: dict, truth: dict) -> str:
         for axis, name in enumerate("xyz"):
             true, low, high = (1e3 * value[leg][axis] for value in (anchors, exits["q05"], exits["q95"]))
             held += low <= true <= high
-            rows += [f"   * - {letter} {name}", f"     - {true:.1f}", f"     - {told_mm[leg][axis]:.1f}",
-                     f"     - {low:.1f} to {high:.1f}"]  # fmt: skip
-    head = [".. list-table::", "   :header-rows: 1", "", "   * - anchor", "     - truth", "     - tape",
-            "     - calibrated, 90 %"]  # fmt: skip
+            rows += [
+                f"   * - {letter} {name}",
+                f"     - {true:.1f}",
+                f"     - {told_mm[leg][axis]:.1f}",
+                f"     - {low:.1f} to {high:.1f}",
+            ]
+    head = [
+        ".. list-table::",
+        "   :header-rows: 1",
+        "",
+        "   * - anchor",
+        "     - truth",
+        "     - tape",
+        "     - calibrated, 90 %",
+    ]
     return "\n".join([*head, *rows, "", f"{held} of {len(rows) // 4} intervals hold the truth."]) + "\n"
 
 

@@ -16,15 +16,29 @@ from wirebayes.views.result import ResultFolder
 
 HELD_OUT = {"plain": {"rmse_N": 0.25}, "final": {"rmse_N": 0.05}}
 SLIP = {
-    "verdict": "ambiguous", "effects": ["grip_slip", "toe"], "set": ["grip_slip", "unknown", "toe"],
+    "verdict": "ambiguous",
+    "effects": ["grip_slip", "toe"],
+    "set": ["grip_slip", "unknown", "toe"],
     "probabilities": {"grip_slip": 0.62, "toe": 0.14, "unknown": 0.17, "ageing": 0.07},
     "group": ["grip_slip", "toe", "ageing", "unknown"],
-    "p_global": 0.001, "p_simulations": 999, "held_out": HELD_OUT, "next_measurement": "Unload.",
+    "p_global": 0.001,
+    "p_simulations": 999,
+    "held_out": HELD_OUT,
+    "next_measurement": "Unload.",
     "amplitudes": {"grip_slip": {"mean": 0.31, "q05": 0.25, "q95": 0.38, "unit": "mm", "hold": 4}},
-}  # fmt: skip
-CLEAN = {"verdict": "nothing-missing", "effects": [], "set": [], "probabilities": {}, "group": [],
-         "p_global": 0.4, "p_simulations": 199, "held_out": HELD_OUT,
-         "next_measurement": "Hold longer.", "amplitudes": {}}  # fmt: skip
+}
+CLEAN = {
+    "verdict": "nothing-missing",
+    "effects": [],
+    "set": [],
+    "probabilities": {},
+    "group": [],
+    "p_global": 0.4,
+    "p_simulations": 199,
+    "held_out": HELD_OUT,
+    "next_measurement": "Hold longer.",
+    "amplitudes": {},
+}
 
 
 def stored(kind: type, folder: Path, name: str, content: dict[str, Any]) -> Any:
@@ -57,9 +71,15 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
 
 @pytest.mark.parametrize(
     ("p", "simulations", "words"),
-    [(0.001, 999, "p < 0.001"), (0.003, 334, "p < 0.01"), (0.01, 199, "p = 0.01"), (0.005, 199, "p < 0.01"),
-     (0.34, 199, "p = 0.34"), (0.05, 19, "p < 0.1")],
-)  # fmt: skip
+    [
+        (0.001, 999, "p < 0.001"),
+        (0.003, 334, "p < 0.01"),
+        (0.01, 199, "p = 0.01"),
+        (0.005, 199, "p < 0.01"),
+        (0.34, 199, "p = 0.34"),
+        (0.05, 19, "p < 0.1"),
+    ],
+)
 def test_a_p_value_says_no_more_than_its_simulations_can(p: float, simulations: int, words: str) -> None:
     assert p_in_words(p, simulations) == words
 
@@ -135,9 +155,11 @@ def test_a_pose_that_no_draw_keeps_to_the_end_is_said_to_be_none(tmp_path: Path)
     assert lost.lines() == ["r: no draw of the wires could be solved"]
     band = {"q05": [0.0, 1.0], "q50": [0.0, 1.5], "q95": [0.0, 2.0]}
     held = stored(
-        Pose, tmp_path, "pose.json",
+        Pose,
+        tmp_path,
+        "pose.json",
         {"robot": "r", "feasible": True, "drift": [drift | {"distance_mm": band}], "wires": {}},
-    )  # fmt: skip
+    )
     assert held.lines()[0].startswith("r: after 60 s the platform has drifted by 1.5 mm [1, 2]")
 
 

@@ -80,8 +80,11 @@ def test_a_pull_is_refused_by_the_names_of_its_own_columns():
         imported("vhb_gbk.csv")
 
 
-HUNG = [("creep_dw_noisy.csv", 4.43, 0.1031), ("creep_deadweight_hand.csv", 4.34, 0.8432),
-        ("creep_cont_small.csv", 4.43, 0.1031)]  # fmt: skip
+HUNG = [
+    ("creep_dw_noisy.csv", 4.43, 0.1031),
+    ("creep_deadweight_hand.csv", 4.34, 0.8432),
+    ("creep_cont_small.csv", 4.43, 0.1031),
+]
 
 
 @pytest.mark.parametrize(

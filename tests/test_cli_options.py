@@ -35,13 +35,24 @@ FUNCTIONS = {
     "export": "export.export",
 }
 RENAMED = {  # the singular of what may be repeated, a file of what may be an object, too
-    "file": "source", "folder": "posterior", "effect": "effects", "parameter": "parameters",
-    "map_rotation": "map_rotations", "spread": "specimen_spread",
-}  # fmt: skip
+    "file": "source",
+    "folder": "posterior",
+    "effect": "effects",
+    "parameter": "parameters",
+    "map_rotation": "map_rotations",
+    "spread": "specimen_spread",
+}
 ON_THE_TERMINAL = {"as_json", "quiet"}
 READ_FIRST = {"wires", "aim", "parameter"}  # text that the command takes apart
-GIVEN = {"wires": ["<wires>"], "parameter": ["k1=700"], "aim": "creep", "raw": [Path("<raw>")],
-         "files": [Path("<files>")], "protocol": Path("<protocol>"), "output": Path("<output>")}  # fmt: skip
+GIVEN = {
+    "wires": ["<wires>"],
+    "parameter": ["k1=700"],
+    "aim": "creep",
+    "raw": [Path("<raw>")],
+    "files": [Path("<files>")],
+    "protocol": Path("<protocol>"),
+    "output": Path("<output>"),
+}
 ONLY_IN_PYTHON = {"progress", "policy", "simulations", "ask", "tests"}
 
 

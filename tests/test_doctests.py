@@ -45,9 +45,14 @@ def test_the_page_from_python_runs_as_shown(shared):
 
 
 CALLED_OTHERWISE = {
-    "import": "import_bench", "init": "new_experiment", "simulate": "simulate_tests", "effects": "list_effects",
-    "report": "write_report", "import-robot": "import_robot", "reproduce": "reproduce_paper",
-}  # fmt: skip
+    "import": "import_bench",
+    "init": "new_experiment",
+    "simulate": "simulate_tests",
+    "effects": "list_effects",
+    "report": "write_report",
+    "import-robot": "import_robot",
+    "reproduce": "reproduce_paper",
+}
 MINUTES = {"reproduce"}  # shown on the page, too long to run
 NOT_CALLED = {"app"}  # a page in a browser, which calls the others
 MOST_LINES = 10

@@ -61,8 +61,13 @@ def test_arrays_are_the_same_test_as_the_file():
         for i, h in enumerate(nylon.holds)
         if not h.recorded
     ]
-    about = {"length_mm": nylon.length_mm, "name": nylon.name, "material": nylon.material,
-             "resolution_N": nylon.resolution_N, "unrecorded_holds": gaps}  # fmt: skip
+    about = {
+        "length_mm": nylon.length_mm,
+        "name": nylon.name,
+        "material": nylon.material,
+        "resolution_N": nylon.resolution_N,
+        "unrecorded_holds": gaps,
+    }
     one, other = wb.from_arrays(**columns, **about), wb.from_arrays(columns, **about)
     assert one.data_hash == other.data_hash == nylon.data_hash
 
@@ -171,8 +176,12 @@ def test_a_script_needs_no_guard(tmp_path):
     paths = os.pathsep.join([str(tmp_path), str(Path(wb.__file__).parents[1])])
     done = subprocess.run(
         [sys.executable, tmp_path / "script.py"],
-        capture_output=True, text=True, check=False, cwd=tmp_path, env={**os.environ, "PYTHONPATH": paths},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": paths},
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout == "script\n['wire-1', 'wire-2']\n"
 
@@ -279,5 +288,6 @@ def test_a_session_in_memory_is_checked_by_row_and_column(folders):
 
 def test_a_folder_of_another_configuration_is_refused(folders):
     with pytest.raises(wb.InputError, match="made with another configuration: seed is 3 there, 4 here"):
-        wb.simulate_tests(displacements=range(1, 7), times=[0, 30, 60], seed=4, parameters={"k1": 700},
-                          output=folders / "simulated")  # fmt: skip
+        wb.simulate_tests(
+            displacements=range(1, 7), times=[0, 30, 60], seed=4, parameters={"k1": 700}, output=folders / "simulated"
+        )

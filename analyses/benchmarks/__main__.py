@@ -56,12 +56,17 @@ def main():
                     options,
                 )
             )
-            write_json(options.output / "samplers.json", {"wanted_ess": measure.WANTED, "minutes": options.minutes,
-                                                          "cases": cases})  # fmt: skip
+            write_json(
+                options.output / "samplers.json",
+                {"wanted_ess": measure.WANTED, "minutes": options.minutes, "cases": cases},
+            )
     print("\nratio of effective draws per second of processor time, all costs counted: median over cases, worst case")
     for name in PEERS:
-        ratios = [c["peers"][name]["ratio_all_costs_cpu"] for c in cases if name in c["peers"]
-                  and "ratio_all_costs_cpu" in c["peers"][name]]  # fmt: skip
+        ratios = [
+            c["peers"][name]["ratio_all_costs_cpu"]
+            for c in cases
+            if name in c["peers"] and "ratio_all_costs_cpu" in c["peers"][name]
+        ]
         tried = sum(name in c["peers"] for c in cases)
         if tried:
             cells = f"{np.median(ratios):8.1f} {min(ratios):8.1f}" if ratios else "not converged"
@@ -88,14 +93,22 @@ def run(problem, title, options):
             theirs["agreement"] = measure.agreement(values, reference)
             if theirs["converged"]:
                 for kind in ("all_costs_per_cpu_s", "all_costs_per_wall_s", "sampling_per_cpu_s"):
-                    key = {"all_costs_per_cpu_s": "ratio_all_costs_cpu", "all_costs_per_wall_s": "ratio_all_costs_wall",
-                           "sampling_per_cpu_s": "ratio_sampling_cpu"}[kind]  # fmt: skip
+                    key = {
+                        "all_costs_per_cpu_s": "ratio_all_costs_cpu",
+                        "all_costs_per_wall_s": "ratio_all_costs_wall",
+                        "sampling_per_cpu_s": "ratio_sampling_cpu",
+                    }[kind]
                     theirs[key] = mine[kind] / theirs[kind]
         out["peers"][name] = theirs
         _tell(name, theirs)
-    _tell("wirebayes (median)", {k: float(np.median([m[k] for m in out["ours"]])) for k in
-          ("all_costs_per_cpu_s", "sampling_per_cpu_s", "ess_per_kept_evaluation", "ess_per_evaluation")}
-          | {"converged": all(m["converged"] for m in out["ours"])})  # fmt: skip
+    _tell(
+        "wirebayes (median)",
+        {
+            k: float(np.median([m[k] for m in out["ours"]]))
+            for k in ("all_costs_per_cpu_s", "sampling_per_cpu_s", "ess_per_kept_evaluation", "ess_per_evaluation")
+        }
+        | {"converged": all(m["converged"] for m in out["ours"])},
+    )
     return out
 
 

@@ -103,9 +103,12 @@ def share_in_likelihood(problem, seed):
         whole = time.process_time() - began
     finally:
         kind.log_likelihood, LogPosterior.__call__ = likelihood, target
-    return {"fit_cpu_s": whole, "likelihood": spent["likelihood"] / whole,
-            "coordinates_and_prior": (spent["target"] - spent["likelihood"]) / whole,
-            "sampler": 1.0 - spent["target"] / whole}  # fmt: skip
+    return {
+        "fit_cpu_s": whole,
+        "likelihood": spent["likelihood"] / whole,
+        "coordinates_and_prior": (spent["target"] - spent["likelihood"]) / whole,
+        "sampler": 1.0 - spent["target"] / whole,
+    }
 
 
 def against_numpy(wire):

@@ -67,8 +67,9 @@ def numpyro_nuts(problem, seed, seconds, natural=True):
         likelihood = model.log_likelihood(jnp, problem)
 
         def wire():
-            theta = {n: numpyro.sample(n, (dist.LogNormal if positive else dist.Normal)(m, s))
-                     for n, positive, m, s in terms}  # fmt: skip
+            theta = {
+                n: numpyro.sample(n, (dist.LogNormal if positive else dist.Normal)(m, s)) for n, positive, m, s in terms
+            }
             numpyro.factor("readings", likelihood(theta))
 
         kernel = NUTS(wire, dense_mass=True)
@@ -76,8 +77,9 @@ def numpyro_nuts(problem, seed, seconds, natural=True):
         density = _log_density(problem, target)
         kernel = NUTS(potential_fn=lambda z: -density(z), dense_mass=True)
     _compiled.clear()
-    mcmc = MCMC(kernel, num_warmup=500, num_samples=100, num_chains=CHAINS, chain_method="vectorized",
-                progress_bar=False)  # fmt: skip
+    mcmc = MCMC(
+        kernel, num_warmup=500, num_samples=100, num_chains=CHAINS, chain_method="vectorized", progress_bar=False
+    )
     start = None
     if not natural:
         with costs.part("start"):

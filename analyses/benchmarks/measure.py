@@ -61,8 +61,10 @@ def judged(costs, values, *, evaluations=None, kept_evaluations=None, divergence
         out |= {"ess": float(ess.min()), "ess_of_means": float(of_means.min()), "r_hat": r_hat, "converged": converged}
     else:
         out |= {"ess": float(weights_ess), "ess_of_means": float(weights_ess), "r_hat": None, "converged": True}
-    before = {k: sum(v for part, v in book.items() if part != "sample") for k, book in
-              (("cpu", costs.cpu), ("wall", costs.wall))}  # fmt: skip
+    before = {
+        k: sum(v for part, v in book.items() if part != "sample")
+        for k, book in (("cpu", costs.cpu), ("wall", costs.wall))
+    }
     for k, book in (("cpu", costs.cpu), ("wall", costs.wall)):
         sampling = out["ess"] / book["sample"]
         out[f"sampling_per_{k}_s"] = sampling
@@ -71,8 +73,7 @@ def judged(costs, values, *, evaluations=None, kept_evaluations=None, divergence
         burn, out["evaluations"] = evaluations - kept_evaluations, evaluations
         for of in ("ess", "ess_of_means"):
             per_kept = out[of] / kept_evaluations
-            out |= {f"{of}_per_kept_evaluation": per_kept,
-                    f"{of}_per_evaluation": WANTED / (burn + WANTED / per_kept)}  # fmt: skip
+            out |= {f"{of}_per_kept_evaluation": per_kept, f"{of}_per_evaluation": WANTED / (burn + WANTED / per_kept)}
     return out
 
 
@@ -88,8 +89,10 @@ def _r_hat(values):
 def agreement(values, reference):
     """Largest difference of a parameter's mean, in reference standard deviations, and of its log standard deviation."""
     a, b = values.reshape(-1, values.shape[-1]), reference.reshape(-1, reference.shape[-1])
-    return {"mean_in_sd": float(np.abs((a.mean(0) - b.mean(0)) / b.std(0)).max()),
-            "log_sd": float(np.abs(np.log(a.std(0) / b.std(0))).max())}  # fmt: skip
+    return {
+        "mean_in_sd": float(np.abs((a.mean(0) - b.mean(0)) / b.std(0)).max()),
+        "log_sd": float(np.abs(np.log(a.std(0) / b.std(0))).max()),
+    }
 
 
 def looked_at(problem, theta):

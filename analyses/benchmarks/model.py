@@ -39,9 +39,17 @@ def data(problem):
     if (p.time_s[p.recorded, 0] != 0.0).any() or (p.duration_s <= 0).any() or not p.mask[p.recorded, 0].all():
         raise ValueError("the benchmark's model wants holds that last, each with its first reading at time 0")
     later = (p.time_s > 0) & p.mask
-    return Data(p.length_mm, sample.resolution, p.setting, p.duration_s,
-                np.log(np.where(later, p.time_s, 1.0)), 1.0 * later, np.where(p.mask, sample.readings[..., 0], 0.0),
-                1.0 * p.mask, sample.model.history == "saturating")  # fmt: skip
+    return Data(
+        p.length_mm,
+        sample.resolution,
+        p.setting,
+        p.duration_s,
+        np.log(np.where(later, p.time_s, 1.0)),
+        1.0 * later,
+        np.where(p.mask, sample.readings[..., 0], 0.0),
+        1.0 * p.mask,
+        sample.model.history == "saturating",
+    )
 
 
 def loop(xp, step, state, arrays):
@@ -60,8 +68,9 @@ def loop(xp, step, state, arrays):
 
 def chain(xp, theta, d):
     """log p(readings | parameters), hold by hold along the staircase."""
-    k1, B, U, k2, N, preload, sensor, setting = (theta[n] for n in
-        ("k1", "B", "U", "k2", "N", "preload", "sensor_sd", "setting_sd"))  # fmt: skip
+    k1, B, U, k2, N, preload, sensor, setting = (
+        theta[n] for n in ("k1", "B", "U", "k2", "N", "preload", "sensor_sd", "setting_sd")
+    )
     kept = 1.0 if d.saturating else 0.0
     noise, tau = sensor**2 + d.resolution_N**2 / 12.0, setting**2
 

@@ -177,5 +177,11 @@ def verdict(shares: Mapping[str, Array], joint: float = 0.99, *, replicates: int
         levels[n] = threshold(n, len(shares), joint, replicates=replicates)
     found = {name: extremeness(np.asarray(v)) for name, v in shares.items()}
     outside = [name for name, v in found.items() if v < levels[len(shares[name])]]
-    return {"joint": joint, "quantities": len(shares), "threshold": {str(n): v for n, v in sorted(levels.items())},
-            "inside": not outside, "outside": outside, "extremeness": found}  # fmt: skip
+    return {
+        "joint": joint,
+        "quantities": len(shares),
+        "threshold": {str(n): v for n, v in sorted(levels.items())},
+        "inside": not outside,
+        "outside": outside,
+        "extremeness": found,
+    }

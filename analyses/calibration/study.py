@@ -56,11 +56,18 @@ class Study:
         ranked = one(problem, own, self.policy, fitted=fitted, accepted=stays_taut)
         chains = ranked.fit.chains
         return {
-            "study": self.name, "index": index, "share_below": ranked.share_below, "truth": ranked.truth,
-            "converged": chains.converged, "why": chains.why, "steps": int(chains.z.shape[1]),
-            "acceptance": chains.acceptance, "learned": chains.learned, "modes": chains.modes,
+            "study": self.name,
+            "index": index,
+            "share_below": ranked.share_below,
+            "truth": ranked.truth,
+            "converged": chains.converged,
+            "why": chains.why,
+            "steps": int(chains.z.shape[1]),
+            "acceptance": chains.acceptance,
+            "learned": chains.learned,
+            "modes": chains.modes,
             "redrawn": ranked.redrawn,
-        }  # fmt: skip
+        }
 
 
 STUDIES = [Study(protocol, likelihood) for likelihood in ("chain", "hold") for protocol in BENCHES]

@@ -52,8 +52,14 @@ def case(index: int, clean: int, seed: int, simulations: int) -> dict[str, Any]:
         experiments = read_experiments(Path(folder) / "cases" / spec.key / "experiment.toml")
     looks, p, count = looked(experiments, int(spec.key, 16) % 2**31, simulations)
     (first, close), *_ = looks
-    return {"index": index, "kind": spec.kind, "early": not close, "p": p if close else first, "p_of_all": p,
-            "trials": count}  # fmt: skip
+    return {
+        "index": index,
+        "kind": spec.kind,
+        "early": not close,
+        "p": p if close else first,
+        "p_of_all": p,
+        "trials": count,
+    }
 
 
 def plan(clean: int, seed: int) -> list[Spec]:
@@ -79,8 +85,10 @@ def main() -> None:
         early = [r for r in part if r["early"]]
         differ = [r for r in early if (r["p"] <= ALPHA) != (r["p_of_all"] <= ALPHA)]
         near = sum(0.01 < r["p_of_all"] < 0.1 for r in part)
-        print(f"{kind}: {len(part)} files, {len(early)} stop early, {len(differ)} of them decide otherwise; "
-              f"{near} with .01 < p < .1")  # fmt: skip
+        print(
+            f"{kind}: {len(part)} files, {len(early)} stop early, {len(differ)} of them decide otherwise; "
+            f"{near} with .01 < p < .1"
+        )
         alarms = rate(r["p"] <= ALPHA for r in part)
         if alarms:
             low, value, high = (100 * alarms[key] for key in ("low", "value", "high"))

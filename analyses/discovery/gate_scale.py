@@ -82,9 +82,11 @@ def main() -> None:
                     patch.object(screening, "by_name", lambda candidates, scans: scans),
                 ):
                     p, low = spread(data, chance, lot, way)
-                print(f"{name:13s} {lot} simulations, {way:26s}: p {np.mean(p):.4f}, "
-                      f"sd of log p {np.std(np.log(p)):.2f}, others with p <= {ALPHA}: {100 * low:.1f} %",
-                      flush=True)  # fmt: skip
+                print(
+                    f"{name:13s} {lot} simulations, {way:26s}: p {np.mean(p):.4f}, "
+                    f"sd of log p {np.std(np.log(p)):.2f}, others with p <= {ALPHA}: {100 * low:.1f} %",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -33,12 +33,19 @@ def unseen(experiment, seed=0):
         held_out.predicted([experiment], [TRAIN[experiment.name]], chosen, block, rng)[0] for chosen in ((), effects)
     )
     return {
-        "verdict": verdict["verdict"], "set": verdict["set"], "accepted": verdict["accepted"], "p": verdict["p_global"],
-        "plain_rmse_N": plain.rmse_N, "final_rmse_N": final.rmse_N, "reduction": 1 - final.rmse_N / plain.rmse_N,
-        "plain_elpd": float(plain.elpd.sum()), "final_elpd": float(final.elpd.sum()),
-        "plain_inside_90": plain.inside, "final_inside_90": final.inside,
+        "verdict": verdict["verdict"],
+        "set": verdict["set"],
+        "accepted": verdict["accepted"],
+        "p": verdict["p_global"],
+        "plain_rmse_N": plain.rmse_N,
+        "final_rmse_N": final.rmse_N,
+        "reduction": 1 - final.rmse_N / plain.rmse_N,
+        "plain_elpd": float(plain.elpd.sum()),
+        "final_elpd": float(final.elpd.sum()),
+        "plain_inside_90": plain.inside,
+        "final_inside_90": final.inside,
         "gap_closed": held_out.gap_closed(plain, final),
-    }  # fmt: skip
+    }
 
 
 def said(report):
@@ -49,11 +56,16 @@ def said(report):
         if family["established"]
     ]
     return {
-        "verdict": report["verdict"], "set": report["set"], "accepted": report["accepted"], "p": report["p_global"],
-        "families": families, "remainder": report["remainder"]["probability"],
-        "screw_error": report["inclusion"].get("screw_error"), "shared_with": report["shared_with"],
+        "verdict": report["verdict"],
+        "set": report["set"],
+        "accepted": report["accepted"],
+        "p": report["p_global"],
+        "families": families,
+        "remainder": report["remainder"]["probability"],
+        "screw_error": report["inclusion"].get("screw_error"),
+        "shared_with": report["shared_with"],
         "parameters": report["parameters"],
-    }  # fmt: skip
+    }
 
 
 def main():

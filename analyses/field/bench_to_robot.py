@@ -223,8 +223,12 @@ def case(index: int) -> dict[str, Any]:
         found = investigate([training], Settings(simulations=SIMULATIONS), index)
         report = found.report["experiments"]["wire"]
         accepted = set(report["accepted"])
-        out |= {"verdict": report["verdict"], "accepted": sorted(accepted), "p": report["p_global"],
-                "set": report["set"]}  # fmt: skip
+        out |= {
+            "verdict": report["verdict"],
+            "accepted": sorted(accepted),
+            "p": report["p_global"],
+            "set": report["set"],
+        }
         out["right"] = accepted == {key.split("@")[0] for key in keys}
         if report["p_global"] > ALPHA:
             plain, _ = fitted(training, (), None, index)
@@ -256,9 +260,11 @@ def table(records: Sequence[dict[str, Any]]) -> str:
     for kind in KINDS:
         ratios = [
             (f["q95"] - f["q05"]) / (o["q95"] - o["q05"])
-            for r in records if "final" in r
-            for f, o in zip(r["final"], r["oracle"], strict=True) if f["kind"] == kind and o["q95"] > o["q05"]
-        ]  # fmt: skip
+            for r in records
+            if "final" in r
+            for f, o in zip(r["final"], r["oracle"], strict=True)
+            if f["kind"] == kind and o["q95"] > o["q05"]
+        ]
         if ratios:
             low, mid, high = np.quantile(ratios, [0.05, 0.5, 0.95])
             lines.append(f"width over the oracle's, {kind}: median {mid:.2f} [{low:.2f}, {high:.2f}]")

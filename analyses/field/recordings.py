@@ -30,10 +30,15 @@ from wirebayes.processes.workers import workers
 from wirebayes.wire.laws import LAWS, creep_fraction, creep_target
 
 WIRES = {
-    "k1": stats.lognorm(0.5, scale=900.0), "B": stats.lognorm(0.5, scale=0.3), "U": stats.lognorm(0.3, scale=0.6),
-    "k2": stats.lognorm(0.5, scale=0.03), "N": stats.lognorm(0.25, scale=0.65), "preload": stats.norm(0.5, 0.2),
-    "sensor_sd": stats.lognorm(0.4, scale=0.015), "setting_sd": stats.lognorm(0.5, scale=0.015),
-}  # fmt: skip
+    "k1": stats.lognorm(0.5, scale=900.0),
+    "B": stats.lognorm(0.5, scale=0.3),
+    "U": stats.lognorm(0.3, scale=0.6),
+    "k2": stats.lognorm(0.5, scale=0.03),
+    "N": stats.lognorm(0.25, scale=0.65),
+    "preload": stats.norm(0.5, 0.2),
+    "sensor_sd": stats.lognorm(0.4, scale=0.015),
+    "setting_sd": stats.lognorm(0.5, scale=0.015),
+}
 PARTS = 400  # of a move
 SHAPES: dict[str, Callable[[Floats], Floats]] = {  # when a share of a move is done, in times that a steady one takes
     "steady": lambda share: share,

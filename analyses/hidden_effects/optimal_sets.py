@@ -44,9 +44,7 @@ class Directions:
     def with_exact(self, name: str, signature: Array) -> Directions:
         """One more: an effect's own signature (R,), shape constants and size as they are."""
         unit = signature / max(float(np.linalg.norm(signature)), 1e-12)
-        return Directions(
-            np.vstack([self.units, unit]), np.append(self.owner, self.names.index(name)), self.names
-        )  # fmt: skip
+        return Directions(np.vstack([self.units, unit]), np.append(self.owner, self.names.index(name)), self.names)
 
 
 @dataclass(frozen=True)
@@ -87,9 +85,12 @@ class Sets:
         members, effects = members[order], effects[order]
         new = np.any(np.diff(effects, axis=0, prepend=-1) != 0, axis=1)
         return Sets(
-            members, np.linalg.inv(gram[order]), 0.5 * np.log(determinant[apart][order]), np.flatnonzero(new),
+            members,
+            np.linalg.inv(gram[order]),
+            0.5 * np.log(determinant[apart][order]),
+            np.flatnonzero(new),
             effects[new],
-        )  # fmt: skip
+        )
 
     def explained(self, along: Array) -> Array:
         """(…, s) square length of data in the sets' span, -inf where an amplitude would be negative.

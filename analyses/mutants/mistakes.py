@@ -14,16 +14,31 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 
 COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
-    ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In,
-}  # fmt: skip
+    ast.Lt: ast.GtE,
+    ast.LtE: ast.Gt,
+    ast.Gt: ast.LtE,
+    ast.GtE: ast.Lt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+}
 # A bound that is held or not: the mistake that only a test at the threshold finds.
 STRICT: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt,
-}  # fmt: skip
+    ast.Lt: ast.LtE,
+    ast.LtE: ast.Lt,
+    ast.Gt: ast.GtE,
+    ast.GtE: ast.Gt,
+}
 COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
-    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.Pow: ast.Mult,
-}  # fmt: skip
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.Pow: ast.Mult,
+}
 
 
 _SMALL = 10  # one more of a thousand steps or draws decides nothing
@@ -145,8 +160,12 @@ def _reached_by(file: str, site: _Site) -> list[tuple[str, int]]:
         return [(file, statement.lineno), *(_span(file, node, node) if isinstance(node, ast.expr | ast.stmt) else [])]
     if functions:
         return _span(file, functions[-1].body[0], functions[-1].body[-1])
-    targets = [target for node in chain if isinstance(node, ast.AnnAssign | ast.Assign)
-               for target in ([node.target] if isinstance(node, ast.AnnAssign) else node.targets)]  # fmt: skip
+    targets = [
+        target
+        for node in chain
+        if isinstance(node, ast.AnnAssign | ast.Assign)
+        for target in ([node.target] if isinstance(node, ast.AnnAssign) else node.targets)
+    ]
     names = [node.id for target in targets for node in ast.walk(target) if isinstance(node, ast.Name)]
     return [line for name in names for line in uses(name)]
 

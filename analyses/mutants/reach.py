@@ -21,13 +21,16 @@ TESTS = {
     "results": _files("results", "contraction identifiability outliers posterior_checks"),
     "prediction": _files("prediction", "held_out leave_one_hold_out left_out_density pit_band predictive table"),
     "comparison": ["tests/comparison"],
-    "discovery": _files("discovery", "explore gate global_test held_out model_space name_evidence power refit "
-                                     "sharing settings shrinking subsets thresholds verdict"),
+    "discovery": _files(
+        "discovery",
+        "explore gate global_test held_out model_space name_evidence power refit "
+        "sharing settings shrinking subsets thresholds verdict",
+    ),
     "robot/mechanics": _files("robot", "statics tensions pulleys"),
     "robot/motion": _files("robot", "forward"),
     "robot/pose": _files("robot", "pose_reports answer controllers drums"),
     "robot/proof": _files("robot", "certificate proofs reach pulleys"),
-}  # fmt: skip
+}
 _PATIENCE_CPU_S = 40.0  # a file that takes longer has no test for a mutant
 
 

@@ -67,8 +67,11 @@ def under_weights(made: Line, shares: Sequence[float], rng: np.random.Generator)
     if rng.random() < 0.5:
         weights = np.concatenate([weights, weights[-3:-1][::-1]])
     step = made.tension_N * 1.2 / (holds - 1)
-    own = {"preload": made.stretch_mm * rng.uniform(-0.2, 0.5), "sensor_sd": made.stretch_mm * _small(rng, -3.3, -2.3),
-           "setting_sd": step * _small(rng, -2.5, -1.2)}  # fmt: skip
+    own = {
+        "preload": made.stretch_mm * rng.uniform(-0.2, 0.5),
+        "sensor_sd": made.stretch_mm * _small(rng, -3.3, -2.3),
+        "setting_sd": step * _small(rng, -2.5, -1.2),
+    }
     times = (made.hold_s * np.array(shares)).tolist()
     return Bench("weights", "line", made.length_mm, weights_N=weights.tolist(), resolution_mm=0.0, times_s=times), own
 
@@ -77,8 +80,11 @@ def under_steps(made: Line, shares: Sequence[float], rng: np.random.Generator) -
     """A step test, and the parameters of its own."""
     holds = int(rng.integers(6, 11))
     steps = made.stretch_mm * np.linspace(0.3, 1.8, holds)
-    own = {"preload": made.stretch_mm * rng.uniform(0.0, 0.3), "sensor_sd": made.tension_N * _small(rng, -3.3, -2.3),
-           "setting_sd": made.stretch_mm * 1.5 / (holds - 1) * _small(rng, -2.5, -1.2)}  # fmt: skip
+    own = {
+        "preload": made.stretch_mm * rng.uniform(0.0, 0.3),
+        "sensor_sd": made.tension_N * _small(rng, -3.3, -2.3),
+        "setting_sd": made.stretch_mm * 1.5 / (holds - 1) * _small(rng, -2.5, -1.2),
+    }
     times = (made.hold_s * np.array(shares)).tolist()
     return Bench("steps", "line", made.length_mm, 0.0, displacements_mm=steps.tolist(), times_s=times), own
 

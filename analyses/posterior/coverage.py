@@ -57,9 +57,13 @@ def training(made: Simulated) -> tuple[Problem, int]:
     count = (2 * len(sample.protocol.setting)) // 3
     p = sample.protocol
     cut = replace(
-        p, setting=p.setting[:count], time_s=p.time_s[:count], mask=p.mask[:count],
-        duration_s=p.duration_s[:count], number=p.number[:count],
-    )  # fmt: skip
+        p,
+        setting=p.setting[:count],
+        time_s=p.time_s[:count],
+        mask=p.mask[:count],
+        duration_s=p.duration_s[:count],
+        number=p.number[:count],
+    )
     return replace(made.problem, samples=(replace(sample, protocol=cut, readings=sample.readings[:count]),)), count
 
 

@@ -24,10 +24,15 @@ from wirebayes.prediction.held_out import LEVELS, held_out
 from wirebayes.processes.workers import workers
 
 WIRES = {
-    "k1": stats.lognorm(0.5, scale=900.0), "B": stats.lognorm(0.5, scale=0.3), "U": stats.lognorm(0.3, scale=0.6),
-    "k2": stats.lognorm(0.5, scale=0.03), "N": stats.lognorm(0.25, scale=0.65), "preload": stats.norm(0.5, 0.3),
-    "sensor_sd": stats.lognorm(0.4, scale=0.008), "setting_sd": stats.lognorm(0.5, scale=0.03),
-}  # fmt: skip
+    "k1": stats.lognorm(0.5, scale=900.0),
+    "B": stats.lognorm(0.5, scale=0.3),
+    "U": stats.lognorm(0.3, scale=0.6),
+    "k2": stats.lognorm(0.5, scale=0.03),
+    "N": stats.lognorm(0.25, scale=0.65),
+    "preload": stats.norm(0.5, 0.3),
+    "sensor_sd": stats.lognorm(0.4, scale=0.008),
+    "setting_sd": stats.lognorm(0.5, scale=0.03),
+}
 TRAINED = 8
 POLICY = Policy(walkers=64, round_draws=2048, ess=1500.0)
 

@@ -24,8 +24,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--experiment", default="roc-line-1.71m")
     experiment = select(experiments(), parser.parse_args().experiment)[0]
-    print(f"{experiment.name}: model, elpd as in a comparison (sampling where any Pareto k > {LARGEST_K}), "
-          "by fits without every hold, difference, largest difference of a hold, holds sampled")  # fmt: skip
+    print(
+        f"{experiment.name}: model, elpd as in a comparison (sampling where any Pareto k > {LARGEST_K}), "
+        "by fits without every hold, difference, largest difference of a hold, holds sampled"
+    )
     fast, exact = {}, {}
     known = catalogue()
     for candidate in candidates(experiment, ModelToCompare(BASE, "", ""), known, MODELS):
@@ -36,9 +38,12 @@ def main() -> None:
             smoothed_leave_one_hold_out(fitted, SEED + 1, exact=True),
         )
         fast[candidate.name], exact[candidate.name] = quick.total, slow.total
-        print(f"{candidate.name:22s} {quick.total:8.2f} {slow.total:8.2f} {quick.total - slow.total:+6.2f} "
-              f"{np.abs(quick.elpd - slow.elpd).max():6.2f}   {list(map(int, quick.hold[quick.refitted]))}"
-              + ("" if slow.converged and quick.converged else "  not converged"), flush=True)  # fmt: skip
+        print(
+            f"{candidate.name:22s} {quick.total:8.2f} {slow.total:8.2f} {quick.total - slow.total:+6.2f} "
+            f"{np.abs(quick.elpd - slow.elpd).max():6.2f}   {list(map(int, quick.hold[quick.refitted]))}"
+            + ("" if slow.converged and quick.converged else "  not converged"),
+            flush=True,
+        )
     rankings = [sorted(scores, key=lambda name: -scores[name]) for scores in (fast, exact)]
     print("same ranking" if rankings[0] == rankings[1] else f"rankings differ: {rankings[0]} and {rankings[1]}")
 

@@ -30,8 +30,9 @@ from wirebayes.planning.widths import at_centre, expected_widths
 from wirebayes.processes.workers import as_finished, processes
 from wirebayes.simulation.synthetic import Bench
 
-POLICY = Policy(ensembles=2, walkers=64, ess=600, rounds=3, most_rounds=5, round_draws=2048, block=32, most_steps=200,
-                r_hat=1.05)  # fmt: skip
+POLICY = Policy(
+    ensembles=2, walkers=64, ess=600, rounds=3, most_rounds=5, round_draws=2048, block=32, most_steps=200, r_hat=1.05
+)
 PROTOCOLS = {
     "paper": Bench("paper", displacements_mm=tuple(range(1, 13))),
     "short": Bench("short", length_mm=600.0, displacements_mm=(0.5, 1.5, 3, 4, 5), times_s=(0.0, 15.0, 40.0)),
@@ -46,11 +47,15 @@ CREEP = ("creep_longest_hold_mm", "creep_1h_mm")
 def guess(n: int, length_mm: float, rng: np.random.Generator) -> dict[str, Any]:
     """What somebody knows who has tested a similar line: 10 to 50 %."""
     about = {
-        "k1": stats.lognorm(0.3, scale=1500.0), "B": stats.lognorm(0.4, scale=3e-4 * length_mm),
-        "U": stats.lognorm(0.2, scale=0.6), "k2": stats.lognorm(0.4, scale=0.03), "N": stats.lognorm(0.15, scale=0.7),
-        "preload": stats.norm(0.5, 0.3), "sensor_sd": stats.lognorm(0.3, scale=0.008),
+        "k1": stats.lognorm(0.3, scale=1500.0),
+        "B": stats.lognorm(0.4, scale=3e-4 * length_mm),
+        "U": stats.lognorm(0.2, scale=0.6),
+        "k2": stats.lognorm(0.4, scale=0.03),
+        "N": stats.lognorm(0.15, scale=0.7),
+        "preload": stats.norm(0.5, 0.3),
+        "sensor_sd": stats.lognorm(0.3, scale=0.008),
         "setting_sd": stats.lognorm(0.4, scale=0.015),
-    }  # fmt: skip
+    }
     return {name: d.rvs(n, random_state=rng) for name, d in about.items()}
 
 
@@ -87,9 +92,12 @@ def compared(planned: ExpectedWidth, lengths: Array, sds: Array) -> dict[str, fl
     again = np.median(lengths[rng.integers(len(lengths), size=(2000, len(lengths)))], axis=1)
     ratio = planned["width_90"] / np.median(lengths)
     return {
-        "planned": planned["width_90"], "fits": float(np.median(lengths)), "ratio": float(ratio),
-        "se": float(ratio * again.std() / np.median(lengths)), "ratio_of_sds": float(planned["sd"] / np.median(sds)),
-    }  # fmt: skip
+        "planned": planned["width_90"],
+        "fits": float(np.median(lengths)),
+        "ratio": float(ratio),
+        "se": float(ratio * again.std() / np.median(lengths)),
+        "ratio_of_sds": float(planned["sd"] / np.median(sds)),
+    }
 
 
 def main() -> int:

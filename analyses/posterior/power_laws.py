@@ -77,10 +77,15 @@ class Test:
         hold = np.repeat(number, len(time))
         stretch, tension = (hold, read) if not self.creep else (read, hold)
         return from_arrays(
-            hold, STRAIN * self.length_mm * stretch, np.tile(self.hold_s * time, self.holds), self.step_N * tension,
-            length_mm=self.length_mm, name=self.name, material=self.name,
+            hold,
+            STRAIN * self.length_mm * stretch,
+            np.tile(self.hold_s * time, self.holds),
+            self.step_N * tension,
+            length_mm=self.length_mm,
+            name=self.name,
+            material=self.name,
             control="force" if self.creep else "displacement",
-        )  # fmt: skip
+        )
 
 
 TESTS = (

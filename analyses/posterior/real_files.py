@@ -118,9 +118,11 @@ def study(test: Experiment) -> dict[str, Any]:
     early = time <= FIRST * hold.duration_s
     first = by_least_squares(time[early], tension[early], test.length_mm, stretched)
     part = replace(
-        hold, time_s=frozen(time[early].tolist()), readings=frozen(tension[early].tolist()),
+        hold,
+        time_s=frozen(time[early].tolist()),
+        readings=frozen(tension[early].tolist()),
         duration_s=float(time[early][-1]),
-    )  # fmt: skip
+    )
     of_part = fitted(known_preload(replace(test, holds=(part,)), preload=False))
     drawn = predicted(of_part, test, time[~early])
     whole = {

@@ -71,9 +71,12 @@ def main() -> None:
                 of = partial(run, wire=wire, effect=effect, likelihood=likelihood, ess=options.ess)
                 converged, means, tails, apart = agreement(list(parallel_map(of, seeds)))
                 both = (f"{np.sqrt((r**2).mean()):.2f} {r.max():.2f}" for r in (means, tails))
-                print(f"{experiments()[wire].name:15s} {effect or 'plain':24s} {likelihood:5s}  "
-                      f"{converged} of {len(seeds)} converged  means {next(both)}  tails {next(both)}  "
-                      f"apart {apart:.3f}", flush=True)  # fmt: skip
+                print(
+                    f"{experiments()[wire].name:15s} {effect or 'plain':24s} {likelihood:5s}  "
+                    f"{converged} of {len(seeds)} converged  means {next(both)}  tails {next(both)}  "
+                    f"apart {apart:.3f}",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -31,16 +31,22 @@ def interval(values: np.ndarray) -> str:
 def joined(parts: Sequence[LeftOutHolds]) -> LeftOutHolds:
     """Separate fits as one model of all holds."""
     return LeftOutHolds(
-        sum((p.sample for p in parts), ()), np.concatenate([p.hold for p in parts]),
-        np.concatenate([p.elpd for p in parts]), np.concatenate([p.pareto_k for p in parts]),
-        np.concatenate([p.refitted for p in parts]), all(p.converged for p in parts),
-    )  # fmt: skip
+        sum((p.sample for p in parts), ()),
+        np.concatenate([p.hold for p in parts]),
+        np.concatenate([p.elpd for p in parts]),
+        np.concatenate([p.pareto_k for p in parts]),
+        np.concatenate([p.refitted for p in parts]),
+        all(p.converged for p in parts),
+    )
 
 
 def fitted(problem: Problem, name: str) -> Fit:
     result = fit_problem(problem, seed_of(SEED, "together", name))
-    print(f"{name}: {len(problem.names)} parameters, {'converged' if result.chains.converged else 'NOT CONVERGED'} "
-          f"{result.chains.why}", flush=True)  # fmt: skip
+    print(
+        f"{name}: {len(problem.names)} parameters, {'converged' if result.chains.converged else 'NOT CONVERGED'} "
+        f"{result.chains.why}",
+        flush=True,
+    )
     return result
 
 
@@ -77,8 +83,10 @@ def main() -> None:
     base = models["separate"].elpd
     for name, left in models.items():
         gained = left.elpd - base
-        print(f"{name:45s} {left.total:8.1f}  {gained.sum():+7.1f} ± {np.sqrt(len(gained) * gained.var(ddof=1)):.1f}"
-              + ("" if left.converged else "  a refit did not converge"))  # fmt: skip
+        print(
+            f"{name:45s} {left.total:8.1f}  {gained.sum():+7.1f} ± {np.sqrt(len(gained) * gained.var(ddof=1)):.1f}"
+            + ("" if left.converged else "  a refit did not converge")
+        )
     print("\nwhat the data determine, both samples together")
     for found in identifiability(together).values():
         print(f"  {found['sentence']}")

@@ -31,7 +31,7 @@ OTHERS = (
     Readme("lmfit", 143, None, None, "fe389bbb, 2026-08-03"),
     Readme("emcee", 57, None, None, "8ab6c0f, 2026-03-15"),
     Readme("ArviZ", 133, 67, None, "dbd191cf, 2026-08-17"),
-)  # fmt: skip
+)
 
 
 def ours() -> Readme:

@@ -82,8 +82,16 @@ def case(index: int) -> dict[str, Any]:
         for i, true in enumerate(true_drift_mm(robot, rig)):
             band = np.nanquantile(distance[:, i], [0.05, 0.5, 0.95]).tolist()
             rank = float(np.mean(distance[np.isfinite(distance[:, i]), i] < true))
-            figures.append({"robot": name, "time_s": TIMES_S[i], "truth_mm": true, "band_mm": band, "rank": rank,
-                            "held": float(np.isfinite(distance[:, i]).mean())})  # fmt: skip
+            figures.append(
+                {
+                    "robot": name,
+                    "time_s": TIMES_S[i],
+                    "truth_mm": true,
+                    "band_mm": band,
+                    "rank": rank,
+                    "held": float(np.isfinite(distance[:, i]).mean()),
+                }
+            )
     parameters = summary["parameters"]
     return {
         "index": index,
@@ -122,12 +130,16 @@ def table(records: Sequence[dict[str, Any]]) -> str:
         own = [[f for f in r["figures"] if (f["time_s"] <= r["longest_hold_s"]) == tested] for r in records]
         lines.append(f"{label:24} {coverage(own)}")
     widths = [(f["band_mm"][2] - f["band_mm"][0]) / f["band_mm"][1] for fs in whole for f in fs]
-    lines.append(f"width of a band by its median: {np.median(widths):.3g} (5 to 95 %: "
-                 f"{np.quantile(widths, 0.05):.3g} to {np.quantile(widths, 0.95):.3g})")  # fmt: skip
+    lines.append(
+        f"width of a band by its median: {np.median(widths):.3g} (5 to 95 %: "
+        f"{np.quantile(widths, 0.05):.3g} to {np.quantile(widths, 0.95):.3g})"
+    )
     away, r_hat = sum(not r["converged"] for r in records), max(r["r_hat"] for r in records)
     fewest, spent = min(r["ess"] for r in records), np.median([r["all_s"] for r in records])
-    lines.append(f"fits not converged: {away}, largest R-hat {r_hat:.4f}, fewest effective draws {fewest:.0f}, "
-                 f"{spent:.0f} s a wire")  # fmt: skip
+    lines.append(
+        f"fits not converged: {away}, largest R-hat {r_hat:.4f}, fewest effective draws {fewest:.0f}, "
+        f"{spent:.0f} s a wire"
+    )
     return "\n".join(lines)
 
 

@@ -28,10 +28,15 @@ POSES, CANDIDATES, TESTS = 10, 200, 6
 def stand_in(rng, n=1000):
     """Round numbers near a Roc line's posterior, for when no fit is given."""
     return draws.WireDraws(
-        {"k1": 803 * np.exp(0.01 * rng.normal(size=n)), "B": 0.31 * np.exp(0.1 * rng.normal(size=n)),
-         "U": rng.normal(1, 0.05, n), "k2": 0.03 * np.exp(0.05 * rng.normal(size=n)), "N": rng.normal(0.64, 0.02, n)},
+        {
+            "k1": 803 * np.exp(0.01 * rng.normal(size=n)),
+            "B": 0.31 * np.exp(0.1 * rng.normal(size=n)),
+            "U": rng.normal(1, 0.05, n),
+            "k2": 0.03 * np.exp(0.05 * rng.normal(size=n)),
+            "N": rng.normal(0.64, 0.02, n),
+        },
         1000.0,
-    )  # fmt: skip
+    )
 
 
 def plan(robot, line, rng):
@@ -50,10 +55,13 @@ def plan(robot, line, rng):
 
     def session(chosen):
         return Session(
-            np.concatenate([home[0], x[chosen]]), np.concatenate([home[1], R[chosen]]),
-            np.concatenate([first, commands.joint_m[chosen]]), np.array([600.0] + [30.0] * POSES),
-            np.array([False] + [True] * POSES), TENSION_SD_N,
-        )  # fmt: skip
+            np.concatenate([home[0], x[chosen]]),
+            np.concatenate([home[1], R[chosen]]),
+            np.concatenate([first, commands.joint_m[chosen]]),
+            np.array([600.0] + [30.0] * POSES),
+            np.array([False] + [True] * POSES),
+            TENSION_SD_N,
+        )
 
     chosen = observability.observe(change[pick], TENSION_SD_N, REFERENCE_SD_M)
     random = observability.observe(change[:POSES], TENSION_SD_N, REFERENCE_SD_M)
@@ -87,8 +95,10 @@ def study(name, line, count, rng):
     real = predict_session(robot, prior, session, truth, longest_step=0.35)
     readings = np.maximum(real.readings + rng.normal(size=real.readings.shape), 0.0)
     print(f"  readings of slack wires: {(real.readings == 0).mean():.3f} of all")
-    results = {"creep model": (prior, length_posterior(robot, prior, session, readings)),
-               "Hooke only": (hooke, length_posterior(robot, hooke, session, readings))}  # fmt: skip
+    results = {
+        "creep model": (prior, length_posterior(robot, prior, session, readings)),
+        "Hooke only": (hooke, length_posterior(robot, hooke, session, readings)),
+    }
     for label, (_, known) in results.items():
         low, high = known.interval(0.9)
         inside = ((low <= real.length_m) & (real.length_m <= high)).mean(1)

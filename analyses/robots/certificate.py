@@ -77,8 +77,10 @@ def enclosures(folder):
         )
         own = proofs.enclosed(robot, wires, course, x, R)["band"]
         if own["low_mm"] is not None and own["high_mm"] is not None:
-            print(f"  {'':14s} each on its own: {np.array([own['low_mm'][2], own['high_mm'][2]]).round(3)}, "
-                  f"share {own['share']:g}")  # fmt: skip
+            print(
+                f"  {'':14s} each on its own: {np.array([own['low_mm'][2], own['high_mm'][2]]).round(3)}, "
+                f"share {own['share']:g}"
+            )
 
 
 if __name__ == "__main__":

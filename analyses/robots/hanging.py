@@ -61,8 +61,17 @@ def compared(robot, k1, rng):
     R = found.rotation[0]
     start = robot.home_m + 0.01 * robot.size_m * rng.standard_normal(3)
     turn = Rotation.from_rotvec(0.01 * rng.standard_normal(3)).as_matrix() @ R
-    x, turned, tension = lowest_energy(robot.exit_m, robot.platform_m, robot.centre_of_mass_m, robot.mass_kg,
-                                       np.full(legs, k1), zero, start, turn, minimize)  # fmt: skip
+    x, turned, tension = lowest_energy(
+        robot.exit_m,
+        robot.platform_m,
+        robot.centre_of_mass_m,
+        robot.mass_kg,
+        np.full(legs, k1),
+        zero,
+        start,
+        turn,
+        minimize,
+    )
     size = robot.span_m
     angle = Rotation.from_matrix(turned @ R.T).magnitude()
     return (
@@ -107,9 +116,13 @@ def lowest_energy(exits, points, centre, mass, k1, zero, start, turn, minimise):
 
     # by trust regions: it only goes down, however stiff the wires
     found = minimise(
-        lambda q: energy(q)[0], np.zeros(6), jac=slope, hess=curvature, method="trust-exact",
+        lambda q: energy(q)[0],
+        np.zeros(6),
+        jac=slope,
+        hess=curvature,
+        method="trust-exact",
         options={"gtol": 1e-6 * mass * G, "maxiter": 3000, "initial_trust_radius": 1e-3 * edge},
-    )  # fmt: skip
+    )
     q = found.x
     for _ in range(4):  # to rounding
         q = q - np.linalg.solve(curvature(q), slope(q))

@@ -79,8 +79,11 @@ def case(name: str, index: int, draws: int) -> dict[str, Any]:
     for key in ("joints", "readings"):
         read = moves
         if key == "readings":
-            read = replace(moves, tension_N=tau + errors_of(kind, ERRORS.tension_N, tau.shape, rng),
-                           tilt_rad=turn + errors_of(kind, ERRORS.tilt_rad, turn.shape, rng))  # fmt: skip
+            read = replace(
+                moves,
+                tension_N=tau + errors_of(kind, ERRORS.tension_N, tau.shape, rng),
+                tilt_rad=turn + errors_of(kind, ERRORS.tilt_rad, turn.shape, rng),
+            )
         found = estimate_poses(robot, known, read, start, ERRORS, np.random.default_rng(seed))
         seen = found.track.position_m
         low, high = np.nanquantile(seen, [0.05, 0.95], axis=0, method="weibull")

@@ -65,8 +65,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("fit", type=Path)
     line = read_wires(parser.parse_args().fit, 1000)
-    head = ["robot", "pulley radius, mm", "length, before zeroing", "length, after zeroing", "position, mm",
-            "poses with a slack wire", "creep in a minute, mm", "creep in an hour, mm"]  # fmt: skip
+    head = [
+        "robot",
+        "pulley radius, mm",
+        "length, before zeroing",
+        "length, after zeroing",
+        "position, mm",
+        "poses with a slack wire",
+        "creep in a minute, mm",
+        "creep in an hour, mm",
+    ]
     print(".. list-table::\n   :header-rows: 1\n   :widths: 16 10 16 18 16 12 10 10\n")
     rows = [head]
     for name in ROBOTS:
@@ -75,12 +83,17 @@ def main():
         drift = creep(robot, line)
         for radius in RADII_M:
             raw, change, share, off, slack = ignored(robot, wires, radius)
-            rows.append([
-                name, f"{1e3 * radius:g}", f"{100 * np.median(raw):.2g} to {100 * raw.max():.2g} %",
-                f"{1e3 * np.median(change):.2g} mm, to {100 * share.max():.2g} %",
-                f"{np.nanmedian(off):.2g}, to {np.nanmax(off):.2g}", f"{100 * slack:.0f} %",
-                *(f"{value:.2g}" for value in drift),
-            ])  # fmt: skip
+            rows.append(
+                [
+                    name,
+                    f"{1e3 * radius:g}",
+                    f"{100 * np.median(raw):.2g} to {100 * raw.max():.2g} %",
+                    f"{1e3 * np.median(change):.2g} mm, to {100 * share.max():.2g} %",
+                    f"{np.nanmedian(off):.2g}, to {np.nanmax(off):.2g}",
+                    f"{100 * slack:.0f} %",
+                    *(f"{value:.2g}" for value in drift),
+                ]
+            )
     for row in rows:
         print("   * - " + "\n     - ".join(row))
 

@@ -81,8 +81,11 @@ def speed():
     rng = np.random.default_rng(0)
     for name in ("cogiro-desk", "segesta-8", "ipanema-1", "linear-6", "linear-7"):
         robot = schema.read_robot_file(name)
-        line = draws.WireDraws({"k1": rng.normal(800 * max(1, robot.mass_kg), 20, SOLVES)} | {
-            k: np.ones(SOLVES) for k in ("B", "U", "k2", "N")}, 1000.0)  # fmt: skip
+        line = draws.WireDraws(
+            {"k1": rng.normal(800 * max(1, robot.mass_kg), 20, SOLVES)}
+            | {k: np.ones(SOLVES) for k in ("B", "U", "k2", "N")},
+            1000.0,
+        )
         wires = draws.for_robot(robot, line)
         x, R = robot.home_m[None], np.eye(3)[None]
         commands = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
@@ -114,8 +117,16 @@ def large():
     robot = schema.read_robot_file("cogiro-desk")
     rng = np.random.default_rng(1)
     n = 10_000
-    line = draws.WireDraws({"k1": rng.normal(800, 20, n), "B": rng.normal(0.3, 0.03, n), "U": rng.normal(1, 0.03, n),
-                            "k2": rng.normal(0.03, 0.002, n), "N": rng.normal(0.64, 0.02, n)}, 1000.0)  # fmt: skip
+    line = draws.WireDraws(
+        {
+            "k1": rng.normal(800, 20, n),
+            "B": rng.normal(0.3, 0.03, n),
+            "U": rng.normal(1, 0.03, n),
+            "k2": rng.normal(0.03, 0.002, n),
+            "N": rng.normal(0.64, 0.02, n),
+        },
+        1000.0,
+    )
     wires = draws.for_robot(robot, line, 0.05, rng)
     began = time.perf_counter()
     course = drift.from_command(robot, wires, robot.home_m, np.eye(3), np.geomspace(5, 3600, 20))

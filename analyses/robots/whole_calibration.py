@@ -116,8 +116,16 @@ def case(
     told = Unknowns(robot, prior, StatedErrors(exit_m=anchor * span, pose_m=pose_sd))
     read = log.joint_m + span * encoder * rng.normal(size=log.joint_m.shape)
     log = replace(log, position_m=position, rotation=turn, joint_m=read, read=np.full(stops, tensions))
-    return Case(told, equations.Holds(log, tension), true.exit_m, values[0, : robot.legs], real.length_m[0],
-                real.position_m[0], real.rotation[0], pull_N)  # fmt: skip
+    return Case(
+        told,
+        equations.Holds(log, tension),
+        true.exit_m,
+        values[0, : robot.legs],
+        real.length_m[0],
+        real.position_m[0],
+        real.rotation[0],
+        pull_N,
+    )
 
 
 def visited(
@@ -201,8 +209,10 @@ def coverage(size: int, seed: int) -> Iterator[dict[str, Any]]:
 
 def coverage_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Shares of 90 % intervals that hold the truth."""
-    shares = {name: _shares([r for r in rows if name in (r["mode"], r["kind"], "all")])
-              for name in ("all", *MODES, *drawn.KINDS)}  # fmt: skip
+    shares = {
+        name: _shares([r for r in rows if name in (r["mode"], r["kind"], "all")])
+        for name in ("all", *MODES, *drawn.KINDS)
+    }
     return {"median_seconds_each": float(np.median([r["seconds"] for r in rows])), "shares": shares}
 
 
@@ -246,10 +256,16 @@ def exact(size: int, seed: int) -> Iterator[dict[str, Any]]:
                 ).content
             power = _power(one, errors, _unplaced(log) if asked.stops == FEW else log) if asked.anchor else 0.0
         yield {
-            "kind": asked.kind, "mode": asked.mode, "anchor": asked.anchor, "encoder": asked.encoder, "power": power,
-            "usable": bool(found["usable"]), "converged": bool(found["with_creep_model"]["converged"]),
-            "p": float(found["with_creep_model"]["p_joint"]), "seconds": time.process_time() - begun,
-        }  # fmt: skip
+            "kind": asked.kind,
+            "mode": asked.mode,
+            "anchor": asked.anchor,
+            "encoder": asked.encoder,
+            "power": power,
+            "usable": bool(found["usable"]),
+            "converged": bool(found["with_creep_model"]["converged"]),
+            "p": float(found["with_creep_model"]["p_joint"]),
+            "seconds": time.process_time() - begun,
+        }
 
 
 def _unplaced(log: session.Session) -> session.Session:
@@ -271,8 +287,13 @@ def _power(one: Case, errors: StatedErrors, log: session.Session) -> float:
     state = equations.State(white, one.position_m, one.rotation, one.pull_N)
     holds = replace(one.holds, session=log)
     creep = holds_creep.creep_of(free, holds, state)
-    noise = equations.Noise(max(errors.joint_m or 0.0, equations.EXACT * one.told.robot.span_m),
-                            equations.FRICTIONLESS, 1.0, 0.0, 1e-3 * one.told.robot.rule.lowest_N)  # fmt: skip
+    noise = equations.Noise(
+        max(errors.joint_m or 0.0, equations.EXACT * one.told.robot.span_m),
+        equations.FRICTIONLESS,
+        1.0,
+        0.0,
+        1e-3 * one.told.robot.rule.lowest_N,
+    )
     e = equations.linearised(free, holds, noise, state, creep, state)
     covariance = np.linalg.inv(descent.eliminated(e, white, 0.0).matrix)
     at = free.slices["exit"]
@@ -308,10 +329,13 @@ def lengths(size: int, seed: int) -> Iterator[dict[str, Any]]:
         s = summarised(found)
         after, before = _between(s.exit_m.mean, one.exit_m), _between(one.told.robot.exit_m, one.exit_m)
         yield {
-            "kind": asked.kind, "usable": bool(_verdict(found)), "seconds": time.process_time() - begun,
+            "kind": asked.kind,
+            "usable": bool(_verdict(found)),
+            "seconds": time.process_time() - begun,
             "worst_sd": float((np.abs(s.exit_m.mean - one.exit_m) / s.exit_m.sd).max()),
-            "sharper": after / before, "sd_over_before": float(np.median(s.exit_m.sd) / one.told.errors.exit_m),
-        }  # fmt: skip
+            "sharper": after / before,
+            "sd_over_before": float(np.median(s.exit_m.sd) / one.told.errors.exit_m),
+        }
 
 
 def lengths_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -339,9 +363,13 @@ def marks(size: int, seed: int) -> Iterator[dict[str, Any]]:
         with np.errstate(all="ignore"):
             found = best(one.told, one.holds, rng)
         yield {
-            "kind": asked.kind, "mode": asked.mode, "seconds": time.process_time() - begun,
-            "converged": bool(found.converged), "usable": bool(_verdict(found)), **_held(found, one),
-        }  # fmt: skip
+            "kind": asked.kind,
+            "mode": asked.mode,
+            "seconds": time.process_time() - begun,
+            "converged": bool(found.converged),
+            "usable": bool(_verdict(found)),
+            **_held(found, one),
+        }
 
 
 def sensors(size: int, seed: int) -> Iterator[dict[str, Any]]:
@@ -365,9 +393,12 @@ def sensors(size: int, seed: int) -> Iterator[dict[str, Any]]:
             ).content
         said = found["sensors_at_fault"]
         yield {
-            "kind": asked.kind, "bad": (np.flatnonzero(off) + 1).tolist(), "usable": bool(found["usable"]),
-            "named": said["wires"] if said else [], "seconds": time.process_time() - begun,
-        }  # fmt: skip
+            "kind": asked.kind,
+            "bad": (np.flatnonzero(off) + 1).tolist(),
+            "usable": bool(found["usable"]),
+            "named": said["wires"] if said else [],
+            "seconds": time.process_time() - begun,
+        }
 
 
 def sensors_of(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -69,8 +69,11 @@ def main() -> None:
                 z, log_density = drawn(other)
                 z = middle + np.linalg.solve(its_factor, (z - its_middle).T).T @ factor.T
                 others.append(share(target(z) - log_density))  # the map's determinant is a constant
-        print(f"{experiments[j].name:8s} own {' '.join(f'{s:.2f}' for s in own)}   others' "
-              f"{min(others):.2f} to {max(others):.2f}, median {np.median(others):.2f}", flush=True)  # fmt: skip
+        print(
+            f"{experiments[j].name:8s} own {' '.join(f'{s:.2f}' for s in own)}   others' "
+            f"{min(others):.2f} to {max(others):.2f}, median {np.median(others):.2f}",
+            flush=True,
+        )
         first.append(own[0])
         frozen.append(own[-1])
         carried += others

@@ -25,9 +25,12 @@ def cost_of(wire: int, model: str) -> dict[str, Any]:
     candidate = next(c for c in known(wire) if c.name == model)
     begin = time.process_time()
     found = judge(Task(experiments()[wire], candidate), 0)
-    return {"cpu_s": time.process_time() - begin, "elpd": found["leave_one_hold_out"]["elpd"],
-            "per_hold": [float(x) for x in found["leave_one_hold_out"]["per_hold"]],
-            "converged": bool(found["converged"])}  # fmt: skip
+    return {
+        "cpu_s": time.process_time() - begin,
+        "elpd": found["leave_one_hold_out"]["elpd"],
+        "per_hold": [float(x) for x in found["leave_one_hold_out"]["per_hold"]],
+        "converged": bool(found["converged"]),
+    }
 
 
 def known(wire: int) -> list[Any]:
@@ -64,13 +67,21 @@ def compared(wire: int, models: list[str] | None, against: Path) -> None:
         new, old = (answered(__file__, given, tree) for tree in (Path(__file__).parents[2], against))
         both.append((new, old))
         apart = np.abs(np.subtract(new["per_hold"], old["per_hold"])).max()
-        print(wire, f"{model:24}", *(f"{r['cpu_s']:6.1f} s  elpd {r['elpd']:7.2f}{' ' if r['converged'] else '!'}"
-              for r in (new, old)), f"a hold differs by {apart:.2f}", f"ratio {old['cpu_s'] / new['cpu_s']:.1f}",
-              sep="  ", flush=True)  # fmt: skip
+        print(
+            wire,
+            f"{model:24}",
+            *(f"{r['cpu_s']:6.1f} s  elpd {r['elpd']:7.2f}{' ' if r['converged'] else '!'}" for r in (new, old)),
+            f"a hold differs by {apart:.2f}",
+            f"ratio {old['cpu_s'] / new['cpu_s']:.1f}",
+            sep="  ",
+            flush=True,
+        )
     new_s, old_s = np.array([[r["cpu_s"] for r in pair] for pair in both]).T
-    print(f"{wire}: {len(both)} models in {new_s.sum():.0f} s and {old_s.sum():.0f} s: ratio "
-          f"{old_s.sum() / new_s.sum():.2f}; of a model {np.median(old_s / new_s):.1f} in the median, "
-          f"{(old_s / new_s).min():.1f} to {(old_s / new_s).max():.1f}")  # fmt: skip
+    print(
+        f"{wire}: {len(both)} models in {new_s.sum():.0f} s and {old_s.sum():.0f} s: ratio "
+        f"{old_s.sum() / new_s.sum():.2f}; of a model {np.median(old_s / new_s):.1f} in the median, "
+        f"{(old_s / new_s).min():.1f} to {(old_s / new_s).max():.1f}"
+    )
 
 
 if __name__ == "__main__":

@@ -65,10 +65,17 @@ def compared(cases: Mapping[str, tuple[str, int]], against: Path, simulations: i
         new, old = (answered(__file__, given, tree) for tree in (Path(__file__).parents[2], against))
         ratios.append(old["cpu_s"] / new["cpu_s"])
         same += (new["verdict"], set(new["effects"])) == (old["verdict"], set(old["effects"]))
-        print(name, *(f"{r['cpu_s']:6.1f} s  p = {r['p']:.3g} {r['verdict']} {r['effects']}" for r in (new, old)),
-              f"ratio {ratios[-1]:.2f}", sep="  ", flush=True)  # fmt: skip
-    print(f"{len(ratios)} cases: ratio {np.median(ratios):.2f} in the median, {min(ratios):.2f} to {max(ratios):.2f}; "
-          f"verdict and effects the same in {same}")  # fmt: skip
+        print(
+            name,
+            *(f"{r['cpu_s']:6.1f} s  p = {r['p']:.3g} {r['verdict']} {r['effects']}" for r in (new, old)),
+            f"ratio {ratios[-1]:.2f}",
+            sep="  ",
+            flush=True,
+        )
+    print(
+        f"{len(ratios)} cases: ratio {np.median(ratios):.2f} in the median, {min(ratios):.2f} to {max(ratios):.2f}; "
+        f"verdict and effects the same in {same}"
+    )
 
 
 if __name__ == "__main__":

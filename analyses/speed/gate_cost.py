@@ -60,8 +60,13 @@ def cost_of(case: str, seed: int, simulations: int) -> dict[str, Any]:
     gate = examine(blocks, CATALOGUE, simulations, rng)
     cpu = time.process_time() - begin
     surprises = gate.test.surprises
-    return {"cpu_s": cpu, "p": gate.test.p, "first": max(surprises, key=lambda n: surprises[n]),
-            "simulations": len(gate.test.null), "surprises": surprises}  # fmt: skip
+    return {
+        "cpu_s": cpu,
+        "p": gate.test.p,
+        "first": max(surprises, key=lambda n: surprises[n]),
+        "simulations": len(gate.test.null),
+        "surprises": surprises,
+    }
 
 
 def main() -> None:
@@ -105,8 +110,10 @@ def compared(cases: Mapping[str, tuple[str, int]], options: argparse.Namespace) 
         ratios = np.array([old["cpu_s"] / new["cpu_s"] for new, old in records])
         total = sum(old["cpu_s"] for _, old in records) / sum(new["cpu_s"] for new, _ in records)
         same = sum(new["p"] == old["p"] for new, old in records)
-        print(f"{len(records)} cases: ratio of processor times {np.median(ratios):.2f} in the median, "
-              f"{ratios.min():.2f} at worst, {total:.2f} in all; p the same in {same}")  # fmt: skip
+        print(
+            f"{len(records)} cases: ratio of processor times {np.median(ratios):.2f} in the median, "
+            f"{ratios.min():.2f} at worst, {total:.2f} in all; p the same in {same}"
+        )
 
 
 if __name__ == "__main__":

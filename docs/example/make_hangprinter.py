@@ -19,9 +19,7 @@ from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
 HERE = Path(__file__).parent
-LINE = {
-    "k1": 5000, "B": 0.03, "U": 0.9, "k2": 0.03, "N": 0.6, "preload": 0.3, "sensor_sd": 0.02, "setting_sd": 0.005
-}  # fmt: skip
+LINE = {"k1": 5000, "B": 0.03, "U": 0.9, "k2": 0.03, "N": 0.6, "preload": 0.3, "sensor_sd": 0.02, "setting_sd": 0.005}
 CONFIG = """; config.g of RepRapFirmware: a Hangprinter, its anchors by tape measure
 M669 K6 A0:-1620:-130 B1310:1270:-120 C-1410:710:-120 D0:0:2300 ; anchors, mm
 M666 U2:2:2:4                       ; mechanical advantages
@@ -76,8 +74,12 @@ def main() -> None:
     tension = real.readings[0].reshape(count, told.legs)
     torque = np.maximum(tension + TORQUE_N * rng.normal(size=tension.shape), 0.0)
     axes = range(1, told.legs + 1)
-    rows = ["hold,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad,duration_s," + ",".join(f"straight_{i}_mm" for i in axes) + ","
-            + ",".join(f"tension_{i}_N" for i in axes)]  # fmt: skip
+    rows = [
+        "hold,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad,duration_s,"
+        + ",".join(f"straight_{i}_mm" for i in axes)
+        + ","
+        + ",".join(f"tension_{i}_N" for i in axes)
+    ]
     for k in range(count):
         pose = [f"{v:.4f}" for v in read[k]] + ["0"] * 3 if k < len(marks) else [""] * 6
         lengths_mm, tensions_N = [f"{v:.2f}" for v in straight[k]], [f"{v:.1f}" for v in torque[k]]

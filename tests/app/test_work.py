@@ -92,15 +92,17 @@ def test_what_a_file_leaves_open_is_asked_all_at_once_and_the_answers_settle_it(
     job = ended(jobs.start(test, READ, SAMPLE))
     assert job.state == "undecided"
     assert [question["question"] for question in job.value] == [
-        "which column is the displacement", "which column is the time",
-    ]  # fmt: skip
+        "which column is the displacement",
+        "which column is the time",
+    ]
     assert str(shelf.root) not in job.value[0]["found"]
     columns = ["--map Kanal 1=displacement", "--map Kanal 2=time"]
     assert [columns[i] in question["answers"] for i, question in enumerate(job.value)] == [True, True]
     job = ended(jobs.start(test, READ, SAMPLE | {"options": columns}))
     assert job.state == "undecided" and {q["question"] for q in job.value} == {
-        "the unit of displacement", "the unit of time",
-    }  # fmt: skip
+        "the unit of displacement",
+        "the unit of time",
+    }
     units = ["--map Kanal 1=displacement [mm]", "--map Kanal 2=time [s]"]
     assert ended(jobs.start(test, READ, SAMPLE | {"options": [*columns, *units]})).state == "done"
 

@@ -42,7 +42,7 @@ FAULTS = """(() => {
   const burst = [...document.querySelectorAll("td, th")].filter(
     e => shown(e) && e.scrollWidth > e.clientWidth + 1).map(named);
   return {burst, scroll: document.documentElement.scrollWidth, wide, lost, over, cut, small};
-})()"""  # fmt: skip
+})()"""
 
 pytestmark = [
     pytest.mark.browser,
@@ -138,9 +138,12 @@ def poses_over_time(folder: Path, wires) -> None:
 
 
 WAY = {
-    "time_s": [0, 60, 600, 660, 3600], "x_m": [0, 0.1, 0.1, -0.1, -0.1], "y_m": [0, 0, 0, 0.05, 0.05],
-    "z_m": [0.6, 0.6, 0.6, 0.65, 0.65], "payload_kg": [0, 0.2, 0.2, 0, 0],
-}  # fmt: skip
+    "time_s": [0, 60, 600, 660, 3600],
+    "x_m": [0, 0.1, 0.1, -0.1, -0.1],
+    "y_m": [0, 0, 0, 0.05, 0.05],
+    "z_m": [0.6, 0.6, 0.6, 0.65, 0.65],
+    "payload_kg": [0, 0.2, 0.2, 0, 0],
+}
 KINDS = (
     "reproduce", "batch", "calibrate", "check", "compare", "discover", "export", "fit", "import", "plan", "pose",
     "pose-joints", "pose-trajectory", "predict", "simulate",

@@ -63,7 +63,10 @@ COMMANDS: dict[str, Callable[[Any, Path], Result[Any]]] = {
     "pose": lambda fitted, out: wb.pose("linear-7", fitted, draws=20, times=[0, 60], output=out),
     "unheld": lambda fitted, out: wb.pose("linear-7", fitted, draws=20, position=[3, 3, 0.6], output=out),
     "trajectory": lambda fitted, out: wb.pose(
-        "linear-7", fitted, draws=8, output=out,
+        "linear-7",
+        fitted,
+        draws=8,
+        output=out,
         trajectory={"time_s": [0, 9000], "x_m": [0, 0], "y_m": [0, 0], "z_m": [0.6, 0.6]},
     ),
     "calibrate": lambda fitted, out: wb.calibrate(
@@ -71,12 +74,20 @@ COMMANDS: dict[str, Callable[[Any, Path], Result[Any]]] = {
     ),
     "export": lambda fitted, out: wb.export("linear-7", fitted, draws=20, output=out),
     "simulate": lambda fitted, out: wb.simulate_tests(displacements=[1, 2, 3], seed=1, output=out),
-}  # fmt: skip
+}
 WARNED = {  # what must be warned of, so that an empty list is no answer
-    "fit": "not-converged", "check": "data", "discover": "data", "compare": "data", "batch": "data", "plan": "budget",
-    "pose": "not-converged", "unheld": "unheld", "trajectory": "not-converged", "calibrate": "not-converged",
+    "fit": "not-converged",
+    "check": "data",
+    "discover": "data",
+    "compare": "data",
+    "batch": "data",
+    "plan": "budget",
+    "pose": "not-converged",
+    "unheld": "unheld",
+    "trajectory": "not-converged",
+    "calibrate": "not-converged",
     "export": "left-out",
-}  # fmt: skip
+}
 
 
 def flat(text: str) -> str:

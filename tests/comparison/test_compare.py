@@ -46,9 +46,14 @@ def test_stacking_maximises_the_log_score_of_the_mixture() -> None:
 
 def row(name: str, elpd: list[float], **more: object) -> dict[str, object]:
     return {
-        "name": name, "scored": "all readings", "failed": None, "converged": True, "held_out": None, "warnings": [],
+        "name": name,
+        "scored": "all readings",
+        "failed": None,
+        "converged": True,
+        "held_out": None,
+        "warnings": [],
         "leave_one_hold_out": {"per_hold": elpd, "elpd": sum(elpd)},
-    } | more  # fmt: skip
+    } | more
 
 
 def test_differences_are_said_only_where_they_mean_something() -> None:
@@ -136,8 +141,17 @@ def test_every_candidate_differs_from_the_base_in_its_one_thing() -> None:
     everything = candidates(experiments()[0], PLAIN, CATALOGUE)
     names = [c.name for c in everything]
     assert len(set(names)) == len(names)
-    assert {"exponential", "logarithmic", "modified_hooke", "additive", "hold_by_hold", "independent_errors",
-            "unrecorded_skipped", "superposition", "grip_slip"} <= set(names)  # fmt: skip
+    assert {
+        "exponential",
+        "logarithmic",
+        "modified_hooke",
+        "additive",
+        "hold_by_hold",
+        "independent_errors",
+        "unrecorded_skipped",
+        "superposition",
+        "grip_slip",
+    } <= set(names)
     assert "unrecorded_skipped" not in [c.name for c in candidates(experiments()[1], PLAIN, CATALOGUE)]
     assert "lost_motion" not in names  # nothing turns back on this protocol
     for c in everything[1:]:

@@ -26,9 +26,14 @@ PLAIN = ModelToCompare(BASE, "", "")
 
 def row(name: str, elpd: list[float], **more: object) -> dict[str, object]:
     return {
-        "name": name, "scored": "all readings", "failed": None, "converged": True, "held_out": None, "warnings": [],
+        "name": name,
+        "scored": "all readings",
+        "failed": None,
+        "converged": True,
+        "held_out": None,
+        "warnings": [],
         "leave_one_hold_out": {"per_hold": elpd, "elpd": sum(elpd)},
-    } | more  # fmt: skip
+    } | more
 
 
 def twelve(gain: float, spread: float = 0.0) -> list[float]:
@@ -59,8 +64,11 @@ def test_a_difference_means_something_from_four_and_from_two_standard_errors_on(
 
 
 def held(free: list[float] | None, given: list[float]) -> dict[str, object]:
-    return {"trained_on": 8, "free": free and {"per_hold": free, "elpd": sum(free), "readings": {}, "pit_band": []},
-            "given_first": {"per_hold": given, "elpd": sum(given), "readings": {}, "pit_band": []}}  # fmt: skip
+    return {
+        "trained_on": 8,
+        "free": free and {"per_hold": free, "elpd": sum(free), "readings": {}, "pit_band": []},
+        "given_first": {"per_hold": given, "elpd": sum(given), "readings": {}, "pit_band": []},
+    }
 
 
 def test_held_out_differences_stand_beside_and_decide_where_models_are_scored_on_other_readings() -> None:
@@ -132,8 +140,15 @@ def test_the_last_third_is_predicted_from_a_posterior_of_the_others(
     def leave(full: object, seed: int) -> object:
         received.update(full=full.holds)  # type: ignore[attr-defined]
         nothing = np.zeros(2)
-        return SimpleNamespace(hold=np.array([1, 2]), total=3.0, se=1.0, elpd=nothing, pareto_k=nothing,
-                               refitted=np.array([False, True]), converged=False)  # fmt: skip
+        return SimpleNamespace(
+            hold=np.array([1, 2]),
+            total=3.0,
+            se=1.0,
+            elpd=nothing,
+            pareto_k=nothing,
+            refitted=np.array([False, True]),
+            converged=False,
+        )
 
     monkeypatch.setattr(compare, "weighted_posterior", weighted)
     monkeypatch.setattr(compare, "fit_problem", fit)
@@ -175,8 +190,17 @@ def test_a_law_of_time_constants_creeps_by_exponentials(name: str) -> None:
     experiment = experiments()[0]
     (law,) = (c for c in module.candidates(experiment, PLAIN, CATALOGUE) if c.name == name)
     problem = module.problem_of(law, experiment, module.effects_of(law, experiment, CATALOGUE, 0))
-    values = {"k1": 700.0, "B": 0.25, "U": 0.7, "k2": 0.05, "preload": 0.3, "sensor_sd": 0.01, "setting_sd": 0.01,
-              "two_modes.slow_share": 0.4, "two_modes.slower": 10.0}  # fmt: skip
+    values = {
+        "k1": 700.0,
+        "B": 0.25,
+        "U": 0.7,
+        "k2": 0.05,
+        "preload": 0.3,
+        "sensor_sd": 0.01,
+        "setting_sd": 0.01,
+        "two_modes.slow_share": 0.4,
+        "two_modes.slower": 10.0,
+    }
     theta = np.array([[values[parameter] for parameter in problem.names]])
     sample = problem.samples[0]
     tension, t = problem.linearised(theta, sample)[0].reading[0, :, 0], sample.protocol.time_s[0]
@@ -190,11 +214,20 @@ def test_a_law_of_time_constants_creeps_by_exponentials(name: str) -> None:
 def test_candidates_differ_from_the_base_as_their_sentences_say() -> None:
     """Every one but the effects of the catalogue: what is kept at a value, what acts, and which law is another."""
     fixed = {
-        "hooke_without_creep": {"B", "U", "k2", "N"}, "creep_at_once": {"k2", "N"}, "exponential": {"N"},
-        "logarithmic": {"k2", "N"}, "power_law": {"k2", "N"}, "two_modes": {"N"}, "independent_errors": {"setting_sd"},
-    }  # fmt: skip
-    acting = {"creep_at_once": ("at_once", "not_in_time"), "logarithmic": ("logarithmic",),
-              "power_law": ("power_law",), "two_modes": ("two_modes",)}  # fmt: skip
+        "hooke_without_creep": {"B", "U", "k2", "N"},
+        "creep_at_once": {"k2", "N"},
+        "exponential": {"N"},
+        "logarithmic": {"k2", "N"},
+        "power_law": {"k2", "N"},
+        "two_modes": {"N"},
+        "independent_errors": {"setting_sd"},
+    }
+    acting = {
+        "creep_at_once": ("at_once", "not_in_time"),
+        "logarithmic": ("logarithmic",),
+        "power_law": ("power_law",),
+        "two_modes": ("two_modes",),
+    }
     chosen = module.candidates(experiments()[0], PLAIN, {})
     assert [c.name for c in chosen] == [
         BASE, "hooke_without_creep", "creep_at_once", "exponential", "logarithmic", "power_law", "two_modes",
@@ -221,8 +254,9 @@ def test_of_another_base_the_laws_of_the_plain_model_are_candidates() -> None:
     chosen = {c.name: c for c in module.candidates(experiments()[1], base, {})}
     assert {"hooke", "saturating", "chain"} <= set(chosen) and len(chosen) == 10
     assert not {"modified_hooke", "additive", "hold_by_hold", "independent_errors", "unrecorded_skipped"} & set(chosen)
-    assert chosen["hooke"] == replace(base, name="hooke", spec=replace(base.spec, law="hooke"), question=module.LAW,
-                                      sentence=chosen["hooke"].sentence)  # fmt: skip
+    assert chosen["hooke"] == replace(
+        base, name="hooke", spec=replace(base.spec, law="hooke"), question=module.LAW, sentence=chosen["hooke"].sentence
+    )
     assert (chosen["saturating"].spec.history, chosen["chain"].spec.likelihood) == ("saturating", "chain")
     assert all(c.spec.law == "modified" for name, c in chosen.items() if name != "hooke")
 
@@ -271,10 +305,13 @@ def test_models_come_by_score_then_those_scored_otherwise_then_failures() -> Non
     later = "later readings given each hold's first"
     models = [
         {"name": "broken", "failed": "no", "scored": "all readings", "warnings": []},
-        row("low", [1.0, 1.0]), row(BASE, [2.0, 2.0]),
-        row("worse", [8.0, 7.0], scored=later), row("better", [9.0, 9.0], scored=later), row("high", [3.0, 3.0]),
+        row("low", [1.0, 1.0]),
+        row(BASE, [2.0, 2.0]),
+        row("worse", [8.0, 7.0], scored=later),
+        row("better", [9.0, 9.0], scored=later),
+        row("high", [3.0, 3.0]),
         {"name": "also", "failed": "no", "scored": later, "warnings": []},
-    ]  # fmt: skip
+    ]
     table = side_by_side(models, BASE)  # type: ignore[arg-type]
     assert [r["name"] for r in table["models"]] == ["high", BASE, "low", "better", "worse", "broken", "also"]
     assert table["base"] == BASE
@@ -283,10 +320,18 @@ def test_models_come_by_score_then_those_scored_otherwise_then_failures() -> Non
 def scored(elpd: list[float]) -> Scores:
     at = np.arange(3.0)
     return Scores(
-        hold=np.array([2, 2, 3]), time_s=at, observed_N=at + 1.0, mean_N=at, sd_N=at + 0.5,
-        quantiles_N=np.outer([-9.0, -3.0, -2.0, 0.0, 2.0, 3.0, 9.0], np.ones(3)) + at, pit=at / 3.0,
-        elpd=np.array(elpd), elpd_together=7.0, pit_band=np.zeros((3, 101)), pit_p=0.25,
-    )  # fmt: skip
+        hold=np.array([2, 2, 3]),
+        time_s=at,
+        observed_N=at + 1.0,
+        mean_N=at,
+        sd_N=at + 0.5,
+        quantiles_N=np.outer([-9.0, -3.0, -2.0, 0.0, 2.0, 3.0, 9.0], np.ones(3)) + at,
+        pit=at / 3.0,
+        elpd=np.array(elpd),
+        elpd_together=7.0,
+        pit_band=np.zeros((3, 101)),
+        pit_p=0.25,
+    )
 
 
 def test_held_out_holds_as_plain_values() -> None:
@@ -336,8 +381,10 @@ def test_only_what_is_missing_is_judged_and_every_model_has_a_file(
     }
     # half the draws of a fit, from half the walkers
     assert (compare.POLICY.ess, compare.POLICY.walkers, compare.POLICY.round_draws) == (
-        Policy().ess / 2, Policy().walkers / 2, Policy().round_draws / 2
-    )  # fmt: skip
+        Policy().ess / 2,
+        Policy().walkers / 2,
+        Policy().round_draws / 2,
+    )
 
 
 def test_a_judgement_has_seeds_of_its_own_for_every_model_and_number_of_holds(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -39,8 +39,12 @@ def reproduce(folder: Path) -> None:
 
 
 COMMANDS: dict[str, Callable[[Path], None]] = {
-    "fit": fit, "discover": discover, "compare": compare, "batch": batch, "reproduce": reproduce,
-}  # fmt: skip
+    "fit": fit,
+    "discover": discover,
+    "compare": compare,
+    "batch": batch,
+    "reproduce": reproduce,
+}
 
 if __name__ == "__main__":
     COMMANDS[sys.argv[1]](Path(sys.argv[2]))

@@ -52,9 +52,7 @@ def explored(
     monkeypatch.setattr(stepwise, "remainder_evidence", lambda block, reference: smooth)
     settings = Settings(kinds=dict.fromkeys(range(NAMES)))  # type: ignore[arg-type]
     plain: Any = SimpleNamespace(log_evidence=0.0)
-    found = stepwise.explore(
-        [plain], evidence(singles), [], [], families, settings, np.random.default_rng(0), map
-    )  # fmt: skip
+    found = stepwise.explore([plain], evidence(singles), [], [], families, settings, np.random.default_rng(0), map)
     return found, order
 
 
@@ -253,8 +251,12 @@ class Fits:
         self.evidence = None if refitted is None else evidence(refitted)
         further = SimpleNamespace(amplitudes=lambda name: refits, reach={}, tried=tried or {})
         self.parent: Any = stepwise.FittedSet(
-            EffectSet(("a",), 7.0, {}, None), self.blocks, ("first",), further, ([], [], [])  # type: ignore[arg-type]
-        )  # fmt: skip
+            EffectSet(("a",), 7.0, {}, None),
+            self.blocks,
+            ("first",),
+            further,
+            ([], [], []),  # type: ignore[arg-type]
+        )
         self.settings: Any = SimpleNamespace(spec="spec", kinds={})
 
         def fitted(experiments: str, effects: Any, spec: str, rng: Any, near: Any, scales: Any) -> Any:

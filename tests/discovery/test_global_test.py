@@ -115,8 +115,9 @@ def test_readings_are_struck_out_one_by_one_of_their_own_experiment(
     def fitted(members: Any, *given: Any, **known: Any) -> Any:
         return SimpleNamespace(**(vars(block) | {"experiments": tuple(members)}))
 
-    block: Any = SimpleNamespace(experiments=pair, target=None, modes=SimpleNamespace(z=np.zeros((1, 1))), effects=(),
-                                 spec=None, scales=None)  # fmt: skip
+    block: Any = SimpleNamespace(
+        experiments=pair, target=None, modes=SimpleNamespace(z=np.zeros((1, 1))), effects=(), spec=None, scales=None
+    )
     # the best effect of this block explains 7, one of another block 50, a smooth curve 4
     effects = SimpleNamespace(effects=np.array([[7.0, 50.0]]), flexible=np.array([4.0]))
     monkeypatch.setattr(gross_errors, "suspect", suspect)
@@ -129,8 +130,10 @@ def test_readings_are_struck_out_one_by_one_of_their_own_experiment(
     assert (
         gone == [{"experiment": other.name, "hold": pair[1].holds[2].number, "reading": 1, "log_bayes": 9.0}] * struck
     )
-    lost = [gross_errors.readings_of([before]) - gross_errors.readings_of([after])
-            for before, after in zip(pair, found.experiments, strict=True)]  # fmt: skip
+    lost = [
+        gross_errors.readings_of([before]) - gross_errors.readings_of([after])
+        for before, after in zip(pair, found.experiments, strict=True)
+    ]
     assert lost == [0, min(struck, 4)]  # a hold of five readings has no second one after four are gone
 
 
@@ -176,8 +179,14 @@ def test_of_few_readings_one_may_be_struck_out(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(
         global_test, "scan", lambda x: SimpleNamespace(effects=np.array([[-7.0]]), flexible=np.array([4.0]))
     )
-    block: Any = SimpleNamespace(experiments=(one,), target=None, modes=SimpleNamespace(z=np.zeros((1, 1))), effects=(),
-                                 spec=PLAIN_SPEC, scales=None)  # fmt: skip
+    block: Any = SimpleNamespace(
+        experiments=(one,),
+        target=None,
+        modes=SimpleNamespace(z=np.zeros((1, 1))),
+        effects=(),
+        spec=PLAIN_SPEC,
+        scales=None,
+    )
     monkeypatch.setattr(global_test, "fitted", lambda members, *given, **known: SimpleNamespace(experiments=members))
     candidates = [Candidate(0, "a", (0,), True)]
     found, gone = global_test._strike_gross_errors(block, [], candidates, 0, np.random.default_rng(0))

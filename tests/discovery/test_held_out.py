@@ -117,8 +117,12 @@ def test_scores_of_several_draws_are_averages_over_them() -> None:
         gain = covariance[np.ix_(~past, past)] @ np.linalg.inv(covariance[np.ix_(past, past)])
         left = covariance[np.ix_(~past, ~past)] - gain @ covariance[np.ix_(past, ~past)]
         error = r[~past] - gain @ r[past]
-        densities.append([stats.multivariate_normal(error[at] * 0.0, left[np.ix_(at, at)]).pdf(error[at])
-                          for at in (hold[~past] == j for j in (9, 10, 11))])  # fmt: skip
+        densities.append(
+            [
+                stats.multivariate_normal(error[at] * 0.0, left[np.ix_(at, at)]).pdf(error[at])
+                for at in (hold[~past] == j for j in (9, 10, 11))
+            ]
+        )
         means.append(error)
         noise = values["sensor_sd"] ** 2 + sample.resolution**2 / 12.0
         floors.append((noise + own**2 * values["setting_sd"] ** 2)[~past])
@@ -159,8 +163,13 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
     monkeypatch.setattr(held_out, "fitted", fitted)
     monkeypatch.setattr(held_out, "_draws", draws)
     target = SimpleNamespace(coordinates=SimpleNamespace(to_natural=lambda z: z))
-    block = SimpleNamespace(effects=effects if same else (), spec=ModelSpec(law="modified"), target=target,
-                            scales=SCALES, modes=SimpleNamespace(z=np.array([[1.0, 2.0], [3.0, 4.0]])))  # fmt: skip
+    block = SimpleNamespace(
+        effects=effects if same else (),
+        spec=ModelSpec(law="modified"),
+        target=target,
+        scales=SCALES,
+        modes=SimpleNamespace(z=np.array([[1.0, 2.0], [3.0, 4.0]])),
+    )
     found = held_out.predicted(pair, [7, 3], effects, block, np.random.default_rng(0))  # type: ignore[arg-type]
     ((counts, extra, spec, _, start),) = given
     assert (counts, extra, spec) == ([7, 3], effects, ModelSpec(law="modified"))
@@ -173,8 +182,9 @@ def test_draws_of_a_block_come_with_all_its_parameters(monkeypatch: pytest.Monke
     monkeypatch.setattr(held_out, "completed", lambda problem, theta, rng: (f"whole {problem}", theta, None))
     block = SimpleNamespace(target=SimpleNamespace(problem="problem"), modes="modes")
     assert held_out._draws(block, np.random.default_rng(0), 7) == (  # type: ignore[arg-type]
-        "whole problem", ("problem", "modes", 7)
-    )  # fmt: skip
+        "whole problem",
+        ("problem", "modes", 7),
+    )
 
 
 @pytest.mark.parametrize(("deviations", "share"), [(1.5, 1.0), (-1.5, 1.0), (1.8, 0.0), (-1.8, 0.0)])

@@ -35,9 +35,14 @@ def any_evidence(draw: st.DrawFn) -> Evidence:
     raw = {name: draw(st.floats(0.0, 1.0)) for name in [*names, "unknown"]}
     total = sum(raw.values()) or 1.0
     return Evidence(
-        draw(probability), draw(probability), named, {n: v / total for n, v in raw.items()}, draw(gain),
-        draw(probability), draw(gain),
-    )  # fmt: skip
+        draw(probability),
+        draw(probability),
+        named,
+        {n: v / total for n, v in raw.items()},
+        draw(gain),
+        draw(probability),
+        draw(gain),
+    )
 
 
 @settings(max_examples=500, deadline=None)

@@ -158,8 +158,10 @@ def test_a_single_fit_is_checked_while_it_is_sampled(tmp_path: Path, monkeypatch
         assert begun.wait(10.0)  # before there is a fit
         summary.write_text('{"experiment": "a", "warnings": []}')
     assert list(json.loads(summary.read_text()).items()) == [
-        ("model_check", found.to_dict()), ("experiment", "a"), ("warnings", []),
-    ]  # fmt: skip
+        ("model_check", found.to_dict()),
+        ("experiment", "a"),
+        ("warnings", []),
+    ]
     begun.clear()
     with model_check.checked_meanwhile(job, tmp_path, 5):
         assert not begun.wait(0.1)

@@ -204,8 +204,10 @@ def test_sums_over_the_sets_are_those_over_all_that_may_be_true_in_a_material() 
             remains = 1.0 if s.remainder is None else over_subsets(s.remainder)[1][b]
             for rest, weight in ((False, bare), (False, more * (1.0 - remains)), (True, more * remains)):
                 for acting in product((False, True), repeat=len(s.names)):
-                    chances = [s.presence[n][b] if on else 1.0 - s.presence[n][b]
-                               for n, on in zip(s.names, acting, strict=True)]  # fmt: skip
+                    chances = [
+                        s.presence[n][b] if on else 1.0 - s.presence[n][b]
+                        for n, on in zip(s.names, acting, strict=True)
+                    ]
                     chance = weight * float(np.prod(chances))
                     there = [n for n, on in zip(s.names, acting, strict=True) if on]
                     nothing += chance * (not there and not rest)

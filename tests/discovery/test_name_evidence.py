@@ -33,9 +33,14 @@ def scan_of(delta: np.ndarray, one_sided: bool, flexible: float = 0.0) -> Scan:
     """Scans of one probe on data whose signature has these lengths (n,), in sensor errors; the noise is known."""
     n, degrees = len(delta), 10**8  # so many readings that the integral over the noise is a normal
     pieces = Pieces(
-        shared=np.zeros((1, n)), rss=np.full((1, n), float(degrees)), along=NORM * delta[None, :, None],
-        square=np.full((1, n, 1), NORM**2), degrees=degrees, least=np.zeros(n), one_sided=np.array([one_sided]),
-    )  # fmt: skip
+        shared=np.zeros((1, n)),
+        rss=np.full((1, n), float(degrees)),
+        along=NORM * delta[None, :, None],
+        square=np.full((1, n, 1), NORM**2),
+        degrees=degrees,
+        least=np.zeros(n),
+        one_sided=np.array([one_sided]),
+    )
     two = np.full(n, -np.inf)  # there is one effect
     norm = np.full((n, 1), NORM)
     return Scan(0.5 * delta[:, None] ** 2, np.full(n, flexible), two, delta[:, None] / NORM, norm, pieces)
@@ -114,9 +119,13 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(name_evidence, "refit", refitted)
     pieces = scan_of(np.array([8.0]), False)
     data = Scan(
-        np.where(np.arange(12) == 6, 32.0, 0.0)[None], pieces.flexible, pieces.two, np.full((1, 12), 8.0 / NORM),
-        np.full((1, 12), NORM), Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(12, bool)})),
-    )  # fmt: skip
+        np.where(np.arange(12) == 6, 32.0, 0.0)[None],
+        pieces.flexible,
+        pieces.two,
+        np.full((1, 12), 8.0 / NORM),
+        np.full((1, 12), NORM),
+        Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(12, bool)})),
+    )
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
     assert found.log_bayes["grip_slip"] == pytest.approx(9.0 - np.log(12.0), abs=1e-3)
     assert found.winners["grip_slip"][0].effect.hold == 7 and found.presence["grip_slip"] == pytest.approx([1.0])
@@ -156,9 +165,13 @@ def test_a_value_of_the_scan_takes_no_name_off_the_list(
     pieces = scan_of(np.array([8.0]), False)
     effects = np.array([[60.0, 12.0, -9.0]])
     data = Scan(
-        effects, pieces.flexible, pieces.two, np.full((1, 3), 8.0 / NORM), np.full((1, 3), NORM),
+        effects,
+        pieces.flexible,
+        pieces.two,
+        np.full((1, 3), 8.0 / NORM),
+        np.full((1, 3), NORM),
         Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(3, bool)})),
-    )  # fmt: skip
+    )
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data], before=before)  # type: ignore[list-item]
     assert asked == refitted and set(found.winners) == set(refitted)
     assert dict(found.tried) == {**before, **{name: own[name] for name in refitted}}
@@ -168,21 +181,27 @@ def test_a_form_that_was_not_refitted_counts_for_no_more_than_one_that_was(monke
     """Twelve holds, each 30 nats by the scan; three are refitted and come to 2."""
     trials = [p for hold in range(1, 13) for p in probes(effect_named(f"grip_slip@{hold}"))[:1]]
     candidates = [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
-    monkeypatch.setattr(name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(
-        effect, tuple(which), 2.0, 8.0, 1.0, ()))  # fmt: skip
+    monkeypatch.setattr(
+        name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(effect, tuple(which), 2.0, 8.0, 1.0, ())
+    )
     pieces = scan_of(np.array([8.0]), False)
     data = Scan(
-        np.full((1, 12), 34.0), pieces.flexible, pieces.two, np.full((1, 12), 8.0 / NORM), np.full((1, 12), NORM),
+        np.full((1, 12), 34.0),
+        pieces.flexible,
+        pieces.two,
+        np.full((1, 12), 8.0 / NORM),
+        np.full((1, 12), NORM),
         Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(12, bool)})),
-    )  # fmt: skip
+    )
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
     assert found.log_bayes["grip_slip"] == pytest.approx(2.0)
 
 
 def test_a_name_whose_climbs_all_failed_is_impossible_and_not_a_number(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its probability is zero; as something that is no number, it made every other probability none either."""
-    monkeypatch.setattr(name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(
-        effect, tuple(which), -np.inf, 0.0, 1.0, ()))  # fmt: skip
+    monkeypatch.setattr(
+        name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(effect, tuple(which), -np.inf, 0.0, 1.0, ())
+    )
     data, trials = scan_of(np.array([8.0]), True), probes(effect_named("toe"))[:1]
     candidates = [Candidate(0, "toe", (0,), True)]
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]

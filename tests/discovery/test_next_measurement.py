@@ -21,10 +21,13 @@ def probe(name: str) -> Any:
 
 TIMES = np.array([0.0, 10.0, 40.0])
 PROTOCOL = Protocol(
-    1500.0, np.array([1.0, 2.0, 4.0]), np.array([[0.0, 5.0, 0.0], TIMES, [0.0, 0.0, 0.0]]),
-    np.array([[True, True, False], [True, True, True], [False, False, False]]), np.array([5.0, 40.0, 30.0]),
+    1500.0,
+    np.array([1.0, 2.0, 4.0]),
+    np.array([[0.0, 5.0, 0.0], TIMES, [0.0, 0.0, 0.0]]),
+    np.array([[True, True, False], [True, True, True], [False, False, False]]),
+    np.array([5.0, 40.0, 30.0]),
     np.arange(1, 4),
-)  # fmt: skip
+)
 WHOLE = Protocol(
     1500.0, np.array([1.0, 2.0, 4.0]), np.tile(TIMES, (3, 1)), np.ones((3, 3), bool), np.full(3, 40.0), np.arange(1, 4)
 )

@@ -154,9 +154,11 @@ def test_what_the_plain_model_takes_up_and_what_a_protocol_cannot_show_is_said(m
     ((target, z, trials),) = asked
     assert target == "target" and z == [[1.0]]
     names = [
-        ("_SensorGain", "gain of the force sensor.a"), ("_ForceOffset", "constant force offset.a"),
-        ("_DisplacementScale", "scale of the displacement.a"), ("_Compliance", "compliance of the fixture.c"),
-    ]  # fmt: skip
+        ("_SensorGain", "gain of the force sensor.a"),
+        ("_ForceOffset", "constant force offset.a"),
+        ("_DisplacementScale", "scale of the displacement.a"),
+        ("_Compliance", "compliance of the fixture.c"),
+    ]
     assert trials == [(kind, {column: 1e-3}, 1e-3, False) for kind, column in names]
     power.not_identifiable(block, kinds, ["fixture_compliance", "superposition"])
     assert [t[0] for t in asked[1][2]] == ["_SensorGain", "_ForceOffset", "_DisplacementScale"]

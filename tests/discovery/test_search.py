@@ -160,10 +160,14 @@ def test_play_shows_on_the_way_back(tmp_path: Path) -> None:
     assert found["best"] == "lost_motion"
 
 
-@pytest.mark.parametrize("bench", [
-    Bench(displacements_mm=(1, 3, 5, 3, 1, -0.5, 1, 3, 5)),  # goes slack in between
-    Bench(times_s=DENSE_S, displacements_mm=(1, 2, 3, 4, 5, 6)),
-], ids=["slack", "25 readings"])  # fmt: skip
+@pytest.mark.parametrize(
+    "bench",
+    [
+        Bench(displacements_mm=(1, 3, 5, 3, 1, -0.5, 1, 3, 5)),  # goes slack in between
+        Bench(times_s=DENSE_S, displacements_mm=(1, 2, 3, 4, 5, 6)),
+    ],
+    ids=["slack", "25 readings"],
+)
 def test_other_protocols_are_answered(tmp_path: Path, bench: Bench) -> None:
     # Of seeds 0 to 24, three slack files have p below .04, seed 0 among them.
     found = answer(made(tmp_path, [bench], {}, [], seed=1))

@@ -132,9 +132,14 @@ def scored(monkeypatch: pytest.MonkeyPatch, stages: list[str], remains: bool, ho
     monkeypatch.setattr(shrinking, "fitted", lambda *given, **_: Model(name="~"))
     monkeypatch.setattr(shrinking, "_gain", gained)
     return shrinking.shrinking(
-        models[0], models[1:], stages, remains, held_out.LeftOut(np.random.default_rng(0), map),  # type: ignore[arg-type]
-        np.random.default_rng(0), map,
-    )  # fmt: skip
+        models[0],
+        models[1:],
+        stages,
+        remains,
+        held_out.LeftOut(np.random.default_rng(0), map),  # type: ignore[arg-type]
+        np.random.default_rng(0),
+        map,
+    )
 
 
 @pytest.mark.parametrize(
@@ -222,9 +227,12 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
     monkeypatch.setattr(shrinking, "fitted", fitted)
     slip = replace(effect_named("grip_slip@4"), test="another")  # type: ignore[type-var]
     whole: Any = SimpleNamespace(
-        effects=(slip, effect_named("superposition")), spec=ModelSpec(history="additive"), names=(one.name, other.name),
-        experiments=(one, other), scales="scales",
-    )  # fmt: skip
+        effects=(slip, effect_named("superposition")),
+        spec=ModelSpec(history="additive"),
+        names=(one.name, other.name),
+        experiments=(one, other),
+        scales="scales",
+    )
     memory, smooth = shrinking.with_discrepancy(whole, other, "rng")  # type: ignore[arg-type]
     assert memory is whole.effects[1] and asked == [([other], (memory,), whole.spec, "rng", "scales")]
     assert smooth == shrinking.discrepancy(other, shrinking.residual_rms(block, other.name))
@@ -241,5 +249,7 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
 
 def test_a_gain_is_reported_by_its_three_numbers() -> None:
     assert _Gain(9.0, 1.0, 2.0).to_dict() == {
-        "elpd_difference": 9.0, "elpd_difference_se": 1.0, "flexible_elpd_difference": 2.0
-    }  # fmt: skip
+        "elpd_difference": 9.0,
+        "elpd_difference_se": 1.0,
+        "flexible_elpd_difference": 2.0,
+    }

@@ -76,8 +76,10 @@ def test_bands_of_held_out_readings_hold_nine_in_ten(
     one = replace(experiments()[2].train(4), resolution=0.0)
     expected = simulate(one.protocol(), {name: np.array([value]) for name, value in WIRE.items()})[..., 0]
     last = len(one.holds) - 1
-    holds = [replace(h, readings=row[: h.time_s.size] + WIRE["sensor_sd"] * away * (j == last))
-             for j, (h, row) in enumerate(zip(one.holds, expected, strict=True))]  # fmt: skip
+    holds = [
+        replace(h, readings=row[: h.time_s.size] + WIRE["sensor_sd"] * away * (j == last))
+        for j, (h, row) in enumerate(zip(one.holds, expected, strict=True))
+    ]
     one = replace(one, holds=tuple(holds))
     problem = build([one.train(3)])
     theta = np.tile([WIRE[name] for name in problem.names], (500, 1))

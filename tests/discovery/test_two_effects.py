@@ -108,9 +108,11 @@ def test_without_a_tangent_no_pair_explains_anything(expansion: Expansion) -> No
 def test_one_effect_makes_no_pair(expansion: Expansion) -> None:
     alone = expansion.kinds == 0
     one = replace(
-        expansion, signatures=expansion.signatures[..., alone], one_sided=expansion.one_sided[alone],
+        expansion,
+        signatures=expansion.signatures[..., alone],
+        one_sided=expansion.one_sided[alone],
         kinds=expansion.kinds[alone],
-    )  # fmt: skip
+    )
     assert scan(one).two[0] == -np.inf
 
 

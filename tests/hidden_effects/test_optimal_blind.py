@@ -93,15 +93,27 @@ def test_what_counts_as_said():
     assert said.names == [["a", "c"], ["b"], ["c"], ["b"]]
     found = said.rates([["a", "b"], ["c"]])
     assert found == {
-        "all": 0.25, "known": 0.75, "all_sure": 0.25, "known_sure": 0.75,
-        "named": 0.5, "remains": 0.25, "right": 0.75, "other": 0.0,
-    }  # fmt: skip
+        "all": 0.25,
+        "known": 0.75,
+        "all_sure": 0.25,
+        "known_sure": 0.75,
+        "named": 0.5,
+        "remains": 0.25,
+        "right": 0.75,
+        "other": 0.0,
+    }
     assert said.rates([["a"], ["c"]])["all_sure"] == 0.25 and said.rates([["b"]])["known_sure"] == 0.25
     assert said.rates([["a"]])["other"] == 0.75
     assert said.above(2.0).rates([["a", "b"]]) == {
-        "all": 1.0, "known": 1.0, "all_sure": 1.0, "known_sure": 1.0,
-        "named": 0.0, "remains": 1.0, "right": 1.0, "other": 0.0,
-    }  # fmt: skip
+        "all": 1.0,
+        "known": 1.0,
+        "all_sure": 1.0,
+        "known_sure": 1.0,
+        "named": 0.0,
+        "remains": 1.0,
+        "right": 1.0,
+        "other": 0.0,
+    }
 
 
 def test_more_speaks_for_something_hidden_the_larger_it_is():

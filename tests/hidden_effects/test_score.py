@@ -225,8 +225,14 @@ def test_what_is_more_likely_than_not_is_compared_with_the_judges_most_probable_
 
 
 def said(kind, probability, accepted=("toe",)):
-    return {"kind": kind, "detected": True, "names": ["toe"], "groups": [["toe"]], "remainder": probability,
-            "accepted": list(accepted)}  # fmt: skip
+    return {
+        "kind": kind,
+        "detected": True,
+        "names": ["toe"],
+        "groups": [["toe"]],
+        "remainder": probability,
+        "accepted": list(accepted),
+    }
 
 
 def test_bins_of_a_stated_probability_with_their_95_percent_intervals():

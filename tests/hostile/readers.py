@@ -143,4 +143,4 @@ READERS = {
     "bench": Reader("raw.csv", BENCH.encode(), {}, bench),
     "bench in cp1252": Reader("raw.txt", BENCH.encode("cp1252"), {}, bench),
     "recording": Reader("raw.csv", RECORDED.encode(), {}, bench),
-}  # fmt: skip
+}

@@ -121,7 +121,7 @@ ABSURD = {
     "one line": "1" * 3_000_000,
     "quotes": CSV.replace("0.90", '"0.90"'),
     "too many holds": "\n".join([LINES[0], *(f"{h},1,{t},2" for h in range(400) for t in range(400 * (h == 7) + 1))]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("what", ABSURD)

@@ -91,8 +91,9 @@ CELL = st.one_of(
 )
 HEADER = st.lists(
     st.sampled_from(["hold", "displacement_mm", "time_s", "tension_N", "temperature_C", "Kraft [N]", "", "t [min]"]),
-    min_size=1, max_size=6,
-)  # fmt: skip
+    min_size=1,
+    max_size=6,
+)
 
 
 @st.composite

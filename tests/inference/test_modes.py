@@ -236,8 +236,12 @@ def test_further_climbs_begin_with_the_noises_held_near_those_of_the_best_mode(l
         named_so = ("sensor_sd", "setting_sd") if fixed == "both" else fixed
         prior = target.problem.prior
         free = {name: d for name, d in prior.distributions.items() if name not in named_so}
-        prior = replace(prior, distributions=free, fixed=prior.fixed | dict.fromkeys(named_so, 0.02),
-                        logarithmic=prior.logarithmic - set(named_so))  # fmt: skip
+        prior = replace(
+            prior,
+            distributions=free,
+            fixed=prior.fixed | dict.fromkeys(named_so, 0.02),
+            logarithmic=prior.logarithmic - set(named_so),
+        )
         target = LogPosterior(replace(target.problem, prior=prior))
     names = target.problem.names
     one = alone(target)

@@ -28,8 +28,16 @@ def crept(weights, times, k1=900.0, share=0.02, k2=0.05, n=0.8):
     return np.array(rows)
 
 
-def by_hand(path, weights, noise_N=0.0, noise_mm=0.0, scale=(1.0, 1.0, 1.0), header="Load (N),Time (s),Extension (mm)",
-            running=False, seed=0):  # fmt: skip
+def by_hand(
+    path,
+    weights,
+    noise_N=0.0,
+    noise_mm=0.0,
+    scale=(1.0, 1.0, 1.0),
+    header="Load (N),Time (s),Extension (mm)",
+    running=False,
+    seed=0,
+):
     """A test under weights, written down; scales of tension, length and time."""
     rng = np.random.default_rng(seed)
     x = crept(weights, MINUTES)

@@ -67,9 +67,12 @@ def test_a_file_in_no_known_words_says_how_it_was_read(tmp_path):
 @pytest.mark.parametrize("header", ["Minutes at load", "minutes", "Minuten", "hours since the step"])
 def test_a_time_may_begin_with_its_unit(tmp_path, header):
     path = tmp_path / "raw.csv"
-    path.write_text(f"{header},Stage,Extension (mm),Load (kN)\n" + "".join(
-        f"{minute},{stage},{stage},{stage + 0.1 / (1 + minute)}\n" for stage in (1, 2) for minute in (0, 1, 3)
-    ))  # fmt: skip
+    path.write_text(
+        f"{header},Stage,Extension (mm),Load (kN)\n"
+        + "".join(
+            f"{minute},{stage},{stage},{stage + 0.1 / (1 + minute)}\n" for stage in (1, 2) for minute in (0, 1, 3)
+        )
+    )
     scale = 3600.0 if "hours" in header else 60.0
     assert [row[2] for row in read(path).rows] == [0.0, scale, 3.0 * scale] * 2
 
@@ -87,12 +90,27 @@ def test_all_columns_that_are_missing_are_said_at_once(tmp_path):
 
 def measurement(sign="\t", decimal=".", units="mm\tN", segments=1, comment=True):
     """An LVM file with the preamble of the file and one of its channels."""
-    head = ["LabVIEW Measurement", "Writer_Version\t2", f"Separator\t{'Tab' if sign == chr(9) else 'Comma'}",
-            f"Decimal_Separator\t{decimal}", "X_Columns\tOne", "***End_of_Header***"]  # fmt: skip
-    channels = ["", "Channels\t2", "Samples\t12\t12", "Date\t2019/05/06\t2019/05/06", "Time\t10:11:12.3\t10:11:12.3",
-                *([f"Y_Unit_Label\t{units}"] if units else []), "X_Dimension\tTime\tTime", "X0\t0.0\t0.0",
-                "Delta_X\t0.1\t0.1", "***End_of_Header***",
-                "X_Value\tPosition\tForce" + "\tComment" * comment]  # fmt: skip
+    head = [
+        "LabVIEW Measurement",
+        "Writer_Version\t2",
+        f"Separator\t{'Tab' if sign == chr(9) else 'Comma'}",
+        f"Decimal_Separator\t{decimal}",
+        "X_Columns\tOne",
+        "***End_of_Header***",
+    ]
+    channels = [
+        "",
+        "Channels\t2",
+        "Samples\t12\t12",
+        "Date\t2019/05/06\t2019/05/06",
+        "Time\t10:11:12.3\t10:11:12.3",
+        *([f"Y_Unit_Label\t{units}"] if units else []),
+        "X_Dimension\tTime\tTime",
+        "X0\t0.0\t0.0",
+        "Delta_X\t0.1\t0.1",
+        "***End_of_Header***",
+        "X_Value\tPosition\tForce" + "\tComment" * comment,
+    ]
     size = len(ROWS) // segments
     lines = head
     for k in range(segments):

@@ -232,8 +232,11 @@ def test_rows_that_are_written_twice_are_left_out_as_before(tmp_path):
 def test_a_hold_that_is_short_beside_the_only_other_one_is_refused_where_it_ends(tmp_path, counts, line, passed):
     path = tmp_path / "raw.csv"
     x = np.repeat([0.5, 3.0], counts)
-    rows = [f"{j + 1},{i / 10:.1f},{x[i]},{2.0 * x[i] - 1e-5 * i:.5f}\n" for j, n in enumerate(counts)
-            for i in range(j * counts[0], j * counts[0] + n)]  # fmt: skip
+    rows = [
+        f"{j + 1},{i / 10:.1f},{x[i]},{2.0 * x[i] - 1e-5 * i:.5f}\n"
+        for j, n in enumerate(counts)
+        for i in range(j * counts[0], j * counts[0] + n)
+    ]
     path.write_text("Number,Time (s),Displacement (mm),Force (N)\n" + "".join(rows))
     with pytest.raises(
         wb.InputError, match=rf"line {line}, column 3 .*: found one displacement .*, {passed} were taken"

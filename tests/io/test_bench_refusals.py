@@ -148,7 +148,7 @@ def test_each_answer_means_what_it_says(tmp_path):
         ),
         ("hold," + HEADER + "1,1,0,2\n1,1,9,2\n1,7,20,2\n2,2,0,4\n2,2,9,3\n", r"line 4, column 2 .*7 mm in a hold"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_read_is_refused_with_its_place(tmp_path, text, message):
     with pytest.raises(wb.InputError, match=message):
         read(tmp_path, text)
@@ -325,7 +325,7 @@ def test_moments_of_a_day_pass_midnight(tmp_path):
         ("20260614 10:00:00", "20260614 10:00:30", "20260614 10:01:10", "20260614T10:01:40.5"),
         ("2026/06/14 10:00:00", "2026/06/14 10:00:30", "2026/06/14 10:01:10", "2026/06/14 10:01:40.5"),
     ],
-)  # fmt: skip
+)
 def test_dates_of_many_countries_are_the_same_times(tmp_path, moments):
     begin, *others, end = moments
     times = (begin, *others, end, *others, end)
@@ -354,7 +354,7 @@ def test_minutes_of_a_date_or_of_half_a_day_are_no_question(tmp_path, moments):
         ("2026-06-14 10:00:00", "2026-06-14 10:00:30Z", "found .*30Z', expected a time without an offset from UTC, as"),
         ("2026-06-14", "2026-06-14", "found '2026-06-14', expected a time such as"),
     ],
-)  # fmt: skip
+)
 def test_dates_that_are_not_clear_are_refused_with_those_that_are(tmp_path, first, last, message):
     for header in ("Timestamp", "Timestamp [s]") if "juin" in first else ("Timestamp",):
         with pytest.raises(wb.InputError, match=rf"line \d, column 1 \(Timestamp.*\): {message}"):
@@ -366,8 +366,12 @@ def test_what_is_harmless_is_done_and_said(tmp_path):
     found = read(tmp_path, text)
     assert len(found.rows) == 5
     message = " ".join(found.notes)
-    for note in ("filled with the value above", "repeat the row above left out: 1", "1 line under the readings",
-                 "holds 2 and 3 have no readings"):  # fmt: skip
+    for note in (
+        "filled with the value above",
+        "repeat the row above left out: 1",
+        "1 line under the readings",
+        "holds 2 and 3 have no readings",
+    ):
         assert note in message
     assert found.recording is None
 

@@ -101,8 +101,13 @@ def test_the_files_written_are_the_same_test_and_fit_is_given_them(tmp_path):
     raw = write_text(tmp_path / "my raw file.csv", HOLDS, Dialect(delimiter=";", decimal=",", absolute=True))
     imported = wb.import_bench(raw, length_mm=800, material="line", output=tmp_path / "out")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        "complete.json", "configuration.json", "import.json", "my-raw-file.csv", "my-raw-file.svg", "my-raw-file.toml",
-    ]  # fmt: skip
+        "complete.json",
+        "configuration.json",
+        "import.json",
+        "my-raw-file.csv",
+        "my-raw-file.svg",
+        "my-raw-file.toml",
+    ]
     (read,) = wb.read_experiments(tmp_path / "out" / "my-raw-file.toml")
     assert read.data_hash == convert(raw, About("my-raw-file", "line", 800.0), Choices()).experiment.data_hash
     same(read, HOLDS, True)

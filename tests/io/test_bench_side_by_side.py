@@ -104,7 +104,7 @@ def test_a_unit_is_asked_for_once_for_all_of_them(tmp_path):
         ("Time (s),Stroke (mm),Load 1 (N),Load 2 (N)", ONE_STROKE),
     ],
     ids=["names that differ by a word", "one displacement"],
-)  # fmt: skip
+)
 def test_two_columns_that_may_be_two_sensors_are_asked_about(tmp_path, header, rows):
     with pytest.raises(Undecided, match="each of which may be the tension.* or --specimens several to say which"):
         read(tmp_path, header, rows)

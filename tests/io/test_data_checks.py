@@ -33,9 +33,13 @@ def test_a_sound_test_gets_no_warning(sound):
 
 def test_times_of_the_whole_test_are_suspected_where_they_are_not_certain():
     protocol = Protocol(
-        1000.0, np.array([1.0, 2.0]), np.arange(10.0).reshape(2, 5), np.ones((2, 5), bool),
-        np.array([4.0, 9.0]), np.array([1, 2]),
-    )  # fmt: skip
+        1000.0,
+        np.array([1.0, 2.0]),
+        np.arange(10.0).reshape(2, 5),
+        np.ones((2, 5), bool),
+        np.array([4.0, 9.0]),
+        np.array([1, 2]),
+    )
     tension = np.array([[1.0] * 5, [2.0] * 5])
     assert "time_s counts from the beginning of each hold" in warning(protocol, tension)
     since = replace(protocol, time_s=protocol.time_s % 5, duration_s=np.array([4.0, 4.0]))

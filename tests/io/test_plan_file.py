@@ -53,8 +53,11 @@ def test_what_a_plan_says_is_read(plan_file):
     assert steps.settings == (0.5, 1.0, 1.5, 1.0, 0.5)
     assert steps.times_s == (0.0, 30.0, 60.0)
     assert (other.name, other.length_mm, other.times_s, other.temperatures_C) == (
-        "protocol-2", 500.0, (0.0, 10.0, 30.0), (20.0, 25.0)
-    )  # fmt: skip
+        "protocol-2",
+        500.0,
+        (0.0, 10.0, 30.0),
+        (20.0, 25.0),
+    )
     assert read.aim == ("toe", "superposition")
     assert read.guess_lines == {"k1": 6, "U": 7}
     assert (read.budget_min, read.posterior, read.robot) == (30.0, None, None)

@@ -57,8 +57,10 @@ def test_an_instrument_belongs_to_the_tests_that_it_reads(pair):
     of_effects = [name for name in problem.names if "." in name]
     assert of_effects == ["toe.w", "sensor_drift.a[displacement]", "sensor_drift.a[force]"]
     assert [problem.column("sensor_drift.a", s) for s in problem.samples] == [
-        "sensor_drift.a[displacement]", "sensor_drift.a[force]", "sensor_drift.a[force]"
-    ]  # fmt: skip
+        "sensor_drift.a[displacement]",
+        "sensor_drift.a[force]",
+        "sensor_drift.a[force]",
+    ]
     units = [unit_of_column(f"sensor_drift.a[{c}]", problem.samples) for c in ("displacement", "force")]
     assert units == ["N/s", "mm/s"]
 
@@ -86,8 +88,10 @@ def test_an_effect_of_one_kind_of_test_is_in_no_other(pair):
     assert [name for name in problem.names if "." in name] == ["sensor_drift.a[force]"]
     assert [[e.key for e in s.model.effects] for s in problem.samples] == [[], ["sensor_drift@force"]]
     assert (gauge.key, gauge.acts_on("hung", "force"), gauge.acts_on("steps", "displacement")) == (
-        "sensor_drift@force", True, False
-    )  # fmt: skip
+        "sensor_drift@force",
+        True,
+        False,
+    )
     with pytest.raises(InputError, match="toe takes no '@'"):  # the wire is the same under both
         effect_named("toe@force")
 
@@ -100,8 +104,10 @@ def test_a_search_looks_for_the_fault_of_each_instrument_apart(pair):
     of_key = {trial.effect.key: k for k, trial in enumerate(trials)}
     seen = forms(block.target, block.modes.z[:1], trials)
     assert {key: [bool(np.any(shape[..., k])) for shape in seen] for key, k in of_key.items()} == {
-        "toe": [True, True], "sensor_drift@displacement": [True, False], "sensor_drift@force": [False, True],
-    }  # fmt: skip
+        "toe": [True, True],
+        "sensor_drift@displacement": [True, False],
+        "sensor_drift@force": [False, True],
+    }
     units = {key: block.unit(trials[k].effect) for key, k in of_key.items()}
     assert units == {"toe": "mm", "sensor_drift@displacement": "N/s", "sensor_drift@force": "mm/s"}
 
@@ -128,8 +134,10 @@ def test_both_drifts_and_the_wire_are_found_together(pair):
     found = wb.fit(pair, together="line", effects=["sensor_drift"], check=False, policy=few).summary()
     assert found["converged"]
     for name, truth, unit in (
-        ("sensor_drift.a[steps]", DRIFT_N, "N/s"), ("sensor_drift.a[hung]", DRIFT_MM, "mm/s"), ("k1", 900.0, "N")
-    ):  # fmt: skip
+        ("sensor_drift.a[steps]", DRIFT_N, "N/s"),
+        ("sensor_drift.a[hung]", DRIFT_MM, "mm/s"),
+        ("k1", 900.0, "N"),
+    ):
         one = found["parameters"][name]
         assert one["unit"] == unit and abs(one["mean"] - truth) < 3.0 * one["sd"]
 

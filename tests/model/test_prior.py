@@ -12,9 +12,13 @@ from wirebayes.numeric.distributions import Normal, TruncatedNormal, log_density
 SCALES = Scales(step_mm=0.5, range_mm=6.0, tension_N=4.0, hold_s=90.0, step_N=1.0)
 
 FORMS = [
-    stats.norm(0.5, 2.0), stats.halfnorm(0.0, 0.3), stats.lognorm(1.2, scale=0.03), stats.uniform(-1.0, 3.0),
-    stats.beta(1.0, 30.0), stats.lognorm(0.5, loc=1.0, scale=2.0),
-]  # fmt: skip
+    stats.norm(0.5, 2.0),
+    stats.halfnorm(0.0, 0.3),
+    stats.lognorm(1.2, scale=0.03),
+    stats.uniform(-1.0, 3.0),
+    stats.beta(1.0, 30.0),
+    stats.lognorm(0.5, loc=1.0, scale=2.0),
+]
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -39,9 +43,15 @@ def test_draws_quantiles_and_density_belong_to_one_distribution():
 
 def test_the_stated_ranges_are_the_5_and_95_percent_points():
     stated = {
-        "k1": (0.13, 18), "B": (0.0064 * 0.5, 0.88 * 0.5), "U": (0.16, 1.6), "k2": (0.059, 8.3), "N": (0.31, 1.4),
-        "preload": (-0.39, 0.59), "sensor_sd": (0.00025, 0.035), "setting_sd": (0.004, 0.16),
-    }  # fmt: skip
+        "k1": (0.13, 18),
+        "B": (0.0064 * 0.5, 0.88 * 0.5),
+        "U": (0.16, 1.6),
+        "k2": (0.059, 8.3),
+        "N": (0.31, 1.4),
+        "preload": (-0.39, 0.59),
+        "sensor_sd": (0.00025, 0.035),
+        "setting_sd": (0.004, 0.16),
+    }
     length, steps = 1000.0 / SCALES.range_mm, SCALES.range_mm / SCALES.step_mm
     unit = {"k1": length, "B": 2.0 * steps, "preload": steps}
     for name, distribution in wire_defaults(1000.0, SCALES).items():

@@ -117,14 +117,25 @@ def test_what_is_positive_is_sampled_by_its_logarithm() -> None:
     """Lengths of time among the amplitudes too; not what a prior of the file lets be negative."""
     drift = effect_named("second_relaxation")
     assert build([short()], [drift]).prior.logarithmic == {
-        "k1", "B", "U", "k2", "N", "sensor_sd", "setting_sd", "second_relaxation.T2"
-    }  # fmt: skip
+        "k1",
+        "B",
+        "U",
+        "k2",
+        "N",
+        "sensor_sd",
+        "setting_sd",
+        "second_relaxation.T2",
+    }
     below = {"distribution": "normal", "mean": 0.5, "sd": 0.1}
     zero = {"distribution": "uniform", "low": 0.0, "high": 1.0}
     problem = build([short("a", priors={"U": below, "N": zero, "preload": zero}), short("b")])
     assert problem.prior.logarithmic == {
-        "k1", "B", "k2", "N", *(f"{name}[{s}]" for s in "ab" for name in ("sensor_sd", "setting_sd"))
-    }  # fmt: skip
+        "k1",
+        "B",
+        "k2",
+        "N",
+        *(f"{name}[{s}]" for s in "ab" for name in ("sensor_sd", "setting_sd")),
+    }
 
 
 def test_priors_of_the_file_replace_those_of_the_most_specific_name() -> None:

@@ -21,10 +21,15 @@ def simulated(seed: int, names: tuple[str, ...] = ("a",)) -> list[Experiment]:
     """Steps up and down with readings of their own and rests, samples of different lengths."""
     rng = np.random.default_rng(seed)
     benches = [
-        Bench(name, length_mm=700.0 + 300.0 * i, resolution_N=0.0, displacements_mm=(1, 2.5, 3, 4, 6, 5.0, 7.5),
-              times_s=[[0.0, 20.0 + j, 75.0] for j in range(7)])
+        Bench(
+            name,
+            length_mm=700.0 + 300.0 * i,
+            resolution_N=0.0,
+            displacements_mm=(1, 2.5, 3, 4, 6, 5.0, 7.5),
+            times_s=[[0.0, 20.0 + j, 75.0] for j in range(7)],
+        )
         for i, name in enumerate(names)
-    ]  # fmt: skip
+    ]
     made = draw(benches, Truth({"k1": 900.0, "sensor_sd": 0.01, "setting_sd": 0.03, "preload": 0.5}), seed)
     return [
         from_arrays(
@@ -32,10 +37,13 @@ def simulated(seed: int, names: tuple[str, ...] = ("a",)) -> list[Experiment]:
             [x for x in sample.protocol.setting for _ in range(4)],
             [t for row in sample.protocol.time_s for t in (*row, row[-1] + 15.0)],
             [y for row in sample.readings[..., 0] for y in (*row, np.nan)],
-            length_mm=sample.protocol.length_mm, name=sample.name, material="line", resolution_N=0.01 * rng.uniform(),
+            length_mm=sample.protocol.length_mm,
+            name=sample.name,
+            material="line",
+            resolution_N=0.01 * rng.uniform(),
         )
         for sample in made.problem.samples
-    ]  # fmt: skip
+    ]
 
 
 def under_weights(seed: int) -> list[Experiment]:
@@ -134,8 +142,16 @@ def test_a_fit_in_other_units_has_the_same_draws():
     by = Units(2.0**7, 2.0**-10, 2.0**6)
     one, other = (fit_problem(build([e]), 3, policy=HASTY) for e in (experiment, rewritten(experiment, by)))
     U, N = (one.flat[:, one.problem.names.index(name)] for name in ("U", "N"))
-    units = {"k1": by.tension_N, "B": by.length_mm * by.tension_N**-U, "U": 1.0, "k2": by.time_s**-N, "N": 1.0,
-             "preload": by.length_mm, "sensor_sd": by.tension_N, "setting_sd": by.length_mm}  # fmt: skip
+    units = {
+        "k1": by.tension_N,
+        "B": by.length_mm * by.tension_N**-U,
+        "U": 1.0,
+        "k2": by.time_s**-N,
+        "N": 1.0,
+        "preload": by.length_mm,
+        "sensor_sd": by.tension_N,
+        "setting_sd": by.length_mm,
+    }
     for i, name in enumerate(one.problem.names):
         np.testing.assert_allclose(other.flat[:, i], one.flat[:, i] * units[name], rtol=1e-12)
 

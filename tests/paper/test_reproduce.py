@@ -20,8 +20,17 @@ from wirebayes.results import jobs
 
 WIRES = {experiment.name: experiment for experiment in paper.experiments()}
 TABLE_4 = paper.published()["table_4"]
-NAMES = ("least_squares", "posterior", "creep", "held_out", "sampling", "measured", "robot", "robot_mass",
-         "robot_claim")  # fmt: skip
+NAMES = (
+    "least_squares",
+    "posterior",
+    "creep",
+    "held_out",
+    "sampling",
+    "measured",
+    "robot",
+    "robot_mass",
+    "robot_claim",
+)
 
 
 @pytest.mark.parametrize(

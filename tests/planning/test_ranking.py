@@ -7,8 +7,7 @@ from wirebayes.simulation.synthetic import Bench
 
 
 def judged(name, bits, creep_sd, cosine=0.0, holds=10):
-    width = {"sd": creep_sd, "width_90": 0.0, "width_90_low": 0.0,
-             "width_90_high": 0.0, "guess_sd": 1.0, "unit": "mm"}  # fmt: skip
+    width = {"sd": creep_sd, "width_90": 0.0, "width_90_low": 0.0, "width_90_high": 0.0, "guess_sd": 1.0, "unit": "mm"}
     expected = Expected({"creep_1h_mm": width}, 1.0, 1000.0, 60.0, bits, 5, ())
     power = {"amplitude_80": 1.0, "unit": "-", "delta_80": 4.0, "delta_prior": 10.0, "confused_with": []}
     effects = Sensitivity({"a": power, "b": power}, {("a", "b"): cosine, ("b", "a"): cosine})

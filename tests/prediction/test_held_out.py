@@ -36,8 +36,10 @@ def dense_conditional(fitted: Fit, experiment: Experiment) -> tuple[np.ndarray, 
     protocol = experiment.protocol()
     holds, step = len(protocol.number), 1e-6
     many = {name: np.full(holds, value) for name, value in truth.items()}
-    jacobian = (simulate(protocol, many, setting_error=step * np.eye(holds))
-                - simulate(protocol, many, setting_error=-step * np.eye(holds))) / (2 * step)  # fmt: skip
+    jacobian = (
+        simulate(protocol, many, setting_error=step * np.eye(holds))
+        - simulate(protocol, many, setting_error=-step * np.eye(holds))
+    ) / (2 * step)
     nominal = simulate(protocol, {name: value[:1] for name, value in many.items()})[..., 0]
     past = np.arange(holds) < trained
     j = jacobian.reshape(-1, holds)

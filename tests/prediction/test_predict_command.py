@@ -144,9 +144,13 @@ def test_hold_by_hold_answers_from_the_first_reading(fits: Path, protocol: Calla
     ],
 )
 def test_repeated_holds_must_be_as_trained(
-    fits: Path, protocol: Callable[..., Path], capsys: pytest.CaptureFixture[str], holds: list[int],
-    changes: dict[str, str], words: list[str],
-) -> None:  # fmt: skip
+    fits: Path,
+    protocol: Callable[..., Path],
+    capsys: pytest.CaptureFixture[str],
+    holds: list[int],
+    changes: dict[str, str],
+    words: list[str],
+) -> None:
     path = protocol(holds, changes=changes)
     out = path.parent / "no.csv"
     code = cli.main(["predict", str(fits / "chain"), str(path), "--experiment", "roc-line-1.71m", "--output", str(out)])

@@ -53,8 +53,13 @@ def test_holds_to_come_follow_the_dense_conditional_normal() -> None:
     experiment, train = wire(), 8
     trained = experiment.train(train)
     problem = build([trained])
-    drawn = draw_predictive(problem, rows(TRUTH, problem.names), problem.samples[0], question_of(experiment, train),
-                    np.random.default_rng(1))  # fmt: skip
+    drawn = draw_predictive(
+        problem,
+        rows(TRUTH, problem.names),
+        problem.samples[0],
+        question_of(experiment, train),
+        np.random.default_rng(1),
+    )
     nominal, jacobian = dense(experiment, TRUTH)
     past = np.zeros(nominal.shape, bool)
     past[: len(trained.holds)] = experiment.protocol().mask[: len(trained.holds)]
@@ -79,8 +84,13 @@ def test_holds_to_come_follow_the_dense_conditional_normal() -> None:
 def test_replicates_have_new_noise_and_new_setting_error() -> None:
     experiment, train = wire(), 8
     problem = build([experiment.train(train)])
-    drawn = draw_predictive(problem, rows(TRUTH, problem.names), problem.samples[0], question_of(experiment, train),
-                    np.random.default_rng(2))  # fmt: skip
+    drawn = draw_predictive(
+        problem,
+        rows(TRUTH, problem.names),
+        problem.samples[0],
+        question_of(experiment, train),
+        np.random.default_rng(2),
+    )
     nominal, jacobian = dense(experiment, TRUTH)
     trained = np.flatnonzero(experiment.protocol().recorded)[:train]
     for row in trained[1:]:
@@ -138,10 +148,14 @@ def test_what_effects_carry_goes_on_from_the_training(key: str) -> None:
     experiment, train = wire("nylon-1.5m"), 5
     effect = effect_named(key)
     problem = build([experiment.train(train)], [effect])
-    values = TRUTH | {"sensor_sd": 1e-7, "setting_sd": 1e-13} | {
-        c: a.neutral + (0.0 if a.is_shape else 0.3 if a.unit == "-" else 1e-3)
-        for c, a in zip(effect.columns(), effect.amplitudes, strict=True)
-    }  # fmt: skip
+    values = (
+        TRUTH
+        | {"sensor_sd": 1e-7, "setting_sd": 1e-13}
+        | {
+            c: a.neutral + (0.0 if a.is_shape else 0.3 if a.unit == "-" else 1e-3)
+            for c, a in zip(effect.columns(), effect.amplitudes, strict=True)
+        }
+    )
     sample = replace(problem.samples[0], resolution=1e-9)
     theta = rows(values, problem.names, 3)
     drawn = draw_predictive(problem, theta, sample, question_of(experiment, train), np.random.default_rng(5))

@@ -30,8 +30,10 @@ def test_rows_as_a_dataset_have_names_and_units() -> None:
         "time_s",
     }
     assert {name: found[name].values.tolist() for name in ("hold", "time_s", "q95_N")} == {
-        "hold": [3, 4], "time_s": [0.0, 30.0], "q95_N": [4.0, 9.0]
-    }  # fmt: skip
+        "hold": [3, 4],
+        "time_s": [0.0, 30.0],
+        "q95_N": [4.0, 9.0],
+    }
     assert [found[name].attrs["units"] for name in header("displacement")[1:]] == [
         "1",
         "mm",
@@ -150,8 +152,10 @@ def test_figures_are_those_of_the_draws_to_the_last_bit_where_a_reading_is_given
     rows = mixture_table([(1.0, request)])  # type: ignore[arg-type]
     where = [(1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]
     assert [row[:4] for row in rows] == [
-        ["wire", 2, 2.0, 0.0], ["wire", 2, 2.0, 50.0], *(["wire", 3, 3.0, time] for time in (0.0, 10.0, 20.0))
-    ]  # fmt: skip
+        ["wire", 2, 2.0, 0.0],
+        ["wire", 2, 2.0, 50.0],
+        *(["wire", 3, 3.0, time] for time in (0.0, 10.0, 20.0)),
+    ]
     for (j, k), row in zip(where, rows, strict=True):
         here = drawn[j, k]
         expected = [here.mean(), here.std(ddof=1), *np.quantile(here, [0.05, 0.5, 0.95])]

@@ -429,10 +429,16 @@ def test_a_scene_cannot_end_its_script():
 
 def test_an_unfinished_reproduction_shows_what_there_is(tmp_path):
     row = {
-        "experiment": "wire-a", "material": "Line", "length_mm": 1000.0,
-        "holds": 3, "unrecorded_holds": 0, "readings": 15,
-        "smallest_tension_N": 1.0, "largest_tension_N": 2.0, "median_loss_percent": 5.0,
-    }  # fmt: skip
+        "experiment": "wire-a",
+        "material": "Line",
+        "length_mm": 1000.0,
+        "holds": 3,
+        "unrecorded_holds": 0,
+        "readings": 15,
+        "smallest_tension_N": 1.0,
+        "largest_tension_N": 2.0,
+        "median_loss_percent": 5.0,
+    }
     page = read(write_page(folder_of(tmp_path / "out", "reproduce", measured=[row])))
     assert "wire-a" in page.words and "Table 4, again" not in page.words
 

@@ -156,8 +156,12 @@ def test_what_was_measured_is_labelled_masked_and_has_units(
     # what ArviZ flattens together has values in the same places
     assert (finite(predicted.tension_N) == finite(observed.tension_N)).all()
     assert finite(predicted.hold_mean_N).all() and finite(data.log_likelihood.tension_N).all()
-    units = {str(n): v.attrs["units"] for g in (observed, predicted, constant) for n, v in g.data_vars.items()
-             if v.dtype.kind == "f"}  # fmt: skip
+    units = {
+        str(n): v.attrs["units"]
+        for g in (observed, predicted, constant)
+        for n, v in g.data_vars.items()
+        if v.dtype.kind == "f"
+    }
     assert units["tension_N"] == units["hold_mean_N"] == "N" and units["time_s"] == units["duration_s"] == "s"
     assert units["displacement_mm"] == units["unrecorded_displacement_mm"] == "mm" and units["warming_K"] == "K"
     assert data.posterior.k1.attrs["units"] == "N" and json.loads(data.posterior.attrs["experiments"])

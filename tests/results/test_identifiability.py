@@ -33,9 +33,10 @@ def normal_model(noise: dict[str, float], draws: int = 4000, total: float | None
     precision = np.eye(d) + design.T @ np.diag(error**-2.0) @ design
     theta = np.random.default_rng(0).multivariate_normal(np.zeros(d), np.linalg.inv(precision), draws)
     problem = SimpleNamespace(
-        prior=Prior(dict.fromkeys(names, stats.norm(0.0, 1.0)), {}, frozenset()), names=names,
+        prior=Prior(dict.fromkeys(names, stats.norm(0.0, 1.0)), {}, frozenset()),
+        names=names,
         log_likelihood=lambda rows: -0.5 * ((rows @ design.T / error) ** 2).sum(axis=1),
-    )  # fmt: skip
+    )
     return SimpleNamespace(problem=problem, flat=theta)
 
 
@@ -104,10 +105,18 @@ def test_extrapolation_of_draws_that_do_not_creep_says_so() -> None:
 
 
 def sentence(contraction: float, sensitivity: float) -> str:
-    return parameter_in_words("k1", {
-        "contraction": contraction, "prior_range_90": 100.0, "posterior_range_90": 1.5, "range_is_factor": True,
-        "prior_sensitivity": sensitivity, "likelihood_sensitivity": 1.0, "ridges": {},
-    })  # fmt: skip
+    return parameter_in_words(
+        "k1",
+        {
+            "contraction": contraction,
+            "prior_range_90": 100.0,
+            "posterior_range_90": 1.5,
+            "range_is_factor": True,
+            "prior_sensitivity": sensitivity,
+            "likelihood_sensitivity": 1.0,
+            "ridges": {},
+        },
+    )
 
 
 @pytest.mark.parametrize(
@@ -265,10 +274,18 @@ def test_an_extrapolation_as_plain_values_has_the_figures_under_their_names() ->
 
 
 def test_a_ridge_names_all_who_are_on_it_but_itself() -> None:
-    words = parameter_in_words("k1", {
-        "contraction": 0.95, "prior_range_90": 20.0, "posterior_range_90": 1.5, "range_is_factor": False,
-        "prior_sensitivity": 0.0, "likelihood_sensitivity": 1.0, "ridges": {"B": -0.95, "U": 0.991},
-    })  # fmt: skip
+    words = parameter_in_words(
+        "k1",
+        {
+            "contraction": 0.95,
+            "prior_range_90": 20.0,
+            "posterior_range_90": 1.5,
+            "range_is_factor": False,
+            "prior_sensitivity": 0.0,
+            "likelihood_sensitivity": 1.0,
+            "ridges": {"B": -0.95, "U": 0.991},
+        },
+    )
     assert words == (
         "k1: the data determine it; its 90 % range is 1.5, the prior's 20; it is correlated with B (r = -0.95) and "
         "U (r = +0.99), and their combination is known better."

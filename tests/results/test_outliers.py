@@ -12,8 +12,12 @@ def row(name, k1, sd=0.01, material="line", length=1000.0, b=0.2):
     def quantiles(middle):
         return {"q05": middle * np.exp(-1.645 * sd), "q50": middle, "q95": middle * np.exp(1.645 * sd)}
 
-    return {"name": name, "material": material, "length_mm": length,
-            "parameters": {"k1": quantiles(k1), "B": quantiles(b * length / 1000.0)}}  # fmt: skip
+    return {
+        "name": name,
+        "material": material,
+        "length_mm": length,
+        "parameters": {"k1": quantiles(k1), "B": quantiles(b * length / 1000.0)},
+    }
 
 
 def lot(n=12, seed=0, **about):
@@ -127,10 +131,14 @@ def test_the_share_would_be_seen_to_be_wrong(monkeypatch):
 def only(name, values, half=0.01, material="line"):
     """Rows with one parameter, known to so much on either side."""
     return [
-        {"name": f"s{i}", "material": material, "length_mm": 500.0,
-         "parameters": {name: {"q05": v - half, "q50": v, "q95": v + half}}}
+        {
+            "name": f"s{i}",
+            "material": material,
+            "length_mm": 500.0,
+            "parameters": {name: {"q05": v - half, "q50": v, "q95": v + half}},
+        }
         for i, v in enumerate(values)
-    ]  # fmt: skip
+    ]
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e-3, 1e4])
@@ -157,11 +165,16 @@ def test_an_outlier_says_all_there_is_to_it():
     values = [1.0, 1.01, 0.99, 1.02, 0.98, 1.0, 1.0, 3.0]
     (found,) = outliers(only("preload", values))
     assert found == {
-        "experiment": "s7", "material": "line", "parameter": "preload", "value": 3.0, "median": 1.0,
-        "z": found["z"], "specimens": 8,
+        "experiment": "s7",
+        "material": "line",
+        "parameter": "preload",
+        "value": 3.0,
+        "median": 1.0,
+        "z": found["z"],
+        "specimens": 8,
         "sentence": f"s7: preload is 3, {found['z']:.1f} robust standard deviations above the median of 8 specimens "
-                    "of line, 1",
-    }  # fmt: skip
+        "of line, 1",
+    }
 
 
 def test_specimens_without_a_parameter_or_a_material_do_not_count_for_it():

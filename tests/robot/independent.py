@@ -120,10 +120,14 @@ def least_tensions(robot, x, R):
     low, high = robot.rule.lowest_N / (robot.mass_kg * G), robot.rule.highest_N / (robot.mass_kg * G)
     begin = np.clip(np.linalg.lstsq(A, load, rcond=None)[0], low, high)
     found = minimize(
-        lambda t: t @ t, begin, jac=lambda t: 2 * t, method="SLSQP", bounds=[(low, high)] * robot.legs,
+        lambda t: t @ t,
+        begin,
+        jac=lambda t: 2 * t,
+        method="SLSQP",
+        bounds=[(low, high)] * robot.legs,
         options={"ftol": 1e-15, "maxiter": 500},
         constraints={"type": "eq", "fun": lambda t: A @ t - load, "jac": lambda t: A},
-    )  # fmt: skip
+    )
     good = np.abs(A @ found.x - load).max() < 1e-7
     return found.x * robot.mass_kg * G if good else None
 
@@ -159,9 +163,16 @@ def drift(rig, theta, length_mm, zero, q, times_s):
     scale = float(np.max(theta["B"] * rig.tension(q, zero) ** theta["U"]))
     u = np.asarray(times_s) ** N
     done = solve_ivp(
-        rate, (0.0, u[-1]), np.zeros(rig.robot.legs), "Radau", u, events=holds, rtol=1e-5, atol=1e-8 * scale,
+        rate,
+        (0.0, u[-1]),
+        np.zeros(rig.robot.legs),
+        "Radau",
+        u,
+        events=holds,
+        rtol=1e-5,
+        atol=1e-8 * scale,
         first_step=1e-3 * u[-1],
-    )  # fmt: skip
+    )
     out = []
     for g in np.reshape(done.y, (rig.robot.legs, -1)).T:
         out.append(pose(g[None])[0][0])

@@ -52,8 +52,12 @@ def test_the_equilibrium_is_that_of_an_energy_in_three_angles(seed):
     np.testing.assert_allclose(back.rotation[0], turn, atol=1e-9)
     zero = commands.zero_m[0] - 2e-3 * rng.random(robot.legs)
     found = forward.solve_equilibrium(robot, wires, zero[None], commands.offset_m, robot.home_m, turn)
-    best = minimize(lambda q: _energy(robot, zero, q), rotation.vector(turn[None])[0], method="Nelder-Mead",
-                    options={"xatol": 1e-10, "fatol": 1e-15, "maxiter": 4000})  # fmt: skip
+    best = minimize(
+        lambda q: _energy(robot, zero, q),
+        rotation.vector(turn[None])[0],
+        method="Nelder-Mead",
+        options={"xatol": 1e-10, "fatol": 1e-15, "maxiter": 4000},
+    )
     np.testing.assert_allclose(rotation.vector(found.rotation)[0], best.x, atol=1e-6)
 
 
@@ -73,8 +77,9 @@ def test_turns_are_as_stiff_as_the_energy_is_curved():
     tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
     wires = Wires("hooke", "saturating", {"k1": np.array([[K1]])}, np.full((robot.legs, 1), 1000.0))
     commands = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
-    K = statics.stiffness(robot, wires, robot.home_m[:, None], np.eye(3)[..., None], commands.zero_m.T,
-                          commands.offset_m.T)[0]  # fmt: skip
+    K = statics.stiffness(
+        robot, wires, robot.home_m[:, None], np.eye(3)[..., None], commands.zero_m.T, commands.offset_m.T
+    )[0]
     h, axes = 1e-4, np.eye(3)
 
     def curved(i, j):

@@ -59,9 +59,16 @@ def case():
     assert known.converged.all()
     start = calibrated(robot, prior, session, known)
     after = History(times[-2:], whole.joint_m[-2:], None, None, np.zeros(2), np.zeros((2, 3)))
-    return Case(robot, line, start, after, x[-2:], lambda joint: _simulated(
-        robot, _theta(wires, 0), replace(whole, joint_m=np.concatenate([whole.joint_m[:-2], joint])), error[0]
-    )[0][-2:])  # fmt: skip
+    return Case(
+        robot,
+        line,
+        start,
+        after,
+        x[-2:],
+        lambda joint: _simulated(
+            robot, _theta(wires, 0), replace(whole, joint_m=np.concatenate([whole.joint_m[:-2], joint])), error[0]
+        )[0][-2:],
+    )
 
 
 @dataclass(frozen=True)

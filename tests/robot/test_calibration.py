@@ -16,10 +16,15 @@ from wirebayes.robot.self_calibration.start import starting_references
 def _line(n=300, seed=1):
     rng = np.random.default_rng(seed)
     return draws.WireDraws(
-        {"k1": 803 * np.exp(0.01 * rng.normal(size=n)), "B": 0.31 * np.exp(0.1 * rng.normal(size=n)),
-         "U": rng.normal(1, 0.05, n), "k2": 0.03 * np.exp(0.05 * rng.normal(size=n)), "N": rng.normal(0.64, 0.02, n)},
+        {
+            "k1": 803 * np.exp(0.01 * rng.normal(size=n)),
+            "B": 0.31 * np.exp(0.1 * rng.normal(size=n)),
+            "U": rng.normal(1, 0.05, n),
+            "k2": 0.03 * np.exp(0.05 * rng.normal(size=n)),
+            "N": rng.normal(0.64, 0.02, n),
+        },
         1000.0,
-    )  # fmt: skip
+    )
 
 
 def _session(robot, line, poses, rng, tilt_sd=None):

@@ -53,8 +53,12 @@ def test_every_sampled_pose_lies_in_the_guaranteed_enclosure(name):
     assert (proof.radius_m[:3] < 4 * reach).all()  # an enclosure, not a room
     if robot.degrees == 6:
         turn = rotation.vector(found.rotation @ R.T)
-        cayley = 2 * np.tan(0.5 * np.linalg.norm(turn, axis=1, keepdims=True)) * turn / np.linalg.norm(
-            turn, axis=1, keepdims=True)  # fmt: skip
+        cayley = (
+            2
+            * np.tan(0.5 * np.linalg.norm(turn, axis=1, keepdims=True))
+            * turn
+            / np.linalg.norm(turn, axis=1, keepdims=True)
+        )
         assert (robot.size_m * np.abs(cayley).max(0) <= proof.radius_m[3:]).all()
 
 

@@ -68,8 +68,14 @@ def test_pose_answers_and_repeats_to_the_byte(fitted, tmp_path, capsys):
     }
     assert 0 < pose["workspace"]["q05_drift_mm"] < pose["workspace"]["q95_drift_mm"]
     assert {path.stem for path in out[0].glob("*.svg")} == {
-        "robot", "drift", "rotation", "pose-error", "error-budget", "workspace-drift", "workspace-tilt"
-    }  # fmt: skip
+        "robot",
+        "drift",
+        "rotation",
+        "pose-error",
+        "error-budget",
+        "workspace-drift",
+        "workspace-tilt",
+    }
     if pose["certificate"]["proved"] is not None:
         band = pose["certificate"]["band"]
         drifted = pose["drift"][0]["displacement_mm"]["q50"][-1]
@@ -215,8 +221,9 @@ def session_csv(tmp_path):
     from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
     robot = schema.read_robot_file("linear-7")
-    line = draws.WireDraws({k: np.full(3, v) for k, v in
-                            {"k1": 803.0, "B": 0.31, "U": 1.0, "k2": 0.03, "N": 0.64}.items()}, 1000.0)  # fmt: skip
+    line = draws.WireDraws(
+        {k: np.full(3, v) for k, v in {"k1": 803.0, "B": 0.31, "U": 1.0, "k2": 0.03, "N": 0.64}.items()}, 1000.0
+    )
     x = robot.home_m + np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0.05], [-0.1, -0.1, -0.05], [0.05, -0.15, 0.1]])
     R = rotation.matrix(np.zeros((len(x), 3)))
     tau = inverse.tensions(robot, x, R)
@@ -260,8 +267,10 @@ def test_a_calibration_that_does_not_converge_says_so_and_gives_no_joint_values(
     """One hold read, its tensions five times too large: no lengths near their references make these."""
     header, unread, read = (DOCS / "linear-7-session.csv").read_text().splitlines()[:3]
     cells = read.split(",")
-    wrong = [str(5 * float(cell)) if name.startswith("tension_") else cell
-             for name, cell in zip(header.split(","), cells, strict=True)]  # fmt: skip
+    wrong = [
+        str(5 * float(cell)) if name.startswith("tension_") else cell
+        for name, cell in zip(header.split(","), cells, strict=True)
+    ]
     file, out = tmp_path / "session.csv", tmp_path / "out"
     file.write_text("\n".join([header, unread, ",".join(wrong)]) + "\n")
     arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(out)]
@@ -444,9 +453,14 @@ def test_the_command_maps_the_requested_slices(fitted, tmp_path):
 
     out = tmp_path / "out"
     held = wb.pose(
-        "linear-6", fitted, times=[0, 60], draws=10, map_heights=[0.5], map_rotations=[[0, 0, 0], [0, 0.1, 0]],
+        "linear-6",
+        fitted,
+        times=[0, 60],
+        draws=10,
+        map_heights=[0.5],
+        map_rotations=[[0, 0, 0], [0, 0.1, 0]],
         output=out,
-    )  # fmt: skip
+    )
     slices = held.summary()["workspace"]["slices"]
     assert [(s["at_m"], s["rotation_vector_rad"]) for s in slices] == [(0.5, [0, 0, 0]), (0.5, [0, 0.1, 0])]
     with (out / "workspace.csv").open() as file:

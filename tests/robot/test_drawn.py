@@ -161,8 +161,11 @@ def test_nothing_depends_on_where_the_origin_is_or_on_the_units_of_force(kind):
     assert (there.status == course.status).all()
     np.testing.assert_allclose(there.position_m - away, course.position_m, atol=1e-9 * robot.span_m + 1e-11)
     for force in (1e-3, 1e7):
-        heavy = replace(robot, mass_kg=force * robot.mass_kg, rule=replace(
-            robot.rule, lowest_N=force * robot.rule.lowest_N, highest_N=force * robot.rule.highest_N))  # fmt: skip
+        heavy = replace(
+            robot,
+            mass_kg=force * robot.mass_kg,
+            rule=replace(robot.rule, lowest_N=force * robot.rule.lowest_N, highest_N=force * robot.rule.highest_N),
+        )
         more = inverse.tensions(heavy, d.position_m[None], d.rotation[None])
         np.testing.assert_allclose(more / force, tau, rtol=1e-9)
         theta = dict(wires.theta) | {"k1": wires.theta["k1"] * force, "B": wires.theta["B"] / force ** wires.theta["U"]}
@@ -188,8 +191,9 @@ def _fallen_out(d, count, rng):
         edges.append((0.5 * (a + b) - 0.5 * band["share"] * (b - a), 0.5 * (a + b) + 0.5 * band["share"] * (b - a)))
     bare = rig.zero_for(q, tau)[0]
     # every wire anywhere in its band, corners among them, creep in step; followed by the other solver
-    where = np.where(rng.random((2, count, 1)) < 0.5, rng.random((2, count, robot.legs)),
-                     rng.integers(0, 2, (2, count, robot.legs)))  # fmt: skip
+    where = np.where(
+        rng.random((2, count, 1)) < 0.5, rng.random((2, count, robot.legs)), rng.integers(0, 2, (2, count, robot.legs))
+    )
     k1, grown = (a + s * (b - a) for s, (a, b) in zip(where, edges, strict=True))
     many = independent.Rig(robot, d.line.law, k1, R)
     q, ok = np.repeat(q, count, 0), np.ones(count, bool)

@@ -27,9 +27,13 @@ def _line(n=1, law="hooke", history="saturating", effects=(), sd=0.0, seed=0, **
 def _bench_with_the_robots_wire(line, displacement_mm, duration_s, follow):
     """One wire held at given stretched lengths: the robot's creep, the bench's protocol."""
     wires = Wires(
-        line.law, line.history, {k: v[None] for k, v in line.parameters.items()}, np.array([[1000.0]]),
-        line.material(), line.tension_ref_N,
-    )  # fmt: skip
+        line.law,
+        line.history,
+        {k: v[None] for k, v in line.parameters.items()},
+        np.array([[1000.0]]),
+        line.material(),
+        line.tension_ref_N,
+    )
     state = fresh(1, line.count)
     readings = []
     for x in displacement_mm:
@@ -79,9 +83,13 @@ def test_a_wire_in_the_robot_creeps_as_on_the_bench(law, history, effect):
     ours = _bench_with_the_robots_wire(line, x, duration, "start")[..., 0]
     h = len(x)
     protocol = Protocol(
-        1000.0, x, np.tile([0.0, 0.4 * duration, duration], (h, 1)), np.ones((h, 3), bool), np.full(h, duration),
+        1000.0,
+        x,
+        np.tile([0.0, 0.4 * duration, duration], (h, 1)),
+        np.ones((h, 3), bool),
+        np.full(h, duration),
         np.arange(1, h + 1),
-    )  # fmt: skip
+    )
     theta = dict(line.parameters) | {"preload": np.zeros(1)}
     bench = simulate(protocol, theta, Model(law, history, effects, tension_ref_N=3.0))[..., 0]
     np.testing.assert_allclose(ours, bench, rtol=1e-12)

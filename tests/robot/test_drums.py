@@ -22,9 +22,13 @@ from wirebayes.strict.table import csv_table
 
 # one layer; five turns a layer; a spiral of one turn a layer; no drum known
 DRUMS = Drums(
-    np.array([0.04, 0.03, 0.02, 0.0]), np.array([2e-3, 1e-3, 0.0, 0.0]), np.array([np.inf, 5.0, 1.0, np.inf]),
-    np.array([0.0, 8e-4, 5e-4, 0.0]), np.array([0.0, 6.0, 6.0, 0.0]), np.array([1.0, 12.75, 0.5, 1.0]),
-)  # fmt: skip
+    np.array([0.04, 0.03, 0.02, 0.0]),
+    np.array([2e-3, 1e-3, 0.0, 0.0]),
+    np.array([np.inf, 5.0, 1.0, np.inf]),
+    np.array([0.0, 8e-4, 5e-4, 0.0]),
+    np.array([0.0, 6.0, 6.0, 0.0]),
+    np.array([1.0, 12.75, 0.5, 1.0]),
+)
 
 
 def _laid_down(leg, drum_rad):

@@ -57,10 +57,16 @@ def _caspr(folder, robot, reference="joint", base=(0.0, 0.0, 0.0), angles=(0.0, 
     point = robot.platform_m - (robot.centre_of_mass_m if reference == "com" else 0.0)
     free = robot.degrees == 6
     home = [*(robot.home_m - base), *(angles if free else ())]
-    (folder / "toy_bodies.xml").write_text(BODIES.format(
-        name=robot.name, joint="SPATIAL_EULER_XYZ" if free else "T_XYZ", home=_row(home), mass=robot.mass_kg,
-        centre=_row(robot.centre_of_mass_m), base=_row(base),
-    ))  # fmt: skip
+    (folder / "toy_bodies.xml").write_text(
+        BODIES.format(
+            name=robot.name,
+            joint="SPATIAL_EULER_XYZ" if free else "T_XYZ",
+            home=_row(home),
+            mass=robot.mass_kg,
+            centre=_row(robot.centre_of_mass_m),
+            base=_row(base),
+        )
+    )
     cables = ""
     for i in range(robot.legs):
         start = f"<attachment><link>0</link><location>{_row(robot.exit_m[i])}</location></attachment>"
@@ -70,24 +76,30 @@ def _caspr(folder, robot, reference="joint", base=(0.0, 0.0, 0.0), angles=(0.0, 
                 f"<pulley_radius>{float(robot.pulleys.radius_m[i])!r}</pulley_radius>"
                 f"<cable_entry_vector>{_row(2 * robot.pulleys.axis[i])}</cable_entry_vector></base_rotating_pulley>"
             )
-        cables += CABLE.format(i=i + 1, reference=reference, low=0.5 + 0.1 * i, high=90 - i, base=start,
-                               point=_row(point[i]))  # fmt: skip
+        cables += CABLE.format(
+            i=i + 1, reference=reference, low=0.5 + 0.1 * i, high=90 - i, base=start, point=_row(point[i])
+        )
     other = CABLE.format(i=1, reference="joint", low=1, high=2, base=start, point="0 0 0")
     (folder / "toy_cables.xml").write_text(
         f'<?xml version="1.0"?>\n<!DOCTYPE cables [\n<!ATTLIST cable_set id ID #REQUIRED>\n]>\n'
         f'<cables default_cable_set="original">\n  <cable_set id="few">\n{other}  </cable_set>\n'
         f'  <cable_set id="original">\n{cables}{extra}  </cable_set>\n</cables>\n'
-    )  # fmt: skip
+    )
     return folder / "toy_bodies.xml"
 
 
 def _wirex(folder, robot, pattern="3R3T"):
     xyz = lambda p: " ".join(f'{k}="{float(v)!r}"' for k, v in zip("xyz", p, strict=True))  # noqa: E731
     chains = "".join(
-        CHAIN.format(i=i + 1, exit=xyz(robot.exit_m[i]), point=xyz(robot.platform_m[i]),
-                     axis=robot.pulleys.axis[i].tolist(), radius=float(robot.pulleys.radius_m[i]))
+        CHAIN.format(
+            i=i + 1,
+            exit=xyz(robot.exit_m[i]),
+            point=xyz(robot.platform_m[i]),
+            axis=robot.pulleys.axis[i].tolist(),
+            radius=float(robot.pulleys.radius_m[i]),
+        )
         for i in range(robot.legs)
-    )  # fmt: skip
+    )
     file = folder / "toy.xml"
     file.write_text(
         f'<models version="0.32">\n<robot generator="Wirelib" motionpattern="{pattern}">\n'
@@ -143,8 +155,9 @@ def test_a_planar_joint_of_caspr_is_a_rail(joint, axes, tmp_path):
     plain = schema.read_robot_file("sled-4")
     robot = replace(plain, exit_m=corners, platform_m=0.1 * corners[[1, 0, 3, 2]], home_m=np.zeros(3), mass_kg=0.1)
     bodies = _caspr(tmp_path, robot)
-    given = re.sub('type="SPATIAL_EULER_XYZ" q_initial="[^"]*"', f'type="{joint}" q_initial="0.3 -0.2 0.1"',
-                   bodies.read_text())  # fmt: skip
+    given = re.sub(
+        'type="SPATIAL_EULER_XYZ" q_initial="[^"]*"', f'type="{joint}" q_initial="0.3 -0.2 0.1"', bodies.read_text()
+    )
     bodies.write_text(given)
     got = schema.read_robot_file(import_robot(bodies, tmp_path / "toy.toml"))
     home = np.zeros(3)
@@ -164,8 +177,9 @@ def test_a_spherical_joint_of_caspr_is_a_ball_joint(joint, axes, tmp_path):
     """Three angles about axes that turn along, or about those of the base; the joint is the home position."""
     robot = ball_joint(np.random.default_rng(0))
     bodies = _caspr(tmp_path, robot, "com", base=robot.home_m)
-    given = re.sub('type="SPATIAL_EULER_XYZ" q_initial="[^"]*"', f'type="{joint}" q_initial="0.1 -0.2 0.15"',
-                   bodies.read_text())  # fmt: skip
+    given = re.sub(
+        'type="SPATIAL_EULER_XYZ" q_initial="[^"]*"', f'type="{joint}" q_initial="0.1 -0.2 0.15"', bodies.read_text()
+    )
     bodies.write_text(given)
     got = schema.read_robot_file(import_robot(bodies, tmp_path / "toy.toml"))
     _same(got, robot)
@@ -224,8 +238,12 @@ def test_a_robot_of_wirex_is_read(name, pattern, tmp_path):
         ("bodies", "<com_location>", "<com_location>1 ", "expected 3 numbers with spaces"),
         ("bodies", 'q_initial="', 'q_initial="1 ', "expected 6 numbers"),
         ("bodies", "bodies_system>", "system>", "found this root"),
-        ("bodies", "<!DOCTYPE bodies_system SYSTEM \"../../../../templates/bodies.dtd\">",
-         '<!DOCTYPE b [<!ENTITY a "aaaa">]>', "found an entity"),
+        (
+            "bodies",
+            '<!DOCTYPE bodies_system SYSTEM "../../../../templates/bodies.dtd">',
+            '<!DOCTYPE b [<!ENTITY a "aaaa">]>',
+            "found an entity",
+        ),
         ("bodies", "utf-8", "no-such", "expected XML"),
         ("cables", "<link>0</link>", "<link>2</link>", "found link 2, expected link 0"),
         ("cables", "force_max>", "most>", "found 0 elements <force_max>, expected one"),
@@ -234,7 +252,7 @@ def test_a_robot_of_wirex_is_read(name, pattern, tmp_path):
         ("cables", "<location>", "<location>nan ", "<location>: found"),
         ("cables", "<attachment><link>0", "<screw_base_rotating_pulley/><attachment><link>0", "found 3 attachments"),
     ],
-)  # fmt: skip
+)
 def test_mistakes_name_file_and_line(file, old, new, message, tmp_path, capsys):
     bodies = _caspr(tmp_path, schema.read_robot_file("cogiro"))
     broken = tmp_path / f"toy_{file}.xml"

@@ -106,9 +106,10 @@ def test_urdf_and_sdf_put_every_frame_in_its_place(name):
     mujoco = pytest.importorskip("mujoco")
     robot = schema.read_robot_file(name)
     robot = replace(
-        cases.with_pulleys(robot, np.random.default_rng(0)), name='a "name" & more',
+        cases.with_pulleys(robot, np.random.default_rng(0)),
+        name='a "name" & more',
         home_rotation_rad=np.array([0.02, -0.03, 0.05]) * (robot.degrees == 6),
-    )  # fmt: skip
+    )
     written = files.simulators(robot, _line("hooke", None, {}))
     assert set(written) == {"robot.xml", "robot.urdf", "robot.sdf"}
     R = rotation.matrix(robot.home_rotation_rad)

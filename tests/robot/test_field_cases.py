@@ -133,9 +133,11 @@ def test_belts_in_a_plane_are_told_how_to_say_so_and_held_when_it_is_said(run, t
 def test_klipper_counts_straight_millimetres_a_turn(run):
     code, _, _, out = run("export", FIELD / "klipper-rotation-distance" / "hp4-drum.toml")
     assert code == 0
-    said = [line.split(":")[-1].split("=")[-1].split("#")[0].strip()
-            for line in (out / "klipper.cfg").read_text().splitlines()
-            if line.lstrip("# ").startswith("rotation_distance")]  # fmt: skip
+    said = [
+        line.split(":")[-1].split("=")[-1].split("#")[0].strip()
+        for line in (out / "klipper.cfg").read_text().splitlines()
+        if line.lstrip("# ").startswith("rotation_distance")
+    ]
     assert [float(value) for value in said[:4]] == pytest.approx([233.735] * 3 + [113.412], rel=1e-5)
     assert "winch_buildup_factor" in (out / "klipper.cfg").read_text()
 

@@ -45,9 +45,14 @@ def test_mujoco_settles_where_we_solve(name):
         soft = _softest(robot, c, found)
         for i in range(len(found.status)):
             x, R, rested = cases.rest_in_mujoco(
-                robot, np.full(robot.legs, c.wires.theta["k1"][0, i]), c.zero_m[i], c.offset_m[i],
-                found.position_m[i] + 1e-3 * robot.size_m, found.rotation[i], soft[i],
-            )  # fmt: skip
+                robot,
+                np.full(robot.legs, c.wires.theta["k1"][0, i]),
+                c.zero_m[i],
+                c.offset_m[i],
+                found.position_m[i] + 1e-3 * robot.size_m,
+                found.rotation[i],
+                soft[i],
+            )
             assert rested
             assert np.abs(x - found.position_m[i]).max() < 1e-6
             assert robot.size_m * np.abs(R - found.rotation[i]).max() < 1e-6
@@ -68,9 +73,14 @@ def test_least_energy_is_where_we_solve_under_law_3(name):
     found = cases.solved(robot, c)
     for i in range(len(found.status)):
         x, R, _ = cases.energy_minimum(
-            robot, "modified", c.wires.theta["k1"][0, i], c.zero_m[i], c.offset_m[i],
-            found.position_m[i] + 1e-3 * robot.size_m, found.rotation[i],
-        )  # fmt: skip
+            robot,
+            "modified",
+            c.wires.theta["k1"][0, i],
+            c.zero_m[i],
+            c.offset_m[i],
+            found.position_m[i] + 1e-3 * robot.size_m,
+            found.rotation[i],
+        )
         assert np.abs(x - found.position_m[i]).max() < 1e-6
         assert robot.size_m * np.abs(R - found.rotation[i]).max() < 1e-6
 
@@ -200,9 +210,18 @@ def stepped(monkeypatch, *, gradient=1.0, stiffness=2.0, damping=0.0, level=4.0,
     one = np.ones(1)
     at, turn = np.array([[x], [0.0], [0.0]]), np.eye(3)[..., None]
     cases_ = forward._Cases(
-        np.zeros(1, int), None, np.ones((4, 1)), np.zeros((4, 1)), at, turn, point(energy, size), damping * one,
-        level * one, floor * one, span * one,
-    )  # fmt: skip
+        np.zeros(1, int),
+        None,
+        np.ones((4, 1)),
+        np.zeros((4, 1)),
+        at,
+        turn,
+        point(energy, size),
+        damping * one,
+        level * one,
+        floor * one,
+        span * one,
+    )
     new, ended = forward._iterate(WEIGHED, cases_, np.ones((3, 1)))
     moved = float(new.x[0, 0] - x)
     assert new.at.energy[0] == (energy - gain if moved else energy)
@@ -423,8 +442,10 @@ def test_starts_lie_among_the_exits_and_below_and_the_known_pose_is_one_of_them(
     near = 1e-6 * robot.span_m
     for i in range(len(found.position_m)):
         for k in range(i):
-            one, other = (forward.Equilibria(*(getattr(found, f)[[j]] for f in forward.Equilibria.__annotations__))
-                          for j in (i, k))  # fmt: skip
+            one, other = (
+                forward.Equilibria(*(getattr(found, f)[[j]] for f in forward.Equilibria.__annotations__))
+                for j in (i, k)
+            )
             assert _distance(robot, one, other.position_m, other.rotation)[0] > near
 
 

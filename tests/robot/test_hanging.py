@@ -75,10 +75,18 @@ def test_tensions_beyond_the_bounds_hold_nothing(four):
 
 def test_two_wires_command_two_directions_and_name_the_nearest_position(four):
     pair = replace(
-        four, exit_m=np.array([[0.0, 0.0, 2.0], [1.3, 0.0, 2.0]]), lines=np.ones(2), beyond_m=np.zeros(2),
-        platform_m=np.array([[-0.06, 0.0, 0.03], [0.06, 0.0, 0.03]]), centre_of_mass_m=np.array([0.0, 0.0, -0.02]),
-        actuator=("drum",) * 2, ratio=np.zeros(2), wire_m=np.zeros(2), wire=("default",) * 2, mass_kg=0.7,
-    )  # fmt: skip
+        four,
+        exit_m=np.array([[0.0, 0.0, 2.0], [1.3, 0.0, 2.0]]),
+        lines=np.ones(2),
+        beyond_m=np.zeros(2),
+        platform_m=np.array([[-0.06, 0.0, 0.03], [0.06, 0.0, 0.03]]),
+        centre_of_mass_m=np.array([0.0, 0.0, -0.02]),
+        actuator=("drum",) * 2,
+        ratio=np.zeros(2),
+        wire_m=np.zeros(2),
+        wire=("default",) * 2,
+        mass_kg=0.7,
+    )
     found = balanced_orientation(pair, np.array([0.4, 0.0, 1.2]), None)
     np.testing.assert_allclose(turning.vector(found.rotation[None])[0], [0.0, 0.25961, 0.0], atol=1e-5)
     assert found.found["position_directions"] == 2 and found.found["commanded_degrees"] == 2

@@ -40,9 +40,14 @@ def _joint_values_for(robot, times, position, holds=None, payload=None):
     wires = uncreeping(draws.for_robot(robot, draws.WireDraws({k: v[0] for k, v in mean.items()}, 1000.0)))
     payload = np.zeros(len(times)) if payload is None else np.asarray(payload, float)
     history = History(
-        np.asarray(times, float), None, np.asarray(position, float), np.tile(np.eye(3), (len(times), 1, 1)), payload,
-        np.zeros((len(times), 3)), None if holds is None else np.asarray(holds),
-    )  # fmt: skip
+        np.asarray(times, float),
+        None,
+        np.asarray(position, float),
+        np.tile(np.eye(3), (len(times), 1, 1)),
+        payload,
+        np.zeros((len(times), 3)),
+        None if holds is None else np.asarray(holds),
+    )
     tau = commanded.wanted_tensions(robot, history)
     joint = [
         inverse.commands(history.robot_at(robot, k), wires, x[None], np.eye(3)[None], t[None]).joint_m[0]
@@ -93,8 +98,10 @@ def _simulated(robot, theta, history, extra_m=0.0):
 
 def _theta(wires, j):
     """One column's parameters, a value a wire."""
-    return {k: v[:, min(j, v.shape[1] - 1)] if k != "N" else float(v.flat[min(j, v.size - 1)])
-            for k, v in wires.theta.items()}  # fmt: skip
+    return {
+        k: v[:, min(j, v.shape[1] - 1)] if k != "N" else float(v.flat[min(j, v.size - 1)])
+        for k, v in wires.theta.items()
+    }
 
 
 TIMES = [0.0, 60.0, 70.0, 400.0, 420.0, 900.0]
@@ -139,9 +146,10 @@ def test_bands_cover_the_truth_and_readings_narrow_them():
     for j in range(2):
         x, R, tau = _simulated(robot, _theta(wires, j), history, error[j])
         read = replace(
-            history, tension_N=tau + 0.02 * rng.standard_normal(tau.shape),
+            history,
+            tension_N=tau + 0.02 * rng.standard_normal(tau.shape),
             tilt_rad=roll_and_pitch(R) + 5e-4 * rng.standard_normal((len(x), 2)),
-        )  # fmt: skip
+        )
         found = estimate_poses(robot, line, read, start, errors, np.random.default_rng(5))
         assert found.converged
         assert found.misfit < 2
@@ -208,9 +216,12 @@ def test_an_even_motion_of_the_joints_needs_no_rows_between(name):
     few = _joint_values_for(robot, [0, 100, 110, 400], [a, a, b, b])
     times = np.unique(np.concatenate([few.times_s, np.arange(100, 110, 0.1)]))
     many = replace(
-        few, times_s=times, joint_m=np.stack([np.interp(times, few.times_s, c) for c in few.joint_m.T], 1),
-        payload_kg=np.zeros(len(times)), payload_m=np.zeros((len(times), 3)),
-    )  # fmt: skip
+        few,
+        times_s=times,
+        joint_m=np.stack([np.interp(times, few.times_s, c) for c in few.joint_m.T], 1),
+        payload_kg=np.zeros(len(times)),
+        payload_m=np.zeros((len(times), 3)),
+    )
     start, ends = (robot.home_m, np.eye(3)), {}
     for kind, history in (("few", few), ("many", many)):
         found = estimate_poses(robot, _line(2), history, start, Uncertain(), np.random.default_rng(0))
@@ -231,8 +242,12 @@ def test_commanded_poses_need_no_rows_between():
     drifts = {}
     for name, columns in tables.items():
         history = _joint_values_for(robot, columns[0], np.stack(columns[1:], 1))
-        history = replace(history, joint_m=None, position_m=np.stack(columns[1:], 1),
-                          rotation=np.tile(np.eye(3), (len(columns[0]), 1, 1)))  # fmt: skip
+        history = replace(
+            history,
+            joint_m=None,
+            position_m=np.stack(columns[1:], 1),
+            rotation=np.tile(np.eye(3), (len(columns[0]), 1, 1)),
+        )
         found, joint = commanded.drift_along(robot, _line(3), history, Uncertain(), np.random.default_rng(0))
         assert joint.shape == (3, len(columns[0]), 8)
         drifts[name] = found.track.position_m[:, -1] - robot.home_m
@@ -319,8 +334,13 @@ def test_draws_given_readings_are_those_of_a_curved_posterior(tension, read, lea
     def way(white, name, without):
         tau = tension(*white.T) * (0.0 if without.any() else 1.0)
         columns = (len(white), 2)
-        return Track(np.zeros((*columns, 3)), np.tile(np.eye(3), (*columns, 1, 1)), tau[..., None],
-                     np.zeros((*columns, 1)), np.zeros(2, np.int64))  # fmt: skip
+        return Track(
+            np.zeros((*columns, 3)),
+            np.tile(np.eye(3), (*columns, 1, 1)),
+            tau[..., None],
+            np.zeros((*columns, 1)),
+            np.zeros(2, np.int64),
+        )
 
     given = LogReadings(values, np.ones(2), of)
     loose = conditioning.slack_wires(given, 1)
@@ -365,8 +385,10 @@ def test_readings_that_too_few_draws_agree_with_are_not_used(monkeypatch):
     arguments = ((robot.home_m, np.eye(3)), Uncertain(1e-3))
     blind = estimate_poses(robot, _line(12), history, *arguments, np.random.default_rng(0))
     used = estimate_poses(robot, _line(12), read, *arguments, np.random.default_rng(0))
-    monkeypatch.setattr("wirebayes.robot.history.estimate.draw_posterior",
-                        lambda *given: replace(conditioning.draw_posterior(*given), effective=5.0))  # fmt: skip
+    monkeypatch.setattr(
+        "wirebayes.robot.history.estimate.draw_posterior",
+        lambda *given: replace(conditioning.draw_posterior(*given), effective=5.0),
+    )
     unused = estimate_poses(robot, _line(12), read, *arguments, np.random.default_rng(0))
     assert used.used
     assert not unused.used

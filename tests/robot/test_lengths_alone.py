@@ -44,9 +44,7 @@ def _session(printer, seed):
 
     def commanded(robot, wires, where, error_m):
         turn = level[: len(where)]
-        return inverse.commands(
-            robot, wires, where, turn, inverse.tensions(robot, where, turn), 0.0, error_m
-        ).joint_m  # fmt: skip
+        return inverse.commands(robot, wires, where, turn, inverse.tensions(robot, where, turn), 0.0, error_m).joint_m
 
     jogged = commanded(true, own, np.array(MARKS, float), reference.T)  # the nozzle is led onto a mark
     sent = commanded(printer, for_robot(printer, exact), places, 0.0)

@@ -130,8 +130,14 @@ def test_a_payload_that_is_set_starts_the_clocks_and_lowers_the_platform():
     after = live.step(1.0, joint)
     assert after.position_m[2] < before.position_m[2] - 1e-4
     assert live._since == 1.0
-    loaded = History(np.array([0.0, 1.0]), np.stack([joint, joint]), None, None, np.full(2, 0.5 * robot.mass_kg),
-                     np.tile(robot.centre_of_mass_m, (2, 1)))  # fmt: skip
+    loaded = History(
+        np.array([0.0, 1.0]),
+        np.stack([joint, joint]),
+        None,
+        None,
+        np.full(2, 0.5 * robot.mass_kg),
+        np.tile(robot.centre_of_mass_m, (2, 1)),
+    )
     batch = estimate_poses(robot, _line(4), loaded, (robot.home_m, np.eye(3)), Uncertain(), np.random.default_rng(0))
     np.testing.assert_allclose(after.position_m, batch.track.position_m[:, 0].mean(0), atol=2e-4)
 
@@ -250,8 +256,12 @@ def test_the_sample_for_firmware_takes_the_creep_off(monkeypatch):
     )
     assert len(sent) > 2
     np.testing.assert_allclose(np.sum(sent, 0), made)
-    assert np.linalg.norm(live.step(400.0, nominal + 1e-3 * robot.lines * made, nominal_m=nominal).position_m
-                          - live._x[-1]) < 2e-4  # fmt: skip
+    assert (
+        np.linalg.norm(
+            live.step(400.0, nominal + 1e-3 * robot.lines * made, nominal_m=nominal).position_m - live._x[-1]
+        )
+        < 2e-4
+    )
     assert sample.klipper([1, 2, 3, -4]).splitlines()[3] == "FORCE_MOVE STEPPER=stepper_d DISTANCE=-4.0000 VELOCITY=2"
     assert sample.reprapfirmware([1, 2, 3, -4]) == "M120 G91 G1 H2 X1.0000 Y2.0000 Z3.0000 U-4.0000 F120 M121"
 

@@ -72,17 +72,28 @@ def test_the_least_is_found_whatever_the_cones():
 def _symmetric():
     """A platform that four upper wires carry and four lower ones, at 0 N, keep from toppling; with its commands."""
     exits = np.array([[x, y, z] for z in (5.0, 1.0) for x, y in ((-4.0, 3.0), (4.0, 3.0), (4.0, -3.0), (-4.0, -3.0))])
-    points = np.array([
-        [x, y, z]
-        for z, a, b in ((0.25, 0.65, 0.125), (0.75, 0.75, 0.1))
-        for x, y in ((-a, b), (a, b), (a, -b), (-a, -b))
-    ])  # fmt: skip
+    points = np.array(
+        [
+            [x, y, z]
+            for z, a, b in ((0.25, 0.65, 0.125), (0.75, 0.75, 0.1))
+            for x, y in ((-a, b), (a, b), (a, -b), (-a, -b))
+        ]
+    )
     robot = replace(
-        schema.read_robot_file("cogiro-desk"), exit_m=exits, platform_m=points, mass_kg=10.0,
-        home_m=np.array([0.0, 0.0, 3.0]), centre_of_mass_m=np.array([0.0, 0.0, 0.5]),
+        schema.read_robot_file("cogiro-desk"),
+        exit_m=exits,
+        platform_m=points,
+        mass_kg=10.0,
+        home_m=np.array([0.0, 0.0, 3.0]),
+        centre_of_mass_m=np.array([0.0, 0.0, 0.5]),
         rule=TensionRule("minimum_norm", 0.0, 200.0),
-        lines=np.ones(8), beyond_m=np.zeros(8), wire=("default",) * 8, drums=None, pulleys=None, mass_kg_m=None,
-    )  # fmt: skip
+        lines=np.ones(8),
+        beyond_m=np.zeros(8),
+        wire=("default",) * 8,
+        drums=None,
+        pulleys=None,
+        mass_kg_m=None,
+    )
     values = {"k1": [1800.0], "B": [0.5], "U": [0.7], "k2": [0.03], "N": [0.55]}
     line = draws.WireDraws({name: np.array(v) for name, v in values.items()}, 1000.0, "hooke")
     wires = draws.for_robot(robot, line)

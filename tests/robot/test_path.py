@@ -18,8 +18,10 @@ def test_a_long_step_stays_on_the_equilibrium_that_short_ones_follow():
     level = np.tile(np.eye(3), (2, 1, 1))
     tau = inverse.tensions(robot, places, level)
     zero, offset = inverse.lengths(robot, inverse.commands(robot, known.plain, places, level, tau).joint_m)
-    way = [(zero[0] + share * (zero[1] - zero[0]) + error, np.broadcast_to(offset[0], error.shape))
-           for share in np.linspace(0, 1, PARTS + 1)]  # fmt: skip
+    way = [
+        (zero[0] + share * (zero[1] - zero[0]) + error, np.broadcast_to(offset[0], error.shape))
+        for share in np.linspace(0, 1, PARTS + 1)
+    ]
     start = forward.solve_equilibrium(robot, wires, *way[0], robot.home_m, np.eye(3))
     here = start
     for old, new in zip(way[:-1], way[1:], strict=True):

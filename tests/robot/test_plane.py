@@ -69,9 +69,12 @@ def test_the_equilibrium_in_the_plane_is_that_of_an_energy_in_three_coordinates(
 def test_a_leaning_plane_leaves_the_weight_along_it(sled):
     lean = rotation.matrix(np.array([0.4, 0.0, 0.0]))
     leaning = replace(
-        sled, exit_m=sled.exit_m @ lean.T, home_m=lean @ sled.home_m, home_rotation_rad=np.array([0.4, 0.0, 0.0]),
+        sled,
+        exit_m=sled.exit_m @ lean.T,
+        home_m=lean @ sled.home_m,
+        home_rotation_rad=np.array([0.4, 0.0, 0.0]),
         plane=replace(sled.plane, normal=lean @ sled.plane.normal),
-    )  # fmt: skip
+    )
     tau, _, _ = _held(leaning, leaning.home_m, lean)
     pulls = tau[:, None] * statics.geometry(leaning, leaning.home_m[:, None], lean[..., None]).direction[..., 0].T
     upwards = lean @ np.array([0.0, 1.0, 0.0])

@@ -46,8 +46,11 @@ def test_falls_are_shares_of_the_draws_that_began() -> None:
     assert found["fall_distance_mm"] == {"first": 20.0, "median": 20.0, "last": 20.0}
     assert found["caught_probability"] == 0.5
     assert found["slack_probability"].tolist() == [0.25, 0.25, 0.0]
-    assert found["slack_time_s"] == [{"first": 20.0, "median": 20.0, "last": 20.0},
-                                     {"first": 4.0, "median": 4.0, "last": 4.0}, None]  # fmt: skip
+    assert found["slack_time_s"] == [
+        {"first": 20.0, "median": 20.0, "last": 20.0},
+        {"first": 4.0, "median": 4.0, "last": 4.0},
+        None,
+    ]
     assert found["least_tension_wire"] == 2  # of four draws three come nearest to slackness there
     # margins are those of the two draws that hold to the end
     assert found["least_tension_share"]["mean"] == pytest.approx(0.3)
@@ -67,10 +70,16 @@ def test_warnings_say_who_falls_when_and_what_catches_it() -> None:
 
 def holding(tension: float, stiffness: float) -> Course:
     n = 4
-    return course(Falls(
-        np.full(n, NEVER), np.full(n, -1), np.zeros(n), np.full((n, 3), NEVER),
-        np.tile([0.9, 0.95, tension], (n, 1)), np.full(n, stiffness),
-    ))  # fmt: skip
+    return course(
+        Falls(
+            np.full(n, NEVER),
+            np.full(n, -1),
+            np.zeros(n),
+            np.full((n, 3), NEVER),
+            np.tile([0.9, 0.95, tension], (n, 1)),
+            np.full(n, stiffness),
+        )
+    )
 
 
 @pytest.mark.parametrize(
@@ -142,8 +151,10 @@ def test_the_paper_s_figures_hold_in_the_draws_that_keep_both() -> None:
     other = at(np.array([0.1 * d] * 4), np.zeros(4), (0.0, 30.0))
     request: Any = None
     found = answer._claim({0.0: alike, 0.05: other}, HERE, TURNED, request)
-    assert found["holds"] == [{"specimen_spread": 0.0, "probability": 0.4}, {"specimen_spread": 0.05,
-                                                                             "probability": None}]  # fmt: skip
+    assert found["holds"] == [
+        {"specimen_spread": 0.0, "probability": 0.4},
+        {"specimen_spread": 0.05, "probability": None},
+    ]
     # section 4 of the paper: 0.3 mm and 0.055° within a minute
     assert (found["time_s"], found["distance_mm"]) == (60.0, pytest.approx(0.3)) and TIME_S == 60.0
     assert found["tilt_deg"] == pytest.approx(0.055)
@@ -263,9 +274,13 @@ def test_a_robot_that_may_fall_says_who_is_to_blame_in_every_way() -> None:
     """Nothing catches it; no wire is slack but one may be; and it has begun in every draw."""
     n = 4
     fallen = Falls(
-        np.array([20.0, 40.0, 40.0, NEVER]), np.array([2, 2, 0, -1]), np.full(n, NEVER), np.full((n, 3), NEVER),
-        np.tile([0.9, 0.8, 0.1], (n, 1)), np.array([0.1, 0.1, 0.1, 0.5]),
-    )  # fmt: skip
+        np.array([20.0, 40.0, 40.0, NEVER]),
+        np.array([2, 2, 0, -1]),
+        np.full(n, NEVER),
+        np.full((n, 3), NEVER),
+        np.tile([0.9, 0.8, 0.1], (n, 1)),
+        np.array([0.1, 0.1, 0.1, 0.5]),
+    )
     found = stability.summary(course(fallen))
     assert found["began"] == 1.0 and found["fall_probability"] == 0.75 and found["caught_probability"] == 0.0
     assert found["fall_wires"].tolist() == [0.25, 0.0, 0.5] and found["fall_distance_mm"] is None
@@ -310,15 +325,18 @@ def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pyt
     robot: Any = SimpleNamespace(size_m=0.5, plane=None, freedom="pose")
     x, R = np.array([1.0, 2.0, 3.0]), np.eye(3)
     commands: Any = SimpleNamespace(
-        zero_m=np.ones((4, 3)), offset_m=np.zeros((4, 3)), feasible=np.array([True, True, False, True]),
+        zero_m=np.ones((4, 3)),
+        offset_m=np.zeros((4, 3)),
+        feasible=np.array([True, True, False, True]),
         tension_N=np.array([[0.0, 5.0, -1.0], [9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [9.0, 9.0, 9.0]]),
         rotation=np.tile(R, (4, 1, 1)),
-    )  # fmt: skip
+    )
     status = np.array([forward.FOUND, forward.FOUND, forward.NOT_CONVERGED, forward.NOT_HELD])
     back: Any = SimpleNamespace(
-        found=status == forward.FOUND, status=status,
+        found=status == forward.FOUND,
+        status=status,
         position_m=x + np.array([[1e-9, 0.0, 0.0], [0.0, 0.0, -3e-9], [9.0] * 3, [9.0] * 3]),
-    )  # fmt: skip
+    )
 
     def solve(used: Any, wires: Any, zero: Any, offset: Any, start: Any, turn: Any) -> Any:
         assert zero is commands.zero_m and offset is commands.offset_m and np.array_equal(turn, R)
@@ -336,9 +354,12 @@ def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pyt
     assert found["solved"] == 0.5 and found["largest_round_trip_error_m"] == pytest.approx(3e-9)
     assert found["slack_wires"] == 2 and found["lowest_stiffness_N_m"]["mean"] == 30.0
     assert found["statuses"] == {
-        "stable equilibrium": 2, "not converged": 1, forward.STATUS[forward.NO_EQUILIBRIUM]: 0,
-        forward.STATUS[forward.NOT_HELD]: 1, forward.STATUS[forward.FELL]: 0,
-    }  # fmt: skip
+        "stable equilibrium": 2,
+        "not converged": 1,
+        forward.STATUS[forward.NO_EQUILIBRIUM]: 0,
+        forward.STATUS[forward.NOT_HELD]: 1,
+        forward.STATUS[forward.FELL]: 0,
+    }
     back.found = np.zeros(4, bool)
     assert answer._round_trip(robot, None, commands, x, R)["largest_round_trip_error_m"] == 0.0  # type: ignore[arg-type]
 
@@ -388,8 +409,11 @@ def test_what_holds_the_commanded_pose_is_marked_among_all_poses(hung: Any, monk
     weak: Any = SimpleNamespace(feasible=np.array([False]), zero_m=[0], offset_m=[0])
     monkeypatch.setattr(answer.inverse, "commands", lambda *given: weak)
     assert answer._all_equilibria(robot, wires, x, R, rng) == {
-        "stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []
-    }  # fmt: skip
+        "stable_found": 0,
+        "starts": 0,
+        "commanded_stable": False,
+        "poses": [],
+    }
 
 
 def test_a_drift_is_told_in_millimetres_and_degrees_of_the_draws_that_are_found() -> None:
@@ -397,8 +421,9 @@ def test_a_drift_is_told_in_millimetres_and_degrees_of_the_draws_that_are_found(
     distance, turn = np.array([1e-3, 3e-3, 5.0]), np.array([0.01, 0.03, 1.0])
     one = at(distance, turn)
     one.rotation[2, 1] = NAN
-    held: Any = Course(one.times_s, one.position_m, one.rotation, np.ones((3, 2, 4)) * 7.0,
-                       np.array([[0, 0], [0, 0], [0, 1]]), None)  # type: ignore[arg-type]  # fmt: skip
+    held: Any = Course(
+        one.times_s, one.position_m, one.rotation, np.ones((3, 2, 4)) * 7.0, np.array([[0, 0], [0, 0], [0, 1]]), None
+    )  # type: ignore[arg-type]
     found = answer._drift(held, HERE, TURNED)
     assert found["solved"] == pytest.approx(2 / 3) and found["times_s"].tolist() == [0.0, 60.0]
     np.testing.assert_allclose(found["displacement_mm"]["mean"], [[0.0] * 3, [2.0, 0.0, 0.0]], atol=1e-9)

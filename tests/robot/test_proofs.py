@@ -56,8 +56,10 @@ def test_the_box_holds_every_pose_that_the_bands_allow_and_is_no_wider_than_they
     k1, strain = bands(wires, course, 1.0)
     bare, offset = commanded(robot, wires)
     corners = np.array(list(product((0, 1), repeat=8)))
-    stiff, grown = (np.where(side, high, low) for side, (low, high) in zip((corners[:, :4], corners[:, 4:]),
-                                                                           (k1, strain), strict=True))  # fmt: skip
+    stiff, grown = (
+        np.where(side, high, low)
+        for side, (low, high) in zip((corners[:, :4], corners[:, 4:]), (k1, strain), strict=True)
+    )
     every = Wires(wires.law, "saturating", {"k1": stiff.T}, np.full((4, 1), 1000.0))
     found = forward.solve_equilibrium(robot, every, bare * (1 + grown), offset, robot.home_m, np.eye(3))
     assert found.found.all()
@@ -182,8 +184,9 @@ def test_only_draws_that_were_followed_count_for_the_bands(hung: Any, monkeypatc
     assert asked[0][1][1] == pytest.approx(np.quantile(strain, 0.95, axis=1))
     # a platform that did not fall is proved of; one that did in a single draw is not
     for fell, pieces in ((np.zeros(30, bool), 2), (np.arange(30) == 7, 2)):
-        some: Any = SimpleNamespace(times_s=course.times_s, found=course.found, falls=SimpleNamespace(fell=fell),
-                                    end=course.end)  # fmt: skip
+        some: Any = SimpleNamespace(
+            times_s=course.times_s, found=course.found, falls=SimpleNamespace(fell=fell), end=course.end
+        )
         proofs.enclosed(robot, wires, some, robot.home_m, np.eye(3))
         assert len(asked) == pieces
 

@@ -109,8 +109,11 @@ def test_mujocos_tendons_wrap_as_ours(name):
     found = cases.solved(robot, c)
     assert found.found.all()
     lengths = np.full(robot.legs, c.wires.theta["k1"][0, 0]), c.zero_m[0], c.offset_m[0]
-    soft = np.linalg.eigvalsh(statics.stiffness(robot, c.wires, c.position_m.T, np.moveaxis(c.rotation, 0, -1),
-                                                c.zero_m.T, c.offset_m.T)[0, :3, :3])[0]  # fmt: skip
+    soft = np.linalg.eigvalsh(
+        statics.stiffness(robot, c.wires, c.position_m.T, np.moveaxis(c.rotation, 0, -1), c.zero_m.T, c.offset_m.T)[
+            0, :3, :3
+        ]
+    )[0]
     towards = c.position_m[0] + robot.platform_m @ c.rotation[0].T
     start = found.position_m[0] + 1e-3 * robot.size_m, found.rotation[0]
     x, R, rested = cases.rest_in_mujoco(robot, *lengths, *start, soft, towards_m=towards)
@@ -187,8 +190,9 @@ def test_drift_and_maps_run_over_pulleys():
     assert course.found.all()
     assert np.abs(course.position_m[:, 0] - robot.home_m).max() < 1e-9
     last = statics.geometry(robot, course.position_m[:, 1].T, np.moveaxis(course.rotation[:, 1], 0, -1))
-    joint = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None],
-                             inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])).joint_m  # fmt: skip
+    joint = inverse.commands(
+        robot, wires, robot.home_m[None], np.eye(3)[None], inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+    ).joint_m
     zero = joint * (1 + course.end.strain(wires).T)
     stretched = statics.stretched(robot, last, robot.beyond_m[:, None]).T
     tension = wires.theta["k1"].T * np.maximum(stretched / zero - 1, 0)

@@ -5,8 +5,13 @@ from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import schema
 
 OPTIONAL = {"k1_N", "B_mm", "length_mm", "wire", "pulley_radius_m", "swivel_axis"} | {
-    "tension_bias_N", "drum_radius_m", "drum_pitch_m", "drum_layer_turns", "drum_layer_height_m", "gear_ratio",
-}  # fmt: skip
+    "tension_bias_N",
+    "drum_radius_m",
+    "drum_pitch_m",
+    "drum_layer_turns",
+    "drum_layer_height_m",
+    "gear_ratio",
+}
 LAYERS = "drum_radius_m = 0.05\ndrum_layer_turns = 9\ndrum_layer_height_m = 5e-4"
 GOOD = """version = 1
 name = "tripod"

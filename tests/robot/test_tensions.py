@@ -29,10 +29,14 @@ def test_tensions_carry_the_weight_within_bounds_and_are_the_nearest(name, choic
     assert tau.max() <= high + 1e-6
     reference = np.zeros(robot.legs) if choice == "minimum_norm" else np.full(robot.legs, 0.5 * (low + high))
     other = minimize(
-        lambda t: ((t - reference) ** 2).sum() / high**2, tau * 1.01, jac=lambda t: 2 * (t - reference) / high**2,
-        method="SLSQP", bounds=[(low, high)] * robot.legs, options={"ftol": 1e-14, "maxiter": 300},
+        lambda t: ((t - reference) ** 2).sum() / high**2,
+        tau * 1.01,
+        jac=lambda t: 2 * (t - reference) / high**2,
+        method="SLSQP",
+        bounds=[(low, high)] * robot.legs,
+        options={"ftol": 1e-14, "maxiter": 300},
         constraints={"type": "eq", "fun": lambda t: structure @ t - load, "jac": lambda t: structure},
-    )  # fmt: skip
+    )
     ours = np.sum((tau - reference) ** 2)
     assert ours <= np.sum((other.x - reference) ** 2) * (1 + 1e-5) + 1e-9
 
@@ -130,10 +134,16 @@ def test_bounds_that_no_tensions_reach_are_refused_and_those_they_touch_are_not(
     assert tensions.nearest(np.array([9.0, 1.0]), structure, load, 0.0, 4.9) is None
 
 
-@pytest.mark.parametrize(("way", "low", "high", "held"), [
-    (1.0, 2.0, 20.0, False), (1.0, 0.0, 8.5, False), (-1.0, 2.0, 9.6, True), (-1.0, 2.0, 7.9, False),
-    (-1.0, 2.1, 9.6, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("way", "low", "high", "held"),
+    [
+        (1.0, 2.0, 20.0, False),
+        (1.0, 0.0, 8.5, False),
+        (-1.0, 2.0, 9.6, True),
+        (-1.0, 2.0, 7.9, False),
+        (-1.0, 2.1, 9.6, False),
+    ],
+)
 def test_what_the_solver_returns_is_held_against_both_bounds(way, low, high, held, monkeypatch):
     """From nine and one newton it moves a half along the null space, or one back, whatever the bounds are."""
     structure, load, at = np.ones((1, 2)), np.array([10.0]), np.array([9.0, 1.0])

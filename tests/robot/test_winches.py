@@ -79,8 +79,17 @@ def test_commands_lead_to_the_position_by_an_energy_minimiser_given_the_lengths_
         R = found.rotation[0]
         start = robot.home_m + 0.01 * robot.size_m * rng.standard_normal(3)
         turn = Rotation.from_rotvec(0.01 * rng.standard_normal(3)).as_matrix() @ R
-        x, turned, tension = lowest_energy(robot.exit_m, robot.platform_m, robot.centre_of_mass_m, robot.mass_kg,
-                                           np.full(robot.legs, k1), found.zero_m[0], start, turn, minimize)  # fmt: skip
+        x, turned, tension = lowest_energy(
+            robot.exit_m,
+            robot.platform_m,
+            robot.centre_of_mass_m,
+            robot.mass_kg,
+            np.full(robot.legs, k1),
+            found.zero_m[0],
+            start,
+            turn,
+            minimize,
+        )
         assert np.linalg.norm(x - robot.home_m) < 1e-6 * robot.span_m
         assert robot.size_m * Rotation.from_matrix(turned @ R.T).magnitude() < 1e-6 * robot.span_m
         assert np.abs(tension - found.tension_N[0]).max() < 1e-5 * tension.max()
@@ -95,9 +104,12 @@ def test_parallel_lines_of_one_winch_carry_alike_and_keep_the_orientation():
     outward = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(6)])
     aside = np.column_stack([-np.sin(turn), np.cos(turn), np.zeros(6)]) * np.tile([-0.1, 0.1], 3)[:, None]
     robot = replace(
-        robot, exit_m=outward + aside + [0.0, 0.0, 2.0], platform_m=0.2 * outward + aside,
-        centre_of_mass_m=np.array([0.0, 0.0, -0.1]), home_m=np.array([0.0, 0.0, 0.6]),
-    )  # fmt: skip
+        robot,
+        exit_m=outward + aside + [0.0, 0.0, 2.0],
+        platform_m=0.2 * outward + aside,
+        centre_of_mass_m=np.array([0.0, 0.0, -0.1]),
+        home_m=np.array([0.0, 0.0, 0.6]),
+    )
     found = commanded(robot, 500.0 * robot.mass_kg * G)
     np.testing.assert_allclose(found.tension_N[0], found.tension_N[0, 0], rtol=1e-9)
     np.testing.assert_allclose(found.rotation[0], np.eye(3), atol=1e-9)
@@ -247,9 +259,11 @@ def _calibrated(name, tmp_path):
     half = 0.1 * robot.span_m
     lowest, highest = 0.02 * robot.mass_kg * G, 5.0 * robot.mass_kg * G
     return replace(
-        robot, lower_m=robot.home_m - half, upper_m=robot.home_m + half,
+        robot,
+        lower_m=robot.home_m - half,
+        upper_m=robot.home_m + half,
         rule=replace(robot.rule, lowest_N=lowest, highest_N=highest),
-    ), min(k1, 300.0 * robot.mass_kg * G)  # fmt: skip
+    ), min(k1, 300.0 * robot.mass_kg * G)
 
 
 @pytest.mark.parametrize("name", ["printer", "pairs-3", "pairs-4"])
@@ -329,8 +343,9 @@ def test_the_exported_model_of_drawn_pairs_rests_in_mujoco(seed):
     robot, k1 = pairs(np.random.default_rng(seed), 3 + seed % 2, 1e-3)
     if commanded(robot, k1) is None:
         pytest.skip("nothing holds it")
-    line = WireDraws({"k1": np.full(2, k1), "B": np.zeros(2), "U": np.ones(2), "k2": np.full(2, 0.03),
-                      "N": np.full(2, 0.5)}, 1000.0)  # fmt: skip
+    line = WireDraws(
+        {"k1": np.full(2, k1), "B": np.zeros(2), "U": np.ones(2), "k2": np.full(2, 0.03), "N": np.full(2, 0.5)}, 1000.0
+    )
     model = mujoco.MjModel.from_xml_string(files.mujoco(robot, line))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

@@ -266,8 +266,11 @@ def test_a_material_effect_of_the_bench_alone_is_said_to_be_left_out():
         amplitudes = ()
         sentence = "An effect that only a bench could show."
 
-    given = WireDraws({name: np.array([PLAIN[name]]) for name in ("k1", "B", "U", "k2", "N")}, 1000.0,
-                      effects=(Settling(), effect_named("thermal_expansion")))  # fmt: skip
+    given = WireDraws(
+        {name: np.array([PLAIN[name]]) for name in ("k1", "B", "U", "k2", "N")},
+        1000.0,
+        effects=(Settling(), effect_named("thermal_expansion")),
+    )
     found = wire_warnings(LINEAR, given, np.ones((1, 6)), 60.0, np.ones((1, 6)))
     lines = [notice.text for notice in found if notice.kind == "left-out"]
     assert any("settling has no place in the robot" in text for text in lines)

@@ -51,16 +51,27 @@ def test_compiled_readings_and_derivatives_are_those_of_numpy(p, model, rows, se
     for name, value in vars(expected).items():
         same(getattr(line, name)[..., usual], value[..., usual], 1e3)
     setting = np.random.default_rng(seed).normal(0.0, 0.02, (len(p.setting), len(rows)))
-    same(simulate(p, theta, model, setting)[..., usual],
-         by_numpy(lambda: simulate(p, theta, model, setting))[..., usual], 1e3)  # fmt: skip
+    same(
+        simulate(p, theta, model, setting)[..., usual],
+        by_numpy(lambda: simulate(p, theta, model, setting))[..., usual],
+        1e3,
+    )
     alone, other = (
         np.array(a) for a in (simulate_alone(p, theta, model), by_numpy(lambda: simulate_alone(p, theta, model)))
     )
     same(alone[..., usual], other[..., usual], 1e3)
 
 
-ELASTIC = ["strain_stiffening", "toe", "toe@strain", "power_strain", "fixture_compliance", "thermal_expansion",
-           "grip_slip@2", "length_dependence@k1"]  # fmt: skip
+ELASTIC = [
+    "strain_stiffening",
+    "toe",
+    "toe@strain",
+    "power_strain",
+    "fixture_compliance",
+    "thermal_expansion",
+    "grip_slip@2",
+    "length_dependence@k1",
+]
 
 
 @pytest.mark.parametrize("law", ["hooke", "modified"])

@@ -77,7 +77,7 @@ def test_a_setting_error_moves_one_coordinate_alone():
         (build([Bench(displacements_mm=(1.0,)).experiment()]), False),  # every reading zero
     ],
     ids=["one hold", "one hold of a known preload", "two holds", "two tests", "slack"],
-)  # fmt: skip
+)
 def test_only_a_test_of_one_hold_has_this_coordinate(problem, has_one):
     def has_it(for_draws):
         return any(isinstance(step, Level) for step in Transformation(problem, for_draws).steps)

@@ -107,9 +107,15 @@ def test_points_that_do_not_span_their_space_are_refused():
         transport_map.fit_map(WeightedPoints.equal(np.ones((100, 2))), np.arange(2))
 
 
-@pytest.mark.parametrize(("wider", "along_tails", "before", "followed"), [
-    (4.9, True, True, "hot"), (5.1, True, True, "cold"), (2.0, False, True, "cold"), (2.0, True, False, "cold"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("wider", "along_tails", "before", "followed"),
+    [
+        (4.9, True, True, "hot"),
+        (5.1, True, True, "cold"),
+        (2.0, False, True, "cold"),
+        (2.0, True, False, "cold"),
+    ],
+)
 def test_the_map_follows_tails_that_belong_to_the_posterior(wider, along_tails, before, followed):
     """Not points spread over five times as much in one coordinate, nor rough ones, nor where tails do not matter."""
     rng = np.random.default_rng(0)

@@ -194,9 +194,16 @@ def test_draws_of_a_poor_proposal_are_given_up(ess: float, anew: bool) -> None:
 
 @pytest.mark.parametrize(
     ("again", "steps", "wanted", "more"),
-    [(0, 32, 10_000.0, False), (0, 32, 11_000.0, True), (0, 64, 6_700.0, False), (0, 64, 7_500.0, True),
-     (1, 32, 6_700.0, False), (1, 32, 7_500.0, True), (3, 32, 7_500.0, False)],
-)  # fmt: skip
+    [
+        (0, 32, 10_000.0, False),
+        (0, 32, 11_000.0, True),
+        (0, 64, 6_700.0, False),
+        (0, 64, 7_500.0, True),
+        (1, 32, 6_700.0, False),
+        (1, 32, 7_500.0, True),
+        (3, 32, 7_500.0, False),
+    ],
+)
 def test_what_is_left_to_do_is_weighed_against_a_better_proposal(
     again: int, steps: int, wanted: float, more: bool
 ) -> None:
@@ -381,8 +388,9 @@ def test_autocorrelation_and_r_hat_are_ratios_of_variances_with_their_divisors()
     assert autocorrelation_steps(values) == pytest.approx([expected])
     own = values.mean(axis=1)[..., 0]  # (ensembles, walkers)
     between = np.var(own.mean(axis=1), ddof=1)
-    within = np.mean([np.var(own[e], ddof=1) + np.mean([np.var(values[e, :, w, 0], ddof=1) for w in range(2)])
-                      for e in range(3)])  # fmt: skip
+    within = np.mean(
+        [np.var(own[e], ddof=1) + np.mean([np.var(values[e, :, w, 0], ddof=1) for w in range(2)]) for e in range(3)]
+    )
     assert nested_r_hat(values) == pytest.approx([np.sqrt(1.0 + between / within)])
 
 
@@ -443,8 +451,15 @@ def test_a_run_goes_from_burn_in_to_kept_draws_until_it_is_finished(
     monkeypatch.setattr(kept, "keep_block", lambda target, state, policy: next(ways["keep"]))
     target = gaussian(2)
     found = ensemble.sample_posterior(
-        target, 7, policy, checkpoint="file", progress=told.append, found="found", near="near", rough="rough"  # type: ignore[arg-type]
-    )  # fmt: skip
+        target,
+        7,
+        policy,
+        checkpoint="file",
+        progress=told.append,
+        found="found",
+        near="near",
+        rough="rough",  # type: ignore[arg-type]
+    )
     states = [begun, replace(begun, round=1), walking, replace(begun, round=2), walking, done]
     of_fit = {"seed": 7, "policy": describe(policy), "parameters": ("x0", "x1")}
     assert fits == [of_fit] and saved == [(state, "file", of_fit) for state in states]
