@@ -28,7 +28,8 @@ MODULES = {
     "comparison": ["candidates", "compare"],
     "discovery": ["global_test", "held_out", "model_space", "power", "refit", "settings", "shrinking", "stepwise",
                   "verdict"],
-    "robot": ["mechanics/statics", "mechanics/tensions", "motion/forward", "pose/answer", "pose/controllers",
+    "robot": ["mechanics/statics", "mechanics/tensions", "motion/forward", "motion/downhill",
+              "pose/answer", "pose/controllers",
               "pose/stability", "proof/certificate", "proof/proofs", "proof/reach"],
 }  # fmt: skip
 

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from tests.robot import cases
 from wirebayes.robot.mechanics import rotation, schema, statics
-from wirebayes.robot.motion import forward
+from wirebayes.robot.motion import forward, outcome
 
 
 def distance(robot, x, R, y, Q):
@@ -63,8 +63,8 @@ def compare(robot, make, law, count, rng):
         back = distance(robot, blind.position_m, blind.rotation, c.position_m, c.rotation)[blind.found]
         there = max(there, back.max())
     slack = (found.tension_N == 0).any(1).sum()
-    answered = found.found | (found.status == forward.NOT_HELD)  # a plate on two points in line is free, and said to be
-    free = int((found.status == forward.NOT_HELD).sum())
+    answered = found.found | (found.status == outcome.NOT_HELD)  # a plate on two points in line is free, and said to be
+    free = int((found.status == outcome.NOT_HELD).sum())
     return len(found.status), answered.mean(), blind.found.mean(), slack, np.mean(rested), np.array(errors), there, free
 
 

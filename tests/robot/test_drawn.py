@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wirebayes.robot.mechanics import draws
-from wirebayes.robot.motion import drift, equilibria, forward, inverse, path
+from wirebayes.robot.motion import drift, equilibria, inverse, outcome, path
 from wirebayes.robot.pose import stability
 from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest
@@ -80,7 +80,7 @@ def _drift(d):
     rig, q, _, zero = _rig(d)
     course = drift.from_command(d.robot, draws.for_robot(d.robot, d.line), d.position_m, d.rotation, TIMES)
     stable = rig.softest(q, zero)[0] > 0
-    assert stable == (course.status[0, 0] != forward.NOT_HELD)
+    assert stable == (course.status[0, 0] != outcome.NOT_HELD)
     if not stable:
         return None
     theta = {k: v[0] for k, v in d.line.parameters.items()}

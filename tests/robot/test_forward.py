@@ -5,8 +5,9 @@ import pytest
 
 from tests.robot.cases import HANGING
 from wirebayes.robot.mechanics import rotation, schema, statics
+from wirebayes.robot.mechanics.description import GRAVITY
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import equilibria, forward, inverse
+from wirebayes.robot.motion import downhill, equilibria, forward, inverse, outcome
 from wirebayes.robot.motion.balance import balance_at, tensions_at
 
 from . import cases
@@ -108,7 +109,7 @@ def test_too_few_iterations_are_reported():
     found = forward.solve_equilibrium(
         robot, c.wires, c.zero_m, c.offset_m, c.position_m + 0.05, np.eye(3), max_iterations=1
     )
-    assert (found.status == forward.NOT_CONVERGED).all()
+    assert (found.status == outcome.NOT_CONVERGED).all()
 
 
 def test_no_equilibrium_is_reported():
@@ -117,7 +118,7 @@ def test_no_equilibrium_is_reported():
     wires = Wires("modified", "saturating", {"k1": np.array([[1.0]])}, np.full((4, 1), 1000.0))
     zero = 2.0 * np.ones((1, 4)) + robot.beyond_m
     found = forward.solve_equilibrium(robot, wires, zero, robot.beyond_m, robot.home_m, np.eye(3), 2000)
-    assert (found.status == forward.NO_EQUILIBRIUM).all()
+    assert (found.status == outcome.NO_EQUILIBRIUM).all()
 
 
 def test_a_platform_on_two_points_in_line_with_its_weight_is_not_held():
@@ -131,7 +132,7 @@ def test_a_platform_on_two_points_in_line_with_its_weight_is_not_held():
     loose = commands.zero_m + np.array([1.0, 0, 1, 0, 1, 0, 1, 0])
     turned = rotation.matrix(np.array([[0.02, 0.01, 0.03]]))
     found = forward.solve_equilibrium(robot, wires, loose, commands.offset_m, robot.home_m + 0.01, turned)
-    assert found.status.tolist() == [forward.NOT_HELD]
+    assert found.status.tolist() == [outcome.NOT_HELD]
     assert found.residual_N[0] < 1e-6
 
 
@@ -183,7 +184,7 @@ def test_a_tackle_of_lines_is_solved_as_one_line_of_their_stiffness():
         found.append(forward.solve_equilibrium(one, wires, m * free, np.zeros(8), c.position_m, c.rotation))
         R = np.moveaxis(c.rotation, 0, -1)
         start = m * free.T, np.zeros((8, n)), c.position_m.T, R
-        begun.append(forward._begin(one, wires, *start, np.ones((6, 1))))
+        begun.append(downhill._begin(one, wires, *start, np.ones((6, 1))))
     np.testing.assert_allclose(found[1].position_m, found[0].position_m, atol=1e-12)
     np.testing.assert_allclose(4.0 * found[1].tension_N, found[0].tension_N, atol=1e-9)
     np.testing.assert_array_equal(found[1].status, found[0].status)
@@ -201,15 +202,15 @@ def stepped(monkeypatch, *, gradient=1.0, stiffness=2.0, damping=0.0, level=4.0,
     def point(value, force):
         g, H = np.zeros((3, 1)), np.eye(3)[..., None] * 7.0
         g[0], H[0, 0] = gradient, stiffness
-        return forward._Point(np.array([value]), g, H, np.zeros((4, 1)), np.array([force]))
+        return downhill._Point(np.array([value]), g, H, np.zeros((4, 1)), np.array([force]))
 
     def evaluate(robot, wires, zero, offset, new_x, new_R, scale):
         return point(energy - gain, new_size)
 
-    monkeypatch.setattr(forward, "_evaluate", evaluate)
+    monkeypatch.setattr(downhill, "_evaluate", evaluate)
     one = np.ones(1)
     at, turn = np.array([[x], [0.0], [0.0]]), np.eye(3)[..., None]
-    cases_ = forward._Cases(
+    cases_ = downhill._Cases(
         np.zeros(1, int),
         None,
         np.ones((4, 1)),
@@ -222,7 +223,7 @@ def stepped(monkeypatch, *, gradient=1.0, stiffness=2.0, damping=0.0, level=4.0,
         floor * one,
         span * one,
     )
-    new, ended = forward._iterate(WEIGHED, cases_, np.ones((3, 1)))
+    new, ended = downhill._iterate(WEIGHED, cases_, np.ones((3, 1)))
     moved = float(new.x[0, 0] - x)
     assert new.at.energy[0] == (energy - gain if moved else energy)
     return moved, float(new.damping[0]), int(ended[0])
@@ -241,7 +242,7 @@ def test_a_step_is_taken_where_the_energy_falls(monkeypatch):
     """By a ten-thousandth of what the slope promises, half a joule here; otherwise it is damped ten times as much."""
     for part, taken in ((1.1, True), (0.9, False), (-1.0, False)):
         moved, damping, ended = stepped(monkeypatch, gain=part * 0.5e-4)
-        assert (moved != 0.0) is taken and damping == (0.0 if taken else 1e-3) and ended == forward._GOING_ON
+        assert (moved != 0.0) is taken and damping == (0.0 if taken else 1e-3) and ended == downhill._GOING_ON
     assert stepped(monkeypatch, gain=-1.0, damping=0.5)[:2] == (0.0, 5.0)
     assert stepped(monkeypatch, gain=-1.0, damping=1e-6)[:2] == (0.0, 1e-3)
     # against a stiffness that pushes as far as against one that pulls, along none at all a tenth of the robot's size
@@ -255,7 +256,7 @@ def test_a_step_is_taken_where_the_energy_falls(monkeypatch):
 @pytest.mark.parametrize("energy", [0.0, 5e4, -5e4])
 def test_a_rise_within_rounding_is_none(energy, monkeypatch):
     """1e-14 of the energy and of the weight times the robot's size, which a potential energy may be off by."""
-    noise = 1e-14 * (abs(energy) + WEIGHED.mass_kg * forward.GRAVITY * 1e6)
+    noise = 1e-14 * (abs(energy) + WEIGHED.mass_kg * GRAVITY * 1e6)
     for part, taken in ((0.5, True), (2.0, False)):
         moved = stepped(monkeypatch, gain=-part * noise, energy=energy, gradient=1e-12, span=1e6)[0]
         assert (moved != 0.0) is taken
@@ -284,23 +285,23 @@ def test_damping_is_given_up_as_far_as_the_energy_falls_as_predicted(monkeypatch
 
 def test_a_case_ends_in_balance_far_away_or_where_no_step_helps(monkeypatch):
     known = {"gain": 1.0, "size": 5.0, "new_size": 4.0}
-    going_on = forward._GOING_ON
-    assert stepped(monkeypatch, **known, floor=4.0)[2] == forward.FOUND  # as small as what can be computed
+    going_on = downhill._GOING_ON
+    assert stepped(monkeypatch, **known, floor=4.0)[2] == outcome.FOUND  # as small as what can be computed
     assert stepped(monkeypatch, **known, floor=3.9)[2] == going_on
     assert stepped(monkeypatch, **known, floor=4.0, damping=0.5)[1:] == (0.0, going_on)  # the bare stiffness decides
-    assert stepped(monkeypatch, gain=-1.0, size=4.0, floor=4.0)[2] == forward.FOUND  # it was in balance before
+    assert stepped(monkeypatch, gain=-1.0, size=4.0, floor=4.0)[2] == outcome.FOUND  # it was in balance before
     loose = {"gain": 0.0, "size": 4.0, "floor": 4.0, "stiffness": 0.0}
-    assert stepped(monkeypatch, **loose)[1:] == (0.0, forward.NOT_HELD)
+    assert stepped(monkeypatch, **loose)[1:] == (0.0, outcome.NOT_HELD)
     assert stepped(monkeypatch, **loose, damping=0.5)[1:] == (0.0, going_on)
     tiny = 2.0 * 1e-9 * WEIGHED.size_m
-    for part, found in ((0.9, forward.FOUND), (1.1, going_on)):
+    for part, found in ((0.9, outcome.FOUND), (1.1, going_on)):
         assert stepped(monkeypatch, gain=1e-9, gradient=part * tiny)[2] == found
     assert stepped(monkeypatch, gain=-1e-3, gradient=0.9 * tiny)[2] == going_on  # a step that was not taken is none
     assert stepped(monkeypatch, gain=1e-9, gradient=0.9 * tiny, damping=1e-9)[2] == going_on
-    for x, ended in ((29.9, going_on), (30.6, forward.NO_EQUILIBRIUM), (-30.1, forward.NO_EQUILIBRIUM)):
+    for x, ended in ((29.9, going_on), (30.6, outcome.NO_EQUILIBRIUM), (-30.1, outcome.NO_EQUILIBRIUM)):
         assert stepped(monkeypatch, gain=1.0, span=3.0, x=x)[2] == ended  # beyond ten times the robot's size
     assert stepped(monkeypatch, gain=-1.0, damping=1e11)[1:] == (1e12, going_on)
-    assert stepped(monkeypatch, gain=-1.0, damping=1.1e11)[2] == forward.NOT_CONVERGED
+    assert stepped(monkeypatch, gain=-1.0, damping=1.1e11)[2] == outcome.NOT_CONVERGED
 
 
 @pytest.mark.parametrize("far", [1.0, 3.0])
@@ -315,7 +316,7 @@ def test_a_case_begins_with_the_force_and_the_stiffness_that_rounding_and_dampin
     zero = np.linspace(1.0, 2.5, 16).reshape(8, 2)
     x, R = np.tile(robot.home_m[:, None], 2), np.tile(np.eye(3)[..., None], 2)
     size = robot.size_m
-    begun = forward._begin(robot, wires, zero, np.zeros((8, 2)), x, R, np.array([[1.0]] * 3 + [[1.0 / size]] * 3))
+    begun = downhill._begin(robot, wires, zero, np.zeros((8, 2)), x, R, np.array([[1.0]] * 3 + [[1.0 / size]] * 3))
     arm = max(1.0, np.abs(platform).max() / size)
     force = 3.0 * k1.max(0) + robot.mass_kg * 9.80665
     np.testing.assert_allclose(begun.floor, 32 * 2.0**-52 * arm * force)
@@ -324,7 +325,7 @@ def test_a_case_begins_with_the_force_and_the_stiffness_that_rounding_and_dampin
     assert (begun.damping == 0).all() and begun.number.tolist() == [0, 1]
     point = replace(WEIGHED, mass_kg=2.0)
     wires = Wires("hooke", "saturating", {"k1": np.array([[300.0]])}, np.full((4, 1), 1000.0))
-    begun = forward._begin(point, wires, np.ones((4, 1)), np.zeros((4, 1)), x[:, :1], R[..., :1], np.ones((3, 1)))
+    begun = downhill._begin(point, wires, np.ones((4, 1)), np.zeros((4, 1)), x[:, :1], R[..., :1], np.ones((3, 1)))
     force = 300.0 * point.lines.max() + 2.0 * 9.80665
     np.testing.assert_allclose(begun.floor, 32 * 2.0**-52 * force)
 
@@ -336,7 +337,7 @@ def test_a_point_has_the_energy_and_the_forces_of_its_pose():
     c = cases.disturbed(robot, "hooke", 4, np.random.default_rng(2))
     R, n = np.moveaxis(c.rotation, 0, -1), len(c.position_m)
     scale = np.array([[1.0]] * 3 + [[1.0 / robot.size_m]] * 3)
-    at = forward._evaluate(robot, c.wires, c.zero_m.T, c.offset_m.T, c.position_m.T, R, scale)
+    at = downhill._evaluate(robot, c.wires, c.zero_m.T, c.offset_m.T, c.position_m.T, R, scale)
     energy = statics.potential(robot, c.wires, c.position_m.T, R, c.zero_m.T, c.offset_m.T)
     np.testing.assert_allclose(at.energy, energy, rtol=1e-12)
     stiff = statics.stiffness(robot, c.wires, c.position_m.T, R, c.zero_m.T, c.offset_m.T)
@@ -368,7 +369,7 @@ def test_rows_that_cannot_be_tried_are_not_found_and_do_no_harm():
     whole = forward.solve_equilibrium(robot, c.wires, zero, offset, start, c.rotation)
     zero[0, 3], offset[2, 0], start[3, 1] = np.nan, np.inf, np.nan
     found = forward.solve_equilibrium(robot, c.wires, zero, offset, start, c.rotation)
-    assert found.status.tolist() == [forward.NOT_CONVERGED, 0, forward.NOT_CONVERGED, forward.NOT_CONVERGED, 0]
+    assert found.status.tolist() == [outcome.NOT_CONVERGED, 0, outcome.NOT_CONVERGED, outcome.NOT_CONVERGED, 0]
     lost = [0, 2, 3]
     assert np.isnan(found.position_m[lost]).all() and np.isnan(found.rotation[lost]).all()
     assert np.isnan(found.tension_N[lost]).all() and np.isinf(found.residual_N[lost]).all()
@@ -389,7 +390,7 @@ def test_inside_a_pulley_there_is_no_equilibrium(monkeypatch):
     clear = np.array([True, False, True, False])
     monkeypatch.setattr(statics.Geometry, "clear", property(lambda shape: clear))
     found = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, c.position_m, c.rotation)
-    assert found.status.tolist() == [forward.FOUND, forward.NOT_CONVERGED] * 2
+    assert found.status.tolist() == [outcome.FOUND, outcome.NOT_CONVERGED] * 2
 
 
 @pytest.mark.parametrize(("chunk", "quick"), [(3, 7), (2048, 2), (4, 1)])
@@ -400,15 +401,15 @@ def test_how_cases_are_cut_into_lots_changes_nothing(chunk, quick, monkeypatch):
     start = c.position_m + 1e-3
     whole = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation)
     assert whole.found.all() and whole.iterations.min() > 2
-    monkeypatch.setattr(forward, "_CHUNK", chunk)
-    monkeypatch.setattr(forward, "_QUICK", quick)
+    monkeypatch.setattr(downhill, "_CHUNK", chunk)
+    monkeypatch.setattr(downhill, "_QUICK", quick)
     cut = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation)
     assert cut.found.all()
     np.testing.assert_allclose(cut.position_m, whole.position_m, atol=1e-12)
     np.testing.assert_allclose(cut.tension_N, whole.tension_N, atol=1e-8)
     assert cut.iterations.tolist() == whole.iterations.tolist()
     few = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation, max_iterations=2)
-    assert few.status.tolist() == [forward.NOT_CONVERGED] * 10 and few.iterations.tolist() == [2] * 10
+    assert few.status.tolist() == [outcome.NOT_CONVERGED] * 10 and few.iterations.tolist() == [2] * 10
 
 
 @pytest.mark.parametrize("name", ["hangprinter-4", "cogiro-desk"])
@@ -451,9 +452,9 @@ def test_starts_lie_among_the_exits_and_below_and_the_known_pose_is_one_of_them(
 
 def test_every_status_has_a_number_of_its_own_and_words():
     """None of them the mark of a case that is still being solved."""
-    numbers = forward.FOUND, forward.NOT_CONVERGED, forward.NO_EQUILIBRIUM, forward.NOT_HELD, forward.FELL
-    assert numbers == (0, 1, 2, 3, 4) and forward._GOING_ON not in numbers
-    assert list(forward.STATUS) == list(numbers) and len(set(forward.STATUS.values())) == 5
+    numbers = outcome.FOUND, outcome.NOT_CONVERGED, outcome.NO_EQUILIBRIUM, outcome.NOT_HELD, outcome.FELL
+    assert numbers == (0, 1, 2, 3, 4) and downhill._GOING_ON not in numbers
+    assert list(outcome.STATUS) == list(numbers) and len(set(outcome.STATUS.values())) == 5
 
 
 @pytest.mark.parametrize("aside", [1e-2, 1e-5, 1e-8])
@@ -466,7 +467,7 @@ def test_a_saddle_is_left_in_as_many_steps_as_its_distance_has_doublings(aside):
     robot = replace(robot, mass_kg=4.0)
     k1 = 300.0
     wires = Wires("hooke", "saturating", {"k1": np.full((1, 1), k1)}, np.full((6, 1), 1000.0))
-    upright = np.array([[0.0, 0.0, 1.0 - robot.mass_kg * forward.GRAVITY / (6.0 * k1)]])
+    upright = np.array([[0.0, 0.0, 1.0 - robot.mass_kg * GRAVITY / (6.0 * k1)]])
     tilted = rotation.matrix(np.array([[aside, 0.3 * aside, 0.0]]))
     found = forward.solve_equilibrium(robot, wires, np.ones((1, 6)), np.zeros(6), upright, tilted)
     assert found.found.all()
@@ -478,8 +479,8 @@ def test_a_stiffness_that_has_overflowed_gives_no_step_and_spoils_no_other():
     rng = np.random.default_rng(0)
     H, gradient = rng.normal(size=(3, 3, 3)), rng.normal(size=(3, 3))
     level, floor = np.ones(3), np.zeros(3)
-    alone = forward._off_saddle(H[..., [0, 2]], gradient[:, [0, 2]], level[:2], floor[:2])
+    alone = downhill._off_saddle(H[..., [0, 2]], gradient[:, [0, 2]], level[:2], floor[:2])
     H[1, 2, 1] = np.inf
-    step = forward._off_saddle(H, gradient, level, floor)
+    step = downhill._off_saddle(H, gradient, level, floor)
     assert np.isnan(step[:, 1]).all()
     np.testing.assert_allclose(step[:, [0, 2]], alone)

@@ -9,7 +9,7 @@ import pytest
 from wirebayes.notice import Notice
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.robot.motion import claim, control, drift, forward
+from wirebayes.robot.motion import claim, control, drift, forward, outcome
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.course import Course, Falls
 from wirebayes.robot.pose import answer, controllers, stability
@@ -331,9 +331,9 @@ def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pyt
         tension_N=np.array([[0.0, 5.0, -1.0], [9.0, 9.0, 9.0], [0.0, 0.0, 0.0], [9.0, 9.0, 9.0]]),
         rotation=np.tile(R, (4, 1, 1)),
     )
-    status = np.array([forward.FOUND, forward.FOUND, forward.NOT_CONVERGED, forward.NOT_HELD])
+    status = np.array([outcome.FOUND, outcome.FOUND, outcome.NOT_CONVERGED, outcome.NOT_HELD])
     back: Any = SimpleNamespace(
-        found=status == forward.FOUND,
+        found=status == outcome.FOUND,
         status=status,
         position_m=x + np.array([[1e-9, 0.0, 0.0], [0.0, 0.0, -3e-9], [9.0] * 3, [9.0] * 3]),
     )
@@ -356,9 +356,9 @@ def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pyt
     assert found["statuses"] == {
         "stable equilibrium": 2,
         "not converged": 1,
-        forward.STATUS[forward.NO_EQUILIBRIUM]: 0,
-        forward.STATUS[forward.NOT_HELD]: 1,
-        forward.STATUS[forward.FELL]: 0,
+        outcome.STATUS[outcome.NO_EQUILIBRIUM]: 0,
+        outcome.STATUS[outcome.NOT_HELD]: 1,
+        outcome.STATUS[outcome.FELL]: 0,
     }
     back.found = np.zeros(4, bool)
     assert answer._round_trip(robot, None, commands, x, R)["largest_round_trip_error_m"] == 0.0  # type: ignore[arg-type]

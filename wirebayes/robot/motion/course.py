@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.motion import forward
+from wirebayes.robot.motion import outcome
 from wirebayes.robot.motion.creep import CreepState
 
 
@@ -38,7 +38,7 @@ class Course:
     @property
     def found(self) -> NDArray[np.bool_]:
         """(n,) True where every time has a stable equilibrium."""
-        return np.asarray((self.status == forward.FOUND).all(1))
+        return np.asarray((self.status == outcome.FOUND).all(1))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward, inverse, one_sided, path
+from wirebayes.robot.motion import forward, inverse, one_sided, outcome, path
 from wirebayes.robot.motion.course import Course, Falls
 from wirebayes.robot.motion.creep import CreepState, Follow, HoldCreep, fresh
 
@@ -181,27 +181,13 @@ class CreepingHold:
         least : bool
             It is taken in any case.
         """
-        creep, now = self.creep, self.creep.time_s
-        done = np.maximum(creep.progress(time), 1e-300)
-        guess = creep.toward(time, np.zeros(1) if self.slope is None else self.slope)
+        now = self.creep.time_s
+        done = np.maximum(self.creep.progress(time), 1e-300)
+        guess = self.creep.toward(time, np.zeros(1) if self.slope is None else self.slope)
         long = not least and 1.0 - (now / time) ** self.power > _FALL_STEP
         there = self._follow(guess, time, _GLANCE if long else path.SMALLEST)
-        first = creep.toward(time, np.zeros(1), creep.amount_at(there.here.tension_N.T))
-        if self.slope is None:
-            # Nothing to extrapolate from yet: correct twice, the change says how good the first correction was.
-            here = self._settle(first, time, there.here)
-            last = creep.toward(time, np.zeros(1), creep.amount_at(here.tension_N.T))
-            off = np.abs(last.grown - first.grown)
-        else:
-            # Errors of prediction and correction are in a known ratio; the part of the corrected is taken off.
-            share = 1.0 / (3.0 * (1.0 + self.before / done))
-            last, off = first, np.abs(first.grown - guess.grown) * share
-            last.grown = first.grown - (first.grown - guess.grown) * share
-        alive = self.live & there.here.found
-        size = np.maximum(np.abs(last.grown), _RESOLVED * np.abs(creep.carried.creep_mm + creep.amount))
-        size = np.broadcast_to(size, (self.robot.legs, self.n)).max(0)
-        error = (np.broadcast_to(off, (self.robot.legs, self.n)).max(0) / np.maximum(size, 1e-300))[alive]
-        worst = float(max(np.quantile(error, 0.9), 0.1 * error.max())) if error.size else 0.0
+        last, off = self._corrected(guess, there.here, time, done)
+        worst = self._worst(off, last, self.live & there.here.found)
         if worst > self.tolerance and not least:
             return worst
         here = self._settle(last, time, there.here)
@@ -209,12 +195,42 @@ class CreepingHold:
         if fell.any() and long:
             return np.inf
         self._note(fell, there, here, (now, time))
-        if creep.follow == "current":
-            last.amount = np.where(self.live, creep.amount_at(here.tension_N.T), creep.amount)
-            self.slope, self.before = (last.amount - creep.amount) / done, done
+        if self.creep.follow == "current":
+            last.amount = np.where(self.live, self.creep.amount_at(here.tension_N.T), self.creep.amount)
+            self.slope, self.before = (last.amount - self.creep.amount) / done, done
         self.creep, self.here = last, here
         self.lengths = self._lengths(time, last.state())
         return worst
+
+    def _corrected(
+        self, guess: HoldCreep, there: forward.Equilibria, time: float, done: Floats
+    ) -> tuple[HoldCreep, Floats]:
+        """The creep at the end of a step by the tensions there, and by how much it may be off, (w, n) mm or less."""
+        first = self._toward(time, there)
+        if self.slope is None:
+            # Nothing to extrapolate from yet: correct twice, the change says how good the first correction was.
+            last = self._toward(time, self._settle(first, time, there))
+            return last, np.abs(last.grown - first.grown)
+        # Errors of prediction and correction are in a known ratio; the part of the corrected is taken off.
+        share = 1.0 / (3.0 * (1.0 + self.before / done))
+        change = first.grown - guess.grown
+        first.grown = first.grown - change * share
+        return first, np.abs(change) * share
+
+    def _toward(self, time: float, there: forward.Equilibria) -> HoldCreep:
+        """The creep at a time by the amounts that belong to the tensions there."""
+        return self.creep.toward(time, np.zeros(1), self.creep.amount_at(there.tension_N.T))
+
+    def _worst(self, off: Floats, last: HoldCreep, alive: NDArray[np.bool_]) -> float:
+        """The error of a step, relative to what creeps in it: that of nearly all draws, a tenth of the largest."""
+        least = _RESOLVED * np.abs(self.creep.carried.creep_mm + self.creep.amount)
+        size = self._of_worst_wire(np.maximum(np.abs(last.grown), least))
+        error = (self._of_worst_wire(off) / np.maximum(size, 1e-300))[alive]
+        return float(max(np.quantile(error, 0.9), 0.1 * error.max())) if error.size else 0.0
+
+    def _of_worst_wire(self, values: Floats) -> Floats:
+        """(n,) the largest of (w, n) values, or of what spreads to these."""
+        return np.asarray(np.broadcast_to(values, (self.robot.legs, self.n)).max(0))
 
     def _follow(self, creep: HoldCreep, time_s: float, smallest: float) -> path.Followed:
         rows = np.flatnonzero(self.live)
@@ -254,7 +270,7 @@ class CreepingHold:
             held = there.here.position_m, there.here.rotation
             self.left = np.where(fell, self._stiffness(held), self.left)
         self.live = self.live & ~fell
-        here.status[fell] = np.where(there.here.found, forward.FELL, there.here.status)[fell]
+        here.status[fell] = np.where(there.here.found, outcome.FELL, there.here.status)[fell]
         lost = ~self.live & ~fell
         here.status[lost] = self.here.status[lost]
 
@@ -288,14 +304,14 @@ def from_command(
     Returns
     -------
     Course
-        NaN poses when no tensions hold the pose, or not stably (status `forward.NOT_HELD`).
+        NaN poses when no tensions hold the pose, or not stably (status `outcome.NOT_HELD`).
     """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
     commands = inverse.commands(robot, wires, position_m[None], rotation[None], tau)
     stable = stably(robot, wires, commands, position_m, commands.rotation)
     joint = np.where(stable[:, None], commands.joint_m, np.nan)
     course = hold(robot, wires, joint, times_s, position_m, commands.rotation, follow=follow)
-    course.status[commands.feasible & ~stable] = forward.NOT_HELD
+    course.status[commands.feasible & ~stable] = outcome.NOT_HELD
     return course
 
 

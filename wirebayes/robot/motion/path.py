@@ -5,6 +5,7 @@ accepted when it ends where the stiffness at its start predicts; otherwise it is
 jump is left that no division removes: there the platform falls.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -14,7 +15,7 @@ from wirebayes.numeric import cholesky
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import forward, mixed
+from wirebayes.robot.motion import forward, mixed, outcome
 from wirebayes.robot.motion.balance import balance_at, tensions_at
 
 SMALLEST = 2.0**-20  # of a step: a jump that is left there is a fall
@@ -34,7 +35,7 @@ class Followed:
     Attributes
     ----------
     here : Equilibria
-        At the new lengths; of those that fell the last pose before, with the status `forward.FELL`.
+        At the new lengths; of those that fell the last pose before, with the status `outcome.FELL`.
     share : (n,) array
         Share of the change up to which each could be followed; 1 where to the end.
     drop_m : (n,) array
@@ -44,6 +45,22 @@ class Followed:
     here: forward.Equilibria
     share: Floats
     drop_m: Floats
+
+    def _go_on(self, rows: NDArray[np.intp], there: forward.Equilibria, held: NDArray[np.bool_], share: Floats) -> None:
+        """Take over the poses that held, in their rows, and how far along they are."""
+        for name in ("position_m", "rotation", "tension_N", "status", "residual_N"):
+            getattr(self.here, name)[rows] = getattr(there, name)[held]
+        self.share[rows] = share[held]
+
+    def _fall(
+        self, robot: Robot, wires: Wires, rows: NDArray[np.intp], lengths: Sequence[Floats], pose: Sequence[Floats]
+    ) -> None:
+        """Note where some platforms come to rest downhill from the poses in which they hung."""
+        caught = forward.solve_equilibrium(robot, wires, lengths[0], lengths[1], pose[0], pose[1])
+        distance = np.linalg.norm(caught.position_m - pose[0], axis=1)
+        lost = caught.status == outcome.NOT_CONVERGED
+        self.here.status[rows] = np.where(lost, outcome.NOT_CONVERGED, outcome.FELL)
+        self.drop_m[rows] = np.where(caught.found, distance, np.inf)
 
 
 def follow(
@@ -73,38 +90,61 @@ def follow(
     Followed
     """
     n = len(start[0])
-    x, R = (np.array(v) for v in start)
-    tau = tensions_at(robot, wires, x, R, *old)
-    whole, good = _step(robot, wires, (x, R), tau, new)  # most need no division: all at once
-    share, drop = np.where(good, 1.0, 0.0), np.zeros(n)
-    step = np.full(n, 0.5)
-    hesitant = np.zeros(n, bool)
-    for name, before in (("position_m", x), ("rotation", R), ("tension_N", tau)):
-        getattr(whole, name)[~good] = before[~good]
+    followed, good = _undivided(robot, wires, start, old, new)
+    whole = followed.here
+    divided = _Divided(np.full(n, 0.5), np.zeros(n, bool))
     live = np.flatnonzero(~good & np.isfinite(whole.position_m).all(1))
     while live.size:
-        to = np.minimum(share[live] + step[live], 1.0)
-        between = [a[live] + to[:, None] * (b[live] - a[live]) for a, b in zip(old, new, strict=True)]
+        to = np.minimum(followed.share[live] + divided.step[live], 1.0)
+        between = tuple(a[live] + to[:, None] * (b[live] - a[live]) for a, b in zip(old, new, strict=True))
         part, at = wires.part(live), (whole.position_m[live], whole.rotation[live])
         there, held = _step(robot, part, at, whole.tension_N[live], (between[0], between[1]))
+        followed._go_on(live[held], there, held, to)
+        divided.adapt(live, held)
+        fell = ~held & (divided.step[live] < smallest)
+        if fell.any():
+            lengths, pose = ([array[fell] for array in arrays] for arrays in (between, at))
+            followed._fall(robot, part.part(np.flatnonzero(fell)), live[fell], lengths, pose)
+        live = live[~fell & (followed.share[live] < 1.0)]
+    return followed
+
+
+def _undivided(
+    robot: Robot, wires: Wires, start: tuple[Floats, Floats], old: tuple[Floats, Floats], new: tuple[Floats, Floats]
+) -> tuple[Followed, NDArray[np.bool_]]:
+    """All at once, as most need no division; the others are where they were, and (n,) says which are not."""
+    x, R = (np.array(v) for v in start)
+    tau = tensions_at(robot, wires, x, R, *old)
+    whole, good = _step(robot, wires, (x, R), tau, new)
+    for name, before in (("position_m", x), ("rotation", R), ("tension_N", tau)):
+        getattr(whole, name)[~good] = before[~good]
+    return Followed(whole, np.where(good, 1.0, 0.0), np.zeros(len(x))), good
+
+
+@dataclass(frozen=True)
+class _Divided:
+    """Into what the change of each of n is divided.
+
+    Attributes
+    ----------
+    step : (n,) array
+        Share of the change that is tried next.
+    hesitant : (n,) bool array
+        Whether the last step was not held.
+    """
+
+    step: Floats
+    hesitant: NDArray[np.bool_]
+
+    def adapt(self, live: NDArray[np.intp], held: NDArray[np.bool_]) -> None:
+        """Longer steps where one held, half as long where it did not.
+
+        After a division one step of the same length: what was hard a moment ago is still near.
+        """
         rows = live[held]
-        for name in ("position_m", "rotation", "tension_N", "status", "residual_N"):
-            getattr(whole, name)[rows] = getattr(there, name)[held]
-        share[rows] = to[held]
-        # After a division one step of the same length: what was hard a moment ago is still near.
-        step[rows] *= np.where(hesitant[rows], 1.0, 2.0)
-        hesitant[live] = ~held
-        step[live[~held]] *= 0.5
-        fell = ~held & (step[live] < smallest)
-        if fell.any():  # downhill from where they hung
-            hung = [a[fell] for a in (*between, *at)]
-            caught = forward.solve_equilibrium(robot, part.part(np.flatnonzero(fell)), *hung)
-            distance = np.linalg.norm(caught.position_m - hung[2], axis=1)
-            lost = caught.status == forward.NOT_CONVERGED
-            whole.status[live[fell]] = np.where(lost, forward.NOT_CONVERGED, forward.FELL)
-            drop[live[fell]] = np.where(caught.found, distance, np.inf)
-        live = live[~fell & (share[live] < 1.0)]
-    return Followed(whole, share, drop)
+        self.step[rows] *= np.where(self.hesitant[rows], 1.0, 2.0)
+        self.hesitant[live] = ~held
+        self.step[live[~held]] *= 0.5
 
 
 def _step(
@@ -121,7 +161,7 @@ def _step(
     close = np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
     close &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
     there = forward.solve_equilibrium(robot, wires, np.where(close[:, None], lengths[0], np.nan), lengths[1], *near)
-    loose = np.flatnonzero(there.status == forward.NOT_HELD)
+    loose = np.flatnonzero(there.status == outcome.NOT_HELD)
     if loose.size:
         _let_go(robot, wires, there, loose, lengths)
     turn = there.rotation @ np.swapaxes(predicted[1], -1, -2) - np.eye(3)
@@ -175,7 +215,7 @@ def settle(
     x, R = mixed.after_step(robot, near, step)
     n = len(x)
     tau = tensions_at(robot, wires, x, R, *lengths)
-    out = forward.Equilibria(x, R, tau, np.full(n, forward.FOUND), np.ones(n, np.int64), np.zeros(n))
+    out = forward.Equilibria(x, R, tau, np.full(n, outcome.FOUND), np.ones(n, np.int64), np.zeros(n))
     # the error left is of the order of the step's square over a wire's length
     far = np.flatnonzero(~(np.linalg.norm(step, axis=1) < small * robot.size_m))
     if far.size:

@@ -25,7 +25,7 @@ from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import claim, control, drift, equilibria, forward, inverse, one_sided
+from wirebayes.robot.motion import claim, control, drift, equilibria, forward, inverse, one_sided, outcome
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose import controllers, on_plane, stability, variance_shares
@@ -268,7 +268,7 @@ def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Float
     stiff = one_sided.lowest_stiffness(robot, wires, pose, (commands.zero_m, commands.offset_m))[commands.feasible]
     return {
         "solved": float(back.found.mean()),
-        "statuses": {text: int((back.status == code).sum()) for code, text in forward.STATUS.items()},
+        "statuses": {text: int((back.status == code).sum()) for code, text in outcome.STATUS.items()},
         "largest_round_trip_error_m": float(np.abs(back.position_m - x)[back.found].max(initial=0.0)),
         "slack_wires": int((commands.tension_N[0] <= 0).sum()),
         "lowest_stiffness_N_m": band_over_draws(stiff),

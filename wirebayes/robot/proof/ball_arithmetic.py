@@ -66,35 +66,40 @@ class Balance:
         """
         from flint import arb_mat
 
-        arb, robot = self.arb, self.robot
-        d = robot.degrees
+        arb, d = self.arb, self.robot.degrees
         turn, by_turn = self._turn(y[3:]) if d == 6 else (self.R, None)
-        weight = [arb(0), arb(0), -arb(robot.mass_kg) * arb(GRAVITY)]
-        force = list(weight)
-        c = _times(turn, robot.centre_of_mass_m, arb)
+        weight = [arb(0), arb(0), -arb(self.robot.mass_kg) * arb(GRAVITY)]
+        force, slope = list(weight), arb_mat(d, d)
+        c = _times(turn, self.robot.centre_of_mass_m, arb)
         moment = _cross(c, weight)
-        slope = arb_mat(d, d)
         if d == 6:
             slope += _block(arb_mat(3, 3), None, _skew(weight, arb) * _skew(c, arb) * by_turn, self.size)
-        for i in range(robot.legs):
+        for i in range(self.robot.legs):
             r, line = self._line(i, y, turn)
-            span = self._span(i, line)
-            m = arb(float(robot.lines[i]))
-            S = m * span.length + self.offset[i]
-            tau, stiff = pulls[i] if pulls else self.pull(i, self.strain(i, S), S)
-            u = span.direction
-            pull = [-m * tau * a for a in u]
-            bends = span.curvature
-            A = arb_mat([[-m * (stiff * m * u[j] * u[k] + tau * bends[j][k]) for k in range(3)] for j in range(3)])
+            pull, by_place = self._pulled(i, self._span(i, line), pulls[i] if pulls else None)
             force = [p + q for p, q in zip(force, pull, strict=True)]
             if d == 3:
-                slope += A
+                slope += by_place
                 continue
             moment = [p + q for p, q in zip(moment, _cross(r, pull), strict=True)]
-            by_arm = -(_skew(r, arb) * by_turn)
             lever = _skew(r, arb)
-            slope += _block(A, A * by_arm, lever * A * by_arm - _skew(pull, arb) * by_arm, self.size, lever * A)
+            by_arm = -(lever * by_turn)
+            by_both = lever * by_place * by_arm - _skew(pull, arb) * by_arm
+            slope += _block(by_place, by_place * by_arm, by_both, self.size, lever * by_place)
         return (force if d == 3 else force + [v / self.size for v in moment]), slope
+
+    def _pulled(self, i: int, span: Span, known: tuple[Any, Any] | None) -> tuple[list[Any], Any]:
+        """Force of a wire on the platform and its slope by the platform point.
+
+        `known`: tension and its slope, where they are known.
+        """
+        from flint import arb_mat
+
+        m, u, bends = self.arb(float(self.robot.lines[i])), span.direction, span.curvature
+        S = m * span.length + self.offset[i]
+        tau, stiff = known or self.pull(i, self.strain(i, S), S)
+        by_place = [[-m * (stiff * m * u[j] * u[k] + tau * bends[j][k]) for k in range(3)] for j in range(3)]
+        return [-m * tau * a for a in u], arb_mat(by_place)
 
     def at_centre(self) -> tuple[Any, list[tuple[Any, Any]]]:
         """Balance at the centre in parts: the weight's, and each wire's wrench of 1 N with its tension."""
@@ -137,14 +142,14 @@ class Balance:
         """A line from an exit point, over its pulley if it has one (`mechanics.pulleys` has the equations)."""
         pulleys = self.robot.pulleys
         if pulleys is None or not pulleys.radius_m[i]:
-            length = _square(line).sqrt()
-            u = [a / length for a in line]
-            return Span(
-                length, u, [[((1 if j == k else 0) - u[j] * u[k]) / length for k in range(3)] for j in range(3)]
-            )
-        arb, rho = self.arb, self.arb(float(pulleys.radius_m[i]))
-        s = [arb(float(a)) for a in pulleys.axis[i]]
-        s = [a / _square(s).sqrt() for a in s]
+            return _straight(line)
+        axis = [self.arb(float(a)) for a in pulleys.axis[i]]
+        return self._over_pulley(line, axis, self.arb(float(pulleys.radius_m[i])))
+
+    def _over_pulley(self, line: list[Any], axis: list[Any], rho: Any) -> Span:
+        """A line that leaves a pulley of radius `rho` which swivels about an axis."""
+        arb = self.arb
+        s = [a / _square(axis).sqrt() for a in axis]
         z = _dot(line, s)
         beside = [a - z * b for a, b in zip(line, s, strict=True)]
         away = _square(beside).sqrt()
@@ -157,9 +162,8 @@ class Balance:
         u = [sine * a + cosine * b for a, b in zip(e, s, strict=True)]
         normal = [cosine * a - sine * b for a, b in zip(e, s, strict=True)]
         across = _cross(s, e)
-        swivel = sine / away
         bends = [
-            [normal[j] * normal[k] / straight + across[j] * across[k] * swivel for k in range(3)] for j in range(3)
+            [normal[j] * normal[k] / straight + across[j] * across[k] * sine / away for k in range(3)] for j in range(3)
         ]
         return Span(rho * wrap + straight, u, bends)
 
@@ -222,6 +226,14 @@ class Balance:
         eye = arb_mat([[int(i == j) for j in range(3)] for i in range(3)])
         by = (eye + K) * (1 / (norm * self.size))
         return (eye + (K + K * K) * (2 / norm)) * self.R, by
+
+
+def _straight(line: list[Any]) -> Span:
+    """A line from a point."""
+    length = _square(line).sqrt()
+    u = [a / length for a in line]
+    bends = [[((1 if j == k else 0) - u[j] * u[k]) / length for k in range(3)] for j in range(3)]
+    return Span(length, u, bends)
 
 
 def _times(matrix: Any, vector: Floats, arb: Any) -> list[Any]:

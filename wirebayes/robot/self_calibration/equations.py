@@ -177,36 +177,55 @@ def _loops(
     J: Floats,
 ) -> None:
     """Every wire is as long as its way: stretched from what the joint value, its reference and creep make of it."""
-    robot, session, at = unknowns.robot, holds.session, unknowns.slices
-    parts, w, d = unknowns.parts(state.white), unknowns.robot.legs, unknowns.robot.degrees
-    residual, by_robot, by_hold = out.residual, out.by_robot, out.by_hold
+    robot, joint, at = unknowns.robot, holds.session.joint_m, unknowns.slices
+    loop, leg, d = out.rows["loop"], np.arange(robot.legs), robot.degrees
     u = np.moveaxis(shape.direction, -1, 0).swapaxes(1, 2) * robot.lines[:, None]  # (p, w, 3)
-    loop = out.rows["loop"]
-    bare, offset = inverse.lengths(robot, session.joint_m)
-    drawn = robot.ratio * session.joint_m * robot.is_linear + session.joint_m * ~robot.is_linear
-    bare = bare + parts.reference_m + parts.drum * drawn * ~robot.is_linear
-    offset = offset + parts.drum * drawn * robot.is_linear
+    bare, offset, drawn = _joint_lengths(unknowns, state, joint)
     elastic = stretch(unknowns, state.white, state.pull_N)
-    change = state.white[at["wires"]] - since.white[at["wires"]]
-    strain = creep.strain + creep.by_wires @ change + creep.by_pull * (state.pull_N - since.pull_N)
+    strain = creep.strain + _more_creep(creep, since, state, at["wires"])
     longer = (1 + strain) * elastic.ratio
-    residual[:, loop] = statics.stretched(robot, shape, offset.T).T - bare * longer
-    by_hold[:, loop, :d] = J
-    leg = np.arange(w)
-    by_hold[:, leg, d + leg] = -bare * (creep.by_pull * elastic.ratio + (1 + strain) * elastic.by_pull)
-    wires = by_robot[:, loop, at["wires"]]
-    wires -= bare[..., None] * (creep.by_wires * elastic.ratio[..., None] + (1 + strain)[..., None] * elastic.by_wires)
+    out.residual[:, loop] = statics.stretched(robot, shape, offset.T).T - bare * longer
+    out.by_hold[:, loop, :d] = J
+    out.by_hold[:, leg, d + leg] = -bare * (creep.by_pull * elastic.ratio + (1 + strain) * elastic.by_pull)
+    by_wires = creep.by_wires * elastic.ratio[..., None] + (1 + strain)[..., None] * elastic.by_wires
+    wires = out.by_robot[:, loop, at["wires"]]
+    wires -= bare[..., None] * by_wires
     wires[:, leg, leg] -= longer * unknowns.prior.reference_sd_m
     if unknowns.errors.drum > 0:
-        by_robot[:, leg, at["drum"].start + (leg if robot.winch is None else robot.winch)] = (
-            np.where(robot.is_linear, drawn, -drawn * longer) * unknowns.errors.drum
-        )
-    _points(by_robot[:, loop], unknowns, -u, np.einsum("pwi,pij->pwj", u, state.rotation))
-    alone = _errors_apart(robot)
-    for values in (residual, by_robot, by_hold):
+        columns = at["drum"].start + (leg if robot.winch is None else robot.winch)
+        out.by_robot[:, leg, columns] = _by_drum(unknowns, drawn, longer)
+    _points(out.by_robot[:, loop], unknowns, -u, np.einsum("pwi,pij->pwj", u, state.rotation))
+    _weigh_loops(out, robot, noise)
+
+
+def _more_creep(creep: Grown, since: State, state: State, wires: slice) -> Floats:
+    """(p, w) creep strain, to first order, that a state has beyond the one since which creep was not simulated."""
+    change = state.white[wires] - since.white[wires]
+    return np.asarray(creep.by_wires @ change + creep.by_pull * (state.pull_N - since.pull_N))
+
+
+def _by_drum(unknowns: Unknowns, drawn: Floats, longer: Floats) -> Floats:
+    """(p, w) slopes by the errors of drums: of what is drawn of the line, or of the line that is `longer` than bare."""
+    linear = unknowns.robot.is_linear
+    return np.asarray(np.where(linear, drawn, -drawn * longer) * unknowns.errors.drum)
+
+
+def _weigh_loops(out: Equations, robot: Robot, noise: Noise) -> None:
+    """Equations of the wires in standard deviations of their errors, which are made independent."""
+    loop, alone = out.rows["loop"], _errors_apart(robot)
+    for values in (out.residual, out.by_robot, out.by_hold):
         values[:, loop] /= noise.joint_m
         if alone is not None:
             values[:, loop] = np.einsum("ij,pj...->pi...", alone, values[:, loop])
+
+
+def _joint_lengths(unknowns: Unknowns, state: State, joint_m: Floats) -> tuple[Floats, Floats, Floats]:
+    """(p, w) bare lengths and offsets by joint values, with the errors of references and drums, and what is drawn."""
+    robot, parts = unknowns.robot, unknowns.parts(state.white)
+    bare, offset = inverse.lengths(robot, joint_m)
+    drawn = robot.ratio * joint_m * robot.is_linear + joint_m * ~robot.is_linear
+    bare = bare + parts.reference_m + parts.drum * drawn * ~robot.is_linear
+    return bare, offset + parts.drum * drawn * robot.is_linear, drawn
 
 
 def _errors_apart(robot: Robot) -> Floats | None:

@@ -1,0 +1,307 @@
+"""Downhill on the energy of weight and wires: Newton's method, damped where it would not lead down, many at once."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.numeric import cholesky
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.wires import Wires, energy, tension
+from wirebayes.robot.motion.balance import in_metres
+from wirebayes.robot.motion.outcome import FOUND, NO_EQUILIBRIUM, NOT_CONVERGED, NOT_HELD
+
+_GOING_ON = -1  # of a case that is still being solved
+_CHUNK, _QUICK = 2048, 7
+_FAR = 10.0  # times the robot's size with its wires: no equilibrium is looked for beyond
+_LOOSE = 0.1  # of the robot's size with its wires: the longest step where the curvature does not bound one
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What became of n cases.
+
+    Attributes
+    ----------
+    x, R, tau : (3, n), (3, 3, n) and (w, n) arrays
+    status, count : (n,) int arrays
+        How each ended, and after how many iterations.
+    left : (n,) array
+        Largest force left over, N.
+    """
+
+    x: Floats
+    R: Floats
+    tau: Floats
+    status: NDArray[np.int64]
+    count: NDArray[np.int64]
+    left: Floats
+
+    @classmethod
+    def not_yet(cls, x: Floats, R: Floats, legs: int) -> "Solved":
+        """Cases at their starts."""
+        n = x.shape[1]
+        status, count = np.full(n, NOT_CONVERGED), np.zeros(n, np.int64)
+        return cls(np.array(x), np.array(R), np.zeros((legs, n)), status, count, np.full(n, np.inf))
+
+    def store(self, cases: "_Cases") -> None:
+        """Note where cases stand."""
+        self.x[:, cases.number], self.R[..., cases.number] = cases.x, cases.R
+        self.tau[:, cases.number], self.left[cases.number] = cases.at.tau, cases.at.size
+
+    def go_on(self, rows: NDArray[np.intp], later: "Solved") -> None:
+        """Put what became of some cases, which had gone on, in their place."""
+        for name in ("x", "R", "tau", "status", "left"):
+            getattr(self, name)[..., rows] = getattr(later, name)
+        self.count[rows] += later.count
+
+
+def solve(
+    robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
+) -> Solved:
+    """All cases by a few iterations, and the slow ones of all chunks together: small arrays waste the machine."""
+    quick = min(_QUICK, max_iterations)
+    solved = _in_chunks(robot, wires, zero, offset, x, R, quick)
+    slow = np.flatnonzero(solved.status == NOT_CONVERGED)
+    if slow.size and max_iterations > quick:
+        part = wires.part(slow), zero[:, slow], offset[:, slow], solved.x[:, slow], solved.R[..., slow]
+        solved.go_on(slow, _in_chunks(robot, *part, max_iterations - quick))
+    return solved
+
+
+def _in_chunks(
+    robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
+) -> Solved:
+    parts = []
+    for first in range(0, zero.shape[1], _CHUNK):
+        cut = slice(first, first + _CHUNK)
+        part = wires.part(cut), zero[:, cut], offset[:, cut], x[:, cut], R[..., cut]
+        parts.append(_in_one_chunk(robot, *part, max_iterations))
+    return Solved(*(np.concatenate([getattr(part, f.name) for part in parts], -1) for f in fields(Solved)))
+
+
+@dataclass(frozen=True)
+class _Cases:
+    """Cases that are still being solved, n of them.
+
+    Attributes
+    ----------
+    number : (n,) int array
+        Which they are among all.
+    wires : Wires
+    zero, offset : (w, n) arrays
+    x, R : (3, n) and (3, 3, n) arrays
+    at : _Point
+        Energy and its derivatives there.
+    damping : (n,) array
+        Added to the Hessian, in units of `level`.
+    level : (n,) array
+        The stiffness if every wire were taut: a measure of damping that exists also when all are slack.
+    floor : (n,) array
+        Force below which no computed one can be trusted, N.
+    span : (n,) array
+        Size of the robot with its wires, m.
+    """
+
+    number: NDArray[np.intp]
+    wires: Wires
+    zero: Floats
+    offset: Floats
+    x: Floats
+    R: Floats
+    at: "_Point"
+    damping: Floats
+    level: Floats
+    floor: Floats
+    span: Floats
+
+    def part(self, keep: NDArray[np.intp]) -> "_Cases":
+        return _Cases(
+            number=self.number[keep],
+            wires=self.wires.part(keep),
+            zero=self.zero[:, keep],
+            offset=self.offset[:, keep],
+            x=self.x[:, keep],
+            R=self.R[..., keep],
+            at=self.at.part(keep),
+            damping=self.damping[keep],
+            level=self.level[keep],
+            floor=self.floor[keep],
+            span=self.span[keep],
+        )
+
+    def moved(self, accept: NDArray[np.bool_], x: Floats, R: Floats, new: "_Point") -> "_Cases":
+        """The cases at new places where these are accepted."""
+        x, R = np.where(accept, x, self.x), np.where(accept, R, self.R)
+        return replace(self, x=x, R=R, at=self.at.where(accept, new))
+
+
+def _in_one_chunk(
+    robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
+) -> Solved:
+    """One chunk; solved cases leave the batch as they finish."""
+    solved = Solved.not_yet(x, R, robot.legs)
+    scale = np.ones((robot.degrees, 1))
+    scale[3:] = 1.0 / robot.size_m  # rotations are stepped in metres at the platform's edge
+    cases = _begin(robot, wires, zero, offset, x, R, scale)
+    for iteration in range(1, max_iterations + 1):
+        cases, ended = _iterate(robot, cases, scale)
+        solved.count[cases.number] = iteration
+        finished = ended != _GOING_ON
+        if finished.any():
+            solved.store(cases.part(np.flatnonzero(finished)))
+            solved.status[cases.number[finished]] = ended[finished]
+            cases = cases.part(np.flatnonzero(~finished))
+        if not cases.number.size:
+            break
+    if cases.number.size:
+        solved.store(cases)
+    return solved
+
+
+def _begin(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, scale: Floats) -> _Cases:
+    """All cases at their starts, undamped."""
+    n = zero.shape[1]
+    k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, n))
+    # S/ℓ - 1 is known to one rounding error. Moments are divided by the platform's size; points far from the reference
+    # point make more of the same error.
+    arm = max(1.0, np.abs(robot.platform_m).max() / robot.size_m) if robot.degrees == 6 else 1.0
+    floor = 32 * np.finfo(float).eps * arm * (np.max(k1, axis=0) * robot.lines.max() + robot.mass_kg * GRAVITY)
+    level = np.sum(k1 * robot.lines[:, None] ** 2 / zero, axis=0)
+    at = _evaluate(robot, wires, zero, offset, x, R, scale)
+    return _Cases(np.arange(n), wires, zero, offset, x, R, at, np.zeros(n), level, floor, robot.span_m + zero.max(0))
+
+
+def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, NDArray[np.int64]]:
+    """A damped Newton step of every case, taken where it leads down, and how it ended (`_GOING_ON` if it did not)."""
+    step = _newton_step(robot, cases)
+    move = step.move * scale
+    x = cases.x + move[:3]
+    R = turning.compose(move[3:], cases.R) if robot.degrees == 6 else cases.R
+    new = _evaluate(robot, cases.wires, cases.zero, cases.offset, x, R, scale)
+    noise = 1e-14 * (np.abs(cases.at.energy) + robot.mass_kg * GRAVITY * cases.span)
+    is_newton = step.positive & (cases.damping == 0)
+    accept = new.energy <= cases.at.energy + 1e-4 * step.downhill + noise
+    accept |= is_newton & (new.size < 0.5 * cases.at.size) & (step.length < 1e-3 * robot.size_m)
+    moved = cases.moved(accept, x, R, new)
+    balanced = moved.at.size <= cases.floor
+    damping = np.where(accept, _calmer(cases, step, new, noise), np.maximum(1e-3, cases.damping * 10))
+    damping = np.where(balanced, 0.0, damping)  # so that the next step uses the bare stiffness
+    lost = np.abs(moved.x).max(0) > _FAR * cases.span
+    done = is_newton & (balanced | (accept & (step.length < 1e-9 * robot.size_m)))
+    loose = balanced & ~step.positive & (cases.damping == 0)
+    stuck = damping > 1e12
+    ended = np.select([lost, done, loose, stuck], [NO_EQUILIBRIUM, FOUND, NOT_HELD, NOT_CONVERGED], _GOING_ON)
+    return replace(moved, damping=damping), ended
+
+
+@dataclass(frozen=True)
+class _Step:
+    """Damped Newton steps of n cases.
+
+    Attributes
+    ----------
+    move : (d, n) array
+        Rotations in metres at the platform's edge.
+    length : (n,) array
+    positive : (n,) bool array
+        Whether the damped stiffness is positive definite.
+    downhill : (n,) array
+        Change of energy along it, to first order.
+    """
+
+    move: Floats
+    length: Floats
+    positive: NDArray[np.bool_]
+    downhill: Floats
+
+
+def _newton_step(robot: Robot, cases: _Cases) -> _Step:
+    """Steps of all cases; one across the room is no Newton step: it is cut, the direction kept."""
+    at = cases.at
+    damped = at.H.copy()
+    for i in range(robot.degrees):
+        damped[i, i] += cases.damping * cases.level
+    step, positive = cholesky.solve_symmetric(damped, -at.gradient)
+    indefinite = np.flatnonzero(~positive)
+    if indefinite.size:
+        part = damped[..., indefinite], at.gradient[:, indefinite], cases.level[indefinite], cases.floor[indefinite]
+        step[:, indefinite] = _off_saddle(*part)
+    np.clip(step, -1e100, 1e100, out=step)  # the square of a step along no stiffness at all would overflow
+    length = np.sqrt((step * step).sum(0))
+    longest = np.where(positive, 0.25 * _FAR * cases.span, _LOOSE * cases.span)
+    cut = np.minimum(1.0, longest / np.maximum(length, 1e-300))
+    step *= cut
+    return _Step(step, length * cut, positive, (at.gradient * step).sum(0))
+
+
+def _calmer(cases: _Cases, step: _Step, new: "_Point", noise: Floats) -> Floats:
+    """(n,) damping after steps that led down: back towards pure Newton where the energy fell as predicted."""
+    predicted = 0.5 * (cases.damping * cases.level * step.length * step.length - step.downhill)
+    as_predicted = cases.at.energy - new.energy > 0.5 * predicted - noise
+    less = np.where(cases.damping < 2e-5, 0.0, cases.damping / 100)
+    return np.where(as_predicted, less, cases.damping)
+
+
+def _off_saddle(H: Floats, gradient: Floats, level: Floats, floor: Floats) -> Floats:
+    """Newton's step with every curvature taken as positive: away from a saddle, twice as far each time.
+
+    Shifting the whole Hessian until it is positive instead takes ever smaller steps the nearer the saddle is.
+
+    Parameters
+    ----------
+    H : (d, d, n) array
+        Only the upper triangle is read.
+    gradient : (d, n) array
+    level : (n,) array
+        The stiffness if every wire were taut; less than its rounding is none.
+    floor : (n,) array
+        Force below which none can be trusted: it leads nowhere.
+
+    Returns
+    -------
+    (d, n) array
+        NaN where the stiffness has overflowed: no step from there is better.
+    """
+    finite = np.isfinite(H).all((0, 1))
+    curvature, along = np.linalg.eigh(np.moveaxis(np.where(finite, H, 0.0), -1, 0), UPLO="U")
+    slope = np.einsum("nij,in->nj", along, gradient)
+    slope = np.where(np.abs(slope) > floor[:, None], slope, 0.0)
+    stiffness = np.maximum(np.abs(curvature), np.finfo(float).eps * level[:, None])
+    step = -np.einsum("nij,nj->in", along, slope / stiffness)
+    return np.where(finite, step, np.nan)
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Energy, gradient and Hessian at a batch of poses, rotations scaled to metres."""
+
+    energy: Floats
+    gradient: Floats
+    H: Floats
+    tau: Floats
+    size: Floats
+
+    def where(self, accept: NDArray[np.bool_], other: "_Point") -> "_Point":
+        if accept.all():
+            return other
+        return _Point(*(np.where(accept, getattr(other, f.name), getattr(self, f.name)) for f in fields(_Point)))
+
+    def part(self, keep: NDArray[np.intp]) -> "_Point":
+        return _Point(*(getattr(self, f.name)[..., keep] for f in fields(_Point)))
+
+
+def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, scale: Floats) -> _Point:
+    shape = statics.geometry(robot, x, R)
+    S = statics.stretched(robot, shape, offset)
+    tau, slope = tension(wires, S, zero)
+    gradient, H = in_metres(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
+    height = x[2]
+    if robot.degrees == 6:
+        c = robot.centre_of_mass_m
+        height = height + (R[2, 0] * c[0] + R[2, 1] * c[1] + R[2, 2] * c[2])
+    total = energy(wires, S, zero).sum(0) + robot.mass_kg * GRAVITY * height
+    return _Point(total, gradient, H, tau, np.abs(gradient).max(0))
