@@ -16,7 +16,7 @@ from wirebayes.discovery.screening import Candidate
 from wirebayes.discovery.search import investigate
 from wirebayes.discovery.settings import Settings
 from wirebayes.effects import CATALOGUE, effect_named
-from wirebayes.inference.climb import Optimum
+from wirebayes.inference.optimum import Optimum
 from wirebayes.simulation.synthetic import Bench, Truth
 
 NORM = 25.0  # δ per unit of amplitude in these scans

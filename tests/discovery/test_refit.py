@@ -12,7 +12,7 @@ from wirebayes.discovery import refit
 from wirebayes.discovery.profile import Profile
 from wirebayes.discovery.refit import occam
 from wirebayes.effects import effect_named
-from wirebayes.inference.climb import Optimum
+from wirebayes.inference.optimum import Optimum
 
 TWO_SIDED = effect_named("strain_stiffening")
 

@@ -12,6 +12,7 @@ from wirebayes.inference import modes
 from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import search
+from wirebayes.inference.optimum import Ends, Optimum
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.linear_amplitudes import integrated
@@ -311,7 +312,7 @@ def quartic(evaluated):
 def test_a_climb_is_given_up_where_a_mode_is_known_and_no_other_with_it():
     start, known = (
         np.array([[3.0, 3.0], [-3.0, 3.0]]),
-        climbing.Optimum(*(np.zeros((1, 2)), np.zeros(1), np.eye(2)[None], np.ones(1, bool))),
+        Optimum(*(np.zeros((1, 2)), np.zeros(1), np.eye(2)[None], np.ones(1, bool))),
     )
     nothing = known.rows([])
     whole_cost, cost = [], []
@@ -338,8 +339,8 @@ def test_of_climbs_on_one_density_those_that_come_to_the_same_place_are_given_up
     [(1.99, -1.0, 0, True), (2.01, -1.0, 0, False), (1.99, 1e-9, 0, False), (1.99, -1.0, 1, False)],
 )
 def test_a_place_is_near_an_end_within_two_standard_deviations_and_below_it(apart, higher, which, near):
-    end = climbing.Optimum(np.array([[1.0, 2.0]]), np.array([5.0]), np.diag([4.0, 1.0])[None], np.ones(1, bool))
-    ends = climbing._Ends.of([end])
+    end = Optimum(np.array([[1.0, 2.0]]), np.array([5.0]), np.diag([4.0, 1.0])[None], np.ones(1, bool))
+    ends = Ends.of([end])
     for place in ([1.0 + 0.5 * apart, 2.0], [1.0, 2.0 - apart]):
         assert ends.near(np.array([which]), np.array([place]), np.array([5.0 + higher]))[0] == near
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from wirebayes.inference import rough_draws
-from wirebayes.inference.climb import Optimum
+from wirebayes.inference.optimum import Optimum
 
 Array = NDArray[Any]
 HILLS = np.array([[0.0, 0.0, 0.0], [7.0, -5.0, 3.0]])

@@ -10,7 +10,7 @@ from scipy import stats
 
 from wirebayes.inference import importance
 from wirebayes.inference import weighted_posterior as module
-from wirebayes.inference.climb import Optimum
+from wirebayes.inference.optimum import Optimum
 from wirebayes.inference.weighted_posterior import overlooked_share, weighted_posterior, witnessed
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build

@@ -9,9 +9,9 @@ import pytest
 from tests.statistical.targets import TARGETS, Analytic, corners, funnel, gaussian, grid, sixteen_modes
 from wirebayes.effects import catalogue, effect_named
 from wirebayes.inference import convergence
-from wirebayes.inference.climb import Optimum
 from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.modes import search
+from wirebayes.inference.optimum import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, kept, moves, proposal, stop_rule
 from wirebayes.inference.sampler import state as sampler_state

@@ -237,31 +237,46 @@ class _Ascent:
         -------
         _Places
         """
-        n, scale = self.data_sets, self.target.coordinates.scale[self.column]
-        ends = (1.0, 1.0 / self.half, self.half)
-        at, near, far = (np.clip(self.neutral + amplitude * f, self.low, self.high) for f in ends)
+        n = self.data_sets
+        at, first, last = self._stretch(amplitude)
         z = z.copy()
-        z[:, self.column] = at / scale
-        first, last = np.minimum(near, far) - at, np.maximum(near, far) - at
-        best = _Places.unseen(z, at - self.neutral)
+        z[:, self.column] = (self.neutral + at) / self._scale
+        best = _Places.unseen(z, at)
         rows = np.flatnonzero(np.tile(alive, len(z) // n))
         for step in range(steps + 1):
-            own = None if self.readings is None else [r[..., rows % n] for r in self.readings]
             with np.errstate(all="ignore"):
-                both = tangent(self.target, z[rows], own, [*free, self.column])
-            signature = both.parameters[..., -1] / scale
+                both = tangent(self.target, z[rows], self._seen(rows), [*free, self.column])
+            signature = both.parameters[..., -1] / self._scale
             here = weigh(without_last(both), signature, first[rows], last[rows], self.degrees)
-            lr = np.nan_to_num(here.height + both.prior - self.nothing[rows], nan=_NEVER, neginf=_NEVER)
+            log_bayes = here.height + both.prior - self.nothing[rows]
+            log_bayes = np.nan_to_num(log_bayes, nan=_NEVER, neginf=_NEVER)
             gain = np.full(len(z), -np.inf)
-            gain[rows] = np.minimum(lr - best.log_bayes[rows], here.promise)
-            better = best.improve(rows, _Places(z[rows], lr, (at - self.neutral)[rows] + here.move, here.norm))
+            gain[rows] = np.minimum(log_bayes - best.log_bayes[rows], here.promise)
+            better = best.improve(rows, _Places(z[rows], log_bayes, at[rows] + here.move, here.norm))
             # A step that led down, where the wire went slack say, is the last one.
             go = np.flatnonzero(better & (self.best_start(gain) >= _SETTLED)[rows % n])
             if step == steps or not len(go):
                 break
-            rows, own = rows[go], None if own is None else [r[..., go] for r in own]
-            z[rows] = _follow(self.target, z[rows], own, both.of(go), here.of(go), free, self.degrees)
+            rows = rows[go]
+            z[rows] = _follow(self.target, z[rows], self._seen(rows), both.of(go), here.of(go), free, self.degrees)
         return best
+
+    def _seen(self, rows: NDArray[np.int64]) -> list[Array] | None:
+        """The readings of the data sets of some climbs, a sample each; None for the measured ones."""
+        return None if self.readings is None else [r[..., rows % self.data_sets] for r in self.readings]
+
+    @property
+    def _scale(self) -> float:
+        """Of the amplitude's coordinate."""
+        return float(self.target.coordinates.scale[self.column])
+
+    def _stretch(self, amplitude: Array) -> tuple[Array, Array, Array]:
+        """Distances (m,) from neutral within the amplitude's ends, and the ends of the moves that each speaks for."""
+        at, near, far = (
+            np.clip(self.neutral + amplitude * share, self.low, self.high)
+            for share in (1.0, 1.0 / self.half, self.half)
+        )
+        return at - self.neutral, np.minimum(near, far) - at, np.maximum(near, far) - at
 
 
 def _begin(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> tuple[_Ascent, Array]:

@@ -83,51 +83,48 @@ class Projected:
 
 def project(x: Expansion) -> Projected:
     """Project residual, signatures and smooth functions on what the parameters leave, in the metric of each ratio."""
-    p, m = x.parameters.shape[2], x.signatures.shape[2]
+    shrink = damp(x.singular[:, None], RATIOS[:, None])
+    log_volume, every = _beside_parameters(x, shrink)
+    signatures = x.signatures.shape[2]
+    residual, form = every.between(0, 1), every.between(1, 1 + signatures)
+    smooth = [every.between(own.start, own.stop) for own in _slices(x.processes, 1 + signatures)]
+    log_metric = np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
+    square = form.squares(shrink)
+    is_left = square > ABSORBED * (form.plain**2).sum(axis=1)[:, None]
+    return Projected(
+        shared=-0.5 * log_metric - log_volume,
+        rss=residual.squares(shrink)[..., 0] + x.prior_square[:, None],
+        along=form.along(residual, shrink),
+        square=np.where(is_left, square, np.inf),
+        smooth_along=[process.along(residual, shrink) for process in smooth],
+        smooth_square=[process.products(process, shrink) for process in smooth],
+        form=form,
+        smooth=smooth,
+        shrink=shrink,
+    )
+
+
+def _beside_parameters(x: Expansion, shrink: Array) -> tuple[Array, "Functions"]:
+    """Log volume (n, k) of the parameters, infinite where they cannot be distinguished, and what they take of columns.
+
+    The columns are the residual, the signatures and the smooth functions.
+    """
+    p = x.parameters.shape[2]
     columns = np.concatenate([x.parameters, x.residual[..., None], x.signatures, x.flexible], axis=2)
     levels = np.swapaxes(x.left, 1, 2) @ columns
-    shrink = damp(x.singular[:, None], RATIOS[:, None])
-    of_m, of_f = slice(p + 1, p + 1 + m), slice(p + 1 + m, None)
     # Inner products of the parameters with everything, at each ratio.
     shrunk = np.swapaxes(levels[..., :p], 1, 2)[:, None] * shrink[:, :, None]
     gram = (np.swapaxes(x.parameters, 1, 2) @ columns)[:, None] - shrunk @ levels[:, None]
     gram[..., :p] += x.prior_precision[:, None]
     gram[..., p] += x.prior_gradient[:, None]
     factor = cholesky(gram[..., :p])
-    # There may be a ratio at which the parameters cannot be distinguished: it is left out.
     regular = np.isfinite(factor).all(axis=(2, 3))
     factor[~regular] = np.eye(p)
     # What the parameters take of each column, in coordinates in which it is a sum of squares.
     taken = np.linalg.inv(factor) @ gram[..., p:]
     taken[~regular] = 0.0
-    residual, signatures, flexible = taken[..., 0], taken[..., 1 : m + 1], taken[..., m + 1 :]
-
-    def in_metric(plain: Array, one: Array, other: Array) -> Array:
-        """(n, k, c) products of columns, given those (n, c) without setting errors and the columns' levels."""
-        return np.asarray(plain[:, None] - shrink @ (one * other))
-
-    r, levels_m, levels_f = levels[..., p : p + 1], levels[..., of_m], levels[..., of_f]
-    square = np.einsum("nim,nim->nm", x.signatures, x.signatures)
-    rr = in_metric((x.residual**2).sum(axis=1)[:, None], r, r)[..., 0]
-    mr = in_metric((x.residual[:, None] @ x.signatures)[:, 0], levels_m, r)
-    mm = in_metric(square, levels_m, levels_m)
-    c = mm - np.einsum("nkpm,nkpm->nkm", signatures, signatures)
-    fr = in_metric((x.residual[:, None] @ x.flexible)[:, 0], levels_f, r) - (residual[:, :, None] @ flexible)[:, :, 0]
-    each = _slices(x.processes)
-    smooth = [Functions(x.flexible[..., own], flexible[..., own], levels_f[..., own]) for own in each]
-    form = Functions(x.signatures, signatures, levels_m)
-    shared = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
-    return Projected(
-        shared=np.where(regular, shared - np.log(np.einsum("nkpp->nkp", factor)).sum(axis=2), -np.inf),
-        rss=rr - (residual**2).sum(axis=2) + x.prior_square[:, None],
-        along=mr - (residual[:, :, None] @ signatures)[:, :, 0],
-        square=np.where(c > ABSORBED * square[:, None], c, np.inf),
-        smooth_along=[fr[..., own] for own in each],
-        smooth_square=[process.products(process, shrink) for process in smooth],
-        form=form,
-        smooth=smooth,
-        shrink=shrink,
-    )
+    log_volume = np.log(np.einsum("nkpp->nkp", factor)).sum(axis=2)
+    return np.where(regular, log_volume, np.inf), Functions(columns[..., p:], taken, levels[..., p:])
 
 
 def with_each_signature(x: Expansion, found: Projected) -> tuple[Array, Array]:
@@ -137,9 +134,9 @@ def with_each_signature(x: Expansion, found: Projected) -> tuple[Array, Array]:
     return left, found.shared[..., None] - 0.5 * x.degrees * np.log(left)
 
 
-def _slices(processes: Sequence[int]) -> list[slice]:
-    """Where the functions of each process stand."""
-    ends = np.cumsum(processes)
+def _slices(processes: Sequence[int], first: int = 0) -> list[slice]:
+    """Where the functions of each process stand, from the column `first` on."""
+    ends = first + np.cumsum(processes)
     return [slice(last - count, last) for last, count in zip(ends, processes, strict=True)]
 
 
@@ -154,6 +151,21 @@ class Functions(NamedTuple):
         """Some of them, by a row of numbers (n, q) each."""
         plain, levels = (np.take_along_axis(v, columns[:, None], axis=2) for v in (self.plain, self.levels))
         return Functions(plain, np.take_along_axis(self.taken, columns[:, None, None], axis=3), levels)
+
+    def between(self, first: int, last: int) -> "Functions":
+        """Those from the column `first` to the one before `last`."""
+        return Functions(*(part[..., first:last] for part in self))
+
+    def squares(self, shrink: Array) -> Array:
+        """(n, k, q) inner product of each with itself."""
+        plain = np.einsum("nif,nif->nf", self.plain, self.plain)[:, None]
+        return np.asarray(plain - shrink @ self.levels**2 - np.einsum("nkpf,nkpf->nkf", self.taken, self.taken))
+
+    def along(self, one: "Functions", shrink: Array) -> Array:
+        """(n, k, q) inner product of each with a single other function."""
+        plain = np.swapaxes(one.plain, 1, 2) @ self.plain
+        taken = (np.swapaxes(one.taken, 2, 3) @ self.taken)[:, :, 0]
+        return np.asarray(plain - shrink @ (self.levels * one.levels) - taken)
 
     def products(self, other: "Functions", shrink: Array) -> Array:
         """(n, k, q, m) inner products with other functions, as `project` has them."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.discovery.noise_integral import ABSORBED, RATIOS
 from wirebayes.discovery.tangent import Tangent, damp
@@ -64,50 +65,122 @@ def weigh(
     return Weighed(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Weighed)))
 
 
+@dataclass(frozen=True)
+class _Free:
+    """Inner products at n places and k noise ratios of what the parameters leave.
+
+    Attributes
+    ----------
+    gram : (n, k, p + 2, p + 2) array
+        Of parameters, signature and residual, before the parameters take anything.
+    regular : (n, k) bool array
+        Whether the parameters can be distinguished.
+    log_volume : (n, k) array
+        Of the parameters.
+    along, square : (n, k) arrays
+        Of the signature with the residual, and with itself.
+    taken : (n, k, p) array
+        What the parameters take of the residual, in coordinates in which it is a sum of squares.
+    """
+
+    gram: Array
+    regular: NDArray[np.bool_]
+    log_volume: Array
+    along: Array
+    square: Array
+    taken: Array
+
+    @property
+    def residual(self) -> Array:
+        """(n, k) of the residual with itself. Nothing is taken off it: far out, steps promise more than they keep."""
+        return np.asarray(self.gram[..., -1, -1])
+
+    def left(self, amplitude: Array, least: Array) -> Array:
+        """(n, k) sum of squares beside amplitudes (n, k); no less than rounding (n,)."""
+        squares = self.residual - 2.0 * amplitude * self.along + amplitude**2 * self.square
+        return np.maximum(squares, least[:, None])
+
+
 def _weigh_few(x: Tangent, signature: Array, near: Array, far: Array, degrees: int) -> Weighed:
-    n, p = x.parameters.shape[0], x.parameters.shape[2]
+    columns, smooth = _columns(x, signature)
+    free = _eliminated(_inner_products(x, columns))
+    amplitude = np.divide(free.along, free.square, out=np.zeros_like(free.square), where=free.square > 0)
+    amplitude = np.clip(amplitude, near[:, None], far[:, None])
+    left = free.left(amplitude, x.least)
+    log_volume = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2) - free.log_volume
+    height = np.where(free.regular, log_volume - 0.5 * degrees * np.log(left), -np.inf)
+    rows, k = np.arange(len(height)), np.argmax(height, axis=1)
+    best = rows, k
+    after = np.maximum(left[best] - (free.taken[best] ** 2).sum(axis=1), x.least)
+    return Weighed(
+        height=np.where(smooth, _summed(height, height[best]), -np.inf),
+        move=amplitude[best],
+        norm=np.sqrt(free.square[best] * degrees / left[best]),
+        step=_steps(free.gram[best], free.regular[best]),
+        ratio=RATIOS[k],
+        promise=0.5 * degrees * np.log(left[best] / after),
+    )
+
+
+def _columns(x: Tangent, signature: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """(n, N, p + 2) parameters, signature and residual, all zero in rows (n,) where the readings jump."""
     columns = np.concatenate([x.parameters, signature[..., None], x.residual[..., None]], axis=2)
     with np.errstate(invalid="ignore"):
         smooth = np.abs(columns).max(axis=(1, 2)) < _JUMP
     columns[~smooth] = 0.0
+    return columns, smooth
+
+
+def _inner_products(x: Tangent, columns: Array) -> Array:
+    """(n, k, c, c) inner products of columns (n, N, c) at each noise ratio, with the prior of the parameters."""
+    n, p = len(columns), x.parameters.shape[2]
     levels = np.swapaxes(x.left, 1, 2) @ columns
     products = (levels[..., None] * levels[..., None, :]).reshape(*levels.shape[:2], -1)
-    # For each ratio all inner products (n, k, p + 2, p + 2): of the parameters, the signature and the residual.
-    gram = (damp(x.singular[:, None], RATIOS[:, None]) @ products).reshape(n, len(RATIOS), p + 2, p + 2)
-    whole = np.swapaxes(columns, 1, 2) @ columns
-    whole[:, :p, :p] += x.prior_precision
-    whole[:, -1, :p] += x.prior_gradient
-    gram = whole[:, None] - gram
-    # Not less what a further step promises: far out, steps promise more than they keep.
-    rss, mm = gram[..., -1, -1].copy(), gram[..., p, p].copy()
-    # One Cholesky factor gives the volume, and what the parameters leave of signature and residual. Its last two pivots
-    # need only be positive: the one is taken back, the other not used.
-    added = np.where(mm > 0, mm, 1.0)
-    gram[..., p, p] += added
-    gram[..., -1, -1] = _LARGE
-    factor = cholesky(gram)
+    whole_holds = damp(x.singular[:, None], RATIOS[:, None]) @ products
+    plain = np.swapaxes(columns, 1, 2) @ columns
+    plain[:, :p, :p] += x.prior_precision
+    plain[:, -1, :p] += x.prior_gradient
+    return np.asarray(plain[:, None] - whole_holds.reshape(n, len(RATIOS), *plain.shape[1:]))
+
+
+def _eliminated(gram: Array) -> _Free:
+    """What the parameters leave, of inner products of parameters, signature and residual.
+
+    One Cholesky factor gives the volume, and what the parameters leave of signature and residual. Its last two pivots
+    need only be positive: the one is taken back, the other not used.
+    """
+    p = gram.shape[-1] - 2
+    own = gram[..., p, p]
+    added = np.where(own > 0, own, 1.0)
+    bordered = gram.copy()
+    bordered[..., p, p] += added
+    bordered[..., -1, -1] = _LARGE
+    factor = cholesky(bordered)
     regular = np.isfinite(factor[..., 0, 0])
     factor[~regular] = 1.0
     pivot = factor[..., p, p]
-    b, c = factor[..., -1, p] * pivot, pivot**2 - added
-    c = np.where(c > ABSORBED * mm, c, 0.0)
-    a = np.divide(b, c, out=np.zeros_like(c), where=c > 0)
-    a = np.clip(a, near[:, None], far[:, None])
-    left = np.maximum(rss - 2.0 * a * b + a**2 * c, x.least[:, None])
-    volume = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
-    volume -= np.log(np.einsum("nkpp->nkp", factor[..., :p, :p])).sum(axis=2)
-    height = np.where(regular, volume - 0.5 * degrees * np.log(left), -np.inf)
-    rows, k = np.arange(n), np.argmax(height, axis=1)
-    best = rows, k
-    step = solve(gram[rows, k, :p, :p], gram[rows, k, -1, :p, None])[..., 0]
-    step = np.where((regular[best] & np.isfinite(step).all(axis=1))[:, None], step, 0.0)
-    peak = height[best]
+    square = pivot**2 - added
+    return _Free(
+        gram,
+        regular,
+        log_volume=np.log(np.einsum("nkpp->nkp", factor[..., :p, :p])).sum(axis=2),
+        along=factor[..., -1, p] * pivot,
+        square=np.where(square > ABSORBED * own, square, 0.0),
+        taken=factor[..., -1, :p],
+    )
+
+
+def _summed(height: Array, peak: Array) -> Array:
+    """(n,) log densities summed over ratios (n, k), whose largest is `peak`; -inf where that is not a number."""
     with np.errstate(invalid="ignore"):
         total = peak + np.log(np.exp(height - peak[:, None]).sum(axis=1))
-    total = np.where(smooth & np.isfinite(total), total, -np.inf)
-    after = np.maximum(left[best] - (factor[rows, k, -1, :p] ** 2).sum(axis=1), x.least)
-    promise = 0.5 * degrees * np.log(left[best] / after)
-    return Weighed(total, a[best], np.sqrt(c[best] * degrees / left[best]), step, RATIOS[k], promise)
+    return np.where(np.isfinite(total), total, -np.inf)
+
+
+def _steps(gram: Array, regular: NDArray[np.bool_]) -> Array:
+    """(n, p) Gauss-Newton steps, of inner products (n, p + 2, p + 2); none where there is no such step."""
+    step = solve(gram[:, :-2, :-2], gram[:, -1, :-2, None])[..., 0]
+    return np.where((regular & np.isfinite(step).all(axis=1))[:, None], step, 0.0)
 
 
 def without_last(x: Tangent) -> Tangent:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from wirebayes.inference.climb import Optimum, together
+from wirebayes.inference.optimum import Optimum, together
 from wirebayes.numeric.typing import Array
 
 _NEAR_TOP = 1.0  # nats below it that a parabola is fitted to; neighbours alone may differ in their last digits only

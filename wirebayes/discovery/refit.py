@@ -14,8 +14,8 @@ import numpy as np
 
 from wirebayes.discovery.profile import Profile, has_near_neighbours, integral_of, top_of
 from wirebayes.discovery.sharing import alike
-from wirebayes.inference.climb import Optimum
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
+from wirebayes.inference.optimum import Optimum
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 

@@ -4,18 +4,16 @@ Every row is an optimisation of its own; rows may also have their own readings (
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference.log_posterior import Density, Residuals
+from wirebayes.inference.optimum import Ends, Optimum, nowhere
 from wirebayes.numeric.typing import Array
 
-LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
-_ONE_MODE = 4.0  # squared standard deviations
 _ENOUGH = 0.25  # of what a step promises to gain: with less, damped ones are tried
 _LONGEST = 2.0  # step of a coordinate; they are of order one under the prior
 _NARROW = 1e-2  # standard deviation assumed where none is known yet, so that differences stay inside it
@@ -23,51 +21,7 @@ _NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard
 # added to the curvature (of order one under the prior alone), tried in one batch where a step gains too little
 _DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
 _PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there are many such steps
-REACH = 30.0  # nats below the best mode that no mode counts
 _RELAX, _LEAST_DAMPING = 0.2, 0.3  # share of the damping kept after a step that was good; less than the latter is none
-
-
-@dataclass(frozen=True)
-class Optimum:
-    """Where the climbs ended.
-
-    Attributes
-    ----------
-    z : (n, d) array, sampled coordinates
-    log_density : (n,) array
-    curvature : (n, d, d) array
-        Minus the Hessian, made positive definite.
-    converged : (n,) bool array
-        The Newton decrement fell below the tolerance.
-    """
-
-    z: Array
-    log_density: Array
-    curvature: Array
-    converged: NDArray[np.bool_]
-
-    def rows(self, which: Any) -> "Optimum":
-        """Some of them, by number or mask."""
-        return Optimum(self.z[which], self.log_density[which], self.curvature[which], self.converged[which])
-
-    @property
-    def covariance(self) -> Array:
-        """(n, d, d) covariance of the normal approximation."""
-        eigen, vectors = np.linalg.eigh(self.curvature)
-        # A ridge thinner than this against its length has no Cholesky factor in double precision.
-        eigen = np.maximum(eigen, 1e-10 * eigen.max(axis=1, keepdims=True))
-        half = vectors / np.sqrt(eigen)[:, None, :]
-        return half @ np.swapaxes(half, 1, 2)
-
-    @property
-    def log_evidence(self) -> Array:
-        """(n,) Laplace approximation of the log evidence of each mode.
-
-        No direction counts as wider than the prior makes it (sampled coordinates are of order one under the prior).
-        """
-        d = self.z.shape[1]
-        eigen = np.maximum(np.linalg.eigvalsh(self.curvature), LEAST_CURVATURE)
-        return np.asarray(self.log_density + 0.5 * d * np.log(2.0 * np.pi) - 0.5 * np.log(eigen).sum(axis=1))
 
 
 @dataclass(frozen=True)
@@ -78,47 +32,105 @@ class _Local:
     gradient: Array
     curvature: Array
 
+    def rows(self, which: NDArray[np.bool_]) -> "_Local":
+        """Some of the places."""
+        return _Local(self.value[which], self.gradient[which], self.curvature[which])
 
-@dataclass(frozen=True)
-class _Ends:
-    """Where climbs of several densities have ended, and which density (k,) each place is of."""
 
-    which: NDArray[np.int64]
-    places: Optimum
+@dataclass
+class _Climbs:
+    """Where n climbs stand, and what each does next.
+
+    Attributes
+    ----------
+    z, value, slope, eigen, vectors
+        The places (n, d), the density (n,), and its gradient along the eigenvectors (n, d, d) of its curvature with
+        their eigenvalues (n, d).
+    ahead : (n, d) array
+        Where to look next: at the end of a step, in the hope that it is taken, or, after another one, at `z`.
+    promised : (n,) array
+        What that step gains, were the density a parabola.
+    arrived : (n,) bool array
+        Whether `ahead` is `z`.
+    damping : (n,) array
+    done, converged : (n,) bool arrays
+    """
+
+    z: Array
+    value: Array
+    slope: Array
+    eigen: Array
+    vectors: Array
+    ahead: Array
+    promised: Array
+    arrived: NDArray[np.bool_]
+    damping: Array
+    done: NDArray[np.bool_]
+    converged: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, known: Sequence[Optimum]) -> "_Ends":
-        """Modes of each density that are known."""
-        return cls(np.repeat(np.arange(len(known)), [len(found.z) for found in known]), together(known))
+    def beginning(cls, start: Array) -> "_Climbs":
+        """At the starts (n, d), where nothing is known yet."""
+        n, d = start.shape
+        return cls(
+            z=start.copy(),
+            value=np.full(n, -np.inf),
+            slope=np.zeros((n, d)),
+            eigen=np.full((n, d), _NARROW**-2),
+            vectors=np.tile(np.eye(d), (n, 1, 1)),
+            ahead=start.copy(),
+            promised=np.zeros(n),
+            arrived=np.ones(n, bool),
+            damping=np.zeros(n),
+            done=np.zeros(n, bool),
+            converged=np.zeros(n, bool),
+        )
 
-    def joined(self, which: NDArray[np.int64], ended: Optimum) -> "_Ends":
-        """With further places, highest first, but for those that are near one.
+    def gain_enough(self, rows: NDArray[np.int64], ahead: Array) -> NDArray[np.bool_]:
+        """Whether rows gain what makes a step good, given their densities ahead; at its start any density will do."""
+        least = np.where(self.arrived[rows], -np.inf, self.value[rows] + _ENOUGH * self.promised[rows])
+        return np.asarray(np.isfinite(ahead) & (ahead > least))
 
-        Parameters
-        ----------
-        which : (n,) int array
-            Their densities.
-        """
-        out = self
-        for i in np.argsort(-ended.log_density):
-            here = ended.rows([i])
-            if not out.near(which[[i]], here.z, here.log_density)[0]:
-                out = _Ends(np.append(out.which, which[i]), together([out.places, here]))
-        return out
+    def lead_damped(self, density: Density, rows: NDArray[np.int64]) -> None:
+        """Lead rows whose step was not good to where the best damped one leads; those that none leads up are done."""
+        if not len(rows):
+            return
+        known = self.slope[rows], self.eigen[rows], self.vectors[rows]
+        trial, tried, by = _damped(density, self.z[rows], rows, *known)
+        better = tried > self.value[rows]
+        self.done[rows] = ~better
+        moved = rows[better]
+        self.z[moved] = self.ahead[moved] = trial[better]
+        self.value[moved] = tried[better]
+        self.damping[moved] = by[better]
+        self.arrived[moved] = True
 
-    def near(self, which: NDArray[np.int64], z: Array, value: Array) -> NDArray[np.bool_]:
-        """(n,) whether places would count as one of these modes of their density; never where they are higher.
+    def take_step(self, rows: NDArray[np.int64], local: _Local, tolerance: float) -> None:
+        """Lead rows to what they looked at, and plan their next steps from what is known there."""
+        self.z[rows], self.value[rows] = self.ahead[rows], local.value
+        eigen, vectors = _positive(local.curvature)
+        slope = np.einsum("nij,ni->nj", vectors, local.gradient)
+        self.eigen[rows], self.vectors[rows], self.slope[rows] = eigen, vectors, slope
+        half_decrement = 0.5 * (slope**2 / eigen).sum(axis=1)
+        self.converged[rows] = self.done[rows] = half_decrement < tolerance
+        damping = np.where(self.arrived[rows], self.damping[rows], self.damping[rows] * _RELAX)
+        damping[damping < _LEAST_DAMPING] = 0.0
+        self.damping[rows] = damping
+        self.promised[rows] = 0.5 * (slope**2 / (eigen + damping[:, None])).sum(axis=1)
+        self.ahead[rows] = self.z[rows] + _step(slope, eigen, vectors, damping[:, None])[:, 0]
+        self.arrived[rows] = False
 
-        Parameters
-        ----------
-        which : (n,) int array
-            Their densities.
-        z : (n, d) array
-        value : (n,) array
-        """
-        near = _apart(z, self.places.z, self.places.curvature) <= _ONE_MODE
-        lower = value[:, None] <= self.places.log_density
-        return np.asarray((near & lower & (self.which == which[:, None])).any(axis=1))
+    def most_promised(self, rows: NDArray[np.int64]) -> Array:
+        """(n,) densities that rows hardly rise beyond."""
+        return np.asarray(self.value[rows] + _PATIENCE * self.promised[rows])
+
+    def give_up(self, rows: NDArray[np.int64]) -> None:
+        self.done[rows], self.value[rows] = True, -np.inf
+
+    def optimum(self, rows: NDArray[np.int64]) -> Optimum:
+        """Where rows stand."""
+        curvature = _composed(self.eigen[rows], self.vectors[rows])
+        return Optimum(self.z[rows], self.value[rows], curvature, self.converged[rows])
 
 
 def climb(
@@ -160,52 +172,30 @@ def climb(
     curvature_at_end : bool
         Where only the places matter, the curvature may stay that of the last step: the Hessian takes d² evaluations.
     """
-    n, d = start.shape
     look = partial(_by_differences, density) if residuals is None else partial(_by_residuals, residuals)
-    group = np.zeros(n, np.int64) if of is None else of
-    ends = _Ends.of(known or [Optimum(start[:0], np.empty(0), np.empty((0, d, d)), np.empty(0, bool))])
-    z, value = start.copy(), np.full(n, -np.inf)
-    slope, eigen, vectors = np.zeros((n, d)), np.full((n, d), _NARROW**-2), np.tile(np.eye(d), (n, 1, 1))
-    # Where to look next: at the end of a step, in the hope that it is taken, or, after another one, at `z`.
-    ahead, promised, arrived = start.copy(), np.zeros(n), np.ones(n, bool)
-    damping, done, converged = np.zeros(n), np.zeros(n, bool), np.zeros(n, bool)
+    group = np.zeros(len(start), np.int64) if of is None else of
+    ends = Ends.of(known or [nowhere(start.shape[1])])
+    climbs = _Climbs.beginning(start)
     for _ in range(iterations):
-        rows = np.flatnonzero(~done)
+        rows = np.flatnonzero(~climbs.done)
         if not len(rows):
             break
-        local = look(ahead[rows], rows, eigen[rows], vectors[rows])
-        least = np.where(arrived[rows], -np.inf, value[rows] + _ENOUGH * promised[rows])
-        kept = np.isfinite(local.value) & (local.value > least)
-        done[rows[arrived[rows] & ~kept]] = True
-        failed = rows[~kept & ~arrived[rows]]
-        if len(failed):
-            trial, tried, by = _damped(density, z[failed], failed, slope[failed], eigen[failed], vectors[failed])
-            better = tried > value[failed]
-            done[failed] = ~better
-            moved = failed[better]
-            z[moved], value[moved], damping[moved] = trial[better], tried[better], by[better]
-            ahead[moved], arrived[moved] = z[moved], True
+        local = look(climbs.ahead[rows], rows, climbs.eigen[rows], climbs.vectors[rows])
+        kept = climbs.gain_enough(rows, local.value)
+        astray = rows[~kept]
+        at_start = climbs.arrived[astray]
+        climbs.done[astray[at_start]] = True  # there is no density where they are
+        climbs.lead_damped(density, astray[~at_start])
         here = rows[kept]
-        z[here], value[here] = ahead[here], local.value[kept]
-        eigen[here], vectors[here] = _positive(local.curvature[kept])
-        slope[here] = np.einsum("nij,ni->nj", vectors[here], local.gradient[kept])
-        converged[here] = done[here] = 0.5 * (slope[here] ** 2 / eigen[here]).sum(axis=1) < tolerance
-        damping[here] = np.where(arrived[here], damping[here], damping[here] * _RELAX)
-        damping[here[damping[here] < _LEAST_DAMPING]] = 0.0
-        promised[here] = 0.5 * (slope[here] ** 2 / (eigen[here] + damping[here, None])).sum(axis=1)
-        ahead[here] = z[here] + _step(slope[here], eigen[here], vectors[here], damping[here, None])[:, 0]
-        arrived[here] = False
-        left = rows[~done[rows]]
-        hopeless = value[left] + _PATIENCE * promised[left] < _best(value, group)[left] - reach
+        climbs.take_step(here, local.rows(kept), tolerance)
+        left = rows[~climbs.done[rows]]
+        hopeless = climbs.most_promised(left) < _best(climbs.value, group)[left] - reach
         if of is not None:
-            if len(here := here[converged[here]]):
-                curvature = _composed(eigen[here], vectors[here])
-                ends = ends.joined(of[here], Optimum(z[here], value[here], curvature, converged[here]))
-            if len(ends.which):
-                hopeless |= ends.near(of[left], z[left], value[left])
-        left = left[hopeless]
-        done[left], value[left] = True, -np.inf
-    found = Optimum(z, value, _composed(eigen, vectors), converged)
+            ended = here[climbs.converged[here]]
+            ends = ends.joined(of[ended], climbs.optimum(ended)) if len(ended) else ends
+            hopeless |= ends.near(of[left], climbs.z[left], climbs.value[left])
+        climbs.give_up(left[hopeless])
+    found = climbs.optimum(np.arange(len(start)))
     return curved(density, found) if curvature_at_end else found
 
 
@@ -311,50 +301,19 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
     direction well enough.
     """
     n, d = z.shape
-    upper = np.triu_indices(d, 1)
+    i, j = np.triu_indices(d, 1)
     unit = np.eye(d)
-    mixed = unit[upper[0]] + unit[upper[1]]
-    moves = np.concatenate([unit, -unit, mixed, -mixed] if sides == 2 else [unit, -unit, mixed])
+    both = unit[i] + unit[j]
+    moves = np.concatenate([unit, -unit, both, -both] if sides == 2 else [unit, -unit, both])
     points = z[:, None, :] + moves[None] * h[:, None, :]
     f = density(points.reshape(-1, d), np.repeat(rows, len(moves))).reshape(n, len(moves))
     f = np.where(np.isfinite(f), f, value[:, None] - 1e3)
-    plus, minus = f[:, :d], f[:, d : 2 * d]
+    plus, minus, both_plus, both_minus = np.split(f, [d, 2 * d, 2 * d + len(i)], axis=1)
     gradient = (plus - minus) / (2.0 * h)
     hessian = np.zeros((n, d, d))
     hessian[:, np.arange(d), np.arange(d)] = (plus + minus - 2.0 * value[:, None]) / h**2
-    i, j = upper
-    twice = f[:, 2 * d : 2 * d + len(i)] - plus[:, i] - plus[:, j] + value[:, None]
+    mixed = both_plus - plus[:, i] - plus[:, j] + value[:, None]
     if sides == 2:
-        twice = 0.5 * (twice + f[:, 2 * d + len(i) :] - minus[:, i] - minus[:, j] + value[:, None])
-    hessian[:, i, j] = hessian[:, j, i] = twice / (h[:, i] * h[:, j])
+        mixed = 0.5 * (mixed + both_minus - minus[:, i] - minus[:, j] + value[:, None])
+    hessian[:, i, j] = hessian[:, j, i] = mixed / (h[:, i] * h[:, j])
     return gradient, hessian
-
-
-def distinct(found: Sequence[Optimum]) -> Optimum:
-    """The rows that no better one is near, none hopelessly below the best; best first.
-
-    Parameters
-    ----------
-    found : sequence of Optimum
-        What climbs returned, put together.
-    """
-    every = together(found)
-    order = np.argsort(-every.log_density)
-    keep: list[int] = []
-    for i in order:
-        if not np.isfinite(every.log_density[i]) or every.log_density[i] < every.log_density[order[0]] - REACH:
-            continue
-        if not (_apart(every.z[[i]], every.z[keep], every.curvature[keep]) <= _ONE_MODE).any():
-            keep.append(int(i))
-    return every.rows(keep)
-
-
-def together(found: Sequence[Optimum]) -> Optimum:
-    """The rows of several, one after the other."""
-    return Optimum(*(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(Optimum)))
-
-
-def _apart(z: Array, modes: Array, curvature: Array) -> Array:
-    """(n, k) squared distances of places (n, d) from modes (k, d), in standard deviations."""
-    apart = z[:, None] - modes
-    return np.asarray(np.einsum("nki,kij,nkj->nk", apart, curvature, apart))

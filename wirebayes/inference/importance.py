@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.inference.chain_statistics import pareto_smoothed
-from wirebayes.inference.climb import Optimum, climb, distinct
+from wirebayes.inference.climb import climb
+from wirebayes.inference.optimum import Optimum, distinct
 from wirebayes.inference.sampler import mixture, proposal
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.points import WeightedPoints
@@ -158,8 +159,8 @@ def importance_sample(
         rough = WeightedPoints.equal(draws)
         current = _learned(rough, rough, start, order, rng, start)
     n, past = _LEAST, None
-    # broadcast to all densities by the first round
-    log_integral, log_ratio, settled = np.zeros(1), np.zeros(1), np.zeros(1, bool)
+    log_integral = log_ratio = np.zeros(1)  # broadcast to all densities by the first round
+    settled = np.zeros(1, bool)
     for done in range(1, _ROUNDS + 1):
         fresh = _weighted(densities, current, n, ess, rng, settled)
         fresh.settled[0] &= expected(fresh, witness, height) >= _LEAST_EXPECTED * ess
@@ -177,11 +178,14 @@ def importance_sample(
         past = _Past.first(fresh) if past is None else past.joined(fresh)
         hot, cold = past.points(wanted, ess)
         if len(witness):
-            hot, cold = (
-                p.joined(WeightedPoints.equal(witness).worth(_REMEMBERED * p.weight.sum())) for p in (hot, cold)
-            )
+            hot, cold = (_remembering(points, witness) for points in (hot, cold))
         current = _learned(hot, cold, start, order, rng, current)
     return replace(fresh, settled=settled, log_integral=log_integral, log_ratio=log_ratio)
+
+
+def _remembering(points: WeightedPoints, witness: Array) -> WeightedPoints:
+    """Points with the draws (k, d) that were known before, which keep a share of the weight."""
+    return points.joined(WeightedPoints.equal(witness).worth(_REMEMBERED * points.weight.sum()))
 
 
 def from_draws(

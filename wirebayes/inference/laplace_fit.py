@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.inference.climb import Optimum, climb, curved
+from wirebayes.inference.climb import climb, curved
 from wirebayes.inference.log_posterior import Density, LogPosterior
 from wirebayes.inference.modes import modes
+from wirebayes.inference.optimum import Optimum
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.column_units import unit_of_column

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.inference.climb import REACH, Optimum, climb, curved, distinct, together
+from wirebayes.inference.climb import climb, curved
 from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.inference.optimum import REACH, Optimum, distinct, together
 from wirebayes.numeric.resampling import next_power, systematic_rows
 from wirebayes.numeric.spread_rows import spread_rows
 from wirebayes.numeric.typing import Array

@@ -6,9 +6,9 @@ sampler. For numbers that are reported, sample with `wirebayes.inference.fit`, w
 
 import numpy as np
 
-from wirebayes.inference.climb import Optimum
 from wirebayes.inference.importance import LARGEST_K, effective, tail
 from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.inference.optimum import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture
 from wirebayes.inference.sampler.ensemble import sample_posterior

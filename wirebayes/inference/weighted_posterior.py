@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.inference import importance
-from wirebayes.inference.climb import Optimum, distinct
 from wirebayes.inference.fit import Fit
 from wirebayes.inference.importance import Weighted, effective, tail
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import searches
+from wirebayes.inference.optimum import Optimum, distinct
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.model.linear_amplitudes import completed, integrated
 from wirebayes.model.problem import Problem

@@ -205,38 +205,53 @@ def _hold(line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: A
 
     Readings whose weight is zero do not count, whatever they are.
     """
-    weight, setting_var = noise.weight, noise.setting_var
     keep = slice(None) if mask.all() else mask
     by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
-    r = np.where(weight > 0, readings[keep], 0.0) - line.reading[j][keep] - by_c * m
-    cc, cs, ss, det, v_cc, v_cs, v_ss = _learned(by_c, by_s, weight, p, setting_var)
-    cr = np.einsum("rn,rn->n", by_c, r) * weight
-    sr = np.einsum("rn,rn->n", by_s, r) * weight
-    post_c, post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
-    pull_c = ((1.0 + setting_var * ss) * cr - setting_var * cs * sr) / det
-    pull_s = ((1.0 + p * cc) * sr - p * cs * cr) / det
+    r = np.where(noise.weight > 0, readings[keep], 0.0) - line.reading[j][keep] - by_c * m
+    known = _learned(by_c, by_s, noise.weight, p, noise.setting_var)
+    cr = np.einsum("rn,rn->n", by_c, r) * noise.weight
+    sr = np.einsum("rn,rn->n", by_s, r) * noise.weight
+    creep, setting = known.errors(cr, sr)
+    pull_c = ((1.0 + noise.setting_var * known.ss) * cr - noise.setting_var * known.cs * sr) / known.det
+    pull_s = ((1.0 + p * known.cc) * sr - p * known.cs * cr) / known.det
     # a sum of squares: the shorter difference of products can turn negative at absurd parameters
-    left = r - by_c * post_c - by_s * post_s
-    square = np.einsum("rn,rn->n", left, left) * weight + p * pull_c**2 + setting_var * pull_s**2
-    log_density = -0.5 * (square + r.shape[0] * noise.log_variance + np.log(det))
+    left = r - by_c * creep - by_s * setting
+    square = np.einsum("rn,rn->n", left, left) * noise.weight + p * pull_c**2 + noise.setting_var * pull_s**2
+    log_density = -0.5 * (square + r.shape[0] * noise.log_variance + np.log(known.det))
     a, c = line.carry_by_creep[j], line.carry_by_setting[j]
-    mean = a * (m + post_c) + c * post_s
-    var = a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
-    return _Read(log_density, mean, var, left, pull_c, pull_s, cc, ss)
+    mean = a * (m + creep) + c * setting
+    var = a * a * known.v_cc + 2.0 * a * c * known.v_cs + c * c * known.v_ss
+    return _Read(log_density, mean, var, left, pull_c, pull_s, known.cc, known.ss)
 
 
-def _learned(by_c: Array, by_s: Array, weight: Array, p: Array, q: Array) -> tuple[Array, ...]:
-    """What a hold (R, n) says about the creep carried in, of variance p before, and of its setting error, q.
+class _Learned(NamedTuple):
+    """What a hold says about the creep carried in, c, and its setting error, s; all (n,).
 
     Products of the slopes, the determinant by which the readings' covariance exceeds that of sensor errors alone, and
     the covariance of the two given the readings.
     """
+
+    cc: Array
+    cs: Array
+    ss: Array
+    det: Array
+    v_cc: Array
+    v_cs: Array
+    v_ss: Array
+
+    def errors(self, along_c: Array, along_s: Array) -> tuple[Array, Array]:
+        """Both errors by what readings have along their slopes, divided by the variance of a reading."""
+        return self.v_cc * along_c + self.v_cs * along_s, self.v_cs * along_c + self.v_ss * along_s
+
+
+def _learned(by_c: Array, by_s: Array, weight: Array, p: Array, q: Array) -> _Learned:
+    """What a hold's slopes (R, n) say, with variances before: p of the creep carried in, q of the setting error."""
     cc = np.einsum("rn,rn->n", by_c, by_c) * weight
     cs = np.einsum("rn,rn->n", by_c, by_s) * weight
     ss = np.einsum("rn,rn->n", by_s, by_s) * weight
     # the difference of two products may come out below zero by rounding
     det = 1.0 + p * cc + q * ss + p * q * np.maximum(cc * ss - cs * cs, 0.0)
-    return cc, cs, ss, det, p * (1.0 + q * ss) / det, -p * q * cs / det, q * (1.0 + p * cc) / det
+    return _Learned(cc, cs, ss, det, p * (1.0 + q * ss) / det, -p * q * cs / det, q * (1.0 + p * cc) / det)
 
 
 def seen(
@@ -267,30 +282,21 @@ def seen(
         observed = _observed(line.reading.shape[2], readings, mask, variance, setting_sd)
         beside = (np.ascontiguousarray(a, float) for a in (filtered.carried_mean, filtered.carried_var, shapes))
         return compiled.kernel.seen(*_flat(line), *observed, *beside)
-    holds, _, n = line.reading.shape
-    k = shapes.shape[2]
+    n, k = line.reading.shape[2], shapes.shape[2]
     gram, along = np.zeros((k, k, n)), np.zeros((k, n))
     mean = np.zeros((k, n))  # of the carried creep, had the shapes been the readings
-    q, weight = setting_sd * setting_sd, 1.0 / variance
-    for j in range(holds):
-        a, c = line.carry_by_creep[j], line.carry_by_setting[j]
-        keep = mask[j]
-        if not keep.any():
-            mean = a * mean
-            continue
-        by_c, by_s, f = line.by_creep[j][keep], line.by_setting[j][keep], shapes[j][keep]
-        r = readings[j][keep] - line.reading[j][keep] - by_c * filtered.carried_mean[j]
-        cc, cs, _, _, v_cc, v_cs, v_ss = _learned(by_c, by_s, weight, filtered.carried_var[j], q)
-        cr = np.einsum("rn,rn->n", by_c, r) * weight
-        sr = np.einsum("rn,rn->n", by_s, r) * weight
-        fc, fs, fr = (f.T @ v * weight for v in (by_c, by_s, r))
-        both = (f.T @ f)[..., None] * weight - mean[:, None] * fc - fc[:, None] * mean + cc * mean[:, None] * mean
-        # From here on what is left of the shapes beside the creep that they would have carried in.
-        fr, fc, fs = fr - mean * cr, fc - cc * mean, fs - cs * mean
-        post_c, post_s = v_cc * fc + v_cs * fs, v_cs * fc + v_ss * fs
-        gram += both - fc[:, None] * post_c - fs[:, None] * post_s
-        along += fr - post_c * cr - post_s * sr
-        mean = a * (mean + post_c) + c * post_s
+    for j, keep in enumerate(mask):
+        slopes = np.stack([line.by_creep[j][keep], line.by_setting[j][keep]])
+        known = _learned(*slopes, 1.0 / variance, filtered.carried_var[j], setting_sd * setting_sd)
+        reading = readings[j][keep] - line.reading[j][keep] - slopes[0] * filtered.carried_mean[j]
+        # What is left of the shapes beside the creep that they would have carried in.
+        left = shapes[j][keep][:, :, None] - slopes[0][:, None] * mean
+        left_along = np.einsum("srn,rkn->skn", slopes, left) / variance
+        errors = np.stack(known.errors(*left_along))
+        gram += np.einsum("rkn,rln->kln", left, left) / variance - np.einsum("skn,sln->kln", left_along, errors)
+        left -= np.einsum("skn,srn->rkn", errors, slopes)
+        along += np.einsum("rkn,rn->kn", left, reading) / variance
+        mean = line.carry_by_creep[j] * (mean + errors[0]) + line.carry_by_setting[j] * errors[1]
     return np.moveaxis(gram, -1, 0), along.T
 
 

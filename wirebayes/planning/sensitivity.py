@@ -11,9 +11,9 @@ import numpy as np
 
 from wirebayes.discovery import power, screening
 from wirebayes.discovery.linear_scan import expand
-from wirebayes.inference.climb import Optimum
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.inference.optimum import Optimum
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import EffectPower
 from wirebayes.model.build import build

@@ -12,8 +12,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.inference.climb import Optimum, climb
+from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import Density, LogPosterior
+from wirebayes.inference.optimum import Optimum
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.plan import ExpectedWidth
 from wirebayes.model.build import build

@@ -115,38 +115,45 @@ def linearise(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> Lineari
     call = compiled.call(protocol, theta, model)
     if call is not None:
         return Linearised(*compiled.kernel.linearise(*call))
-    n = np.shape(theta["k1"])[0]
-    holds, width = protocol.time_s.shape
     by_hand = not model.effects and protocol.control == "displacement"
-    walk = Walk(protocol, theta if by_hand else {k: np.tile(v, 2) for k, v in theta.items()}, model)
-    shape = (holds, width, n)
-    reading, by_setting, by_creep = np.empty(shape), np.empty(shape), np.empty(shape)
+    return _by_closed_form(protocol, theta, model) if by_hand else _by_complex_steps(protocol, theta, model)
+
+
+def _nothing(protocol: Protocol, n: int) -> Linearised:
+    """Arrays of n columns to be filled, without creep at the start."""
+    holds, width = protocol.time_s.shape
+    reading, by_setting, by_creep = (np.empty((holds, width, n)) for _ in range(3))
     carry_by_setting, carry_by_creep = np.empty((holds, n)), np.empty((holds, n))
-    creep = np.zeros((holds + 1, n))
-    if by_hand:
-        for j in range(holds):
-            reading[j], by_setting[j], by_creep[j], creep[j + 1], carry_by_setting[j], carry_by_creep[j] = (
-                walk.closed_form(j, walk.base + protocol.setting[j], creep[j])
-            )
-        return Linearised(reading, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
-    # Both complex steps in one pass: the first n columns take that of the setting error, the others that of the creep.
+    return Linearised(reading, by_setting, by_creep, carry_by_setting, carry_by_creep, np.zeros((holds + 1, n)))
+
+
+def _by_closed_form(protocol: Protocol, theta: Theta, model: Model) -> Linearised:
+    walk, out = Walk(protocol, theta, model), _nothing(protocol, np.shape(theta["k1"])[0])
+    for j, setting in enumerate(protocol.setting):
+        here = walk.closed_form(j, walk.base + setting, out.creep[j])
+        out.reading[j], out.by_setting[j], out.by_creep[j] = here[:3]
+        out.creep[j + 1], out.carry_by_setting[j], out.carry_by_creep[j] = here[3:]
+    return out
+
+
+def _by_complex_steps(protocol: Protocol, theta: Theta, model: Model) -> Linearised:
+    """Both complex steps in one pass: the first n columns take that of the setting error, the others the creep's."""
+    n = np.shape(theta["k1"])[0]
+    walk, out = Walk(protocol, {k: np.tile(v, 2) for k, v in theta.items()}, model), _nothing(protocol, n)
     of_setting, of_creep = slice(None, n), slice(n, None)
     steps = 1j * np.repeat([[_STEP, 0.0], [0.0, _STEP]], n, axis=1)
     before, beside = walk.begin(2 * n)
-    creep[0] = before[:n]
-    for j in range(holds):
-        y, out, beside = walk.hold(j, protocol.setting[j] + steps[0], np.tile(creep[j], 2) + steps[1], beside)
-        reading[j], by_setting[j], by_creep[j] = y[:, of_creep].real, y[:, of_setting].imag, y[:, of_creep].imag
-        creep[j + 1], carry_by_setting[j], carry_by_creep[j] = (
-            out[of_creep].real,
-            out[of_setting].imag,
-            out[of_creep].imag,
-        )
+    out.creep[0] = before[:n]
+    for j, setting in enumerate(protocol.setting):
+        y, carried, beside = walk.hold(j, setting + steps[0], np.tile(out.creep[j], 2) + steps[1], beside)
+        out.reading[j], out.creep[j + 1] = y[:, of_creep].real, carried[of_creep].real
+        out.by_setting[j], out.carry_by_setting[j] = y[:, of_setting].imag, carried[of_setting].imag
+        out.by_creep[j], out.carry_by_creep[j] = y[:, of_creep].imag, carried[of_creep].imag
         walk.past = [(start_s, goal.real, k2.real) for start_s, goal, k2 in walk.past]
         beside = {key: value.real for key, value in beside.items()}
-    for derivative in (by_setting, by_creep, carry_by_setting, carry_by_creep):
+    for derivative in (out.by_setting, out.by_creep, out.carry_by_setting, out.carry_by_creep):
         derivative /= _STEP
-    return Linearised(reading, by_setting, by_creep, carry_by_setting, carry_by_creep, creep)
+    return out
 
 
 def streamed(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> "Linearised | Staircases":
@@ -306,27 +313,29 @@ class Walk:
         carried, carry_by_setting, carry_by_creep : (n,) arrays
             Creep carried out, mm, and its derivatives by the same two.
         """
-        law, length, k1 = laws.LAWS[self.model.law], self.protocol.length_mm, self.k1
-        zero = length + creep
-        first = k1 * law.strain(stretched, zero)
-        by_s, by_l = law.by_stretched(stretched, zero), law.by_zero(stretched, zero)
+        zero = self.protocol.length_mm + creep
+        first, by_stretched, by_zero = self._tension(stretched, zero)
         taut = first > 0
         safe = np.where(taut, first, 1.0)
         target = np.where(taut, self.B * np.power(safe, self.U), 0.0)
-        slope = self.U * target / safe * k1
+        slope = self.U * target / safe * self.k1
         amount = target - self.kept * creep
-        amount_s, amount_c = slope * by_s, slope * by_l - self.kept
+        amount_by_setting, amount_by_creep = slope * by_stretched, slope * by_zero - self.kept
         every = self.fraction[self.where[j]]
         fraction = every[rows]
-        zero = zero + amount * fraction
-        tension = k1 * law.strain(stretched, zero)
-        by_s, by_l = law.by_stretched(stretched, zero), law.by_zero(stretched, zero)
-        stiff = np.where(tension > 0, k1, 0.0)
-        by_setting = stiff * (by_s + by_l * (amount_s * fraction))
-        by_creep = stiff * (by_l * (1.0 + amount_c * fraction))
+        tension, by_stretched, by_zero = self._tension(stretched, zero + amount * fraction)
+        stiff = np.where(tension > 0, self.k1, 0.0)
+        by_setting = stiff * (by_stretched + by_zero * (amount_by_setting * fraction))
+        by_creep = stiff * (by_zero * (1.0 + amount_by_creep * fraction))
         end = every[self.protocol.end[j]]
-        out = creep + amount * end
-        return np.maximum(tension, 0.0), by_setting, by_creep, out, amount_s * end, 1.0 + amount_c * end
+        carried = creep + amount * end, amount_by_setting * end, 1.0 + amount_by_creep * end
+        return np.maximum(tension, 0.0), by_setting, by_creep, *carried
+
+    def _tension(self, stretched: NDArray[Any], zero: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+        """Tension, N, and the slopes of strain by stretched and zero-tension length, 1/mm; (n,) or (r, n) arrays."""
+        law = laws.LAWS[self.model.law]
+        slopes = law.by_stretched(stretched, zero), law.by_zero(stretched, zero)
+        return self.k1 * law.strain(stretched, zero), *slopes
 
     def _first(self, held: NDArray[Any], elongation: NDArray[Any], hold: HoldContext) -> NDArray[Any]:
         """Tension (1, n) when the hold begins: effects see its first time only."""

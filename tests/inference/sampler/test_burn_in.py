@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.statistical.targets import banana, gaussian, two_modes
-from wirebayes.inference.climb import Optimum
+from wirebayes.inference.optimum import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.mixture import Mixture

@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.inference.climb import Optimum, climb, distinct
+from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import search
+from wirebayes.inference.optimum import Optimum, distinct
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, net, proposal
 from wirebayes.inference.sampler.mixture import Mixture

@@ -23,8 +23,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from wirebayes.inference.climb import Optimum
 from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.inference.optimum import Optimum
 from wirebayes.inference.policy import DEFAULT, Policy, describe
 from wirebayes.inference.sampler import burn_in, kept, resume
 from wirebayes.inference.sampler.state import BurnIn, State, by_ensemble

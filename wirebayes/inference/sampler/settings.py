@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wirebayes.inference.climb import LEAST_CURVATURE
+from wirebayes.inference.optimum import LEAST_CURVATURE
 
 # The first proposal, of the modes that a search has found.
 # of the covariance at a mode: too narrow a start misses what is bent, too wide a one costs some draws
