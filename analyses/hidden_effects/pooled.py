@@ -1,15 +1,20 @@
 """The table of targets over several runs together, as the docs include it.
 
     python -m analyses.hidden_effects.pooled out/clean/scores.json out/singles/scores.json > table.inc
+    python -m analyses.hidden_effects.pooled out/singles/scores.json --stated > stated.inc
 
 What is found has its 90 % interval; a missed row is bold. The last column counts only cases of which a refit of the
-plain model, whose noise is not known, leaves most to be seen.
+plain model, whose noise is not known, leaves most to be seen. With --stated: the probabilities that were stated, in
+five bins, and how often what they were of was there.
 """
 
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
+from . import stated
+from .rates import Row
 from .target import Target
 from .targets import targets
 
@@ -41,17 +46,42 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scores", type=Path, nargs="+")
     parser.add_argument("--answer", default="api", help="who was asked (default api)")
+    parser.add_argument("--stated", action="store_true", help="stated probabilities instead of the targets")
     options = parser.parse_args()
     every = [json.loads(path.read_text(encoding="utf-8"))[options.answer] for path in options.scores]
     rows = [row for scores in every for row in scores["rows"]]
+    print_table(*(stated_lines(rows) if options.stated else target_lines(rows)))
+
+
+def target_lines(rows: list[Row]) -> tuple[str, list[list[str]]]:
+    """Widths and cells of the table of targets."""
     seen = targets([row for row in rows if row["visible"]])
-    print(".. list-table::\n   :header-rows: 1\n   :widths: 40 14 24 22\n")
     lines = [["", "wanted", "found", "still visible after a refit"]]
     for row, same in zip(targets(rows), seen, strict=True):
         if not row["found"]:
             continue
         again = cell(same) if same["found"] and same["found"]["n"] != row["found"]["n"] else ""
         lines.append([row["target"], row["wanted"], cell(row, row["passed"] is False), again])
+    return "40 14 24 22", lines
+
+
+def stated_lines(rows: list[Row]) -> tuple[str, list[list[str]]]:
+    """Widths and cells of the table of stated probabilities, a line a bin: what was said, what was found."""
+    lines = [["inclusion or probability of", *(f"{low:.1f} to {low + stated.WIDTH:.1f}" for low in stated.BINS)]]
+    for of, bins in stated.apart(rows).items():
+        lines.append([of, *map(_said_and_found, bins)])
+    return "30 14 14 14 14 14", lines
+
+
+def _said_and_found(one: dict[str, Any]) -> str:
+    if one["said"] is None:
+        return ""
+    found = one["found"]
+    return f"{one['said']:.2f}: {found['value']:.2f} [{found['low']:.2f}, {found['high']:.2f}]"
+
+
+def print_table(widths: str, lines: list[list[str]]) -> None:
+    print(f".. list-table::\n   :header-rows: 1\n   :widths: {widths}\n")
     for cells in lines:
         print(signed("   * - " + "\n     - ".join(cells).rstrip()))
 

@@ -17,6 +17,7 @@ Bins = list[dict[str, Any]]
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8)  # where each begins
 WIDTH = 0.2
 LEVEL = 0.95  # of the intervals
+WITH_FOREIGN = ("without", "foreign", "mixed")  # kinds with an effect that no catalogue has, or not this one
 
 
 def remainders(rows: list[Row], weights: Mapping[str, float] = {}) -> Bins:
@@ -46,6 +47,22 @@ def families(rows: list[Row], weights: Mapping[str, float] = {}) -> Bins:
     each = [(r, family) for r in _hiding(rows) for family in r["families"]]
     there = [bool(set(family["members"]) & set(r["names"])) for r, family in each]
     return _binned([family["inclusion"] for _, family in each], there, _of_kinds([r for r, _ in each], weights))
+
+
+def apart(rows: list[Row]) -> dict[str, Bins]:
+    """All that is stated, kinds as frequent as the prior expects; and families where all effects are known, or not.
+
+    A family that resembles an effect of no catalogue counts as wrong.
+    """
+    expected = prior_weights(rows)
+    known = [r for r in rows if r["kind"] not in WITH_FOREIGN]
+    return {
+        "name": names(rows, expected),
+        "family": families(rows, expected),
+        "family, all effects in the catalogue": families(known),
+        "family, an effect in no catalogue": families([r for r in rows if r["kind"] in WITH_FOREIGN]),
+        "something else": remainders(rows, expected),
+    }
 
 
 def _hiding(rows: list[Row]) -> list[Row]:

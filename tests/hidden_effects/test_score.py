@@ -9,6 +9,7 @@ from analyses.hidden_effects import page
 from analyses.hidden_effects import pooled as program
 from analyses.hidden_effects import several as names_and_remainders
 from analyses.hidden_effects.catalogue import EFFECTS
+from analyses.hidden_effects.pooled import stated_lines
 from analyses.hidden_effects.rates import (
     closed,
     closed_of_oracle,
@@ -20,7 +21,7 @@ from analyses.hidden_effects.rates import (
     weighted_rate,
 )
 from analyses.hidden_effects.score import confusion, score
-from analyses.hidden_effects.stated import families, names, prior_weights, remainders
+from analyses.hidden_effects.stated import apart, families, names, prior_weights, remainders
 from analyses.hidden_effects.targets import targets
 
 HOLDS = {"sample-1": [9, 10]}
@@ -263,6 +264,18 @@ def in_family(members, inclusion, name="toe", established=False):
         "families": [family],
         "inclusion": {member: inclusion / len(members) for member in members},
     }
+
+
+def test_what_is_stated_beside_an_effect_of_no_catalogue_is_counted_apart():
+    known = in_family(["toe"], 1.0)
+    resembles = in_family(["ageing"], 1.0, name="yield") | {"kind": "foreign"}
+    beside = in_family(["toe"], 1.0) | {"kind": "mixed", "names": ["toe", "yield"]}
+    top = {of: bins[-1]["found"] for of, bins in apart([known, resembles, beside]).items()}
+    for of, right, among in (("all effects in the catalogue", 1, 1), ("an effect in no catalogue", 1, 2)):
+        assert (top[f"family, {of}"]["k"], top[f"family, {of}"]["n"]) == (right, among)
+    _, lines = stated_lines([known, resembles])
+    assert lines[0][-1] == "0.8 to 1.0" and lines[3][0] == "family, all effects in the catalogue"
+    assert lines[3][1:5] == [""] * 4 and lines[3][5].startswith("1.00: 1.00 [")
 
 
 def test_inclusions_of_names_and_families_are_counted_by_themselves():
