@@ -54,6 +54,13 @@ def test_an_effect_is_spoken_of_in_words_with_its_hold() -> None:
     assert spoken("unknown") == "something unknown"
 
 
+def test_an_error_on_held_out_holds_that_grows_is_said_to_be_no_better(tmp_path: Path) -> None:
+    for after, said in ((0.25, "rmse 0.25 -> 0.25 N"), (0.26, "rmse 0.25 -> 0.26 N: no better")):
+        held_out = {"plain": {"rmse_N": 0.25}, "final": {"rmse_N": after}}
+        content = {"version": 2, "experiments": {"a": SLIP | {"held_out": held_out}}}
+        assert f"  held-out holds: {said}" in stored(Findings, tmp_path, "discovery.json", content).lines()
+
+
 def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": SLIP, "b": CLEAN}})
     assert found.lines() == [

@@ -82,6 +82,47 @@ def test_one_gross_outlier_is_named_with_its_place(sound):
     assert "in hold 12 at 120 s is" in warning(protocol, last)
 
 
+@pytest.mark.parametrize(
+    ("steps", "levels", "warned"),
+    [
+        (3, 16.0, True),  # tightened between two readings
+        (3, 9.0, False),  # by less than ten noise levels
+        (3, -16.0, False),  # with the hold's course: creep may do that
+        (1, 16.0, False),  # after its first reading, when creep may be over
+        (5, 16.0, False),  # its last reading, which may be a misprint
+    ],
+)
+def test_a_jump_against_the_course_of_a_hold_is_named_with_its_place(steps, levels, warned):
+    times = np.tile(np.arange(6.0) * 20.0, (3, 1))
+    protocol = Protocol(
+        1000.0,
+        np.array([2.0, 4.0, 6.0]),
+        times,
+        np.ones((3, 6), bool),
+        np.full(3, 100.0),
+        np.array([1, 2, 5]),
+    )
+    course = -3e-4 * times + 0.002 * np.resize([1.0, -1.0, 1.0, 1.0, -1.0], times.shape)
+    tension = np.array([[2.0], [5.0], [8.0]]) + course
+    noise = data_checks.CheckedTest(protocol, tension, 0.0).noise
+    tension[1, steps:] += levels * noise
+    text = warning(protocol, tension, 0.0)
+    assert (
+        "and 60 s of hold 2, against the hold's course, and stays there: if the wire was tightened" in text
+    ) == warned
+
+
+def test_a_jump_back_is_no_jump():
+    """One reading far from its neighbours is another warning's affair."""
+    times = np.arange(7.0)[None]
+    protocol = Protocol(1000.0, np.array([2.0]), times, np.ones((1, 7), bool), np.full(1, 6.0), np.array([1]))
+    tension = np.array([[5.0, 4.9, 4.85, 5.85, 4.82, 4.81, 4.8]])
+    assert "against the hold's course" not in warning(protocol, tension, 0.0)
+    tension[0, 4:] += 1.0
+    assert "jumps from 4.85 to 5.85 N between 2 and 3 s of hold 1" in warning(protocol, tension, 0.0)
+    assert "if the gauge or the hook was touched" in warning(replace(protocol, control="force"), tension, 0.0)
+
+
 @pytest.mark.parametrize(("strain", "warned"), [(4e-5, True), (6e-5, False), (0.4, False), (0.6, True)])
 def test_displacements_beside_the_length(sound, strain, warned):
     protocol, tension = sound

@@ -272,12 +272,17 @@ DISCOVERY = {
 }
 
 
+WORSE = DISCOVERY["held_out"] | {"final": {"rmse_N": 0.2, "elpd": 9.0, "elpd_difference_se": 2.0}}
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({}, "On this protocol hard to distinguish from sensor nonlinearity."),
         ({"group": ["strain_stiffening"]}, "wire-a: strain stiffening is missing, of size 12.0 (9.00 … 15.0); with it"),
-        ({}, "the error on unused holds goes from 0.100 to 0.0300 N (p < 0.001)."),
+        ({}, "; with it the error on unused holds goes from 0.100 to 0.0300 N (p < 0.001)."),
+        ({"held_out": WORSE}, "; but with it the error on unused holds grows from 0.100 to 0.200 N (p < 0.001)."),
+        ({"held_out": WORSE}, "On the unused holds 9 and 10 the rms error grows from 0.10 to 0.20 N"),
         ({}, "The wire becomes stiffer (or softer) the more it is strained. τ = k1 s (1 + c s)."),
         ({"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}}, "nothing is missing"),
         ({"verdict": "unknown", "effects": [], "set": ["unknown"]}, "that no effect in the catalogue explains"),

@@ -100,8 +100,9 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     before, after = (read_value(held[model], "rmse") for model in ("plain", "final"))
     gain = ""
     if report["effects"] and before is not None and after is not None:
-        gain = f"; with {'them' if effects[1:] else 'it'} the error on unused holds goes from {number(before)} to "
-        gain += f"{number(after)} {unit_read(held['plain'])}"
+        with_it = f"with {'them' if effects[1:] else 'it'} the error on unused holds"
+        goes = f"; {with_it} goes" if after <= before else f"; but {with_it} grows"
+        gain = f"{goes} from {number(before)} to {number(after)} {unit_read(held['plain'])}"
     sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
     return f"{name}: {what}{size}{gain}{sure}."
 

@@ -76,7 +76,8 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     gain = report["held_out"]
     before, after = (read_value(gain[model], "rmse") for model in ("plain", "final"))
     if report["effects"] and None not in (before, after):
-        lines.append(f"  held-out holds: rmse {before:.3g} -> {after:.3g} {unit_read(gain['plain'])}")
+        worse = ": no better" if after > before else ""
+        lines.append(f"  held-out holds: rmse {before:.3g} -> {after:.3g} {unit_read(gain['plain'])}{worse}")
     return lines
 
 

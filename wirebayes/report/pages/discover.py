@@ -242,9 +242,10 @@ def _held_out(v: ExperimentFindings) -> str:
         return ""
     if not held["holds"]:
         return "No hold was held out: that needs three recorded holds of every test."
-    plain, final = (number(read_value(held[model], "rmse"), 2) for model in ("plain", "final"))
-    holds = listed([str(h) for h in held["holds"]])
-    text = f"On the unused holds {holds} the rms error goes from {plain} to {final} {unit_read(held['plain'])}"
+    plain, final = (read_value(held[model], "rmse") for model in ("plain", "final"))
+    goes = "grows" if plain is not None and final is not None and final > plain else "goes"
+    holds, unit = listed([str(h) for h in held["holds"]]), unit_read(held["plain"])
+    text = f"On the unused holds {holds} the rms error {goes} from {number(plain, 2)} to {number(final, 2)} {unit}"
     if v["verdict"] == "partial":
         text += " with a smooth discrepancy beside the named effects"
     if v.get("accepted") and (flexible := held.get("flexible")):
