@@ -1,5 +1,7 @@
 """Every effect: neutral to the last bit, its formula re-derived in a few lines, differentiable; and a user's own."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -230,6 +232,22 @@ def test_permanent_creep_at_one_is_the_additive_chain():
     assert readings({"permanent_creep.psi": 1.0}, "permanent_creep") == pytest.approx(
         plain(history="additive"), rel=1e-12
     )
+
+
+def test_a_standard_linear_solid_held_at_displacements_looks_as_if_what_it_relaxes_were_permanent():
+    """A spring of K in series with a spring beside a dashpot, which relaxes a share of K x and gives all of it back."""
+    K, share, rate = 2.0, 0.3, 0.02
+    p = replace(bench(), length_mm=1e7)
+    expected, crept = [], 0.0
+    for x in PATH:
+        end = share * x
+        course = end + (crept - end) * np.exp(-rate * TIMES)
+        expected.append(K * (x - course))
+        crept = course[-1]
+    own = {"k1": K * p.length_mm, "B": share / K, "U": 1.0, "k2": rate, "N": 1.0, "preload": 0.0}
+    found = readings(own | {"permanent_creep.psi": share}, "permanent_creep", p=p)
+    assert found == pytest.approx(np.array(expected), rel=1e-6)
+    assert np.abs(readings(own, p=p) - expected).max() > 0.3
 
 
 @pytest.mark.parametrize("key", KEYS)

@@ -38,3 +38,20 @@ def test_what_is_known_of_a_parameter_of_another_s_unit_is_its_product() -> None
     free = {"B": stats.lognorm(1.0), "U": stats.uniform(-9.0, 20.0)}
     prior = Prior(free, {}, frozenset({"B"}), {"B": PowerScaled("U", float(np.log(4.0)))})
     assert leaning(prior, theta, prior.names) == []
+
+
+@pytest.mark.parametrize(
+    ("noise", "other", "leans"),
+    [
+        ("setting_sd", "preload", False),
+        ("sensor_sd[a]", "setting_sd[a]", False),
+        ("setting_sd", "k1", True),
+        ("preload", "setting_sd", True),
+    ],
+)
+def test_the_prior_of_a_noise_may_decide_what_is_known_of_it(noise: str, other: str, leans: bool) -> None:
+    """It is said where an interval of the wire would move, too."""
+    one = draws(0.97)[:, 0]
+    theta = np.column_stack([np.exp(one), np.exp(one + 0.01 * RNG.normal(size=len(one)))])
+    free = {noise: stats.lognorm(1.0), other: stats.lognorm(50.0)}
+    assert bool(leaning(Prior(free, {}, frozenset(free)), theta, (noise,))) == leans

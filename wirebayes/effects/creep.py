@@ -15,14 +15,21 @@ Own = dict[str, NDArray[Any]]
 
 
 class PermanentCreep(Effect):
-    """a_j = B τ^U - (1 - ψ) e_j; ψ = 1 is the additive chain."""
+    """a_j = B τ^U - (1 - ψ) e_j; ψ = 1 is the additive chain.
+
+    Creep that heads for the tension as it falls (a standard linear solid: U = N = 1) is the same in a test by steps,
+    with ψ the share of the tension that relaxes.
+    """
 
     name = "permanent_creep"
     place = "amount"
     formula = "permanent"
     scope = "material"
     amplitudes = (Amplitude("psi", "-", 0.0, Uniform(0.0, 1.0)),)
-    sentence = "A part of the creep is permanent: later holds creep as if it had not occurred."
+    sentence = (
+        "A part of the creep is permanent: later holds creep as if it had not occurred. Creep that heads for the tension "
+        "as it falls within a hold looks the same, unless the wire hangs under weights."
+    )
     shows = "between holds, unloading"
 
     def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:

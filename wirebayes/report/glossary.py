@@ -17,8 +17,8 @@ SYMBOLS = {
     "k2": "creep rate; with N = 1 its inverse is the time after which 63 % of the creep has happened",
     "N": "shape of the creep in time; 1 is an exponential, below 1 it begins faster and lasts longer",
     "preload": "stretch that the wire already had at displacement zero",
-    "sensor_sd": "standard deviation of the error of one tension reading",
-    "setting_sd": "standard deviation of the error of one hold's displacement",
+    "sensor_sd": "standard deviation of the error of one reading: of a tension, or of a displacement under weights",
+    "setting_sd": "standard deviation of the error of what one hold is set to: a displacement, or a weight",
 }
 TERMS = {
     "hold": "one position of the moving end, kept while the tension is read.",

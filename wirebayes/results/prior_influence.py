@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 
 from wirebayes.model.prior import Prior
+from wirebayes.model.sample import SAMPLE
 from wirebayes.notice import Notice
 from wirebayes.numeric.distributions import HalfNormal, LogitNormal, LogNormal, Normal, log_density_of, ours
 from wirebayes.numeric.typing import Array
 from wirebayes.sentences import listed
 
+NOISES = ("sensor_sd", "setting_sd")
 WIDER = 2.0  # times as wide: a prior that two people may well disagree about
 MOVED = 1.0  # posterior standard deviations by which an end of the 90 % interval moves
 
@@ -19,7 +21,9 @@ MOVED = 1.0  # posterior standard deviations by which an end of the 90 % interva
 def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
     """A sentence on the priors that decide an interval, or none.
 
-    The posterior under a wider prior is that of the draws, weighted by the ratio of the two priors.
+    The posterior under a wider prior is that of the draws, weighted by the ratio of the two priors. The prior of a
+    noise may decide what is known of that noise and of the preload: a few holds never tell how well they were set, and
+    nothing that is said of the wire depends on it.
 
     Parameters
     ----------
@@ -42,11 +46,17 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
         log_weight = log_density_of(wide)(known[:, i]) - log_density_of(prior.distributions[name])(known[:, i])
         weight = np.exp(log_weight - log_weight.max())
         after = np.stack([_weighted_ends(theta[order[:, j], j], weight[order[:, j]]) for j in range(theta.shape[1])], 1)
-        moved = np.abs(after - before).max(axis=0) > MOVED * spread
-        if moved.any():
+        moved = np.flatnonzero(np.abs(after - before).max(axis=0) > MOVED * spread)
+        of_sample = all(_parameter(prior.names[j]) in SAMPLE for j in moved)
+        if len(moved) and not (_parameter(name) in NOISES and of_sample):
             deciding.append(name)
-            open_ones.update(map(int, np.flatnonzero(moved)))
+            open_ones.update(map(int, moved))
     return [_notice(deciding, [prior.names[j] for j in sorted(open_ones)])] if deciding else []
+
+
+def _parameter(column: str) -> str:
+    """Of which parameter a column is, whatever sample or material it belongs to."""
+    return column.split("[")[0]
 
 
 _ENDS = (0.05, 0.95)  # of the interval that is reported
@@ -70,7 +80,7 @@ def _wider(distribution: Any) -> Any:
 
 def _notice(deciding: Sequence[str], moved: Sequence[str]) -> Notice:
     what = f"the interval of {moved[0]}" if len(moved) == 1 else f"the intervals of {', '.join(moved)}"
-    keys = ", ".join(dict.fromkeys(f"[prior.{name.split('[')[0]}]" for name in deciding))
+    keys = ", ".join(dict.fromkeys(f"[prior.{_parameter(name)}]" for name in deciding))
     named = listed(deciding)
     whose, decide = ("prior", "prior decides") if len(deciding) == 1 else ("priors", "priors decide")
     return Notice(
