@@ -27,8 +27,8 @@ class PermanentCreep(Effect):
     scope = "material"
     amplitudes = (Amplitude("psi", "-", 0.0, Uniform(0.0, 1.0)),)
     sentence = (
-        "A part of the creep is permanent: later holds creep as if it had not occurred. Creep that heads for the tension "
-        "as it falls within a hold looks the same, unless the wire hangs under weights."
+        "A part of the creep is permanent: later holds creep as if it had not occurred. Creep that heads for the "
+        "tension as it falls within a hold looks the same, unless the wire hangs under weights."
     )
     shows = "between holds, unloading"
 
