@@ -67,7 +67,12 @@ def target_lines(rows: list[Row]) -> tuple[str, list[list[str]]]:
 
 def stated_lines(rows: list[Row]) -> tuple[str, list[list[str]]]:
     """Widths and cells of the table of stated probabilities, a line a bin: what was said, what was found."""
-    lines = [["inclusion or probability of", *(f"{low:.1f} to {low + stated.WIDTH:.1f}" for low in stated.BINS)]]
+    lines = [
+        [
+            "said, and found [95 % interval]: inclusion or probability of",
+            *(f"{low:.1f} to {low + stated.WIDTH:.1f}" for low in stated.BINS),
+        ]
+    ]
     for of, bins in stated.apart(rows).items():
         lines.append([of, *map(_said_and_found, bins)])
     return "30 14 14 14 14 14", lines
