@@ -70,6 +70,7 @@ def unexplained() -> list[str]:
         if CLI not in path.parents
         for function, owner in functions(tree)
         if not function.name.startswith("_")
+        and not (owner is not None and owner.name.startswith("_"))
         and len(parameters(function)) >= MANY_PARAMETERS
         and not explains_parameters(function)
         and not (owner is not None and overrides_an_explained_method(function, owner))

@@ -11,7 +11,7 @@ from wirebayes.robot.history import follow
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.rotation import matrix
-from wirebayes.robot.motion import forward, inverse, mixed
+from wirebayes.robot.motion import downhill, inverse, mixed
 
 FIELD = Path(__file__).parent / "field" / "stiff-log-hang"
 STIFFNESS = (1.0, 1e4)  # times the drawn one, which stretches by .2 to 2 %
@@ -39,7 +39,7 @@ def _log(kind, seed, factor):
 def _counted(monkeypatch):
     """A list that grows with each step of the solvers."""
     work = []
-    for name, module in (("newton_step_with_tensions", mixed), ("_evaluate", forward)):
+    for name, module in (("newton_step_with_tensions", mixed), ("_evaluate", downhill)):
         made = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given, made=made: work.append(1) or made(*given))
     return work

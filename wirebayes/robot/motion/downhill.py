@@ -42,7 +42,14 @@ class Solved:
 
     @classmethod
     def not_yet(cls, x: Floats, R: Floats, legs: int) -> "Solved":
-        """Cases at their starts."""
+        """Cases at their starts.
+
+        Parameters
+        ----------
+        x, R : (3, n) and (3, 3, n) arrays
+        legs : int
+            Of the robot.
+        """
         n = x.shape[1]
         status, count = np.full(n, NOT_CONVERGED), np.zeros(n, np.int64)
         return cls(np.array(x), np.array(R), np.zeros((legs, n)), status, count, np.full(n, np.inf))
@@ -59,10 +66,29 @@ class Solved:
         self.count[rows] += later.count
 
 
-def solve(
+def lead_downhill(
     robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
 ) -> Solved:
-    """All cases by a few iterations, and the slow ones of all chunks together: small arrays waste the machine."""
+    """Lead all cases downhill: by a few iterations, and the slow ones of all chunks together.
+
+    Small arrays waste the machine.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its exit points counted from their middle.
+    wires : Wires
+        ``n`` draws.
+    zero, offset : (w, n) arrays
+        Zero-tension lengths, and stretched lengths that are not between exit and platform point.
+    x, R : (3, n) and (3, 3, n) arrays
+        Where each begins.
+    max_iterations : int
+
+    Returns
+    -------
+    Solved
+    """
     quick = min(_QUICK, max_iterations)
     solved = _in_chunks(robot, wires, zero, offset, x, R, quick)
     slow = np.flatnonzero(solved.status == NOT_CONVERGED)

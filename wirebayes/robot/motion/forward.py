@@ -88,7 +88,7 @@ def solve_equilibrium(
     position = np.array(start_m.T) - middle[:, None]
     rotation = np.array(np.moveaxis(start_rotation, 0, -1))
     zero, offset = np.ascontiguousarray(zero_m.T), np.ascontiguousarray(offset_m.T)
-    solved = downhill.solve(robot, wires, zero, offset, position, rotation, max_iterations)
+    solved = downhill.lead_downhill(robot, wires, zero, offset, position, rotation, max_iterations)
     _look_again(robot, wires, zero, offset, solved)
     rotation = np.moveaxis(solved.R, -1, 0)
     return Equilibria(solved.x.T + middle, rotation, solved.tau.T, solved.status, solved.count, solved.left)
