@@ -309,6 +309,27 @@ def test_moments_of_a_day_pass_midnight(tmp_path):
     assert [row[2] for row in found] == [0.0, 30.0, 0.0, 30.0, 60.5]
 
 
+def test_a_clock_without_dates_goes_on_the_next_morning(tmp_path):
+    """Of a weight changed every morning, and read through the day."""
+    rows = [f"{hour}:00:00,{5 + 5 * day},{10 + day}.{hour}" for day in range(3) for hour in ("08", "09", "17")]
+    text = "Time,Weight (kg),Elongation (mm)\n" + "\n".join(rows)
+    found = read(tmp_path, text)
+    assert "the clock passes midnight 2 times" in found.notes
+    assert [hold.duration_s for hold in found.experiment.holds] == [86400.0, 86400.0, 32400.0]
+    first, second = read(tmp_path, text.replace(",10,", ",5,")).experiment.holds
+    assert first.time_s.tolist() == [0.0, 3600.0, 32400.0, 86400.0, 90000.0, 118800.0]
+    assert (first.duration_s, second.duration_s) == (172800.0, 32400.0)
+
+
+@pytest.mark.parametrize(("first", "goes_on"), [("3:00:00", False), ("3:00:01", True)])
+def test_a_clock_that_begins_no_later_than_its_readings_are_apart_may_start_again(tmp_path, first, goes_on):
+    """One hour is the least time between readings; three times as much is the most that counts as a beginning."""
+    rows = [f"{time},{weight},{weight}.{time[0]}" for weight in (5, 10) for time in (first, "4:00:01", "5:00:01")]
+    found = read(tmp_path, "Time,Weight (kg),Elongation (mm)\n" + "\n".join(rows))
+    assert any("passes midnight" in note for note in found.notes) == goes_on
+    assert any("time starts again at the beginning of hold 2" in note for note in found.notes) != goes_on
+
+
 @pytest.mark.parametrize(
     "moments",
     [

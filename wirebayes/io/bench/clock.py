@@ -15,6 +15,7 @@ from wirebayes.io.bench.undecided import Undecided
 
 _DAY = 86400.0
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
+_LATE = 3.0  # times the least time between readings: nobody who counts from zero begins so late
 _LAST_MONTH = 12  # a larger number in a date is a day
 UNDERSTOOD = (
     "a time such as 0:01:30 or 10:01:30 AM, or with a date such as 2024-05-31 10:01:30, 2024-05-31T10:01:30+02:00, "
@@ -30,6 +31,11 @@ def looks_like_a_moment(cell: str) -> bool:
 def has_moments(table: RawTable, column: int) -> bool:
     """Whether a column holds clocks or dates."""
     return any(is_moment(cell) for cell in table.column(column))
+
+
+def has_dates(table: RawTable, column: int) -> bool:
+    """Whether the moments of a column say the day, too."""
+    return any(found is not None and found["date"] is not None for found in map(moment, table.column(column)))
 
 
 def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np.float64], bool]:
@@ -64,8 +70,24 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
         days = _days(table, column, moments)
         return (days - days[0]) + values, True
     of_day = short is None and (not of_clock[0] or values[0] >= 3600.0)
-    falls = np.concatenate([[False], np.diff(values) < -_MIDNIGHT])
-    return values + _DAY * np.cumsum(falls), of_day
+    return values + _DAY * np.cumsum(_days_begin(values, of_day)), of_day
+
+
+def _days_begin(values: NDArray[np.float64], of_day: bool) -> NDArray[np.bool_]:
+    """(r,) where a clock (r,) has passed midnight since the row before.
+
+    On the next day a clock of the day may read nearly as much as before. A clock that starts again counts from zero:
+    its first reading is hardly much later than its readings are apart.
+    """
+    steps = np.diff(values, prepend=values[0])
+    closest = steps[steps > 0.0].min(initial=np.inf)
+    goes_on = of_day & (values > _LATE * closest)
+    return (steps < -_MIDNIGHT) | ((steps < 0.0) & goes_on)
+
+
+def midnights(time_s: NDArray[np.float64]) -> int:
+    """How often a clock without dates has passed midnight, of its times (r,) in seconds since the first day began."""
+    return int(time_s.max() // _DAY)
 
 
 def _moments(table: RawTable, column: int) -> list[re.Match[str]]:

@@ -23,7 +23,7 @@ from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
 from wirebayes.io.bench.unread import unread
 from wirebayes.numeric.typing import Floats
-from wirebayes.sentences import listed
+from wirebayes.sentences import counted, listed
 from wirebayes.strict.table import LARGEST
 from wirebayes.wire.protocol import Control
 
@@ -195,6 +195,9 @@ def _converted(column: Column, texts: list[str]) -> Floats:
 def _times(table: RawTable, column: Column, numbers: Floats | None, notes: list[str]) -> tuple[Floats, bool]:
     """Times in s, of numbers or of clocks, and whether they are moments of a day; what was done joins the notes."""
     time, of_day = (numbers, False) if numbers is not None else clock.seconds(table, column.index, column.unit)
+    days = clock.midnights(time) if of_day and not clock.has_dates(table, column.index) else 0
+    if days:
+        notes.append(f"the clock passes midnight {counted(days, 'time')}")
     if is_coarse(table, column.index):
         time, spreading = spread(time)
         notes += spreading
