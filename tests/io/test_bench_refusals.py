@@ -303,6 +303,45 @@ def test_workbooks_with_times_line_breaks_and_several_sheets(tmp_path):
         convert(path, ABOUT, Choices())
 
 
+def test_a_weight_written_once_for_each_hold_is_filled_from_above(tmp_path):
+    rows = ["0,5,10.1", "60,,10.4", "120,,10.5", "180,10,20.0", "240,,20.6", "300,,20.7"]
+    found = read(tmp_path, "Time (s),Weight (kg),Elongation (mm)\n" + "\n".join(rows), time_since="test")
+    assert "4 empty cells of hold or weight filled with the value above them" in found.notes
+    assert [len(hold.readings) for hold in found.experiment.holds] == [3, 3]
+    assert [hold.setting for hold in found.experiment.holds] == pytest.approx([5 * 9.80665, 10 * 9.80665])
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ["0,5,10.1", "60,4.9,10.1", "120,,10.1", "180,10,20.0", "240,9,20.0", "300,,20.0"],  # readings that are missing
+        ["0,5,10.1", "60,,10.1", "120,,10.1", "180,10,20.0", "240,,20.0", "300,,20.0"],  # displacements that were set
+        [
+            "0,,10.1",
+            "60,5,10.4",
+            "120,,10.5",
+            "180,10,20.0",
+            "240,,20.6",
+            "300,,20.7",
+        ],  # nothing to fill the first from
+    ],
+)
+def test_a_missing_tension_is_not_filled(tmp_path, rows):
+    with pytest.raises(wb.InputError, match="found an empty cell"):
+        read(tmp_path, "Time (s),Force (N),Displacement (mm)\n" + "\n".join(rows))
+
+
+def test_a_crosshead_and_an_extensometer_are_two_displacements(tmp_path):
+    rows = ["0,4.055,4.000,11.0", "10,4.052,4.000,10.5", "0,8.1,8.0,21.0", "10,8.1,8.0,20.5"]
+    text = "Time (s),Crosshead (mm),Extensometer (mm),Force (N)\n" + "\n".join(rows)
+    with pytest.raises(
+        Undecided, match=r"found Crosshead \(mm\) and Extensometer \(mm\), each of which may be the disp"
+    ):
+        read(tmp_path, text)
+    found = read(tmp_path, text, mapping=("Extensometer (mm)=displacement",))
+    assert [hold.setting for hold in found.experiment.holds] == [4.0, 8.0]
+
+
 def test_moments_of_a_day_pass_midnight(tmp_path):
     rows = ["23:59:00;1;2", "23:59:30;1;1,9", "00:00:10;2;4", "00:00:40;2;3,9", "00:01:10,5;2;3,8"]
     found = with_readings(read(tmp_path, "Uhrzeit;Weg [mm];Kraft [N]\n" + "\n".join(rows)))
@@ -328,6 +367,14 @@ def test_a_clock_that_begins_no_later_than_its_readings_are_apart_may_start_agai
     found = read(tmp_path, "Time,Weight (kg),Elongation (mm)\n" + "\n".join(rows))
     assert any("passes midnight" in note for note in found.notes) == goes_on
     assert any("time starts again at the beginning of hold 2" in note for note in found.notes) != goes_on
+
+
+@pytest.mark.parametrize(("again", "goes_on"), [("02:00:00", False), ("01:59:59", True)])
+def test_a_clock_that_is_put_back_by_an_hour_is_no_new_day(tmp_path, again, goes_on):
+    rows = [f"{time},5,5.{i}" for i, time in enumerate(("02:58:00", "02:59:00", "03:00:00"))]
+    rows += [f"{time},10,10.{i}" for i, time in enumerate((again, "02:01:00", "02:02:00"))]
+    found = read(tmp_path, "Time,Weight (kg),Elongation (mm)\n" + "\n".join(rows))
+    assert any("passes midnight 1 time" in note for note in found.notes) == goes_on
 
 
 @pytest.mark.parametrize(

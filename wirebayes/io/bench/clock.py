@@ -15,6 +15,7 @@ from wirebayes.io.bench.undecided import Undecided
 
 _DAY = 86400.0
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
+_PUT_BACK = 3600.0  # clocks are put back by an hour in autumn
 _LATE = 3.0  # times the least time between readings: nobody who counts from zero begins so late
 _LAST_MONTH = 12  # a larger number in a date is a day
 UNDERSTOOD = (
@@ -77,12 +78,13 @@ def _days_begin(values: NDArray[np.float64], of_day: bool) -> NDArray[np.bool_]:
     """(r,) where a clock (r,) has passed midnight since the row before.
 
     On the next day a clock of the day may read nearly as much as before. A clock that starts again counts from zero:
-    its first reading is hardly much later than its readings are apart.
+    its first reading is hardly much later than its readings are apart. Rows with the newest first fall throughout.
     """
     steps = np.diff(values, prepend=values[0])
-    closest = steps[steps > 0.0].min(initial=np.inf)
-    goes_on = of_day & (values > _LATE * closest)
-    return (steps < -_MIDNIGHT) | ((steps < 0.0) & goes_on)
+    rises, falls = steps > 0.0, steps < -_PUT_BACK
+    closest = steps[rises].min(initial=np.inf)
+    goes_on = of_day and rises.sum() > falls.sum()
+    return (steps < -_MIDNIGHT) | (falls & goes_on & (values > _LATE * closest))
 
 
 def midnights(time_s: NDArray[np.float64]) -> int:

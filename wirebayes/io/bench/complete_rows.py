@@ -17,14 +17,17 @@ def complete_rows(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTabl
     """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows."""
     indices = [column.index for column in columns.values()]
     rows, below = _without_what_is_below(table, indices)
-    filled = _filled(rows, table, columns)
+    weights_once = _weights_are_written_once(rows, columns)
+    written_once: tuple[Role, ...] = ("hold", "tension") if weights_once else ("hold", "displacement")
+    filled = _filled(rows, table, [columns[role].index for role in written_once if role in columns])
     kept = _without_repetitions(filled, table, columns["time"].index)
     gaps = sum(a.cells[i] != b.cell(i) for a, b in zip(filled, rows, strict=True) for i in indices)
     notes = []
     if below:
         notes.append(f"{counted(below, 'line')} under the readings left out")
     if gaps:
-        notes.append(f"{gaps} empty cells of hold or displacement filled with the value above them")
+        of = "weight" if weights_once else "displacement"
+        notes.append(f"{gaps} empty cells of hold or {of} filled with the value above them")
     if len(kept) < len(filled):
         notes.append(f"rows that repeat the row above left out: {len(filled) - len(kept)}")
     _check_no_cell_is_empty(kept, table, columns)
@@ -40,9 +43,21 @@ def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Sh
     return [row for row in rows if any(row.cell(i) for i in indices)], below
 
 
-def _filled(rows: list[SheetRow], table: RawTable, columns: dict[Role, Column]) -> list[SheetRow]:
-    """Rows with the hold and the displacement of the row above where they have none."""
-    may_be_left_out = [columns[role].index for role in ("hold", "displacement") if role in columns]
+def _weights_are_written_once(rows: list[SheetRow], columns: dict[Role, Column]) -> bool:
+    """Whether a weight stands in the first row of its hold only, while the displacement is read in every row.
+
+    Where most tensions are missing the displacement is what was read, if it changes where they are.
+    """
+    tension, displacement = columns["tension"].index, columns["displacement"].index
+    bare = [i for i, row in enumerate(rows) if not row.cell(tension)]
+    if not rows or 0 in bare or 2 * len(bare) <= len(rows) or not all(row.cell(displacement) for row in rows):
+        return False
+    changes = sum(rows[i].cell(displacement) != rows[i - 1].cell(displacement) for i in bare)
+    return 2 * changes > len(bare)
+
+
+def _filled(rows: list[SheetRow], table: RawTable, may_be_left_out: list[int]) -> list[SheetRow]:
+    """Rows with the cells of the row above where they have none of what may be left out."""
     last = dict.fromkeys(may_be_left_out, "")
     filled = []
     for row in rows:

@@ -20,6 +20,7 @@ WORDS: dict[Role, tuple[str, ...]] = {
         "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp", "ext",
         "forlangning", "forskjutning", "forskydning", "forskyvning", "forlengelse", "siirtyma", "venyma",
         "posunuti", "prodlouzeni", "uzama",
+        "extensometer", "extensometre", "extensometro", "estensimetro", "ekstensometr", "lvdt",
         "przemieszczenie", "wydłuzenie", "перемещение", "удлинение", "ход", "смещение",
         "変位", "伸び", "ストローク", "位移", "伸长", "伸長", "變形", "变形", "행정", "변위", "신율",
     ),
