@@ -303,6 +303,32 @@ def test_workbooks_with_times_line_breaks_and_several_sheets(tmp_path):
         convert(path, ABOUT, Choices())
 
 
+@pytest.mark.parametrize("gap", [",0:30,,phone rang", "0.25,0:30,", ",0:30,"])
+def test_a_reading_that_is_missing_early_does_not_hide_the_header(tmp_path, gap):
+    rows = ["0.25,0:00,2.05", ",0:15,1.89", gap, ",1:00,1.74", ",2:00,1.62"]
+    text = "Nylon of 3 May\nStretch (in),Elapsed (min:sec),Pull (lbf),Comment\n" + "\n".join(rows)
+    with pytest.raises(wb.InputError, match=r"line 5, column 3 \(Pull \(lbf\)\): found an empty cell"):
+        read(tmp_path, text)
+
+
+def test_lines_of_words_between_readings_and_statistics_below_them_are_left_out_and_said(tmp_path):
+    first, second = (["10\t0\t11", "10\t60\t10", "10\t120\t9.5"], ["20\t0\t18", "20\t60\t17.5", "20\t120\t17"])
+    lines = ["Stretch mm\ts\tForce (N)", "Cycle 1", *first, "Cycle 2", *second, "", "Mean\t\t13.8", "Max\t90\t18"]
+    found = read(tmp_path, "\n".join(lines), mapping=("s=time [s]",))
+    assert "lines 6 (Cycle 2), 11 (Mean) and 12 (Max) left out: words or statistics in place of readings" in found.notes
+    assert [hold.readings.tolist() for hold in found.experiment.holds] == [[11.0, 10.0, 9.5], [18.0, 17.5, 17.0]]
+
+
+def test_a_word_among_the_readings_is_no_statistic(tmp_path):
+    """A statistic stands below all readings; a reading that is no number is refused wherever it stands."""
+    rows = ["10,0,11", "Mean,60,10", "10,120,9.5", "20,0,18", "20,60,17.5", "20,120,NaN"]
+    with pytest.raises(wb.InputError, match=r"line 3, column 1 .*found 'Mean', expected a number"):
+        read(tmp_path, "Displacement (mm),Time (s),Force (N)\n" + "\n".join(rows))
+    rows[1] = "10,60,10"
+    with pytest.raises(wb.InputError, match=r"line 7, column 3 .*found 'NaN', expected a number"):
+        read(tmp_path, "Displacement (mm),Time (s),Force (N)\n" + "\n".join(rows))
+
+
 def test_a_weight_written_once_for_each_hold_is_filled_from_above(tmp_path):
     rows = ["0,5,10.1", "60,,10.4", "120,,10.5", "180,10,20.0", "240,,20.6", "300,,20.7"]
     found = read(tmp_path, "Time (s),Weight (kg),Elongation (mm)\n" + "\n".join(rows), time_since="test")

@@ -8,8 +8,10 @@ from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.sheet import SheetRow, is_value
 from wirebayes.io.bench.stamps import is_coarse
 from wirebayes.io.bench.table import RawTable
-from wirebayes.sentences import counted
+from wirebayes.io.bench.words import STATISTICS
+from wirebayes.sentences import counted, listed
 
+_SHOWN = 3  # lines that a note names
 WHERE_MISSING = "; where a reading is missing, delete its row"
 
 
@@ -17,6 +19,7 @@ def complete_rows(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTabl
     """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows."""
     indices = [column.index for column in columns.values()]
     rows, below = _without_what_is_below(table, indices)
+    rows, words = _without_words(rows, indices)
     weights_once = _weights_are_written_once(rows, columns)
     written_once: tuple[Role, ...] = ("hold", "tension") if weights_once else ("hold", "displacement")
     filled = _filled(rows, table, [columns[role].index for role in written_once if role in columns])
@@ -25,6 +28,8 @@ def complete_rows(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTabl
     notes = []
     if below:
         notes.append(f"{counted(below, 'line')} under the readings left out")
+    if words:
+        notes.append(f"{_lines_of(words)} left out: words or statistics in place of readings")
     if gaps:
         of = "weight" if weights_once else "displacement"
         notes.append(f"{gaps} empty cells of hold or {of} filled with the value above them")
@@ -41,6 +46,24 @@ def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Sh
         rows.pop()
     below = len(table.rows) - len(rows)
     return [row for row in rows if any(row.cell(i) for i in indices)], below
+
+
+def _without_words(rows: list[SheetRow], indices: list[int]) -> tuple[list[SheetRow], list[SheetRow]]:
+    """Rows without those that name a part of the test, such as ``Cycle 2``, or a statistic below; and these."""
+    last = max((i for i, row in enumerate(rows) if not _is_statistic(row)), default=-1)
+    words = [row for i, row in enumerate(rows) if i > last or not any(is_value(row.cell(k)) for k in indices)]
+    return [row for row in rows if row not in words], words
+
+
+def _is_statistic(row: SheetRow) -> bool:
+    return any(cell.casefold().rstrip(":.") in STATISTICS for cell in row.filled)
+
+
+def _lines_of(rows: list[SheetRow]) -> str:
+    """Lines as a sentence names them, with what begins each."""
+    shown = [f"{row.line} ({row.filled[0]})" for row in rows[:_SHOWN]]
+    more = [] if len(rows) <= _SHOWN else [f"{len(rows) - _SHOWN} more"]
+    return f"line{'s' * (len(rows) > 1)} {listed([*shown, *more])}"
 
 
 def _weights_are_written_once(rows: list[SheetRow], columns: dict[Role, Column]) -> bool:

@@ -18,7 +18,17 @@ COMMON: dict[Role, tuple[str, ...]] = {
 # What strains and stresses may be in, where a column of that name says no unit; or it is a length or a force after all.
 OF_SAMPLE: dict[Role, tuple[str, ...]] = {"displacement": ("mm/mm", "%", "mm"), "tension": ("MPa", "N")}
 # seconds that the first number of a two-part clock counts; three parts leave no doubt
-CLOCKS = {"mm:ss": 60.0, "m:ss": 60.0, "min:s": 60.0, "hh:mm": 3600.0, "h:mm": 3600.0, "hh:mm:ss": 1.0, "h:mm:ss": 1.0}
+CLOCKS = {
+    "mm:ss": 60.0,
+    "m:ss": 60.0,
+    "min:s": 60.0,
+    "min:sec": 60.0,
+    "h:min": 3600.0,
+    "hh:mm": 3600.0,
+    "h:mm": 3600.0,
+    "hh:mm:ss": 1.0,
+    "h:mm:ss": 1.0,
+}
 
 # Spellings that pint does not know, or knows as something else.
 _SPELLINGS = {

@@ -104,7 +104,9 @@ def find_table(sheet: Sheet) -> RawTable:
     if first is None:
         line = rows[0].line if rows else 1
         raise InputError(f"{sheet.path}, line {line}: found no rows of numbers, expected a header and readings")
-    above = list(rows[:first])
+    above = [*rows[:first]]
+    while len(above) > 1 and _is_subheading(above[-1]):
+        above.pop()
     units: tuple[str, ...] = ()
     if len(above) > 1 and _are_units(above[-1]) and len(above[-2].filled) >= max(2, len(above[-1].filled)):
         units = tuple(cell.strip("[]() ") for cell in above.pop().cells)
@@ -123,6 +125,11 @@ def find_table(sheet: Sheet) -> RawTable:
     body = tuple(row for row in rows[first:] if not row.comment)
     _check_width(sheet, head, body, width)
     return RawTable(sheet, header, padded, body, head.line, names)
+
+
+def _is_subheading(row: SheetRow) -> bool:
+    """Whether a row between header and readings names a part of the test, as ``Cycle 1``."""
+    return len(row.filled) == 1 and not is_value(row.filled[0]) and not row.comment and not _are_units(row)
 
 
 def _is_header(row: SheetRow) -> bool:
@@ -151,11 +158,13 @@ def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: 
 
 
 def _first(rows: tuple[SheetRow, ...]) -> int | None:
-    """The first row of readings: one that is followed by rows like it."""
-    measured = [not row.comment and _is_measured(row) for row in rows]
-    for i, yes in enumerate(measured):
-        following = [flag for flag, row in zip(measured[i:], rows[i:], strict=True) if not row.comment]
-        if yes and all(following[:_ALIKE]):
+    """The first row of readings: one that is followed by rows like it, in one of which a reading may be missing."""
+    of_table = [i for i, row in enumerate(rows) if not row.comment]
+    measured = {i: _is_measured(rows[i]) for i in of_table}
+    for place, i in enumerate(of_table):
+        following = of_table[place : place + _ALIKE]
+        gaps = [k for k in following if not measured[k]]
+        if measured[i] and len(gaps) < 2 and all(_has_a_gap(rows[k]) for k in gaps):
             return i
     return None
 
@@ -163,6 +172,11 @@ def _first(rows: tuple[SheetRow, ...]) -> int | None:
 def _is_measured(row: SheetRow) -> bool:
     values = sum(map(is_value, row.filled))
     return values >= 2 and 2 * values >= len(row.filled)
+
+
+def _has_a_gap(row: SheetRow) -> bool:
+    """Whether a row may be one of readings of which one is missing: it begins with a value, a preamble with words."""
+    return bool(row.filled) and is_value(row.filled[0])
 
 
 def _are_units(row: SheetRow) -> bool:

@@ -62,6 +62,11 @@ RIG_WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok"),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
 }  # fmt: skip
+# What stands before a statistic of a column, below its readings.
+STATISTICS = {
+    "mean", "average", "avg", "median", "max", "maximum", "min", "minimum", "sum", "total", "std", "stdev", "sd",
+    "mittel", "mittelwert", "durchschnitt", "summe", "moyenne", "somme", "media", "promedio", "suma", "somma", "totale",
+}  # fmt: skip
 _COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg or Prüfzeit
 
 
