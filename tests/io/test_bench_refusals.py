@@ -329,6 +329,24 @@ def test_a_word_among_the_readings_is_no_statistic(tmp_path):
         read(tmp_path, "Displacement (mm),Time (s),Force (N)\n" + "\n".join(rows))
 
 
+@pytest.mark.parametrize(("begins", "said"), [(300, False), (301, True)])
+def test_holds_that_go_on_long_after_their_last_readings_are_named(tmp_path, begins, said):
+    """Longer than half of what was read, and than twice the longest pause: it may be a rest that is not in the file."""
+    first = [f"{t},5,{10 + t / 100}" for t in (0, 60, 120, 180)]
+    second = [f"{begins + t},10,{20 + t / 100}" for t in (0, 60, 120, 180)]
+    text = "Time (s),Weight (kg),Elongation (mm)\n" + "\n".join(first + second)
+    notes = read(tmp_path, text, time_since="test").notes
+    assert any("hold 1: the next one begins up to 2.02 min after the last reading" in note for note in notes) == said
+    longer_pause = text.replace(f"{first[2]}\n", "")
+    assert not any("the next one begins" in note for note in read(tmp_path, longer_pause, time_since="test").notes)
+
+
+def test_a_record_of_tension_over_time_needs_a_column_of_its_displacement(tmp_path):
+    rows = "\n".join(f"{t},{10 - t / 10}" for t in range(1, 6))
+    with pytest.raises(Undecided, match="to a hold at one displacement add a column with it, the same in every row$"):
+        read(tmp_path, f"t/s,F/N\n{rows}")
+
+
 def test_a_weight_written_once_for_each_hold_is_filled_from_above(tmp_path):
     rows = ["0,5,10.1", "60,,10.4", "120,,10.5", "180,10,20.0", "240,,20.6", "300,,20.7"]
     found = read(tmp_path, "Time (s),Weight (kg),Elongation (mm)\n" + "\n".join(rows), time_since="test")

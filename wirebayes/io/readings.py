@@ -192,7 +192,9 @@ class _Rows:
         displacement = self.setting if self.control == "displacement" else self.read
         _check_displacement(self.table, row, displacement[row], length_mm)
         if self.control == "force" and not self.setting[row] > 0:
-            rest = ": of a rest, the weight of the empty hook" if self.setting[row] == 0 else ""
+            rest = ""
+            if self.setting[row] == 0:
+                rest = ": of a rest, the weight of the empty hook; a rest that is not read is one of unrecorded_holds"
             raise self.complain(row, SET[self.control], f"a tension above 0 N{rest}")
         if self.time_s[row] < 0:
             raise self.complain(row, "time_s", "0 s or later")

@@ -245,10 +245,11 @@ def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missin
     place = f"{table.sheet.path}, line {table.header_line}: found no column of"
     options = [_option(table, unread, missed) for missed in missing]
     about_units = " (a unit only where the header has no unit)" if any("HEADER=" in text for text in options) else ""
-    message = (
-        f"{place} {listed(missing, 'or')} among {', '.join(names)}, expected {'one of each' if more else 'one'}; "
-        f"say which with {' '.join(options)}{about_units}{hint}"
-    )
+    how = f"; say which with {' '.join(options)}{about_units}"
+    if not unread and missing == ["displacement"]:  # a record of tension over time
+        how = "; to a hold at one displacement add a column with it, the same in every row"
+    wanted = "one of each" if more else "one"
+    message = f"{place} {listed(missing, 'or')} among {', '.join(names)}, expected {wanted}{how}{hint}"
     answers = {f"--map {table.header[i]}={role}": table.header[i] for i in unread}
     others = [_missing(table, free, unread, more)] if more else []
     return Undecided(f"{place} {role}", f"which column is the {role}", answers, others, message)

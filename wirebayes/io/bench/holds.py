@@ -31,10 +31,11 @@ from wirebayes.io.bench.resets import joined_at_resets
 from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
 from wirebayes.numeric.typing import Floats
-from wirebayes.sentences import counted, listed
+from wirebayes.sentences import counted, lasting, listed
 
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
+UNREAD, LONGER = 0.5, 2.0  # of the time that was read, and times its longest pause: beyond, it may be a rest
 BACKWARDS = 0.5  # of the steps in time: holds of two readings or more whose times start again fall at fewer
 
 
@@ -144,6 +145,7 @@ def _ingroups_between(
                 "its last reading as the others"
             )
         times = [of_hold - zero for of_hold, zero in zip(times, zeros, strict=True)]
+        notes += _unread_ends(times, ends, readings.role)
     levels = [float(x[rows[0]]) for rows in groups]
     if any(np.ptp(x[rows]) > 0 for rows in groups):
         levels = [level_of(x[rows]) for rows in groups]
@@ -201,6 +203,22 @@ def _ends(times: list[Floats], zeros: list[float]) -> tuple[list[float | None], 
             zero = before[-1] + usual
         ends.append(float(zero - zeros[j]))
     return [*ends, None], resets
+
+
+def _unread_ends(times: list[Floats], ends: Sequence[float | None], role: str) -> list[str]:
+    """That holds go on long after their last readings, as rests do whose rows are not in the file."""
+    unread: dict[int, float] = {}
+    for j, (of_hold, end) in enumerate(zip(times, ends, strict=True)):
+        after = 0.0 if end is None else end - of_hold[-1]
+        if after > max(UNREAD * of_hold[-1], LONGER * np.diff(of_hold).max(initial=0.0)):
+            unread[j + 1] = after
+    if not unread:
+        return []
+    which = f"hold{'s' * (len(unread) > 1)} {listed([str(number) for number in unread])}"
+    return [
+        f"{which}: the next one begins up to {lasting(max(unread.values()))} after the last reading, and the {role} is "
+        "taken to stay until then; a rest in between is one of unrecorded_holds"
+    ]
 
 
 def _between_readings(times: list[Floats]) -> list[float]:
