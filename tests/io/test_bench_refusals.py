@@ -341,6 +341,13 @@ def test_holds_that_go_on_long_after_their_last_readings_are_named(tmp_path, beg
     assert not any("the next one begins" in note for note in read(tmp_path, longer_pause, time_since="test").notes)
 
 
+@pytest.mark.parametrize("sign", [";", ","])
+def test_units_in_the_cells_are_asked_into_the_header(tmp_path, sign):
+    lines = [["Step", "Stretch", "Time", "Pull"], ["1", "4 mm", "0 s", "11.02 N"], ["1", "4 mm", "10 s", "10.48 N"]]
+    with pytest.raises(wb.InputError, match="expected numbers alone in the cells, not '4 mm', and their units in the"):
+        read(tmp_path, "\n".join(map(sign.join, lines)))
+
+
 def test_a_record_of_tension_over_time_needs_a_column_of_its_displacement(tmp_path):
     rows = "\n".join(f"{t},{10 - t / 10}" for t in range(1, 6))
     with pytest.raises(Undecided, match="to a hold at one displacement add a column with it, the same in every row$"):

@@ -1,6 +1,7 @@
 """Files are written whole, and a folder belongs to one configuration."""
 
 import errno
+import hashlib
 import json
 import os
 import stat
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from wirebayes.errors import InputError
+from wirebayes.io import run_folder
 from wirebayes.io.run_folder import Run, check_file, check_run, open_run, write_bytes, write_csv, write_json
 
 
@@ -110,6 +112,14 @@ def test_another_configuration_is_refused_by_name(tmp_path, change, found):
         opened(tmp_path / "out", CONFIGURATION | change)
     assert str(caught.value).startswith(f"{tmp_path / 'out'}: made with another configuration: {found} expected a new")
     assert (tmp_path / "out" / "configuration.json").read_bytes() == before
+
+
+def test_a_file_that_has_changed_since_is_said_to_have(tmp_path):
+    sums = [hashlib.sha256(text).hexdigest() for text in (b"before", b"after")]
+    opened(tmp_path / "out", {"raw": {"bench.csv": sums[0]}, "seed": 0})
+    with pytest.raises(InputError, match=r"configuration: bench\.csv has changed since; expected a new"):
+        opened(tmp_path / "out", {"raw": {"bench.csv": sums[1]}, "seed": 0})
+    assert run_folder.differences("abc", "abd", "data") == ["data is abc there, abd here"]
 
 
 OPTIONS = {"--position": None, "--times": "0,60", "readings": "abc"}

@@ -10,6 +10,7 @@ import glob
 import io
 import json
 import os
+import re
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -314,7 +315,14 @@ def differences(found: Any, wanted: Any, key: str = "") -> list[str]:
         return [phrase for part in parts for phrase in part]
     if found == wanted:
         return []
+    if _is_checksum(found) and _is_checksum(wanted):
+        return [f"{key.removeprefix('raw.') or 'content'} has changed since"]
     return [f"{key or 'content'} is {_short(found)} there, {_short(wanted)} here"]
+
+
+def _is_checksum(value: Any) -> bool:
+    """Whether a value stands for a file's content (SHA-256)."""
+    return isinstance(value, str) and re.fullmatch(r"[0-9a-f]{64}", value) is not None
 
 
 _ABSENT = "nothing"

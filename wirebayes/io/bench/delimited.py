@@ -13,6 +13,7 @@ _NAMES = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spa
 LONGEST_LINE = 100_000  # characters: thousands of columns; Python's csv refuses longer cells
 _LOOKED_AT = 2000  # lines: enough to see a habit
 _COMMENT = re.compile(r"\s*[\"']?(#|%|//)+\s*")
+_WITH_UNIT = re.compile(r"[-+]?\d+([.,]\d+)? ?[^\W\d]{1,5}\d?")  # 4 mm, 11.02 N
 _SEPARATOR = re.compile(
     r"\ufeff?\"?sep=([^\w\s\"']|\t)\"?\s*", re.IGNORECASE
 )  # the first line that Excel writes and obeys
@@ -50,6 +51,10 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     if not stated and scores[best][0] <= 0.0:
         line = next((i for i, content in enumerate(lines, start=1) if content.strip()), 1)
         expected = "cells between commas, semicolons, tabs or spaces"
+        cells = [cell for sign in candidates if sign != " " for line in sample for cell in _cells(line, sign)]
+        with_unit = next((cell for cell in cells if _WITH_UNIT.fullmatch(cell)), None)
+        if with_unit is not None:
+            expected = f"numbers alone in the cells, not {with_unit!r}, and their units in the header"
         raise InputError(f"{path}, line {line}: found no columns of numbers, expected {expected}")
     described = f"{_NAMES.get(best, best)} between cells"
     if encoding in UNICODE:
