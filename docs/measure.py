@@ -60,7 +60,7 @@ STUDIES = {
         "it.json",
     ),
     "discover_clean": (
-        "-m analyses.hidden_effects --size small --answer api --simulations 199 --kinds clean --clean 1200 --seed 5000 "
+        "-m analyses.hidden_effects --size small --answer api --simulations 199 --kinds clean --clean 1200 --seed 5010 "
         "--output {folder}",
         "scores.json",
     ),
