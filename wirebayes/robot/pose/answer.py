@@ -150,6 +150,8 @@ def _warnings(held: _Held, courses: dict[float, Course], stable: bool, turned: O
     out = _weak(held.commands)
     for spread, course in courses.items():
         out += stability.stability_warnings(course, spread, stable)
+    if turned.turned_away:
+        out.append(Notice("unheld", turned.turned_away))
     if turned.refused:
         out.append(Notice("geometry", turned.refused))
     return out + _untested(held)

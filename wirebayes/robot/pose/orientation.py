@@ -1,6 +1,6 @@
 """The orientation of a requested pose: what can be asked for, what balance decides, and both in words."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,9 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
 
 COMPONENTS = ("rx", "ry", "rz")
+_COUNT = {1: "one", 2: "two"}
 _ROUNDING = 1e-6  # of the robot's span: what a position written with six digits may be off
+_TURNED_AWAY = 1.0  # degrees from the home orientation: nobody levels a platform by eye to much better
 _SAME = 5e-5  # rad: a component that balance decides and that was asked for to four decimals is as asked for
 
 
@@ -32,6 +34,8 @@ class Orientation:
         Why the platform cannot hang; empty where it can.
     refused : str
         What was asked for and cannot be had; empty where all was had.
+    turned_away : str
+        How far the platform hangs from a home orientation that nothing holds, though the wires could command it.
     """
 
     position_m: Floats
@@ -39,6 +43,7 @@ class Orientation:
     found: OrientationFound | None = None
     sentence: str = ""
     refused: str = ""
+    turned_away: str = ""
 
 
 def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | None) -> Orientation:
@@ -78,7 +83,8 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
             if not part.held[0]:
                 return Orientation(position_m, near, None, _out_of_reach(asked, had, found))
             found = part
-    return _described(robot, position_m, found, asked, had)
+    there = _described(robot, position_m, found, asked, had)
+    return replace(there, turned_away=_turned_away(robot, there.rotation)) if asked_rad is None else there
 
 
 def by_lines(robot: Robot) -> OrientationFound:
@@ -102,6 +108,19 @@ def by_lines(robot: Robot) -> OrientationFound:
         "sentence": f"{robot.joints} winches with {robot.legs} lines command {robot.joints} of {robot.freedoms} "
         "degrees of freedom; the lines' lengths and balance decide the orientation.",
     }
+
+
+def _turned_away(robot: Robot, rotation: Floats) -> str:
+    """By how much a platform on wires enough hangs away from home; empty where that is little, or all one can have."""
+    home = turning.matrix(robot.home_rotation_rad)
+    away = float(np.degrees(np.linalg.norm(turning.vector((rotation @ home.T)[None])[0])))
+    if robot.is_underactuated or away < _TURNED_AWAY:
+        return ""
+    return (
+        "no tensions within the bounds hold the rotation that the robot's file asks for (pose.rotation_vector_rad): "
+        f"the platform hangs {away:.3g} degrees away from it; check that rotation (rad), the centre of mass and the "
+        "points (m)"
+    )
 
 
 def _clear(robot: Robot, x: Floats, R: Floats) -> bool:
@@ -164,12 +183,15 @@ def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, h
 
 def _summary(robot: Robot, degrees: int, places: int, choice: int, free: list[str], others: int) -> str:
     """What is commanded, what is not, and which of several solutions this is."""
-    said = f"{robot.legs} wires command {degrees} of {robot.freedoms} degrees of freedom"
-    by_balance = f"balance decides {_listed(free)}" if free else "the orientation is as asked for"
-    said += f"; {by_balance}"
-    if choice:
-        count = "one component" if choice == 1 else f"{choice} components"
-        said += f", {count} of the rotation can be asked for"
+    said = f"{robot.legs} wires command {degrees} of {robot.freedoms} degrees of freedom; "
+    if choice == 3 and len(free) == 3:
+        said += "this is the rotation nearest to the home orientation that was found to be held"
+        said += ", and --rotation may ask for another"
+    else:
+        said += f"balance decides {_listed(free)}" if free else "the orientation is as asked for"
+        left = choice - (3 - len(free))
+        if left > 0:
+            said += f", but --rotation may ask for {'any' if left == len(free) else _COUNT[left]} of them"
     if places < 3:
         said += f", the position can be chosen in {places} directions only"
     if others:
