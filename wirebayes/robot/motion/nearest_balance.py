@@ -3,7 +3,8 @@
 Unknown are rotation and tensions; known is the position, unless it may move. Balance and the components of the rotation
 vector that are asked for are equations. Every step is the smallest that solves the equations where they are linearised,
 by a singular value decomposition, so that robots whose equations depend on each other (all wires in one plane) need no
-case of their own. A wire whose tension leaves its bounds is held at the bound.
+case of their own. A wire whose tension leaves its bounds is held at the bound, and let go once where the search has come
+to rest and could come nearer without.
 """
 
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ _NEARLY = 1e-3  # rad: so small a step has nearly come to rest, and tensions are
 _FAR_FROM_BALANCE = 0.1  # of the unit of forces: balance comes first
 _SETTLED = 1e-10  # rad: a step so small changes nothing
 _PLACE = 30.0  # weight of a position, in spans, that may move: it is what shall stay, before angles and tensions
+_HINDERED = 1e-6  # of the goal's slope by a tension: what holds a search back by less does not hold it back
 _LESSER = 1e-3  # weight of what decides only where the first aim, tensions or angles, leaves a choice
 
 
@@ -61,16 +63,17 @@ def nearest_balances(
         if not rows.size:
             break
         goal = position_m[rows], target[rows]
-        step, imbalance = _step(robot, search.at(rows), goal, asked, search.bound[rows], unit, movable)
+        step, imbalance, hindrance = _step(robot, search.at(rows), goal, asked, search.bound[rows], unit, movable)
         turned = np.linalg.norm(step[:, 3:6], axis=1)
         step *= np.minimum(1.0, _LONGEST_RAD / np.maximum(turned, 1e-300))[:, None]
         lost = ~np.isfinite(step).all(1)
         search.dead[rows[lost]] = True
-        rows, step, imbalance = rows[~lost], step[~lost], imbalance[~lost]
+        rows, step, imbalance, hindrance = rows[~lost], step[~lost], imbalance[~lost], hindrance[~lost]
         search.move(rows, step, unit)
         change = np.abs(step[:, :6]).max(1)
         newly = search.hold_at_bounds(rows, change < _NEARLY, robot, unit)
-        search.done[rows] = (imbalance < _BALANCED) & (change < _SETTLED) & ~newly
+        rest = (imbalance < _BALANCED) & (change < _SETTLED) & ~newly
+        search.done[rows] = rest & ~search.let_go(rows, rest, hindrance)
     return search.balances(robot, target, asked)
 
 
@@ -88,6 +91,8 @@ class _Search:
     x, R, tau : (n, 3), (n, 3, 3) and (n, w) arrays
     bound : (n, w) int array
         -1 and 1: held at the lowest and the highest tension.
+    freed : (n, w) bool array
+        Whether each wire was let go already: a second time would be a circle.
     done, dead : (n,) bool arrays
         Whether each has come to rest, and whether it can go no further.
     """
@@ -96,6 +101,7 @@ class _Search:
     R: Floats
     tau: Floats
     bound: NDArray[np.int64]
+    freed: NDArray[np.bool_]
     done: NDArray[np.bool_]
     dead: NDArray[np.bool_]
 
@@ -104,7 +110,8 @@ class _Search:
         n = len(rotation)
         x, R = np.array(position_m), np.array(rotation)
         bound = np.zeros((n, robot.legs), np.int64)
-        return cls(x, R, _first_tensions(robot, x, R), bound, np.zeros(n, bool), np.zeros(n, bool))
+        none = np.zeros(n, bool)
+        return cls(x, R, _first_tensions(robot, x, R), bound, bound != 0, none, none.copy())
 
     def at(self, rows: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
         """Poses and tensions of some searches."""
@@ -126,6 +133,15 @@ class _Search:
         self.bound[rows] += np.where(newly, np.where(tau < low, -1, 1), 0)
         return np.asarray(newly.any(1))
 
+    def let_go(self, rows: NDArray[np.intp], rest: NDArray[np.bool_], hindrance: Floats) -> NDArray[np.bool_]:
+        """Let go the wire whose bound keeps a search at `rest` most from its goal, and say which searches have one."""
+        most = np.where(self.freed[rows], 0.0, hindrance).argmax(1)
+        there = rows, most
+        wrongly = rest & ~self.freed[there] & (hindrance[np.arange(len(rows)), most] > _HINDERED)
+        self.bound[there] = np.where(wrongly, 0, self.bound[there])
+        self.freed[there] |= wrongly
+        return np.asarray(wrongly)
+
     def balances(self, robot: Robot, target: Floats, asked: Floats) -> Balances:
         """What has come to rest in balance, within the bounds of tensions, with what is asked for."""
         low, high = robot.rule.lowest_N, robot.rule.highest_N
@@ -146,7 +162,7 @@ def _step(
     bound: NDArray[np.int64],
     unit: float,
     movable: bool,
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats, Floats]:
     """The smallest step from poses and tensions that solves the linearised equations and comes nearest to the goal.
 
     Returns
@@ -155,6 +171,8 @@ def _step(
         Displacement, turn, and change of the tensions in `unit`.
     imbalance : (n,) array
         What the equations leave before the step, in `unit`.
+    hindrance : (n, w) array
+        How much nearer to the goal a search would come by leaving each wire's bound inwards; below 0: not at all.
     """
     A, value = _linearised(robot, at, asked, bound, unit, movable)
     wish, weight = _wish(robot, at, goal, unit, movable)
@@ -163,8 +181,10 @@ def _step(
     B = np.where(sound[:, None, None], A / weight, 0.0)
     step = np.where(sound[:, None], wish * weight, np.nan)
     missed = value + (B @ step[..., None])[..., 0]
-    step = step - (np.linalg.pinv(B, rcond=DEPENDENT) @ missed[..., None])[..., 0]
-    return step / weight, np.abs(value).max(1)
+    inverse = np.linalg.pinv(B, rcond=DEPENDENT)
+    back = inverse @ missed[..., None]
+    multiplier = (inverse.swapaxes(1, 2) @ back)[..., 0]  # Lagrange's; the bounds' equations are the last
+    return (step - back[..., 0]) / weight, np.abs(value).max(1), -bound * multiplier[:, -bound.shape[1] :]
 
 
 def _linearised(

@@ -1,0 +1,63 @@
+"""A home orientation that nothing holds: how near to it the platform hangs, and that it is said."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics import schema
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.motion import hanging
+from wirebayes.robot.pose import orientation
+from wirebayes.robot.pose.orientation import balanced_orientation
+
+
+def six_wires(centre_of_mass_m=(0.02, 0.01, -0.05), turned_rad=(0.0, 0.0, 0.0)) -> Robot:
+    """A platform under three pairs of exit points, which hangs level on tensions from 1 to 400 N."""
+    third = 2 * np.pi / 3 * (np.arange(6) // 2)
+    side = np.tile([-1.0, 1.0], 3)
+
+    def ring(angle, radius, height):
+        return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(6, height)])
+
+    base = schema.read_robot_file("cogiro")
+    return replace(
+        base, name="six", exit_m=ring(third + 0.15 * side, 2.5, 3.0), platform_m=ring(third + 0.85 * side, 0.35, 0.05),
+        lines=np.ones(6), beyond_m=np.zeros(6), actuator=("drum",) * 6, ratio=np.zeros(6), wire_m=np.zeros(6),
+        wire=("default",) * 6, mass_kg=12.0, centre_of_mass_m=np.array(centre_of_mass_m),
+        home_m=np.array([0.2, -0.1, 1.2]), home_rotation_rad=np.array(turned_rad), pulleys=None, drums=None,
+        mass_kg_m=None, rule=replace(base.rule, choice="minimum_norm", lowest_N=1.0, highest_N=400.0),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("wrong", "degrees"),
+    [({"centre_of_mass_m": (1.5, 0.01, -0.05)}, "74.8"), ({"turned_rad": (0.0, 0.0, 20.0)}, "27.6")],
+)
+def test_a_home_orientation_that_nothing_holds_is_said_with_its_distance(wrong, degrees):
+    robot = six_wires(**wrong)
+    found = balanced_orientation(robot, robot.home_m, None)
+    assert f"hangs {degrees} degrees away" in found.turned_away and "pose.rotation_vector_rad" in found.turned_away
+    assert "nearest to the home orientation" in found.found["sentence"]
+
+
+def test_what_is_held_or_asked_for_is_no_warning():
+    robot = six_wires()
+    assert balanced_orientation(robot, robot.home_m, None).turned_away == ""
+    tilted = six_wires(centre_of_mass_m=(1.5, 0.01, -0.05))
+    assert balanced_orientation(tilted, tilted.home_m, np.array([np.nan, 0.1, np.nan])).turned_away == ""
+
+
+@pytest.mark.parametrize(("degrees", "said"), [(0.999, False), (1.001, True)])
+def test_a_tilt_that_no_eye_sees_is_no_warning(degrees, said):
+    rotation = turning.matrix(np.array([0.0, np.radians(degrees), 0.0]))
+    assert bool(orientation._turned_away(six_wires(), rotation)) == said
+    assert not orientation._turned_away(replace(six_wires(), freedom="pose", exit_m=np.zeros((5, 3))), rotation)
+
+
+def test_a_wire_at_its_bound_is_let_go_where_that_leads_nearer():
+    """A general minimiser with the tensions as constraints finds a balance 0.4165 rad from home at best."""
+    robot = six_wires(centre_of_mass_m=(20.0, 10.0, -50.0))
+    found = hanging.hang(robot, robot.home_m[None], np.eye(3))
+    assert np.linalg.norm(turning.vector(found.rotation)[0]) < 0.418
