@@ -11,6 +11,7 @@ from wirebayes.notice import Notice, to_json
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts
+from wirebayes.robot.motion.plausible import robot_notices
 from wirebayes.strict.files import PathLike
 from wirebayes.views.export import Export
 from wirebayes.views.result import ResultFolder
@@ -102,7 +103,7 @@ def export(
 
 def _warnings(robot: Robot, line: WireDraws, contents: Mapping[str, str]) -> list[Notice]:
     """What speaks against the fits, and what could not be exported."""
-    out = doubts(robot, line)
+    out = [*doubts(robot, line), *robot_notices(robot)]
     if "klipper.cfg" not in contents:
         text = "no firmware settings: they exist for four or five drums with a position-only platform"
         out.append(Notice("left-out", text))

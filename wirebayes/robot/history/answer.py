@@ -93,9 +93,9 @@ def history_report(
     try:
         found, joint, again = asked.followed(line, progress)
     except commanded.Unheld as why:
-        return HistoryAnswer(_without_answer(content, f"No{str(why)[2:]}."), {}, rows)
+        return HistoryAnswer(_without_answer(robot, content, f"No{str(why)[2:]}."), {}, rows)
     if not found.track.held[:, 0].any():
-        return HistoryAnswer(_without_answer(content, _NEVER_HELD), {}, rows)
+        return HistoryAnswer(_without_answer(robot, content, _NEVER_HELD), {}, rows)
     to = corrections.target(robot, history, found)
     change = corrections.wanted(robot, history, found, to) - joint
     course = _course(history, found, rows)
@@ -184,9 +184,9 @@ def _with_agreement(readings: HistoryReadings, found: Estimate) -> HistoryReadin
     }
 
 
-def _without_answer(content: PoseHistoryJson, sentence: str) -> PoseHistoryJson:
+def _without_answer(robot: Robot, content: PoseHistoryJson, sentence: str) -> PoseHistoryJson:
     """An answer that ends because nothing holds the platform, and why."""
-    return content | {"feasible": False, "sentence": sentence, "warnings": unheld(sentence)}
+    return content | {"feasible": False, "sentence": sentence, "warnings": unheld(robot, sentence)}
 
 
 def _requested(robot: Robot, line: WireDraws, history: History, errors: Uncertain) -> PoseHistoryJson:

@@ -12,7 +12,7 @@ from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics import draws, sag
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
-from wirebayes.robot.motion import inverse
+from wirebayes.robot.motion import inverse, plausible
 
 _FEWEST = 50  # effective draws; of so many, what lies beyond a 5 % quantile is 2 to 8 %
 _NAMED = 6  # times in a warning: as many as a line holds
@@ -70,6 +70,7 @@ def history_warnings(
     lengths = inverse.lengths(robot, joint_m)[0]
     out += draws.wire_warnings(robot, line, found.track.tension_N, longest, lengths)
     plain = found.plain
+    out += plausible.robot_notices(robot) + plausible.strain_notices(robot, line, plain.tension_N[0, -1])
     return out + sag.sag_warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
 
 

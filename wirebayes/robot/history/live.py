@@ -127,7 +127,7 @@ class LiveEstimator:
         self._rng = np.random.default_rng(seed)
         known = unknowns(robot, line, errors, self._rng)
         self._bare, self.robot, self._reads = robot, robot, reads
-        self.warnings = tuple(doubts(robot, line))
+        self.warnings = (*doubts(robot, line), *plausible.robot_notices(robot))
         n, d, m = line.count, known.count, robot.legs + 2
         white = known.draws
         if reads:

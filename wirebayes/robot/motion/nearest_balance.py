@@ -3,8 +3,8 @@
 Unknown are rotation and tensions; known is the position, unless it may move. Balance and the components of the rotation
 vector that are asked for are equations. Every step is the smallest that solves the equations where they are linearised,
 by a singular value decomposition, so that robots whose equations depend on each other (all wires in one plane) need no
-case of their own. A wire whose tension leaves its bounds is held at the bound, and let go once where the search has come
-to rest and could come nearer without.
+case of their own. A wire whose tension leaves its bounds is held at the bound; where the search has come to rest and
+could come nearer without, it is let go, once.
 """
 
 from dataclasses import dataclass

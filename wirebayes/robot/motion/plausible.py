@@ -1,4 +1,8 @@
-"""Joint values that cannot be meant: nothing paid out, millimetres, or straight lengths where the wire is meant."""
+"""What cannot be meant: joint values and robots' files in the wrong unit, straight lengths where the wire is meant.
+
+Joint values are refused; of a robot's file, which may describe an unusual robot, there is a warning for each key. Its
+rules compare what the file says with what else it says: they hold at any scale, but for the largest robot there is.
+"""
 
 from collections.abc import Sequence
 
@@ -6,18 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import shown
+from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.draws import WireDraws, lines_of
 from wirebayes.robot.mechanics.joint_columns import column_of_leg, meant
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
+from wirebayes.sentences import number
 from wirebayes.strict.table import CsvTable
 
 _FAR = 10.0  # times the robot's size: no wire is so long, and of millimetres those above a hundredth of it are noticed
 _TWICE = 2.0  # times its length: no wire stretches so far, but a wire of two lines looks so where one line was given
 _RIGID = 1e6  # times the weight: the wires' stiffness, so that lengths alone decide how far they stretch
+_LARGEST_M = 1000.0  # the largest cable robot, which carries the receiver of the FAST telescope, spans 600 m
+_OUTSIDE = 5.0  # times the platform's radius: a mass so far out hangs on a pole, not in a platform
 _STARTS = 8  # anywhere in the workspace, where the home pose leads to no pose that the lengths allow
 
 
@@ -74,6 +83,82 @@ def refuse(robot: Robot, joint_m: Floats, table: CsvTable, columns: Sequence[str
     column = column_of_leg(robot, columns, leg)
     found = shown(table.cell(row, column)) + meant(column, joint_m[row, leg])
     raise table.complain(row, column, found, expected)
+
+
+def robot_notices(robot: Robot) -> list[Notice]:
+    """A warning for each key of a robot's file whose value looks like one in another unit.
+
+    Parameters
+    ----------
+    robot : Robot
+    """
+    out = []
+    span = robot.span_m
+    if span > _LARGEST_M:
+        out.append(
+            f"leg.exit_point_m: the exit points span {number(span)} m, and no cable robot spans {_LARGEST_M:g} m"
+        )
+    arms = np.linalg.norm(robot.platform_m - robot.platform_m.mean(0), axis=1).max()
+    mass_at = float(np.linalg.norm(robot.centre_of_mass_m - robot.platform_m.mean(0)))
+    if 0 < _OUTSIDE * arms < mass_at:
+        out.append(
+            f"platform.centre_of_mass_m: the centre of mass is {number(mass_at)} m from the middle of the platform "
+            f"points, which lie within {number(arms)} m of it"
+        )
+    home = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
+    farthest = float(np.linalg.norm(robot.exit_m - home, axis=1).max())
+    if 0 < _FAR * span < farthest:
+        out.append(
+            f"pose.position_m: the home position is {number(farthest)} m from an exit point, {_beyond(span, _FAR)}"
+        )
+    size = max(span, min(farthest, _FAR * span))
+    radius = np.zeros(robot.legs) if robot.drums is None else robot.drums.radius_m
+    rim = np.zeros(robot.legs) if robot.pulleys is None else robot.pulleys.radius_m
+    for key, length, many in (
+        ("beyond_exit_m", robot.beyond_m, _FAR),
+        ("drum_radius_m", radius, 0.5),  # a drum as wide as the robot
+        ("pulley_radius_m", rim, 0.5),
+    ):
+        legs = np.flatnonzero(length > many * size)
+        if legs.size:
+            more = f" and {legs.size - 1} more" if legs.size > 1 else ""
+            out.append(f"leg.{key} of wire {legs[0] + 1}{more}: {number(length[legs[0]])} m, {_beyond(size, many)}")
+    return [Notice("geometry", f"{text}; is the unit of the robot's file metres?") for text in out]
+
+
+def _beyond(size_m: float, times: float) -> str:
+    """That something is larger than it can be for the robot's size."""
+    many = "half" if times == 0.5 else f"{times:g} times"
+    return f"more than {many} the robot's size, {number(size_m)} m"
+
+
+def strain_notices(robot: Robot, line: WireDraws, tension_N: Floats) -> list[Notice]:
+    """A warning for each kind of wire that tensions would stretch, or let creep, by more than its own length.
+
+    Parameters
+    ----------
+    robot : Robot
+    line : WireDraws
+        For every leg whose wire is not given in the robot's file.
+    tension_N : (w,) array
+    """
+    out: dict[str, str] = {}
+    for leg, (name, wire) in enumerate(zip(robot.wire, lines_of(robot, line), strict=True)):
+        one = wire.centre().parameters
+        pull = float(tension_N[leg])
+        place = f"[wires.{name}]" if name in robot.given else "the fitted wire"
+        if not pull > 0 or place in out:
+            continue
+        stretch, creep = pull / one["k1"][0], one["B"][0] * pull ** one["U"][0] / wire.length_mm
+        if stretch > _TWICE - 1:
+            out[place] = f"k1_N = {one['k1'][0]:.4g}: {pull:.3g} N stretch wire {leg + 1} by {number(100 * stretch)} %"
+        elif creep > _TWICE - 1:
+            keys = f"B_mm = {one['B'][0]:.4g}, length_mm = {wire.length_mm:.4g}"
+            out[place] = f"{keys}: wire {leg + 1} creeps by {number(100 * creep)} % at {pull:.3g} N"
+    return [
+        Notice("geometry", f"{place}, {text}, expected less than 100 %; are the units those of the keys?")
+        for place, text in out.items()
+    ]
 
 
 def _first(bad: NDArray[np.bool_]) -> tuple[int, int]:

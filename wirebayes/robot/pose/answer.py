@@ -25,7 +25,7 @@ from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import claim, control, drift, equilibria, forward, inverse, one_sided, outcome
+from wirebayes.robot.motion import claim, control, drift, equilibria, forward, inverse, one_sided, outcome, plausible
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose import controllers, on_plane, stability, variance_shares
@@ -80,12 +80,12 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
     if turned.found is not None:
         content["orientation"] = turned.found
     if not content["feasible"]:
-        return _unheld(content, *((lifted, "unheld") if lifted else _why_not(robot, x, turned)))
+        return _unheld(robot, content, *((lifted, "unheld") if lifted else _why_not(robot, x, turned)))
     shared = draws.for_robot(robot, line)
     commands = inverse.commands(robot, shared, x[None], R[None], tau)
     content["feasible_draws"] = float(commands.feasible.mean())
     if not commands.feasible.any():
-        return _unheld(content, "These wires cannot pull as hard as the pose requires, however far stretched.")
+        return _unheld(robot, content, "These wires cannot pull as hard as the pose requires, however far stretched.")
     if robot.winch is not None:
         tau = commands.tension_N[commands.feasible].mean(0, keepdims=True)
         R = inverse.commands(robot, control.known(shared), x[None], R[None], tau).rotation[0]
@@ -146,7 +146,7 @@ def _courses(held: _Held, rng: np.random.Generator) -> dict[float, Course]:
 
 
 def _warnings(held: _Held, courses: dict[float, Course], stable: bool, turned: Orientation) -> list[Notice]:
-    """What speaks against the answer: weak wires, falls, what was asked for in vain, and what was never tested."""
+    """What speaks against the answer: weak wires, falls, what was asked for in vain, the robot's file, what was never tested."""
     out = _weak(held.commands)
     for spread, course in courses.items():
         out += stability.stability_warnings(course, spread, stable)
@@ -154,14 +154,15 @@ def _warnings(held: _Held, courses: dict[float, Course], stable: bool, turned: O
         out.append(Notice("unheld", turned.turned_away))
     if turned.refused:
         out.append(Notice("geometry", turned.refused))
+    out += plausible.robot_notices(held.robot) + plausible.strain_notices(held.robot, held.line, held.tension_N[0])
     return out + _untested(held)
 
 
-def _unheld(content: PoseJson, sentence: str, kind: str = "unheld") -> PoseAnswer:
+def _unheld(robot: Robot, content: PoseJson, sentence: str, kind: str = "unheld") -> PoseAnswer:
     """An answer that ends because nothing holds the platform, and why."""
     content["feasible"] = False
     content["sentence"] = sentence
-    content["warnings"] = unheld(sentence, kind)
+    content["warnings"] = unheld(robot, sentence, kind)
     return PoseAnswer(content, {})
 
 
@@ -185,16 +186,18 @@ def _pulled_up(robot: Robot, x: Floats, R: Floats) -> bool:
     return bool((-direction[2]).max() > _LEVEL)
 
 
-def unheld(sentence: str, kind: str = "unheld") -> list[NoticeJson]:
-    """The only warning of an answer that ends because nothing holds the platform.
+def unheld(robot: Robot, sentence: str, kind: str = "unheld") -> list[NoticeJson]:
+    """The warnings of an answer that ends because nothing holds the platform.
 
     Parameters
     ----------
+    robot : Robot
+        Whose file may be why.
     sentence : str
         Why.
     kind : str
     """
-    return to_json([Notice(kind, sentence[:1].lower() + sentence[1:].rstrip("."))])
+    return to_json([Notice(kind, sentence[:1].lower() + sentence[1:].rstrip(".")), *plausible.robot_notices(robot)])
 
 
 def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible: bool) -> PoseJson:

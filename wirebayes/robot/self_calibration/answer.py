@@ -19,7 +19,7 @@ from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.mechanics.winches import of_each_winch
-from wirebayes.robot.motion import control, hanging, inverse
+from wirebayes.robot.motion import control, hanging, inverse, plausible
 from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import LengthPosterior, corrected_joints, length_posterior
@@ -81,7 +81,13 @@ def lengths_report(
         **_poses(robot, prior, known),
         **_observed(robot, prior, session, np.random.default_rng(seed), visits),
         "warnings": to_json(
-            [*_unsure(known, plain), *contradicted, *sensors.sensor_notices(at_fault), *doubts(robot, prior.line)]
+            [
+                *_unsure(known, plain),
+                *contradicted,
+                *sensors.sensor_notices(at_fault),
+                *plausible.robot_notices(robot),
+                *doubts(robot, prior.line),
+            ]
         ),
     }
     return content, calibrated(robot, prior, session, known)

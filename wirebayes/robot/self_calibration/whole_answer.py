@@ -20,7 +20,7 @@ from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.mechanics.winches import of_each_winch
-from wirebayes.robot.motion import inverse
+from wirebayes.robot.motion import inverse, plausible
 from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
@@ -137,7 +137,14 @@ def calibration_report(
         "observability": _observability(seen),
         "next_positions_m": ahead.position_m,
         "next_pose_sd_mm": 1e3 * ahead.pose_sd_m,
-        "warnings": to_json([*_warnings(verdict), *sensors.sensor_notices(at_fault), *doubts(robot, prior.line)]),
+        "warnings": to_json(
+            [
+                *_warnings(verdict),
+                *sensors.sensor_notices(at_fault),
+                *plausible.robot_notices(robot),
+                *doubts(robot, prior.line),
+            ]
+        ),
     }
     return WholeAnswer(content, moved(robot, found.unknowns.parts(found.state.white)), _known(found, session))
 

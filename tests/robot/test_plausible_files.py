@@ -1,0 +1,97 @@
+"""Robots' files in the wrong unit: a warning that names the key, at the limit and no earlier."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.robot.test_unheld_home import six_wires
+from wirebayes.robot.mechanics import schema
+from wirebayes.robot.mechanics.description import Drums, GivenWire, Pulleys
+from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.motion import plausible
+from wirebayes.robot.pose.answer import pose_report
+from wirebayes.robot.pose.request import PoseRequest
+
+FIELD = sorted((Path(__file__).parent / "field").rglob("*.toml"))
+LINE = WireDraws({k: np.full(2, v) for k, v in {"k1": 8e3, "B": 0.3, "U": 1.0, "k2": 0.03, "N": 0.7}.items()}, 1000.0)
+
+
+def _warned(robot):
+    return [notice.text for notice in plausible.robot_notices(robot)]
+
+
+@pytest.mark.parametrize("name", [*schema.shipped(), *map(str, FIELD)])
+def test_no_robot_that_was_built_or_drawn_up_is_suspected(name):
+    assert _warned(schema.read_robot_file(name)) == []
+
+
+def _scaled(factor):
+    robot = six_wires()
+    lengths = ("exit_m", "platform_m", "centre_of_mass_m", "home_m", "lower_m", "upper_m")
+    return replace(robot, **{name: factor * getattr(robot, name) for name in lengths})
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_a_robot_larger_than_any_is_suspected(share):
+    """Everything in millimetres: its size alone shows it."""
+    said = _warned(_scaled(share * 1000.0 / six_wires().span_m))
+    assert bool(said) == (share > 1)
+    assert all(text.startswith("leg.exit_point_m") for text in said)
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+@pytest.mark.parametrize(("key", "times"), [("beyond_exit_m", 10.0), ("drum_radius_m", 0.5), ("pulley_radius_m", 0.5)])
+def test_what_is_larger_than_the_robot_is_suspected(key, times, share):
+    base, one = six_wires(), np.ones(6)
+    length = np.full(6, share * times * base.span_m)
+    robot = {
+        "beyond_exit_m": replace(base, beyond_m=length),
+        "drum_radius_m": replace(base, drums=Drums(length, one, one, one, one, one)),
+        "pulley_radius_m": replace(base, pulleys=Pulleys(length, np.tile([0.0, 0.0, 1.0], (6, 1)))),
+    }[key]
+    said = _warned(robot)
+    assert bool(said) == (share > 1)
+    assert all(text.startswith(f"leg.{key} of wire 1 and 5 more") for text in said)
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_a_mass_far_outside_its_platform_is_suspected(share):
+    robot = six_wires()
+    middle = robot.platform_m.mean(0)
+    arm = np.linalg.norm(robot.platform_m - middle, axis=1).max()
+    said = _warned(replace(robot, centre_of_mass_m=middle - [0.0, 0.0, share * 5.0 * arm]))
+    assert bool(said) == (share > 1)
+    assert all(text.startswith("platform.centre_of_mass_m") for text in said)
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_a_home_far_from_its_exit_points_is_suspected(share):
+    robot = replace(six_wires(), platform_m=np.zeros((6, 3)))
+    exits = np.array([[-1.0, 0, 0], [1.0, 0, 0]] * 3)
+    said = _warned(replace(robot, exit_m=exits, home_m=np.array([0.0, 0.0, -np.sqrt((share * 20.0) ** 2 - 1.0)])))
+    assert bool(said) == (share > 1)
+    assert all(text.startswith("pose.position_m") for text in said)
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+@pytest.mark.parametrize(("wrong", "key"), [({"k1": 10.0}, "k1_N"), ({"B": 100.0}, "B_mm")])
+def test_a_wire_that_is_strained_beyond_its_length_is_suspected(wrong, key, share):
+    """At 10 N a wire of k1 = 10 N doubles its length, and so it does by creep of 100 mm/N at 1000 mm."""
+    values = {"k1": 8e3, "B": 0.3, "U": 1.0, "k2": 0.03, "N": 0.7} | wrong
+    robot = replace(six_wires(), wire=("line",) * 6, given={"line": GivenWire(values, 1000.0)})
+    said = plausible.strain_notices(robot, LINE, np.full(6, share * 10.0))
+    assert [bool(said), len(said)] == [share > 1, int(share > 1)]
+    assert all(f"[wires.line], {key}" in notice.text for notice in said)
+    assert plausible.strain_notices(six_wires(), LINE, np.full(6, share * 10.0)) == []
+
+
+def test_the_warnings_stand_in_an_answer_and_where_there_is_none():
+    mistaken = replace(six_wires(), beyond_m=np.full(6, 1e4))
+    request = PoseRequest(mistaken.home_m, np.eye(3), np.array([0.0, 60.0]))
+    held = pose_report(mistaken, LINE, request).content["warnings"]
+    nowhere = pose_report(mistaken, LINE, replace(request, position_m=mistaken.home_m + 9.0)).content["warnings"]
+    for said in (held, nowhere):
+        assert [one["text"][:17] for one in said if one["kind"] == "geometry"] == ["leg.beyond_exit_m"]
+    assert [one["kind"] for one in nowhere][0] in ("unheld", "uncarried")
