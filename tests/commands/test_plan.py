@@ -10,6 +10,7 @@ from wirebayes.commands import plan as module
 from wirebayes.commands import plan_content
 from wirebayes.effects import CATALOGUE
 from wirebayes.io.run_folder import write_json
+from wirebayes.robot.mechanics import schema
 
 FEW = wb.Policy(walkers=32, ess=100, rounds=2, most_rounds=2, round_draws=512, block=8, most_steps=16, r_hat=99)
 PLAN = """budget_min = 4.0
@@ -67,6 +68,21 @@ def measured():
 @pytest.fixture(scope="module")
 def fitted(measured, tmp_path_factory):
     return wb.fit(measured, check=False, policy=FEW, output=tmp_path_factory.mktemp("fitted") / "out").folder.parent
+
+
+def test_a_robot_on_wires_of_its_own_is_said_to_be_changed_by_no_test(plan_file, tmp_path, capsys):
+    table = "\n[wires.mine]\nk1_N = 800.0\nB_mm = 0.3\nU = 1.0\nk2 = 0.03\nN = 0.7\nlength_mm = 1000.0\n"
+    text = schema.robot_text("hangprinter-4").replace("[[leg]]", '[[leg]]\nwire = "mine"') + table
+    robot, out = tmp_path / "own.toml", tmp_path / "out"
+    robot.write_text(text)
+    plan_file.write_text(PLAN.replace('"linear-7"', f'"{robot}"'))
+    assert main(["plan", str(plan_file), "--output", str(out)]) == 0
+    found = json.loads((out / "plan.json").read_text())
+    assert [row["robot"] for row in found["protocols"]] == [None, None]
+    assert [one["kind"] for one in found["warnings"]] == ["left-out"]
+    printed = capsys.readouterr()
+    assert "no test of this line changes the drift of" in printed.err and "drift of the robot" not in printed.out
+    assert "drift in 1 h" not in (out / "report.html").read_text()
 
 
 def test_a_plan_file_is_ranked_within_its_budget(plan_file, tmp_path, capsys):

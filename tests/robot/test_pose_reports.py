@@ -1,5 +1,6 @@
 """What a pose report says of falls, margins, claims and controllers, from results that are written down."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,6 +9,7 @@ import pytest
 
 from wirebayes.notice import Notice
 from wirebayes.robot.mechanics import draws, schema
+from wirebayes.robot.mechanics.description import GivenWire
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import claim, control, drift, forward, outcome
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
@@ -253,12 +255,12 @@ def test_a_leg_without_a_drum_leaves_no_gap_in_the_others() -> None:
 @pytest.mark.parametrize(("held", "shared"), [(29, False), (30, True)])
 def test_shares_need_thirty_draws_that_hold_and_leave_the_others_out(held: int, shared: bool) -> None:
     """The drift is ten times the logarithm of one parameter, in millimetres, of the draws that hold."""
-    rng = np.random.default_rng(0)
+    rng, robot = np.random.default_rng(0), schema.read_robot_file("linear-7")
     line = draws.WireDraws({k: np.exp(rng.standard_normal(40)) for k in draws.CORE}, 1000.0)
     size = 1e-2 * (10.0 + np.log(line.parameters["B"]))
     size[held:] = NAN
     courses = {s: at(size * (1.0 + s), np.zeros(40), (0.0, 30.0, 60.0)) for s in (0.0, 0.1)}
-    found = answer._shares(line, courses, HERE, TURNED)
+    found = answer._shares(robot, line, courses, HERE, TURNED)
     assert (found["time_s"], found["output"]) == (60.0, "distance")
     if not shared:
         assert "Fewer than 30 draws" in found["sentence"] and "shared_draw" not in found
@@ -267,7 +269,10 @@ def test_shares_need_thirty_draws_that_hold_and_leave_the_others_out(held: int, 
     sd = 1e3 * np.std(size[:held])
     assert [row["sd_mm"] for row in found["sd_mm"]] == pytest.approx([sd, 1.1 * sd])
     lost = {0.0: courses[0.0], 0.1: at(np.full(40, NAN), np.zeros(40))}
-    assert answer._shares(line, lost, HERE, TURNED)["sd_mm"][1]["sd_mm"] is None
+    assert answer._shares(robot, line, lost, HERE, TURNED)["sd_mm"][1]["sd_mm"] is None
+    given = replace(robot, given=dict.fromkeys(robot.wire, GivenWire({}, 1000.0)))
+    said = answer._shares(given, line, courses, HERE, TURNED)
+    assert "parameters of all wires" in said["sentence"] and "shared_draw" not in said
 
 
 def test_a_robot_that_may_fall_says_who_is_to_blame_in_every_way() -> None:

@@ -78,7 +78,7 @@ def protocol_content(
         "effects": seen.effects,
         "cosines": cosines,
         "not_identifiable": list(seen.hidden),
-        "robot": None if machine is None else _drift(judged, request.guess, machine, spec),
+        "robot": None if machine is None or machine.is_on_given_wires else _drift(judged, request.guess, machine, spec),
     }
 
 
@@ -105,7 +105,7 @@ def plan_content(rows: list[JudgedProtocol], request: PlanRequest, machine: Robo
         },
         "robot": None if machine is None else machine.name,
         "protocols": rows,
-        "warnings": to_json([*_over_budget(rows[0], request.budget_min), *guess.doubts]),
+        "warnings": to_json([*_over_budget(rows[0], request.budget_min), *_unchanged(machine), *guess.doubts]),
     }
 
 
@@ -114,6 +114,17 @@ def _over_budget(best: JudgedProtocol, budget_min: float | None) -> list[Notice]
     if best["within_budget"]:
         return []
     return [Notice("budget", f"no test is done within {budget_min:g} min")]
+
+
+def _unchanged(machine: Robot | None) -> list[Notice]:
+    """That the drift of a robot does not depend on the line that is tested, if so."""
+    if machine is None or not machine.is_on_given_wires:
+        return []
+    text = (
+        f"no test of this line changes the drift of {machine.name}: its file gives the parameters of all its wires; "
+        "leave them out, or write fitted = true under [wires.NAME]"
+    )
+    return [Notice("left-out", text)]
 
 
 def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) -> RobotDrift:

@@ -99,7 +99,7 @@ def _reliability(rows: list[JudgedProtocol]) -> Points:
 
 def _ranking(found: PlanJson) -> Table:
     names = [n for n in ("k1", "B", "U", "k2", "N") if n in found["protocols"][0]["parameters"]]
-    robot = found["robot"] is not None
+    robot = found["protocols"][0]["robot"] is not None
     lines = [
         [
             str(row["rank"]),

@@ -239,6 +239,11 @@ class Robot:
         return self.freedom == "pose" and self.legs < self.freedoms
 
     @property
+    def is_on_given_wires(self) -> bool:
+        """Whether the file gives the parameters of every leg's wire: then no test of a line changes the robot."""
+        return all(name in self.given for name in self.wire)
+
+    @property
     def is_linear(self) -> NDArray[np.bool_]:
         """(w,) True where a linear actuator drives the leg."""
         return np.array([a == "linear" for a in self.actuator])

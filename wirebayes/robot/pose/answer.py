@@ -126,7 +126,7 @@ def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, cont
     content["claim"] = _claim(courses, x, R, request)
     content["pose_error"] = controllers.errors(robot, line, request, rng, other)
     content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
-    content["variance_shares"] = _shares(line, courses, x, R)
+    content["variance_shares"] = _shares(robot, line, courses, x, R)
     content["warnings"] = to_json(_warnings(held, courses, content["equilibria"]["commanded_stable"], turned))
     spaces = map_slices(robot, line, request.slices)
     reached = [one for one in spaces if len(one.drift.position_m)]
@@ -146,7 +146,7 @@ def _courses(held: _Held, rng: np.random.Generator) -> dict[float, Course]:
 
 
 def _warnings(held: _Held, courses: dict[float, Course], stable: bool, turned: Orientation) -> list[Notice]:
-    """What speaks against the answer: weak wires, falls, what was asked for in vain, the robot's file, what was never tested."""
+    """What speaks against the answer: weak wires, falls, what is not had, the robot's file, what was never tested."""
     out = _weak(held.commands)
     for spread, course in courses.items():
         out += stability.stability_warnings(course, spread, stable)
@@ -358,7 +358,7 @@ def _claim(courses: dict[float, Course], x: Floats, R: Floats, request: PoseRequ
     }
 
 
-def _shares(line: WireDraws, courses: dict[float, Course], x: Floats, R: Floats) -> VarianceShares:
+def _shares(robot: Robot, line: WireDraws, courses: dict[float, Course], x: Floats, R: Floats) -> VarianceShares:
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
     size = {s: np.linalg.norm(drift.distance_moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
     held = np.isfinite(size[0.0])
@@ -369,6 +369,9 @@ def _shares(line: WireDraws, courses: dict[float, Course], x: Floats, R: Floats)
         own = f"{wire} " if line.others else ""
         kept |= {f"{own}{name}": one.parameters[name][held] for name in names}
     result: VarianceShares = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
+    if robot.is_on_given_wires:
+        result["sentence"] = "The robot's file gives the parameters of all wires: no share comes from the fit."
+        return result
     if held.sum() < 30:
         result["sentence"] = "Fewer than 30 draws that hold the platform: no shares are computed."
         return result
