@@ -111,16 +111,21 @@ def test_with_exact_geometry_a_sensor_is_named_from_the_same_level_and_holds_on(
     whole = np.eye(9)
     whole[5:, 5:] = covariance
 
-    def calibrated(robot, prior, session, readings):
+    def calibrated(robot, prior, session, readings, patience):
         assert prior.bias_sd_N == PRIOR_N  # as much as a sensor ever read
         unknowns = np.concatenate([np.full(5, 7.0), bias])
-        return SimpleNamespace(unknowns=unknowns[None], covariance=whole[None], converged=np.array([True]))
+        ended = {"converged": np.array([True]), "misfit": np.array([left]), "p_joint": np.array([SIGNIFICANT / 2])}
+        return SimpleNamespace(unknowns=unknowns[None], covariance=whole[None], **ended)
 
     monkeypatch.setattr(answer, "length_posterior", calibrated)
     monkeypatch.setattr(answer, "replace", lambda prior, **changed: SimpleNamespace(**{**vars(prior), **changed}))
     session = SimpleNamespace(read=np.arange(3) < read, tension_sd_N=0.5)
     readings = np.full(4 * read + 3, PRIOR_N / 0.5)
     readings[4 * read :] = 1e6  # of an inclinometer, which comes after the tensions
-    found = answer._at_fault(SimpleNamespace(legs=4), SimpleNamespace(bias_sd_N=0.0), session, readings)
+    known = SimpleNamespace(misfit=np.array([100.0]))
+    robot, left = SimpleNamespace(legs=4), 19.9
+    found = answer._at_fault(robot, SimpleNamespace(bias_sd_N=0.0), session, readings, known)
     assert wires is None if found is None else found.wires == wires
-    assert answer._at_fault(SimpleNamespace(legs=4), SimpleNamespace(bias_sd_N=1.0), session, readings) is None
+    assert answer._at_fault(robot, SimpleNamespace(bias_sd_N=1.0), session, readings, known) is None
+    left = 20.1  # sensors explain less than four fifths of what contradicts
+    assert answer._at_fault(robot, SimpleNamespace(bias_sd_N=0.0), session, readings, known) is None

@@ -22,9 +22,10 @@ from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.motion import control, hanging, inverse, plausible
 from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
-from wirebayes.robot.self_calibration.estimate import LengthPosterior, corrected_joints, length_posterior
+from wirebayes.robot.self_calibration.estimate import GROSS, LengthPosterior, corrected_joints, length_posterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
-from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval_about
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about
+from wirebayes.sentences import number
 
 CANDIDATES = 200  # in the workspace: the best of them come within a few percent of the best there are
 # Times the error of a reference length and the creep of the wire that crept most, by which a pose may be off. In
@@ -62,7 +63,7 @@ def lengths_report(
         given["tension_bias_sd_N"] = prior.bias_sd_N
         given["tension_bias_sign"] = "constant" if session.motion is None else "motion"
     contradicted = _contradicted(robot, prior, session, known)
-    at_fault = None if usable(known) else _at_fault(robot, prior, session, readings)
+    at_fault = None if usable(known) else _at_fault(robot, prior, session, readings, known)
     content: CalibrateJson = {
         "version": 2,
         "robot": robot.name,
@@ -148,6 +149,11 @@ def _unsure(known: LengthPosterior, plain: LengthPosterior) -> list[Notice]:
     """What speaks against the lengths, or against the comparison with those that ignore creep."""
     if not known.converged[0]:
         advice = "read more poses, or check the readings, --tension-sd and --reference-sd"
+        if known.misfit[0] > GROSS:
+            advice = (
+                f"the readings are {number(known.misfit[0] ** 0.5)} standard errors from what robot and wires allow; "
+                "check their units, the order of their columns, and the robot's file"
+            )
         text = f"not converged with the creep model: do not use these lengths; {advice}"
         return [Notice("not-converged", text)]
     notices = []
@@ -157,7 +163,7 @@ def _unsure(known: LengthPosterior, plain: LengthPosterior) -> list[Notice]:
     if not known.p_joint[0] >= SIGNIFICANT:  # where it is not known, too
         text = (
             "robot and wires do not explain the readings together with the reference lengths (joint test, "
-            f"p = {known.p_joint[0]:.2g}, mean squared residual {known.misfit[0]:.3g}): do not use these lengths; "
+            f"{chance(known.p_joint[0])}, mean squared residual {known.misfit[0]:.3g}): do not use these lengths; "
             "check exit and platform points, which are taken as exact, --wires, the readings' units and signs, "
             "--tension-sd and --reference-sd"
         )
@@ -182,14 +188,18 @@ def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: Len
     return [Notice("misfit", text) for text in texts]
 
 
-def _at_fault(robot: Robot, prior: LengthPrior, session: Session, readings: Floats) -> sensors.Suspects | None:
-    """Which sensor would explain what contradicts; None where sensors have a bias already, or nothing converged."""
+def _at_fault(
+    robot: Robot, prior: LengthPrior, session: Session, readings: Floats, known: LengthPosterior
+) -> sensors.Suspects | None:
+    """Which sensor would explain what contradicts; None where sensors have a bias already, or explain little of it."""
     holds = int(session.read.sum())
     widest = session.tension_sd_N * float(readings[: holds * robot.legs].max(initial=0.0))  # no more than it ever read
     if holds < sensors.LEAST_HOLDS or prior.bias_sd_N > 0 or not widest > 0:
         return None
-    other = length_posterior(robot, replace(prior, bias_sd_N=widest), session, readings[None])
-    if not other.converged[0]:
+    # errors of sensors add to the readings: the first steps foresee already what they explain
+    other = length_posterior(robot, replace(prior, bias_sd_N=widest), session, readings[None], patience=1)
+    left = float(other.misfit[0] / known.misfit[0])  # of what contradicts, with errors of all sensors
+    if not other.converged[0] or (other.p_joint[0] < SIGNIFICANT and left > 1 - sensors.MOST):
         return None
     bias = slice(-robot.legs, None)
     return sensors.weighed(other.unknowns[0, bias], other.covariance[0, bias, bias], widest)

@@ -21,6 +21,11 @@ from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.start import starting_references
 from wirebayes.robot.self_calibration.trust import joint_test
 
+# Mean squared residual, foreseen by the slopes at best, from which on readings contradict the robot grossly: they are
+# missed by a hundred standard errors. A search is given up after so many steps then; of sessions that fit, however
+# rough, the third step foresees less than a thousandth of it.
+GROSS, PATIENT = 1e4, 5
+
 
 @dataclass(frozen=True)
 class LengthPosterior:
@@ -71,7 +76,12 @@ class LengthPosterior:
 
 
 def length_posterior(
-    robot: Robot, prior: LengthPrior, session: Session, readings: Floats, iterations: int = 40
+    robot: Robot,
+    prior: LengthPrior,
+    session: Session,
+    readings: Floats,
+    iterations: int = 40,
+    patience: int = PATIENT,
 ) -> LengthPosterior:
     """Posterior of the wires' lengths from standardised readings of one session on ``m`` robots.
 
@@ -84,6 +94,8 @@ def length_posterior(
         In the order and the units of `Prediction.readings`.
     iterations : int
         Levenberg-Marquardt steps at most.
+    patience : int
+        Steps from which on the search is given up where the readings contradict the robot grossly.
 
     Returns
     -------
@@ -95,7 +107,7 @@ def length_posterior(
     # Unknowns in units of their prior; references first brought near by the geometry of measured tensions.
     white = np.zeros((len(readings), len(mean)))
     white[:, : robot.legs] = starting_references(robot, prior, session, readings) / prior.reference_sd_m
-    mode = _mode(target, white, iterations)
+    mode = _mode(target, white, iterations, patience)
     here = mode.here
     J, G, P = target.derivatives(mode.white, here)
     spread = inv(np.swapaxes(J, 1, 2) @ J + np.eye(len(mean)))
@@ -155,15 +167,18 @@ class _Mode:
     converged: NDArray[np.bool_]
 
 
-def _mode(target: _Target, white: Floats, iterations: int) -> _Mode:
-    """Modes by Levenberg-Marquardt, all robots at once, from a start ``(m, d)``."""
+def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mode:
+    """Modes by Levenberg-Marquardt, all robots at once, from a start ``(m, d)``; given up where readings are absurd."""
     m, d = white.shape
     here = target.predicted(white)
     cost = target.cost(here, white)
-    converged, moved, damping = np.zeros(m, bool), np.ones(m, bool), np.full(m, 1e-3)
+    converged, given_up = np.zeros(m, bool), np.zeros(m, bool)
+    moved, damping = np.ones(m, bool), np.full(m, 1e-3)
     J = np.zeros((m, target.readings.shape[1], d))
-    for _ in range(iterations):
-        open_ = np.flatnonzero(~converged & moved)  # where a step failed, the derivatives stay: they are the work
+    for taken in range(iterations):
+        open_ = np.flatnonzero(
+            ~(converged | given_up) & moved
+        )  # where a step failed, the derivatives stay: they are the work
         if len(open_):
             J[open_] = target.derivatives(white[open_], _part(here, open_))[0]
         normal = np.swapaxes(J, 1, 2) @ J + np.eye(d)
@@ -172,10 +187,12 @@ def _mode(target: _Target, white: Floats, iterations: int) -> _Mode:
         decrement = np.einsum("md,md->m", slope, solve(normal, slope[..., None])[..., 0])
         # A mode on the edge of slackness has no zero slope; there, no step however short improves.
         converged |= (decrement < 1e-3) | (damping > 1e8)
-        if converged.all():
+        if taken >= patience:
+            given_up |= ~converged & (cost - decrement > GROSS * target.readings.shape[1])
+        if (converged | given_up).all():
             break
         step = _damped_step(normal, slope, damping)
-        step[converged] = 0.0
+        step[converged | given_up] = 0.0
         there = target.predicted(white + step, near=(here.begun_m, here.begun_rotation))
         new = target.cost(there, white + step)
         better = new < cost - 1e-9 * np.where(np.isfinite(cost), cost, 0.0)

@@ -16,12 +16,15 @@ from wirebayes.numeric.linear_algebra import inv, solve
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.posterior import Whole
-from wirebayes.robot.self_calibration.trust import SIGNIFICANT
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance
 from wirebayes.robot.self_calibration.whole import estimate
 
 LEAST_HOLDS = 2  # read: at a single one an error of a sensor and one of a length look the same
 _TRIES, _STILL = 3, 0.5  # searches, and standard deviations: along a narrow valley the last steps change little
-_MOST = 0.8  # of what contradicts: two sensors as bad as each other explain half of it each
+MOST = 0.8  # of what contradicts: two sensors as bad as each other explain half of it each
+
+
+_NEARLY_ALL = 99.5  # percent, which are rounded to all of it
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ class Suspects:
         if self.p_none >= SIGNIFICANT:
             return []
         alone = self.p_alone >= SIGNIFICANT
-        return [int(i) for i in np.flatnonzero(alone if alone.any() else self.explains >= _MOST)]
+        return [int(i) for i in np.flatnonzero(alone if alone.any() else self.explains >= MOST)]
 
 
 def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
@@ -139,7 +142,7 @@ def sensor_notices(found: Suspects | None) -> list[Notice]:
     if found is None or found.p_none >= SIGNIFICANT:
         return []
     if not found.wires:
-        text = f"several tension sensors are off (p = {found.p_none:.2g} for none): do not use these values"
+        text = f"several tension sensors are off ({chance(found.p_none)} if none were): do not use these values"
         return [Notice("misfit", text)]
     texts = [
         f"wire {i + 1} (reads {abs(found.bias_N[i]):.3g} +- {found.sd_N[i]:.2g} N too "
@@ -148,6 +151,8 @@ def sensor_notices(found: Suspects | None) -> list[Notice]:
     ]
     one = len(texts) == 1
     share = 100 * found.explains[found.wires].min()
-    said = f"the tension sensor of {' or of '.join(texts)} would explain {share:.0f} % of what contradicts"
+    whole = bool((found.p_alone[found.wires] >= SIGNIFICANT).all()) or share >= _NEARLY_ALL
+    much = "" if whole else f"{share:.0f} % of "
+    said = f"the tension sensor of {' or of '.join(texts)} would explain {much}what contradicts"
     advice = f"do not use these values; {'zero it' if one else 'find out which, zero it'}, or give --tension-bias"
     return [Notice("misfit", f"{said}: {advice}")]

@@ -11,6 +11,7 @@ from wirebayes.numeric.typing import Floats
 # Of a session with nothing wrong one in a hundred is called unusable: a warning that is heeded costs another session,
 # lengths that are wrong cost a crash.
 SIGNIFICANT = 0.01
+_LEAST = 1e-4  # probability: farther out, no error is known to be Gaussian
 _UNLEARNT = 1e-6  # of a prior's variance: of a length of which the readings say less, there is nothing to be tested
 
 
@@ -42,11 +43,16 @@ def joint_test(cost: Floats, count: float, white: Floats, spread: Floats, count_
     return np.asarray(np.minimum(1.0, 2.0 * least))
 
 
+def chance(p: float) -> str:
+    """A probability as a message has it."""
+    return f"p < {_LEAST:g}" if p < _LEAST else f"p = {p:.2g}"
+
+
 def unlikely(p: float) -> Notice:
     """What to say of a calibration that did not pass."""
     return Notice(
         "misfit",
-        f"readings and model do not belong together (p = {p:.2g}): something that is taken as exact, or a stated "
+        f"readings and model do not belong together ({chance(p)}): something that is taken as exact, or a stated "
         "error, is wrong; do not use these values",
     )
 
