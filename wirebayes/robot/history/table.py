@@ -97,6 +97,8 @@ def parse_log(table: CsvTable, robot: Robot, columns_of: Callable[[Robot, Sequen
     history = _history(robot, joints, table.header, cells)
     if history.joint_m is not None:
         plausible.refuse(robot, history.joint_m, table, joints)
+    if history.position_m is not None:
+        plausible.refuse_far(robot, history.position_m, table, POSITION)
     return history
 
 

@@ -85,6 +85,32 @@ def refuse(robot: Robot, joint_m: Floats, table: CsvTable, columns: Sequence[str
     raise table.complain(row, column, found, expected)
 
 
+def refuse_far(robot: Robot, position_m: Floats, table: CsvTable, columns: Sequence[str]) -> None:
+    """Refuse positions of a table that lie far outside the robot.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m : (t, 3) array
+        NaN where they are not known.
+    table : CsvTable
+        Where they were read, a row a time.
+    columns : sequence of str
+        The columns of the positions.
+
+    Raises
+    ------
+    InputError
+        Naming line and column, what was found and what was expected.
+    """
+    most = _FAR * robot.span_m
+    far = np.nan_to_num(np.abs(position_m - robot.home_m)) > most
+    if far.any():
+        row, axis = _first(far)
+        expected = f"metres, at most {number(most)} from home, {_FAR:g} times the robot's size"
+        raise table.complain(row, columns[axis], shown(table.cell(row, columns[axis])), expected)
+
+
 def robot_notices(robot: Robot) -> list[Notice]:
     """A warning for each key of a robot's file whose value looks like one in another unit.
 

@@ -11,12 +11,14 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.joint_columns import joint_columns, joint_values
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import plausible
+from wirebayes.robot.self_calibration.mistaken import refuse_mistaken
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.strict.files import read_text
 from wirebayes.strict.table import LARGEST_READING, CsvTable, Header, Numbers, csv_table
 
 POSITION, TURN = ("x_m", "y_m", "z_m"), ("rx_rad", "ry_rad", "rz_rad")
 NORMAL = ("normal_x", "normal_y")
+_NOISE = 5.0  # standard errors: so far below zero a slack wire may read, once in millions of readings
 
 
 def columns(robot: Robot, given: Sequence[str] = ()) -> Header:
@@ -41,8 +43,8 @@ def read_session(
 
     A row without tensions is a hold that was not read; one without a position is a hold at a pose that nobody knows,
     and one without a rotation at an orientation that nobody knows: NaN in the session. With the columns
-    ``normal_x,normal_y`` an inclinometer's readings join in. Sensors that may be `biased` may read below zero, and
-    directions of motion, ``motion_1`` and so on, may be given for them only.
+    ``normal_x,normal_y`` an inclinometer's readings join in. Tensions may be below zero by their noise, and by any
+    amount where sensors may be `biased`; directions of motion, ``motion_1`` and so on, may be given for these only.
 
     Raises
     ------
@@ -96,7 +98,7 @@ def parse_session(
     moved, tilted = motions[0] in table.header, NORMAL[0] in table.header
     if moved and not biased:
         raise _motions_without_bias(table)
-    cells = table.numbers(lambda name: _allowed(name, biased))
+    cells = table.numbers(lambda name: _allowed(name, -np.inf if biased else -_NOISE * tension_sd_N))
     if not len(cells):
         raise InputError(f"{table.path}: found no holds, expected at least one row")
 
@@ -108,6 +110,7 @@ def parse_session(
     joints = joint_columns(robot, table.header)
     joint = joint_values(robot, joints, some(joints))
     plausible.refuse(robot, joint, table, joints)
+    plausible.refuse_far(robot, some(POSITION), table, POSITION)
     tension, normal = some(tensions), some(NORMAL if tilted else ())
     position, turn = some(POSITION), some(TURN)
     _refuse_half(table, np.concatenate([tension, normal], axis=1), "the readings")
@@ -125,6 +128,7 @@ def parse_session(
         some(motions) if moved else None,
         number,
     )
+    refuse_mistaken(robot, session, tension, table, joints)
     # without any tension read, what is left is for the calibration of the whole robot
     read_N, read_normal = tension[was_read].ravel(), normal[was_read].ravel()
     return session, np.concatenate([read_N / tension_sd_N, read_normal / tilt_sd_rad])
@@ -166,15 +170,16 @@ def may_be_empty(name: str) -> bool:
     return name.startswith(("tension_", "normal_")) or name in (*POSITION, *TURN)
 
 
-def _allowed(name: str, biased: bool) -> Numbers:
+def _allowed(name: str, least_N: float) -> Numbers:
     """What the cells of a column may hold."""
     empty = may_be_empty(name)
     if name == "duration_s":
         return Numbers(f"a number above 0, at most {LARGEST_READING:.0e}", above=0.0)
     if name.startswith("motion_"):
         return Numbers("1 (pulled in last), -1 (let out) or 0", -1.0, 1.0, whole=True)
-    if name.startswith("tension_") and not biased:
-        return Numbers(f"a number of at least 0, at most {LARGEST_READING:.0e}", 0.0, empty=empty)
+    if name.startswith("tension_") and np.isfinite(least_N):
+        way_out = f"{-least_N:g} N below 0 at most, as noise of --tension-sd; --tension-bias allows for a wrong zero"
+        return Numbers(f"a number up to {LARGEST_READING:.0e}, {way_out}", least_N, empty=empty)
     if name in NORMAL:
         return Numbers("a component of a unit vector, from -1 to 1", -1.0, 1.0, empty=empty)
     return Numbers(empty=empty)

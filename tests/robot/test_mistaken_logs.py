@@ -1,0 +1,127 @@
+"""Sessions in another unit, with columns mixed up or absurd readings; slack wires that read below zero."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.robot.test_unheld_home import six_wires
+from wirebayes.errors import InputError
+from wirebayes.robot.history import table
+from wirebayes.robot.mechanics.draws import WireDraws, for_robot
+from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.motion import inverse
+from wirebayes.robot.self_calibration import answer, estimate
+from wirebayes.robot.self_calibration.session import LengthPrior
+from wirebayes.robot.self_calibration.session_file import may_be_empty, parse_session
+from wirebayes.strict.columns import columns_table
+
+LINE = WireDraws({k: np.full(2, v) for k, v in {"k1": 15e3, "B": 0.05, "U": 0.9, "k2": 0.03, "N": 0.7}.items()}, 1000.0)
+HOLDS = 4
+SD_N = 0.02
+
+
+@pytest.fixture(scope="module")
+def session():
+    """Six holds of a platform on six wires: poses, joint values of wires that do not creep, and their tensions."""
+    robot, rng = six_wires(), np.random.default_rng(5)
+    x = robot.home_m + rng.uniform(-0.3, 0.3, (HOLDS, 3))
+    turn = rng.uniform(-0.03, 0.03, (HOLDS, 3))
+    tau = inverse.tensions(robot, x, matrix(turn))
+    assert np.isfinite(tau).all()
+    joint = inverse.commands(robot, for_robot(robot, LINE.centre()), x, matrix(turn), tau).joint_m
+    cells = {"hold": np.arange(1, HOLDS + 1)}
+    cells |= dict(zip(("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"), np.hstack([x, turn]).T, strict=True))
+    cells |= {"duration_s": np.full(HOLDS, 60.0)}
+    cells |= {f"joint_{i + 1}_m": joint[:, i] for i in range(6)}
+    return robot, cells | {f"tension_{i + 1}_N": tau[:, i] for i in range(6)}
+
+
+def _read(robot, cells, biased=False):
+    given = {name: np.asarray(value).tolist() for name, value in cells.items()}
+    return parse_session(columns_table(given, Path("log"), may_be_empty), robot, SD_N, 1e-3, biased)
+
+
+def _tensions(cells, change):
+    return cells | {name: change(v) for name, v in cells.items() if name.startswith("tension_")}
+
+
+def test_a_sound_session_is_read(session):
+    robot, cells = session
+    assert len(_read(robot, cells)[1]) == 6 * HOLDS
+
+
+@pytest.mark.parametrize(("times", "refused"), [(2.99, False), (3.01, True), (1 / 2.99, False), (1 / 3.01, True)])
+def test_all_tensions_in_another_unit_are_refused_by_the_weight(session, times, refused):
+    robot, cells = session
+    scaled = _tensions(cells, lambda tension: tension * times)
+    if not refused:
+        _read(robot, scaled)
+        return
+    with pytest.raises(
+        InputError, match=r"tension_1_N to tension_6_N: found tensions that are, all together, (3\.01|0\.332)"
+    ):
+        _read(robot, scaled)
+
+
+@pytest.mark.parametrize("kind", ["joint_{}_m", "tension_{}_N"])
+def test_columns_in_the_place_of_each_other_are_named(session, kind):
+    robot, cells = session
+    two, five = kind.format(2), kind.format(5)
+    with pytest.raises(InputError, match=f"columns {two} and {five}: .* in the place of each other"):
+        _read(robot, cells | {two: cells[five], five: cells[two]})
+
+
+def test_reference_lengths_that_err_are_no_mix_up(session):
+    robot, cells = session
+    _read(robot, cells | {"joint_2_m": np.asarray(cells["joint_2_m"]) + 0.4})
+
+
+@pytest.mark.parametrize(("times", "refused"), [(0.999, False), (1.001, True)])
+def test_poses_far_outside_the_robot_are_refused(session, times, refused):
+    robot, cells = session
+    far = np.array(cells["y_m"])
+    far[3] = robot.home_m[1] - times * 10.0 * robot.span_m
+    unread = _tensions(cells, lambda tension: np.full(HOLDS, np.nan))  # nothing to be balanced there
+    path = {"time_s": [0.0, 9.0], "x_m": [0.2, 0.2], "y_m": [-0.1, far[3]], "z_m": [1.2, 1.2]}
+    commanded = columns_table(path, Path("path"), table.may_be_unread)
+    if not refused:
+        _read(robot, unread | {"y_m": far})
+        table.parse_log(commanded, robot, table.commanded_columns)
+        return
+    with pytest.raises(InputError, match="row 3 .*y_m.* 10 times the robot's size"):
+        _read(robot, unread | {"y_m": far})
+    with pytest.raises(InputError, match="y_m.* 10 times the robot's size"):
+        table.parse_log(commanded, robot, table.commanded_columns)
+
+
+@pytest.mark.parametrize(("below", "refused"), [(4.99, False), (5.01, True)])
+def test_a_slack_wire_may_read_below_zero_by_noise(session, below, refused):
+    robot, cells = session
+    pull = np.array(cells["tension_1_N"])
+    pull[2] = -below * SD_N
+    slack = cells | {"tension_1_N": pull}
+    if refused:
+        with pytest.raises(InputError, match="tension_1_N.*--tension-bias"):
+            _read(robot, slack)
+        _read(robot, slack, biased=True)
+    else:
+        assert _read(robot, slack)[1].min() == pytest.approx(-below)
+
+
+def test_a_search_is_given_up_where_the_readings_are_absurd(session, monkeypatch):
+    """Tensions of five times the weight, up and down at random: no step leads anywhere."""
+    robot, cells = session
+    read, values = _read(robot, cells)
+    absurd = np.abs(np.random.default_rng(2).normal(0.0, 5.0 * 12.0 * 9.81 / SD_N, values.shape))
+    predicted, made = [], estimate.predict_session
+    monkeypatch.setattr(estimate, "predict_session", lambda *given, **more: predicted.append(1) or made(*given, **more))
+    with np.errstate(all="ignore"):
+        known = estimate.length_posterior(robot, LengthPrior(LINE, 5e-3), read, absurd[None])
+    assert not known.converged[0] and known.misfit[0] > estimate.GROSS
+    assert len(predicted) <= 2 * (estimate.PATIENT + 3)
+    (said,) = answer._unsure(known, known)
+    assert said.kind == "not-converged" and "standard errors from what robot and wires allow" in said.text
+    near = replace(known, misfit=np.array([estimate.GROSS]))
+    assert "read more poses" in answer._unsure(near, near)[0].text

@@ -1,0 +1,120 @@
+"""Sessions whose columns are not what their header says: another unit of force, two columns in the place of each other.
+
+Where poses are stated, their tensions must carry the platform's weight, and their joint values must be the lengths to
+there, whatever the wires are. That is checked before anything is fitted, for no fit would name the mistake.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.errors import InputError
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.winches import lengths
+from wirebayes.robot.self_calibration.session import Session
+from wirebayes.sentences import number
+from wirebayes.strict.table import CsvTable
+
+_ANOTHER_UNIT = 3.0  # times: units of force differ by 3.6 (ounces) and more, masses that were measured badly by less
+_EVEN = 0.1  # of the weight: tensions that leave so much of it unbalanced are not those of the poses
+_BETTER = 5.0  # times smaller: what two columns must leave, put in the place of each other
+_FEWEST = 3  # holds: with fewer of them a constant error of each wire explains any lengths
+_APART = 0.01  # of the robot's size: joint values that far from the lengths to their poses are not theirs
+
+
+def refuse_mistaken(robot: Robot, session: Session, tension_N: Floats, table: CsvTable, joints: Sequence[str]) -> None:
+    """Refuse columns of a session that contradict its stated poses, and would not in another unit or order.
+
+    Parameters
+    ----------
+    robot : Robot
+    session : Session
+    tension_N : (p, w) array
+        NaN where they were not read.
+    table : CsvTable
+        Where it was read.
+    joints : sequence of str
+        The columns of the joint values.
+
+    Raises
+    ------
+    InputError
+        Naming the columns, what was found and what was expected.
+    """
+    placed = np.isfinite(session.position_m).all(1) & np.isfinite(session.rotation).all((1, 2))
+    if robot.winch is not None or placed.sum() < _FEWEST:
+        return
+    _refuse_lengths(robot, session, placed, table, joints)
+    read = placed & session.read
+    if read.sum() >= _FEWEST:
+        _refuse_tensions(robot, session, tension_N, read, table)
+
+
+def _refuse_lengths(
+    robot: Robot, session: Session, rows: NDArray[np.bool_], table: CsvTable, joints: Sequence[str]
+) -> None:
+    """Two columns of joint values that are the lengths of each other's wires."""
+    shape = statics.geometry(robot, session.position_m[rows].T, np.moveaxis(session.rotation[rows], 0, -1))
+
+    def apart(order: Sequence[int]) -> Floats:
+        bare, offset = lengths(robot, session.joint_m[rows][:, order])
+        return np.asarray((statics.stretched(robot, shape, offset.T).T - bare).std(0))  # references may err
+
+    as_read = apart(range(robot.legs))
+    for i, j in combinations(range(robot.legs), 2):
+        there = apart(_swapped(robot.legs, i, j))[[i, j]].max()
+        if as_read[[i, j]].min() > max(_APART * robot.span_m, _BETTER * there):
+            found = f"{joints[i]} as far as {number(as_read[i])} m from the lengths to the stated poses"
+            raise _mixed_up(table, (joints[i], joints[j]), found, f"{number(there)} m")
+
+
+def _refuse_tensions(
+    robot: Robot, session: Session, tension_N: Floats, rows: NDArray[np.bool_], table: CsvTable
+) -> None:
+    """Tensions in another unit, and two columns that are the tensions of each other's wires."""
+    turn = np.moveaxis(session.rotation[rows], 0, -1)
+    shape = statics.geometry(robot, session.position_m[rows].T, turn)
+    force, load = -statics.wire_jacobian(robot, shape), -statics.weight(robot, turn)
+    scale = np.where(np.arange(len(load)) < 3, 1.0, 1.0 / robot.size_m)[:, None]
+    load = scale * load
+    names = [f"tension_{i}_N" for i in range(1, robot.legs + 1)]
+
+    def pulled(order: Sequence[int]) -> Floats:
+        return scale * (force * tension_N[rows][:, order].T).sum(1)
+
+    def left(pull: Floats) -> float:
+        return float(np.linalg.norm(pull - load) / np.linalg.norm(load))
+
+    pull = pulled(range(robot.legs))
+    times = float((pull * load).sum() / max((pull * pull).sum(), 1e-300))
+    if not 1 / _ANOTHER_UNIT < times < _ANOTHER_UNIT and left(times * pull) < _EVEN:
+        found = f"tensions that are, all together, {number(1 / times)} times what carries the platform's weight"
+        raise InputError(
+            f"{table.path}, {names[0]} to {names[-1]}: found {found}, expected newtons (or another mass_kg)"
+        )
+    if left(pull) < _EVEN:
+        return
+    for i, j in combinations(range(robot.legs), 2):
+        other = left(pulled(_swapped(robot.legs, i, j)))
+        if _BETTER * other < left(pull):
+            found = f"tensions that leave {100 * left(pull):.2g} % of the weight unbalanced"
+            raise _mixed_up(table, (names[i], names[j]), found, f"{100 * other:.2g} %")
+
+
+def _swapped(count: int, i: int, j: int) -> list[int]:
+    """The numbers from 0, two of them in the place of each other."""
+    order = list(range(count))
+    order[i], order[j] = j, i
+    return order
+
+
+def _mixed_up(table: CsvTable, pair: tuple[str, str], found: str, otherwise: str) -> InputError:
+    """The error for two columns, what they leave, and what they would leave in each other's place."""
+    return InputError(
+        f"{table.path}, columns {pair[0]} and {pair[1]}: found {found}, expected the two in the place of each other, "
+        f"which leaves {otherwise}"
+    )
