@@ -1,7 +1,7 @@
 """Pieces of the sentences that people read on a terminal, on a page and in a message."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from wirebayes.json_files.discovery import SharedFindings
@@ -126,6 +126,14 @@ def unit_text(unit: str) -> str:
 def short(value: float, digits: int = 4) -> str:
     """A number with at most so many digits and no zeros behind them: 6, 4.5, 1800."""
     return f"{float(f'{value:.{digits}g}'):g}"
+
+
+def coordinates(values: Iterable[float], digits: int = 4) -> str:
+    """Metres or radians of a point or a turn; what is less than a millionth of one is zero."""
+    return ", ".join(f"{value if abs(value) >= _NOTHING else 0:.{digits}g}" for value in values)
+
+
+_NOTHING = 1e-6
 
 
 def number(value: Any, digits: int = 3) -> str:

@@ -332,7 +332,7 @@ def test_a_requested_pose_far_from_where_the_joint_values_lead_causes_a_warning(
     lines = [line.split(",") for line in file.read_text().splitlines()]
     for k, cells in enumerate(lines[1:]):
         cells[0] = str(10 * (k + 1))
-    lines[2][1] = "50"  # metres, in x
+    lines[2][1] = "20"  # metres, in x
     lines[4][6] = "2.5"  # radians, about z
     file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
     assert main([*arguments, str(tmp_path / "odd")]) == 0

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wirebayes.commands.asked_pose import asked_place
+from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
@@ -61,3 +63,31 @@ def test_a_wire_at_its_bound_is_let_go_where_that_leads_nearer():
     robot = six_wires(centre_of_mass_m=(20.0, 10.0, -50.0))
     found = hanging.hang(robot, robot.home_m[None], np.eye(3))
     assert np.linalg.norm(turning.vector(found.rotation)[0]) < 0.418
+
+
+def two_wires() -> Robot:
+    """A weight on two wires, which keep it in their plane."""
+    base = schema.read_robot_file("hangprinter-4")
+    return replace(
+        base, name="two", exit_m=np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), platform_m=np.zeros((2, 3)),
+        lines=np.ones(2), beyond_m=np.zeros(2), actuator=("drum",) * 2, ratio=np.zeros(2), wire_m=np.zeros(2),
+        wire=("default",) * 2, mass_kg=0.8, centre_of_mass_m=np.zeros(3), home_m=np.array([0.2, 0.0, -0.6]),
+        home_rotation_rad=np.zeros(3), pulleys=None, drums=None, mass_kg_m=None,
+        rule=replace(base.rule, choice="minimum_norm", lowest_N=0.1, highest_N=50.0),
+    )  # fmt: skip
+
+
+def test_beside_the_plane_of_two_wires_the_nearest_position_within_it_is_named():
+    robot = two_wires()
+    there = balanced_orientation(robot, np.array([0.2, 0.1, -0.6]), None)
+    np.testing.assert_allclose(there.nearest_m, [0.2, 0.0, -0.6], atol=1e-6)
+    assert "(0.2, 0, -0.6) m" in there.sentence
+    assert balanced_orientation(robot, robot.home_m, None).sentence == ""
+    nowhere = balanced_orientation(robot, np.array([0.2, 0.0, 0.4]), None)
+    assert nowhere.nearest_m is None and "nearest" not in nowhere.sentence
+
+
+def test_a_rotation_of_a_platform_that_cannot_turn_is_refused():
+    with pytest.raises(InputError, match="--rotation: found one for a robot whose lines keep the orientation"):
+        asked_place(two_wires(), None, (0.0, 0.0, 20.0))
+    assert asked_place(two_wires(), None, (0.0, 0.0, 0.0))[1] is not None

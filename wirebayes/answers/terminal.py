@@ -20,6 +20,7 @@ from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import Quantiles
 from wirebayes.sentences import (
+    coordinates,
     counted,
     families_said,
     likely,
@@ -221,7 +222,7 @@ def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
 
 def _turned(found: PoseJson) -> list[str]:
     """The orientation that balance decided."""
-    vector = ", ".join(f"{v:.4g}" for v in found["pose"]["rotation_vector_rad"])
+    vector = coordinates(found["pose"]["rotation_vector_rad"])
     return [f"{found['robot']}: rotation vector ({vector}) rad; {found['orientation']['sentence']}"]
 
 

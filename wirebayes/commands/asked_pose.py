@@ -65,6 +65,8 @@ def asked_place(robot: Robot, position: Numbers | None, rotation: Numbers | None
     turned = asked_rotation(rotation)
     if turned is not None and np.isnan(turned).any() and robot.freedom == "orientation":
         raise InputError("--rotation: found free components for a platform on a ball joint, expected three numbers")
+    if turned is not None and robot.freedom == "position" and not np.array_equal(turned, robot.home_rotation_rad):
+        raise InputError("--rotation: found one for a robot whose lines keep the orientation, expected none")
     _refuse_off_plane(robot, where, about(robot, turned))
     return where, turned
 

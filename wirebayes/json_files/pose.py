@@ -308,6 +308,7 @@ class PoseJson(RobotOnWires):
     pose: PoseNow
     tension_distribution: TensionDistribution
     orientation: NotRequired[OrientationFound]
+    nearest_position_m: NotRequired[Numbers]
     plane: NotRequired[OnPlane]
     feasible_draws: NotRequired[float]
     inverse: NotRequired[InverseKinematics]

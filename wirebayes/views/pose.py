@@ -3,12 +3,13 @@
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, cast
 
 from wirebayes.answers import terminal
 from wirebayes.json_files.pose import PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.robot.mechanics.draws import specimens_in_words
+from wirebayes.sentences import coordinates
 
 if TYPE_CHECKING:
     pass
@@ -76,6 +77,10 @@ def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path, given: Given) -
         return f"give the controller the joint values of {corrections}"
     if any(warning["kind"] == "uncarried" for warning in found["warnings"]):
         return "[plane] in the robot's file, if a table or a rail carries the platform; else another pose"
+    nearest = cast(PoseJson, found).get("nearest_position_m")
+    if nearest is not None:
+        near = coordinates(nearest, 5).replace(" ", "")
+        return f"wirebayes pose {given.file} --wires {given.wires} --position={near}, where the platform hangs"
     if lost or not found.get("feasible", True):
         return "another pose or payload, or other bounds of the tension in the robot's file"
     calibrate = f"wirebayes calibrate {given.file} READINGS.csv --wires {given.wires}"

@@ -43,7 +43,8 @@ def equations(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, 
     shape = statics.geometry(robot, x.T, turn)
     force, H = statics.unbalance_and_stiffness(robot, shape, turn, tau.T, np.zeros_like(tau.T))
     scale = scale_of(robot)
-    by_turn = np.moveaxis(H, -1, 0)[:, :, 3:] * scale[:, None]
+    by_turn = np.zeros((len(x), robot.degrees, 3))  # of a platform that cannot turn
+    by_turn[..., : robot.degrees - 3] = np.moveaxis(H, -1, 0)[:, :, 3:] * scale[:, None]
     by_tension = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0) * scale[:, None]
     return (force * scale[:, None]).T, by_turn, by_tension
 

@@ -79,6 +79,8 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
     turned = request.orientation or Orientation(x, R)
     if turned.found is not None:
         content["orientation"] = turned.found
+    if turned.nearest_m is not None:
+        content["nearest_position_m"] = turned.nearest_m
     if not content["feasible"]:
         return _unheld(robot, content, *((lifted, "unheld") if lifted else _why_not(robot, x, turned)))
     shared = draws.for_robot(robot, line)

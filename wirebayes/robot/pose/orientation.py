@@ -10,6 +10,7 @@ from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
+from wirebayes.sentences import coordinates, listed
 
 COMPONENTS = ("rx", "ry", "rz")
 _COUNT = {1: "one", 2: "two"}
@@ -34,6 +35,8 @@ class Orientation:
         Why the platform cannot hang; empty where it can.
     refused : str
         What was asked for and cannot be had; empty where all was had.
+    nearest_m : (3,) array or None
+        The nearest position at which the platform hangs, where it cannot at the one requested.
     turned_away : str
         How far the platform hangs from a home orientation that nothing holds, though the wires could command it.
     """
@@ -44,6 +47,7 @@ class Orientation:
     sentence: str = ""
     refused: str = ""
     turned_away: str = ""
+    nearest_m: Floats | None = None
 
 
 def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | None) -> Orientation:
@@ -65,8 +69,11 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
     asked = np.full(3, np.nan) if asked_rad is None else asked_rad
     near = turning.matrix(np.where(np.isfinite(asked), asked, home))
     whole = asked_rad is None or bool(np.isfinite(asked).all())
-    given = robot.freedom == "position" or not _clear(robot, position_m, near)
-    if given or (whole and not robot.is_underactuated and _held(robot, position_m, near, asked)):
+    clear = _clear(robot, position_m, near)
+    if robot.freedom == "position" and clear and robot.plane is None and not _held(robot, position_m, near):
+        return _nowhere(robot, position_m, near)
+    given = robot.freedom == "position" or not clear
+    if given or (whole and not robot.is_underactuated and (np.isfinite(asked).all() or _held(robot, position_m, near))):
         return Orientation(position_m, near)
     found = hanging.hang(robot, position_m[None], near, asked)
     if not found.held[0]:
@@ -76,7 +83,7 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
     if not found.held[0]:
         found = hanging.hang(robot, x, near)
         if not found.held[0]:
-            return Orientation(position_m, near, None, _nowhere(robot, position_m, near))
+            return _nowhere(robot, position_m, near)
         had = _to_be_had(hanging.chosen(robot, position_m, found.rotation[0], found.tension_N[0]), had)
         if had.any():
             part = hanging.hang(robot, x, near, np.where(had, asked, np.nan))
@@ -136,9 +143,9 @@ def _cleared(robot: Robot, x: Floats, reference: Floats) -> Floats:
     return x if near is None or np.abs(near - x).max() > _ROUNDING * robot.span_m else near
 
 
-def _held(robot: Robot, x: Floats, R: Floats, asked: Floats) -> bool:
-    """Whether a commanded orientation is to be taken as it is: it was asked for as a whole, or tensions hold it."""
-    return bool(np.isfinite(asked).all() or np.isfinite(inverse.tensions(robot, x[None], R[None])).all())
+def _held(robot: Robot, x: Floats, R: Floats) -> bool:
+    """Whether tensions within the bounds hold a pose."""
+    return bool(np.isfinite(inverse.tensions(robot, x[None], R[None])).all())
 
 
 def _to_be_had(ways: Floats, asked: Floats) -> Floats:
@@ -188,7 +195,7 @@ def _summary(robot: Robot, degrees: int, places: int, choice: int, free: list[st
         said += "this is the rotation nearest to the home orientation that was found to be held"
         said += ", and --rotation may ask for another"
     else:
-        said += f"balance decides {_listed(free)}" if free else "the orientation is as asked for"
+        said += f"balance decides {listed(free)}" if free else "the orientation is as asked for"
         left = choice - (3 - len(free))
         if left > 0:
             said += f", but --rotation may ask for {'any' if left == len(free) else _COUNT[left]} of them"
@@ -199,26 +206,25 @@ def _summary(robot: Robot, degrees: int, places: int, choice: int, free: list[st
     return said + "."
 
 
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
 def _out_of_reach(asked: Floats, had: Floats, found: hanging.Hanging) -> str:
     """That components cannot have the values asked for, and what hangs in balance instead."""
     wanted = ", ".join(f"{COMPONENTS[i]} = {asked[i]:g}" for i in np.flatnonzero(had))
-    vector = ", ".join(f"{v:.5g}" for v in turning.vector(found.rotation)[0])
     return (
         f"No tensions within the bounds hold the platform here with {wanted}; without that it hangs with the rotation "
-        f"vector ({vector}) rad."
+        f"vector ({coordinates(turning.vector(found.rotation)[0], 5)}) rad."
     )
 
 
-def _nowhere(robot: Robot, x: Floats, reference: Floats) -> str:
+def _nowhere(robot: Robot, x: Floats, reference: Floats) -> Orientation:
     """That no orientation is in balance, and where the nearest position with one is."""
     said = "No orientation hangs in stable balance at this position with tensions within the bounds"
-    if np.ptp(robot.platform_m, axis=0).max() == 0:
-        return f'{said}: all wires meet in one point, about which the platform turns freely (freedom = "position").'
+    if robot.freedom == "position":
+        said = "No tensions within the bounds hold the platform at this position"
+    elif np.ptp(robot.platform_m, axis=0).max() == 0:
+        said += ': all wires meet in one point, about which the platform turns freely (freedom = "position").'
+        return Orientation(x, reference, None, said)
     near = hanging.nearest_position(robot, x, reference)
     if near is None or np.abs(near - x).max() < _ROUNDING * robot.span_m:
-        return f"{said}."
-    return f"{said}; the nearest position that was found to have one is ({', '.join(f'{v:.5g}' for v in near)}) m."
+        return Orientation(x, reference, None, f"{said}.")
+    said += f"; the nearest position that was found to have a balance is ({coordinates(near, 5)}) m."
+    return Orientation(x, reference, None, said, nearest_m=near)

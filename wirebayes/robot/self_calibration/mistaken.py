@@ -45,7 +45,7 @@ def refuse_mistaken(robot: Robot, session: Session, tension_N: Floats, table: Cs
     InputError
         Naming the columns, what was found and what was expected.
     """
-    placed = np.isfinite(session.position_m).all(1) & np.isfinite(session.rotation).all((1, 2))
+    placed = np.asarray(np.isfinite(session.position_m).all(1) & np.isfinite(session.rotation).all((1, 2)))
     if robot.winch is not None or placed.sum() < _FEWEST:
         return
     _refuse_lengths(robot, session, placed, table, joints)
