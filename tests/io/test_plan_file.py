@@ -112,5 +112,5 @@ def test_a_mistake_is_named_by_its_place(plan_file, old, new, message):
 
 def test_a_plan_without_protocols_is_refused(tmp_path):
     (tmp_path / "plan.toml").write_text("budget_min = 3\n")
-    with pytest.raises(InputError, match=r"key protocol: found nothing, expected at least one \[\[protocol\]\]"):
+    with pytest.raises(InputError, match=r"key protocol: found no such key, expected at least one \[\[protocol\]\]"):
         read_plan(tmp_path / "plan.toml")

@@ -339,12 +339,12 @@ def test_a_requested_pose_far_from_where_the_joint_values_lead_causes_a_warning(
     shown = capsys.readouterr().err.splitlines()
     warned = [line for line in shown if "warning" in line]
     assert [line.split(":")[1] for line in warned] == [" hold 20", " hold 40"]
-    assert "the requested pose is 49.9 m and 0.0" in warned[0]
+    assert "the requested pose is 19.9 m and 0.0" in warned[0]
     assert " m and 2.5 rad from the one that its joint values lead to" in warned[1]
     found = json.loads((tmp_path / "odd" / "calibration.json").read_text())
     assert found["with_creep_model"]["converged"]
     np.testing.assert_allclose(found["with_creep_model"]["length_m"]["mean"], truth, atol=1e-2)
-    assert "Hold 20: the requested pose is 49.9 m" in (tmp_path / "odd" / "report.html").read_text()
+    assert "Hold 20: the requested pose is 19.9 m" in (tmp_path / "odd" / "report.html").read_text()
 
 
 def test_a_bias_is_estimated_on_request_and_its_sign_may_follow_the_motion(fitted, session_csv, tmp_path, capsys):

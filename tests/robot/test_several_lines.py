@@ -128,7 +128,7 @@ def test_commands_take_a_posterior_for_each_name(fitted, tmp_path, capsys):  # n
     arguments = ["pose", str(robot), "--trajectory", str(way), "--draws", "10", "--output", str(out)]
     assert main([*arguments, "--wires", str(fitted)]) == 2
     line = capsys.readouterr().err.strip()
-    assert "leg[0].wire: found 'thick' and posteriors of default" in line
+    assert "leg 1, key wire: found 'thick' and posteriors of default" in line
     assert "\n" not in line
     assert not out.exists()
     assert main([*arguments, "--wires", f"default={fitted}", "--wires", f"thick={fitted}"]) == 0

@@ -5,14 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wirebayes.answers import terminal
 from wirebayes.commands.asked_pose import asked_place
+from wirebayes.commands.wires import folder_of
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import rotation as turning
-from wirebayes.robot.mechanics import schema
+from wirebayes.robot.mechanics import sag, schema
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging
 from wirebayes.robot.pose import orientation
 from wirebayes.robot.pose.orientation import balanced_orientation
+from wirebayes.sentences import coordinates
 
 
 def six_wires(centre_of_mass_m=(0.02, 0.01, -0.05), turned_rad=(0.0, 0.0, 0.0)) -> Robot:
@@ -91,3 +94,55 @@ def test_a_rotation_of_a_platform_that_cannot_turn_is_refused():
     with pytest.raises(InputError, match="--rotation: found one for a robot whose lines keep the orientation"):
         asked_place(two_wires(), None, (0.0, 0.0, 20.0))
     assert asked_place(two_wires(), None, (0.0, 0.0, 0.0))[1] is not None
+
+
+@pytest.mark.parametrize(
+    ("choice", "free", "said"),
+    [
+        (3, ["rx", "ry", "rz"], "nearest to the home orientation that was found to be held"),
+        (1, ["rx", "ry", "rz"], "balance decides rx, ry and rz, but --rotation may ask for one of them"),
+        (2, ["rx", "ry"], "balance decides rx and ry, but --rotation may ask for one of them"),
+        (1, ["rx", "ry"], "balance decides rx and ry."),
+        (3, ["rx", "ry"], "balance decides rx and ry, but --rotation may ask for any of them"),
+        (0, [], "the orientation is as asked for"),
+    ],
+)
+def test_what_can_be_asked_for_is_said_where_balance_decides_it_now(choice, free, said):
+    assert said in orientation._summary(six_wires(), 6, 3, choice, free, 0)
+
+
+def test_noise_in_coordinates_is_zero():
+    assert coordinates([-1.021e-13, -0.1028, 0.999e-6, 1.001e-6]) == "0, -0.1028, 0, 1.001e-06"
+
+
+def test_a_folder_of_results_with_one_posterior_or_one_final_one_is_that_one(tmp_path):
+    def posterior(*names):
+        place = tmp_path.joinpath(*names)
+        place.mkdir(parents=True)
+        (place / "posterior.nc").write_bytes(b"")
+        return place
+
+    one = posterior("fit", "line")
+    assert folder_of(tmp_path / "fit") == folder_of(one) == one
+    posterior("found", "line", "plain")
+    final = posterior("found", "line", "final")
+    assert folder_of(tmp_path / "found") == final
+    posterior("fit", "other")
+    assert folder_of(tmp_path / "fit") == tmp_path / "fit"
+
+
+@pytest.mark.parametrize(
+    ("heavy", "said"), [(1, ""), (2, "; 1 more wire weighs more"), (3, "; 2 more wires weigh more")]
+)
+def test_other_wires_that_sag_are_counted(heavy, said):
+    mass = np.where(np.arange(6) < heavy, [0.02, 0.018, 0.016, 1, 1, 1], 0.0)
+    robot = replace(six_wires(), mass_kg_m=mass)
+    (notice,) = sag.sag_warnings(robot, robot.home_m, np.eye(3), np.full(6, 5.0))
+    assert notice.text.partition("taken for")[2].startswith(said)
+
+
+def test_a_long_drift_is_a_plain_number():
+    found = {"robot": "six", "feasible": True}
+    drift = {"specimen_spread": 0.05, "times_s": [3600.0]}
+    drift["distance_mm"] = {"q05": [3761.0], "q50": [3984.0], "q95": [4254.0]}
+    assert "3980 mm [3760, 4250]" in terminal.of_pose(found | {"drift": [drift]})[0]

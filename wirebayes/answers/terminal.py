@@ -213,9 +213,10 @@ def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
     for drift in found["drift"]:
         far, time = drift["distance_mm"], drift["times_s"][-1]
         if known_at_the_end(drift):
+            middle, low, high = (short(far[q][-1], 3) for q in ("q50", "q05", "q95"))
             drifts.append(
-                f"{found['robot']}: after {time:g} s the platform {moved} by {far['q50'][-1]:.3g} mm "
-                f"[{far['q05'][-1]:.3g}, {far['q95'][-1]:.3g}] (specimen spread {100 * drift['specimen_spread']:g} %)"
+                f"{found['robot']}: after {time:g} s the platform {moved} by {middle} mm [{low}, {high}] "
+                f"(specimen spread {100 * drift['specimen_spread']:g} %)"
             )
     return lines + (drifts or [f"{found['robot']}: no draw of the wires could be solved"])
 

@@ -169,11 +169,12 @@ def pose(
     _refuse_calibration(calibration is not None and not over_time)
     bare = robot_of(robot)
     machine = loaded(bare, float(payload), payload_at)
-    line = given.draws_of(wires, machine)
-    asked = AskedPose(machine, line, *asked_place(machine, position, rotation), given.seed, given.own_effects)
     allowed = _Allowed(rising_times(times), float(tolerance), float(tolerance_tilt))
     allowed.check()
-    specimen_spread = typical_spread(line, check_spread(specimen_spread, alike=False))
+    specimen_spread = check_spread(specimen_spread, alike=False)
+    line = given.draws_of(wires, machine)
+    asked = AskedPose(machine, line, *asked_place(machine, position, rotation), given.seed, given.own_effects)
+    specimen_spread = typical_spread(line, specimen_spread)
     carried = {"--payload": float(payload), **spelled({"--payload-at": payload_at})}
     at = spelled({"--position": position, "--rotation": rotation})
     if over_time:

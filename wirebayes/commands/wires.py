@@ -99,7 +99,16 @@ def folder_of(wires: Wires, experiment: str | None = None) -> Path:
         return wires.folder
     if not isinstance(wires, str | os.PathLike):
         raise InputError(f"wires: found {type(wires).__name__}, expected a Posterior or a folder with a posterior.nc")
-    return Path(wires)
+    return _only_one_in(Path(wires))
+
+
+def _only_one_in(folder: Path) -> Path:
+    """The folder of the one posterior in a folder of results, or of the final one; the folder itself otherwise."""
+    if (folder / POSTERIOR).is_file():
+        return folder
+    below = [path.parent for path in folder.glob(f"*/**/{POSTERIOR}")]
+    last = below if len(below) == 1 else [place for place in below if place.name == "final"]
+    return last[0] if len(last) == 1 else folder
 
 
 def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:

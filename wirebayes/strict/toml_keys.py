@@ -142,8 +142,16 @@ class Keys:
         if key in self.table:
             return self.table[key]
         if default is None:
-            raise self.complain(key, "nothing", expected)
+            self._refuse_other_unit(key)
+            raise self.complain(key, "no such key", expected)
         return default
+
+    def _refuse_other_unit(self, key: str) -> None:
+        """Refuse the key that stands in the place of a missing one and names another unit."""
+        stem = key.rpartition("_")[0]
+        for other in self.table:
+            if stem and other.rpartition("_")[0] == stem:
+                raise self.complain(other, f"an unknown key{hint(other, (key,))}", key)
 
     def string(
         self, key: str, expected: str = "a text", default: str | None = None, among: tuple[str, ...] = ()

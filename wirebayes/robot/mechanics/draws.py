@@ -234,7 +234,7 @@ def lines_of(robot: Robot, line: WireDraws) -> list[WireDraws]:
         else:
             known = " or ".join(line.each)
             raise InputError(
-                f"{robot.name}: leg[{i}].wire: found {name!r} and posteriors of {known}, expected one more, "
+                f"{robot.name}: leg {i + 1}, key wire: found {name!r} and posteriors of {known}, expected one more, "
                 f"--wires {name}=FOLDER"
             )
     return out

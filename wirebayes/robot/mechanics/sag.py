@@ -14,6 +14,7 @@ from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.statics import geometry
+from wirebayes.sentences import counted, short
 
 # Weight by tension from which on sag is reported: a level wire is then longer than its chord by a ten-thousandth, as
 # much as minutes of creep.
@@ -60,9 +61,13 @@ def sag_warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: 
     if not heavy.size:
         return []
     i = int(heavy[np.argmax(extra[heavy])])
-    others = f", and {heavy.size - 1} more" if heavy.size > 1 else ""
+    others = ""
+    if heavy.size > 1:
+        others = (
+            f"; {counted(heavy.size - 1, 'more wire')} weigh{'s' * (heavy.size == 2)} more than {100 * _REPORTED:g} %"
+        )
     text = (
-        f"wire {i + 1} weighs {100 * share[i]:.2g} % of its tension{others}: it sags by {1e3 * depth[i]:.2g} mm and is "
-        f"{1e3 * extra[i]:.2g} mm longer than the straight line it is taken for"
+        f"wire {i + 1} weighs {short(100 * share[i], 2)} % of its tension: it sags by {short(1e3 * depth[i], 2)} mm "
+        f"and is {short(1e3 * extra[i], 2)} mm longer than the straight line it is taken for{others}"
     )
     return [Notice("sag", text)]

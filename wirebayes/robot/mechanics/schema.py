@@ -242,7 +242,7 @@ def _or_none(values: Floats) -> Floats | None:
 
 def _legs(top: Keys, declared: set[str]) -> tuple[list[dict[str, Any]], NDArray[np.intp] | None]:
     """All legs, and the number of each one's winch."""
-    tables = [replace(leg, name="", prefix=f"leg[{leg.index}].") for leg in top.tables("leg", least=2)]
+    tables = [replace(leg, name=str(number)) for number, leg in enumerate(top.tables("leg", least=2), 1)]
     legs = [_leg(leg, declared) for leg in tables]
     return legs, _winches(tables, legs)
 
