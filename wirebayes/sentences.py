@@ -133,7 +133,7 @@ def coordinates(values: Iterable[float], digits: int = 4) -> str:
     return ", ".join(f"{value if abs(value) >= _NOTHING else 0:.{digits}g}" for value in values)
 
 
-_NOTHING = 1e-6
+_NOTHING = 1e-6  # m or rad: no robot is set or measured so finely
 
 
 def number(value: Any, digits: int = 3) -> str:

@@ -134,7 +134,17 @@ class _Search:
         return np.asarray(newly.any(1))
 
     def let_go(self, rows: NDArray[np.intp], rest: NDArray[np.bool_], hindrance: Floats) -> NDArray[np.bool_]:
-        """Let go the wire whose bound keeps a search at `rest` most from its goal, and say which searches have one."""
+        """Let go the wire whose bound keeps a search most from its goal, and say which searches have one.
+
+        Parameters
+        ----------
+        rows : (k,) int array
+            The searches.
+        rest : (k,) bool array
+            Which of them have come to rest.
+        hindrance : (k, w) array
+            As `_step` returns it.
+        """
         most = np.where(self.freed[rows], 0.0, hindrance).argmax(1)
         there = rows, most
         wrongly = rest & ~self.freed[there] & (hindrance[np.arange(len(rows)), most] > _HINDERED)

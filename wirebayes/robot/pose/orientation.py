@@ -13,7 +13,7 @@ from wirebayes.robot.motion import hanging, inverse
 from wirebayes.sentences import coordinates, listed
 
 COMPONENTS = ("rx", "ry", "rz")
-_COUNT = {1: "one", 2: "two"}
+_COUNT = {1: "one", 2: "two"}  # in words, as sentences have it
 _ROUNDING = 1e-6  # of the robot's span: what a position written with six digits may be off
 _TURNED_AWAY = 1.0  # degrees from the home orientation: nobody levels a platform by eye to much better
 _SAME = 5e-5  # rad: a component that balance decides and that was asked for to four decimals is as asked for

@@ -156,6 +156,10 @@ class _Target:
         value = ((self.readings - at.readings) ** 2).sum(1) + (white**2).sum(1)
         return np.where(at.solved, value, np.inf)
 
+    def contradicted(self, foreseen: Floats) -> NDArray[np.bool_]:
+        """(m,) Whether the readings contradict a robot grossly where slopes foresee no lower cost."""
+        return np.asarray(foreseen > GROSS * self.readings.shape[1])
+
 
 @dataclass(frozen=True)
 class _Mode:
@@ -172,13 +176,10 @@ def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mo
     m, d = white.shape
     here = target.predicted(white)
     cost = target.cost(here, white)
-    converged, given_up = np.zeros(m, bool), np.zeros(m, bool)
-    moved, damping = np.ones(m, bool), np.full(m, 1e-3)
+    converged, ended, moved, damping = np.zeros(m, bool), np.zeros(m, bool), np.ones(m, bool), np.full(m, 1e-3)
     J = np.zeros((m, target.readings.shape[1], d))
     for taken in range(iterations):
-        open_ = np.flatnonzero(
-            ~(converged | given_up) & moved
-        )  # where a step failed, the derivatives stay: they are the work
+        open_ = np.flatnonzero(~ended & moved)  # where a step failed, the derivatives stay: they are the work
         if len(open_):
             J[open_] = target.derivatives(white[open_], _part(here, open_))[0]
         normal = np.swapaxes(J, 1, 2) @ J + np.eye(d)
@@ -187,12 +188,11 @@ def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mo
         decrement = np.einsum("md,md->m", slope, solve(normal, slope[..., None])[..., 0])
         # A mode on the edge of slackness has no zero slope; there, no step however short improves.
         converged |= (decrement < 1e-3) | (damping > 1e8)
-        if taken >= patience:
-            given_up |= ~converged & (cost - decrement > GROSS * target.readings.shape[1])
-        if (converged | given_up).all():
+        ended = converged | ((taken >= patience) & target.contradicted(cost - decrement))
+        if ended.all():
             break
         step = _damped_step(normal, slope, damping)
-        step[converged | given_up] = 0.0
+        step[ended] = 0.0
         there = target.predicted(white + step, near=(here.begun_m, here.begun_rotation))
         new = target.cost(there, white + step)
         better = new < cost - 1e-9 * np.where(np.isfinite(cost), cost, 0.0)

@@ -98,7 +98,7 @@ def parse_session(
     moved, tilted = motions[0] in table.header, NORMAL[0] in table.header
     if moved and not biased:
         raise _motions_without_bias(table)
-    cells = table.numbers(lambda name: _allowed(name, -np.inf if biased else -_NOISE * tension_sd_N))
+    cells = table.numbers(lambda name: _allowed(name, tension_sd_N, biased))
     if not len(cells):
         raise InputError(f"{table.path}: found no holds, expected at least one row")
 
@@ -170,16 +170,18 @@ def may_be_empty(name: str) -> bool:
     return name.startswith(("tension_", "normal_")) or name in (*POSITION, *TURN)
 
 
-def _allowed(name: str, least_N: float) -> Numbers:
+def _allowed(name: str, sd_N: float, biased: bool) -> Numbers:
     """What the cells of a column may hold."""
     empty = may_be_empty(name)
     if name == "duration_s":
         return Numbers(f"a number above 0, at most {LARGEST_READING:.0e}", above=0.0)
     if name.startswith("motion_"):
         return Numbers("1 (pulled in last), -1 (let out) or 0", -1.0, 1.0, whole=True)
-    if name.startswith("tension_") and np.isfinite(least_N):
-        way_out = f"{-least_N:g} N below 0 at most, as noise of --tension-sd; --tension-bias allows for a wrong zero"
-        return Numbers(f"a number up to {LARGEST_READING:.0e}, {way_out}", least_N, empty=empty)
+    if name.startswith("tension_") and not biased:
+        way_out = (
+            f"{_NOISE * sd_N:g} N below 0 at most, as noise of --tension-sd; --tension-bias allows for a wrong zero"
+        )
+        return Numbers(f"a number up to {LARGEST_READING:.0e}, {way_out}", -_NOISE * sd_N, empty=empty)
     if name in NORMAL:
         return Numbers("a component of a unit vector, from -1 to 1", -1.0, 1.0, empty=empty)
     return Numbers(empty=empty)

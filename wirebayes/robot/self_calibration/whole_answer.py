@@ -141,7 +141,6 @@ def calibration_report(
             [
                 *_warnings(verdict),
                 *sensors.sensor_notices(at_fault),
-                *plausible.robot_notices(robot),
                 *doubts(robot, prior.line),
             ]
         ),
@@ -319,7 +318,7 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
 
 
 def _warnings(verdict: _Verdict) -> list[Notice]:
-    found, out = verdict.found, []
+    found, out = verdict.found, plausible.robot_notices(verdict.found.unknowns.robot)
     if not found.converged:
         text = "not converged: do not use these values; read more poses, or check the readings and the stated errors"
         out.append(Notice("not-converged", text))
