@@ -1,5 +1,6 @@
 """Sessions in another unit, with columns mixed up or absurd readings; slack wires that read below zero."""
 
+import contextlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,12 +10,13 @@ import pytest
 from tests.robot.test_unheld_home import six_wires
 from wirebayes.errors import InputError
 from wirebayes.robot.history import table
+from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import answer, estimate
 from wirebayes.robot.self_calibration.session import LengthPrior
-from wirebayes.robot.self_calibration.session_file import may_be_empty, parse_session
+from wirebayes.robot.self_calibration.session_file import POSITION, TURN, may_be_empty, parse_session
 from wirebayes.strict.columns import columns_table
 
 LINE = WireDraws({k: np.full(2, v) for k, v in {"k1": 15e3, "B": 0.05, "U": 0.9, "k2": 0.03, "N": 0.7}.items()}, 1000.0)
@@ -125,3 +127,32 @@ def test_a_search_is_given_up_where_the_readings_are_absurd(session, monkeypatch
     assert said.kind == "not-converged" and "standard errors from what robot and wires allow" in said.text
     near = replace(known, misfit=np.array([estimate.GROSS]))
     assert "read more poses" in answer._unsure(near, near)[0].text
+
+
+@pytest.mark.parametrize(("holds", "refused"), [(2, False), (3, True)])
+@pytest.mark.parametrize("kind", ["unit", "tension_{}_N", "joint_{}_m"])
+def test_fewer_than_three_stated_holds_say_nothing_of_columns(session, holds, refused, kind):
+    robot, cells = session
+    few = {name: np.asarray(values)[:holds] for name, values in cells.items()}
+    if kind == "unit":
+        few = _tensions(few, lambda tension: tension / 9.81)
+    else:
+        few |= {kind.format(2): few[kind.format(5)], kind.format(5): few[kind.format(2)]}
+    with pytest.raises(InputError) if refused else contextlib.nullcontext():
+        _read(robot, few)
+
+
+@pytest.mark.parametrize(("uneven", "refused"), [(0.099, True), (0.101, False)])
+def test_tensions_that_no_factor_balances_are_not_in_another_unit(session, uneven, refused):
+    """Kilogram-force, and a force aside at every hold that is a known share of the weight."""
+    robot, cells = session
+    turn = np.moveaxis(matrix(np.column_stack([cells[name] for name in TURN])), 0, -1)
+    shape = statics.geometry(robot, np.array([cells[name] for name in POSITION]), turn)
+    force, load = statics.wire_jacobian(robot, shape), statics.weight(robot, turn)
+    force[3:] /= robot.size_m
+    load[3:] /= robot.size_m
+    load[1] += uneven * np.linalg.norm(load) / np.sqrt(HOLDS)
+    tau = np.linalg.solve(np.moveaxis(force, -1, 0), load.T[..., None])[..., 0] / 9.81
+    scaled = cells | {f"tension_{i + 1}_N": tau[:, i] for i in range(6)}
+    with pytest.raises(InputError) if refused else contextlib.nullcontext():
+        _read(robot, scaled, biased=True)
