@@ -147,11 +147,12 @@ def test_a_platform_point_on_an_exit_point_is_no_pose(leg, fitted, tmp_path, cap
 def test_a_folder_without_a_posterior_is_refused(tmp_path, capsys):
     assert main(["pose", "linear-6", "--wires", str(tmp_path), "--output", str(tmp_path / "o")]) == 2
     assert "posterior.nc" in capsys.readouterr().err
-    deeper = tmp_path / "wire" / "final"
-    deeper.mkdir(parents=True)
-    (deeper / "posterior.nc").write_text("")
+    deeper = [tmp_path / name / "final" for name in ("one", "two")]  # of two lines: one alone would be taken
+    for folder in deeper:
+        folder.mkdir(parents=True)
+        (folder / "posterior.nc").write_text("")
     assert main(["pose", "linear-6", "--wires", str(tmp_path), "--output", str(tmp_path / "o")]) == 2
-    assert f"expected one of {deeper}" in capsys.readouterr().err
+    assert f"expected one of {deeper[0]}, {deeper[1]}" in capsys.readouterr().err
     (tmp_path / "posterior.nc").write_text("not netcdf")
     assert main(["pose", "linear-6", "--wires", str(tmp_path), "--output", str(tmp_path / "o")]) == 2
     assert "posterior.nc" in capsys.readouterr().err
