@@ -210,7 +210,7 @@ def test_legs_of_one_winch_with_drums_of_two_sizes_are_refused(tmp_path):
     file = printer(tmp_path)
     file.write_text(file.read_text().replace("drum_radius_m = 0.05", "drum_radius_m = 0.06", 1))
     with pytest.raises(
-        InputError, match=r"line \d+, key leg\[1\]\.drum_radius_m: found 0\.05, expected that of the first"
+        InputError, match=r"line \d+, leg 2, key drum_radius_m: found 0\.05, expected that of the first"
     ):
         schema.read_robot_file(file)
 
