@@ -54,7 +54,9 @@ KINDS = {
     "few-holds": Kind("There are fewer than three holds: no effect can be established.", True),
     "extrapolation": Kind("The answer goes beyond the tensions, times or lengths that were tested.", False),
     "left-out": Kind("Something that is known of wire or robot has no place in the answer.", False),
-    "geometry": Kind("What is asked does not fit the robot, as more wire than a drum holds.", False),
+    "geometry": Kind(
+        "What is asked does not fit the robot, as more wire than a drum holds, or its file does not fit itself.", False
+    ),
     "sag": Kind("A wire's own weight matters, which the statics leaves out.", False),
     "clock": Kind("It matters when the creep of a moving wire starts anew, which no test of holds shows.", False),
     "few-draws": Kind("Few posterior draws agree with the readings: the ends of the bands are rough.", False),
