@@ -19,9 +19,6 @@ CLI = ROOT / "wirebayes" / "cli"
 MANY_PARAMETERS = 3
 MOST_NODES = 500  # of syntax, without the docstring: about fifty loose lines
 MOST_NAMES = 20  # assigned in a function: more is not kept in mind
-# The functions that were beyond these limits when they came: none is added, and what is loosened is struck out.
-DENSE = Path(__file__).parent / "dense_functions.txt"
-DENSEST_NODES, DENSEST_NAMES = 620, 20  # of those: none grows beyond the densest
 
 # A name that says all there is: a unit in seconds, or a constant of mathematics.
 NEEDS_NO_REASON = re.compile(r"_?(MINUTE|HOUR|DAY|YEAR)(_S)?|_?(HALF_)?LOG_2PI")
@@ -138,36 +135,21 @@ def sizes() -> dict[str, tuple[int, int]]:
     return found
 
 
-SIZES = sizes()
-LISTED = DENSE.read_text(encoding="utf-8").split()
+def is_dense(nodes: int, names: int) -> bool:
+    return nodes > MOST_NODES or names > MOST_NAMES
 
 
-def beyond(size: tuple[int, int], most_nodes: int, most_names: int) -> bool:
-    return size[0] > most_nodes or size[1] > most_names
-
-
-def test_no_further_function_is_dense():
-    dense = [place for place, size in SIZES.items() if beyond(size, MOST_NODES, MOST_NAMES)]
-    assert sorted(set(dense) - set(LISTED)) == [], "split it, or give it fewer names"
-
-
-def test_the_list_of_dense_functions_shrinks():
-    loose = [place for place in LISTED if not beyond(SIZES.get(place, (0, 0)), MOST_NODES, MOST_NAMES)]
-    assert loose == [], f"no longer dense, or gone: strike it from {DENSE.name}"
-
-
-def test_no_function_is_denser_than_the_densest_now():
-    worst = [place for place, size in SIZES.items() if beyond(size, DENSEST_NODES, DENSEST_NAMES)]
-    assert worst == []
+def test_no_function_is_dense():
+    assert [place for place, size in sizes().items() if is_dense(*size)] == [], "split it, or give it fewer names"
 
 
 def test_what_is_dense_is_found():
     names = "\n".join(f"    a{i} = {i}" for i in range(MOST_NAMES + 1))
     source = f"def many():\n{names}\n\n\ndef packed():\n    return [{'1, ' * (MOST_NODES + 1)}]\n"
     many, packed = (function for function, _ in functions(ast.parse(source)))
-    assert beyond((nodes(many), len(local_names(many))), MOST_NODES, MOST_NAMES)
+    assert is_dense(nodes(many), len(local_names(many)))
     assert len(local_names(packed)) == 0
-    assert beyond((nodes(packed), 0), MOST_NODES, MOST_NAMES)
+    assert is_dense(nodes(packed), 0)
 
 
 def test_no_public_name_stands_for_two_things():

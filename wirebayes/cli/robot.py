@@ -22,60 +22,76 @@ TensionError = Annotated[
     float, typer.Option("--tension-sd", metavar="N", help="Standard error of a tension, in newtons.")
 ]
 Spread = Annotated[float, typer.Option("--specimen-spread", help="Relative difference between wires of one line.")]
+Position = Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Pose in metres; default: the file's.")]
+Rotation = Annotated[
+    str | None,
+    typer.Option(metavar="X,Y,Z", help="Rotation vector in radians; free for what balance decides: free,free,0.2."),
+]
+Times = Annotated[str, typer.Option(metavar="T,T,…", help="Times in seconds.")]
+Tolerance = Annotated[float, typer.Option("--tolerance", metavar="MM", help="Allowed pose error.")]
+TiltTolerance = Annotated[float, typer.Option("--tolerance-tilt", metavar="DEG", help="Allowed rotation.")]
+MapHeights = Annotated[
+    str | None, typer.Option("--map-heights", metavar="Z,Z,…", help="Heights of the mapped slices, in metres.")
+]
+MapRotation = Annotated[
+    list[str] | None,
+    typer.Option("--map-rotation", metavar="X,Y,Z", help="Rotation vector of a mapped platform; repeatable."),
+]
+OtherFit = Annotated[
+    Path | None,
+    typer.Option("--other-fit", metavar="FOLDER", help="Another fit of the wire, used by one more controller."),
+]
+JointsFile = Annotated[
+    Path | None,
+    typer.Option("--joints", metavar="FILE.csv", help="Joint values over time: where was the platform?"),
+]
+TrajectoryFile = Annotated[
+    Path | None,
+    typer.Option("--trajectory", metavar="FILE.csv", help="Commanded poses and loads over time: where does it go?"),
+]
+Payload = Annotated[float, typer.Option("--payload", metavar="KG", help="Carried beside the platform's mass.")]
+PayloadAt = Annotated[
+    str | None, typer.Option("--payload-at", metavar="X,Y,Z", help="Its centre in the platform's frame, metres.")
+]
+TiltError = Annotated[
+    float, typer.Option("--tilt-sd", metavar="RAD", help="Standard error of roll and pitch in --joints.")
+]
+ReferenceLengthError = Annotated[
+    float, typer.Option("--reference-sd", metavar="MM", help="Standard error of the lengths that joints stand for.")
+]
+CalibrationFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibration", metavar="FOLDER", help="What calibrate found; --joints and --trajectory go on from there."
+    ),
+]
+MostDraws = Annotated[
+    int | None, typer.Option("--draws", min=1, help="Posterior draws used; default: 1000, 200 over time.")
+]
 
 
 def pose_command(
     robot: RobotFile,
     wires: Wires,
     output: Output = None,
-    position: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Pose in metres; default: the file's.")] = None,
-    rotation: Annotated[
-        str | None,
-        typer.Option(metavar="X,Y,Z", help="Rotation vector in radians; free for what balance decides: free,free,0.2."),
-    ] = None,
-    times: Annotated[str, typer.Option(metavar="T,T,…", help="Times in seconds.")] = "0,10,30,60,120,300,600,1800,3600",
-    tolerance: Annotated[float, typer.Option("--tolerance", metavar="MM", help="Allowed pose error.")] = 0.3,
-    tolerance_tilt: Annotated[float, typer.Option("--tolerance-tilt", metavar="DEG", help="Allowed rotation.")] = 0.055,
+    position: Position = None,
+    rotation: Rotation = None,
+    times: Times = "0,10,30,60,120,300,600,1800,3600",
+    tolerance: Tolerance = 0.3,
+    tolerance_tilt: TiltTolerance = 0.055,
     spread: Spread = 0.05,
-    map_heights: Annotated[
-        str | None, typer.Option("--map-heights", metavar="Z,Z,…", help="Heights of the mapped slices, in metres.")
-    ] = None,
-    map_rotation: Annotated[
-        list[str] | None,
-        typer.Option("--map-rotation", metavar="X,Y,Z", help="Rotation vector of a mapped platform; repeatable."),
-    ] = None,
-    other_fit: Annotated[
-        Path | None,
-        typer.Option("--other-fit", metavar="FOLDER", help="Another fit of the wire, used by one more controller."),
-    ] = None,
-    joints: Annotated[
-        Path | None,
-        typer.Option("--joints", metavar="FILE.csv", help="Joint values over time: where was the platform?"),
-    ] = None,
-    trajectory: Annotated[
-        Path | None,
-        typer.Option("--trajectory", metavar="FILE.csv", help="Commanded poses and loads over time: where does it go?"),
-    ] = None,
-    payload: Annotated[float, typer.Option("--payload", metavar="KG", help="Carried beside the platform's mass.")] = 0,
-    payload_at: Annotated[
-        str | None, typer.Option("--payload-at", metavar="X,Y,Z", help="Its centre in the platform's frame, metres.")
-    ] = None,
+    map_heights: MapHeights = None,
+    map_rotation: MapRotation = None,
+    other_fit: OtherFit = None,
+    joints: JointsFile = None,
+    trajectory: TrajectoryFile = None,
+    payload: Payload = 0,
+    payload_at: PayloadAt = None,
     tension_sd: TensionError = 0.02,
-    tilt_sd: Annotated[
-        float, typer.Option("--tilt-sd", metavar="RAD", help="Standard error of roll and pitch in --joints.")
-    ] = 1e-3,
-    reference_sd: Annotated[
-        float, typer.Option("--reference-sd", metavar="MM", help="Standard error of the lengths that joints stand for.")
-    ] = 0.0,
-    calibration: Annotated[
-        Path | None,
-        typer.Option(
-            "--calibration", metavar="FOLDER", help="What calibrate found; --joints and --trajectory go on from there."
-        ),
-    ] = None,
-    draws: Annotated[
-        int | None, typer.Option("--draws", min=1, help="Posterior draws used; default: 1000, 200 over time.")
-    ] = None,
+    tilt_sd: TiltError = 1e-3,
+    reference_sd: ReferenceLengthError = 0.0,
+    calibration: CalibrationFolder = None,
+    draws: MostDraws = None,
     experiment: ExperimentName = None,
     own_effects: OwnEffects = None,
     seed: Seed = 0,

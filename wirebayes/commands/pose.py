@@ -37,6 +37,7 @@ from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.json_files.plain import plain
 from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import computing
+from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread
 from wirebayes.robot.pose.answer import PoseAnswer, pose_report
@@ -172,34 +173,34 @@ def pose(
     allowed = _Allowed(rising_times(times), float(tolerance), float(tolerance_tilt))
     allowed.check()
     specimen_spread = check_spread(specimen_spread, alike=False)
-    line = given.draws_of(wires, machine)
-    asked = AskedPose(machine, line, *asked_place(machine, position, rotation), given.seed, given.own_effects)
-    specimen_spread = typical_spread(line, specimen_spread)
+    asked = given.asked(machine, position, rotation)
+    specimen_spread = typical_spread(asked.line, specimen_spread)
     carried = {"--payload": float(payload), **spelled({"--payload-at": payload_at})}
     at = spelled({"--position": position, "--rotation": rotation})
     if over_time:
-        _refuse_beside_history("--map-heights and --map-rotation", map_heights is not None or map_rotations is not None)
-        _refuse_beside_history("--times and --other-fit", other_fit is not None or text_of(times) != text_of(TIMES_S))
+        _refuse_single_only(times, map_heights, map_rotations, other_fit)
         errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
-        errors = calibrated_errors(errors, calibration, bare, line, wires, experiment)
-        if joints is None:
-            return pose_along(asked, trajectory, errors, given.begun({**carried, **at}))
-        _refuse_both(trajectory is not None)
-        return pose_from_joints(asked, joints, errors, given.begun({**carried, **at}))
+        errors = calibrated_errors(errors, calibration, bare, asked.line, wires, experiment)
+        return _along(asked, joints, trajectory, errors, given.begun({**carried, **at}))
     slices = _slices(machine, map_heights, map_rotations)
-    other = None if other_fit is None else given.draws_of(other_fit, machine)
-    options = {
-        **at,
-        "--times": text_of(times),
-        "--tolerance": allowed.distance_mm,
-        "--tolerance-tilt": allowed.tilt_deg,
-        "--specimen-spread": specimen_spread,
-        "--other-fit": None if other_fit is None else content_hash(folder_of(other_fit, experiment) / POSTERIOR),
-        **carried,
-    }
-    if slices is not LEVEL:
-        options["--map-heights, --map-rotation"] = plain(asdict(slices))
+    other, of_other = given.other(other_fit, machine)
+    options = {**at, "--times": text_of(times), **allowed.options(), "--specimen-spread": specimen_spread}
+    options |= {"--other-fit": of_other, **carried, **_options_of(slices)}
     return pose_at(asked, _request(asked, allowed, specimen_spread, slices), other, given.begun(options))
+
+
+def _along(asked: AskedPose, joints: Any, trajectory: Any, errors: Uncertain, begun: Begun) -> Pose:
+    """Poses over time, of measured joint values or of commands."""
+    if joints is None:
+        return pose_along(asked, trajectory, errors, begun)
+    if trajectory is not None:
+        raise InputError("--joints and --trajectory: found both, expected one (a file of --joints may hold poses too)")
+    return pose_from_joints(asked, joints, errors, begun)
+
+
+def _options_of(slices: Slices) -> dict[str, Any]:
+    """The slices as options decide a result; none where they were left out."""
+    return {} if slices is LEVEL else {"--map-heights, --map-rotation": plain(asdict(slices))}
 
 
 @dataclass(frozen=True)
@@ -219,6 +220,17 @@ class _Given:
         """Draws of the posterior of some wires, for the robot with its payload."""
         return draws_for(machine, wires, self.draws, self.experiment, self.own_effects)
 
+    def asked(self, machine: Robot, position: Numbers | None, rotation: Numbers | None) -> AskedPose:
+        """The pose of the robot with its payload, and its wires."""
+        line, place = self.draws_of(self.wires, machine), asked_place(machine, position, rotation)
+        return AskedPose(machine, line, *place, self.seed, self.own_effects)
+
+    def other(self, fit: Wires | None, machine: Robot) -> tuple[WireDraws | None, str | None]:
+        """Draws of another fit of the line, and what its content is known by; none where there is none."""
+        if fit is None:
+            return None, None
+        return self.draws_of(fit, machine), content_hash(folder_of(fit, self.experiment) / POSTERIOR)
+
     def begun(self, options: Mapping[str, Any]) -> Begun:
         """Where results go, and what decides them."""
         posterior = posterior_of(self.wires, self.experiment)
@@ -237,7 +249,11 @@ class _Allowed:
 
     def check(self) -> None:
         """Refuse what allows nothing."""
-        above_zero(("--tolerance", self.distance_mm), ("--tolerance-tilt", self.tilt_deg))
+        above_zero(*self.options().items())
+
+    def options(self) -> dict[str, float]:
+        """As the command's options have it."""
+        return {"--tolerance": self.distance_mm, "--tolerance-tilt": self.tilt_deg}
 
 
 def _request(asked: AskedPose, allowed: _Allowed, specimen_spread: float, slices: Slices) -> PoseRequest:
@@ -284,14 +300,17 @@ def _write(folder: Path, robot: Robot, request: PoseRequest, found: PoseAnswer) 
     pictures.save_pose(folder, robot, request, found)
 
 
-def _refuse_beside_history(options: str, given: bool) -> None:
-    if given:
-        raise InputError(f"{options}: found beside a history, expected them for a single pose only")
-
-
-def _refuse_both(given: bool) -> None:
-    if given:
-        raise InputError("--joints and --trajectory: found both, expected one (a file of --joints may hold poses too)")
+def _refuse_single_only(
+    times: Numbers, map_heights: Numbers | None, map_rotations: Sequence[Numbers] | None, other_fit: Wires | None
+) -> None:
+    """Refuse, beside poses over time, what is said of a single pose only."""
+    given = {
+        "--map-heights and --map-rotation": map_heights is not None or map_rotations is not None,
+        "--times and --other-fit": other_fit is not None or text_of(times) != text_of(TIMES_S),
+    }
+    for options, are_given in given.items():
+        if are_given:
+            raise InputError(f"{options}: found beside a history, expected them for a single pose only")
 
 
 def _refuse_calibration(alone: bool) -> None:
