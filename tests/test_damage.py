@@ -174,19 +174,13 @@ def test_damaged_robots_and_sessions(results: Path, tmp_path: Path, capsys: pyte
     every(damage_robot, range(16), results, tmp_path, capsys)
 
 
-@pytest.mark.parametrize(
-    ("column", "wild"),
-    [
-        ("x_m", "-1e7"),
-        pytest.param("tension_1_N", "9e8", marks=pytest.mark.slow),
-    ],
-)
 def test_readings_that_nothing_explains_end_unconverged(
-    column: str, wild: str, results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A platform thrown far off: matrices are singular or overflow."""
+    """A tension beyond all strength: matrices are singular or overflow."""
     header, first, second = SESSION.read_text().splitlines()[:3]
-    cells = [wild if key == column else cell for key, cell in zip(header.split(","), second.split(","), strict=True)]
+    columns = zip(header.split(","), second.split(","), strict=True)
+    cells = ["9e8" if key == "tension_1_N" else cell for key, cell in columns]
     file, out = tmp_path / "session.csv", tmp_path / "out"
     file.write_text("\n".join([header, first, ",".join(cells)]) + "\n")
     wires = ["--wires", str(results / "fit" / "simulated"), "--draws", "5", "--output", str(out)]
