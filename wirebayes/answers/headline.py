@@ -14,7 +14,7 @@ from wirebayes.json_files.comparison import ComparedModels
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.plan import PlanJson
 from wirebayes.json_files.pose import PoseJson, known_at_the_end
-from wirebayes.json_files.read_units import read_value, unit_read
+from wirebayes.json_files.read_units import error_grows, read_value, unit_read
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.sentences import (
@@ -101,7 +101,7 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     gain = ""
     if report["effects"] and before is not None and after is not None:
         with_it = f"with {'them' if effects[1:] else 'it'} the error on unused holds"
-        goes = f"; {with_it} goes" if after <= before else f"; but {with_it} grows"
+        goes = f"; but {with_it} grows" if error_grows(held) else f"; {with_it} goes"
         gain = f"{goes} from {number(before)} to {number(after)} {unit_read(held['plain'])}"
     sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
     return f"{name}: {what}{size}{gain}{sure}."

@@ -16,7 +16,7 @@ from wirebayes.json_files.imported import ImportedExperiment
 from wirebayes.json_files.plan import JudgedProtocol
 from wirebayes.json_files.pose import PoseJson, known_at_the_end
 from wirebayes.json_files.pose_history import PoseHistoryJson
-from wirebayes.json_files.read_units import read_value, unit_read
+from wirebayes.json_files.read_units import error_grows, read_value, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import Quantiles
 from wirebayes.sentences import (
@@ -77,7 +77,7 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     gain = report["held_out"]
     before, after = (read_value(gain[model], "rmse") for model in ("plain", "final"))
     if report["effects"] and None not in (before, after):
-        worse = ": no better" if after > before else ""
+        worse = ": no better" if error_grows(gain) else ""
         lines.append(f"  held-out holds: rmse {before:.3g} -> {after:.3g} {unit_read(gain['plain'])}{worse}")
     return lines
 

@@ -8,7 +8,7 @@ import numpy as np
 from wirebayes.discovery.scans import Scan
 from wirebayes.json_files.discovery import Disagreement
 from wirebayes.model.problem import Problem
-from wirebayes.model.sample import Sample
+from wirebayes.model.sample import NOISES, Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Control
@@ -72,7 +72,7 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
     """
     covariates = _covariates(problem)
     moving = [name.split("[")[0] for name in problem.names]
-    moving = [name for name in moving if name not in ("sensor_sd", "setting_sd")]
+    moving = [name for name in moving if name not in NOISES]
     along = [name for name in (_set_in(problem), "elapsed time") if any(c[0] == name for c in covariates)]
     holds = [
         (at, int(sample.protocol.number[j]), j)

@@ -9,11 +9,11 @@ import numpy as np
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
+from wirebayes.model.sample import NOISES
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.staircase import linearise, simulate
 
 LARGEST_SLOPE = 1e100  # of any derivative: the square of a larger one overflows
-_NOISE = ("sensor_sd", "setting_sd")
 
 
 _STEP = 1e-5  # of sampled coordinates, which are of order one: truncation and rounding both stay below 1e-5 of a slope
@@ -86,7 +86,7 @@ class Tangent:
 
 def moving_columns(problem: Problem) -> list[int]:
     """The columns of parameters that move the mean of the readings."""
-    return [i for i, name in enumerate(problem.names) if name.split("[")[0] not in _NOISE]
+    return [i for i, name in enumerate(problem.names) if name.split("[")[0] not in NOISES]
 
 
 def tangent(target: LogPosterior, z: Array, readings: Sequence[Array] | None, moving: list[int]) -> Tangent:

@@ -33,6 +33,12 @@ def read_value(entry: Mapping[str, Any], name: str) -> Any:
     return entry[f"{name}_{unit_read(entry, name)}"]
 
 
+def error_grows(held: Mapping[str, Any]) -> bool:
+    """Whether the final model predicts the holds left out with a larger error than the plain one."""
+    plain, final = (read_value(held[model], "rmse") for model in ("plain", "final"))
+    return plain is not None and final is not None and bool(final > plain)
+
+
 def unit_read(entry: Mapping[str, Any], name: str = "rmse") -> str:
     """The unit of what was read, from an entry's own key."""
     return "mm" if f"{name}_mm" in entry else "N"

@@ -13,7 +13,8 @@ from wirebayes.wire.protocol import Protocol
 
 Likelihood = Literal["chain", "hold"]
 MATERIAL = ("k1", "B", "U", "k2", "N")
-SAMPLE = ("preload", "sensor_sd", "setting_sd")
+NOISES = ("sensor_sd", "setting_sd")
+SAMPLE = ("preload", *NOISES)
 LENGTH_EXPONENT = "creep_length_exponent"
 
 

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from wirebayes.model.prior import Prior
-from wirebayes.model.sample import SAMPLE
+from wirebayes.model.sample import NOISES, SAMPLE
 from wirebayes.notice import Notice
 from wirebayes.numeric.distributions import HalfNormal, LogitNormal, LogNormal, Normal, log_density_of, ours
 from wirebayes.numeric.typing import Array
 from wirebayes.sentences import listed
 
-NOISES = ("sensor_sd", "setting_sd")
 WIDER = 2.0  # times as wide: a prior that two people may well disagree about
 MOVED = 1.0  # posterior standard deviations by which an end of the 90 % interval moves
 

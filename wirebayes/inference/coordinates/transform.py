@@ -54,6 +54,7 @@ from wirebayes.inference.coordinates.steps import (
 )
 from wirebayes.inference.coordinates.tension_level import tension_level
 from wirebayes.model.problem import Problem
+from wirebayes.model.sample import NOISES
 from wirebayes.numeric.typing import Array
 
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
@@ -220,7 +221,7 @@ def _noises(problem: Problem, columns: ColumnMap) -> tuple[Noises, ...]:
     """Of every sample of which neither noise is fixed; holds by themselves have no setting errors."""
     out = []
     for sample in problem.samples if problem.likelihood == "chain" else ():
-        names = [problem.column(name, sample) for name in ("sensor_sd", "setting_sd")]
+        names = [problem.column(name, sample) for name in NOISES]
         pair = [problem.names.index(name) for name in names if name in problem.names]
         if len(pair) == len(names) and columns.positive[pair].all():
             middle = np.diff([np.log(problem.prior.distributions[name].median()) for name in names])[0]

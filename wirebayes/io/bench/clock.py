@@ -36,7 +36,8 @@ def has_moments(table: RawTable, column: int) -> bool:
 
 def has_dates(table: RawTable, column: int) -> bool:
     """Whether the moments of a column say the day, too."""
-    return any(found is not None and found["date"] is not None for found in map(moment, table.column(column)))
+    first = moment(table.rows[0].cell(column))  # either all have a date, or none
+    return first is not None and first["date"] is not None
 
 
 def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np.float64], bool]:

@@ -50,9 +50,13 @@ def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Sh
 
 def _without_words(rows: list[SheetRow], indices: list[int]) -> tuple[list[SheetRow], list[SheetRow]]:
     """Rows without those that name a part of the test, such as ``Cycle 2``, or a statistic below; and these."""
-    last = max((i for i, row in enumerate(rows) if not _is_statistic(row)), default=-1)
-    words = [row for i, row in enumerate(rows) if i > last or not any(is_value(row.cell(k)) for k in indices)]
-    return [row for row in rows if row not in words], words
+    end = len(rows)
+    while end and _is_statistic(rows[end - 1]):
+        end -= 1
+    kept, words = list[SheetRow](), list[SheetRow]()
+    for row in rows[:end]:
+        (kept if any(is_value(row.cell(i)) for i in indices) else words).append(row)
+    return kept, [*words, *rows[end:]]
 
 
 def _is_statistic(row: SheetRow) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 from wirebayes.errors import InputError
 from wirebayes.io.bench import labview
 from wirebayes.io.bench.decode import UNICODE
-from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
 
 _NAMES = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 LONGEST_LINE = 100_000  # characters: thousands of columns; Python's csv refuses longer cells
@@ -65,7 +65,7 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
 def _score(lines: list[str], sign: str) -> tuple[float, int, int]:
     """How well a sign splits lines: share of the cells that are values, headers of as many cells, cells."""
     split = [_cells(line, sign) for line in lines]
-    measured = [cells for cells in split if _is_measured(cells)]
+    measured = [cells for cells in split if is_measured(cells)]
     if not measured:
         return 0.0, 0, 0
     values = sum(is_value(cell) for cells in measured for cell in cells)
@@ -74,12 +74,6 @@ def _score(lines: list[str], sign: str) -> tuple[float, int, int]:
     headed = any(len(cells) == width and not any(map(is_value, cells)) for cells in split)
     every = len(measured) / len(lines)
     return round(every * values / max(filled, 1), 3), int(headed), width
-
-
-def _is_measured(cells: list[str]) -> bool:
-    """Whether a line has two values or more: a word and a number may be a title, or a mean below the readings."""
-    values = sum(map(is_value, cells))
-    return values > 1 and 2 * values >= len(cells)
 
 
 def _cells(line: str, sign: str) -> list[str]:

@@ -1,6 +1,7 @@
 """Cells as a file has them, each with its place, before they are interpreted."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -102,6 +103,15 @@ def moment(cell: str) -> re.Match[str] | None:
 def is_moment(cell: str) -> bool:
     """Whether a cell looks like a date or a clock."""
     return moment(cell) is not None
+
+
+def is_measured(cells: Sequence[str]) -> bool:
+    """Whether cells may be those of a reading: two values or more, and no more words than values.
+
+    A word and a number may be a title, or a mean below the readings.
+    """
+    values = sum(map(is_value, cells))
+    return values >= 2 and 2 * values >= len(cells)
 
 
 def is_value(cell: str) -> bool:

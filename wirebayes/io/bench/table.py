@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import ROLES, quantity_unit
-from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
 
 _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
 LONGEST_HEADER = 200  # characters: names and units take a few words, prose is no header
@@ -160,18 +160,13 @@ def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: 
 def _first(rows: tuple[SheetRow, ...]) -> int | None:
     """The first row of readings: one that is followed by rows like it, in one of which a reading may be missing."""
     of_table = [i for i, row in enumerate(rows) if not row.comment]
-    measured = {i: _is_measured(rows[i]) for i in of_table}
+    measured = {i: is_measured(rows[i].filled) for i in of_table}
     for place, i in enumerate(of_table):
         following = of_table[place : place + _ALIKE]
         gaps = [k for k in following if not measured[k]]
         if measured[i] and len(gaps) < 2 and all(_has_a_gap(rows[k]) for k in gaps):
             return i
     return None
-
-
-def _is_measured(row: SheetRow) -> bool:
-    values = sum(map(is_value, row.filled))
-    return values >= 2 and 2 * values >= len(row.filled)
 
 
 def _has_a_gap(row: SheetRow) -> bool:

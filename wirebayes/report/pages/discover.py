@@ -8,7 +8,7 @@ from wirebayes.answers.headline import findings_in_a_sentence
 from wirebayes.answers.terminal import in_other_tests
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.discovery import AmplitudeEstimate, DiscoveryJson, ExperimentFindings
-from wirebayes.json_files.read_units import read_value, unit_read
+from wirebayes.json_files.read_units import error_grows, read_value, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.report.blocks import (
     Block,
@@ -243,7 +243,7 @@ def _held_out(v: ExperimentFindings) -> str:
     if not held["holds"]:
         return "No hold was held out: that needs three recorded holds of every test."
     plain, final = (read_value(held[model], "rmse") for model in ("plain", "final"))
-    goes = "grows" if plain is not None and final is not None and final > plain else "goes"
+    goes = "grows" if error_grows(held) else "goes"
     holds, unit = listed([str(h) for h in held["holds"]]), unit_read(held["plain"])
     text = f"On the unused holds {holds} the rms error {goes} from {number(plain, 2)} to {number(final, 2)} {unit}"
     if v["verdict"] == "partial":

@@ -43,8 +43,7 @@ def wrong(robot: Robot, joint_m: Floats) -> tuple[tuple[int, int], str] | None:
     (row, leg), expected
         Where it is, from 0, and what was expected there; None where all can be meant.
     """
-    home = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
-    wires = robot.lines * np.maximum(np.linalg.norm(robot.exit_m - home, axis=1), robot.span_m) + robot.beyond_m
+    wires = robot.lines * np.maximum(_straight_at_home(robot), robot.span_m) + robot.beyond_m
     most = _FAR * float(wires.max())
     for bad, expected in (
         (~(joint_m > 0) & ~robot.is_linear, "a length above 0"),
@@ -131,8 +130,7 @@ def robot_notices(robot: Robot) -> list[Notice]:
             f"platform.centre_of_mass_m: the centre of mass is {number(mass_at)} m from the middle of the platform "
             f"points, which lie within {number(arms)} m of it"
         )
-    home = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
-    farthest = float(np.linalg.norm(robot.exit_m - home, axis=1).max())
+    farthest = float(_straight_at_home(robot).max())
     if 0 < _FAR * span < farthest:
         out.append(
             f"pose.position_m: the home position is {number(farthest)} m from an exit point, {_beyond(span, _FAR)}"
@@ -150,6 +148,12 @@ def robot_notices(robot: Robot) -> list[Notice]:
             more = f" and {legs.size - 1} more" if legs.size > 1 else ""
             out.append(f"leg.{key} of wire {legs[0] + 1}{more}: {number(length[legs[0]])} m, {_beyond(size, many)}")
     return [Notice("geometry", f"{text}; is the unit of the robot's file metres?") for text in out]
+
+
+def _straight_at_home(robot: Robot) -> Floats:
+    """(w,) distances of the platform points from their exit points at the home pose, m."""
+    points = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
+    return np.asarray(np.linalg.norm(robot.exit_m - points, axis=1))
 
 
 def _beyond(size_m: float, times: float) -> str:
