@@ -117,37 +117,53 @@ def robot_notices(robot: Robot) -> list[Notice]:
     ----------
     robot : Robot
     """
-    out = []
-    span = robot.span_m
-    if span > _LARGEST_M:
-        out.append(
-            f"leg.exit_point_m: the exit points span {number(span)} m, and no cable robot spans {_LARGEST_M:g} m"
-        )
-    arms = np.linalg.norm(robot.platform_m - robot.platform_m.mean(0), axis=1).max()
-    mass_at = float(np.linalg.norm(robot.centre_of_mass_m - robot.platform_m.mean(0)))
-    if 0 < _OUTSIDE * arms < mass_at:
-        out.append(
-            f"platform.centre_of_mass_m: the centre of mass is {number(mass_at)} m from the middle of the platform "
-            f"points, which lie within {number(arms)} m of it"
-        )
-    farthest = float(_straight_at_home(robot).max())
-    if 0 < _FAR * span < farthest:
-        out.append(
-            f"pose.position_m: the home position is {number(farthest)} m from an exit point, {_beyond(span, _FAR)}"
-        )
-    size = max(span, min(farthest, _FAR * span))
-    radius = np.zeros(robot.legs) if robot.drums is None else robot.drums.radius_m
-    rim = np.zeros(robot.legs) if robot.pulleys is None else robot.pulleys.radius_m
-    for key, length, many in (
+    found = [_exit_points(robot), _centre_of_mass(robot), _home(robot), *_lengths_of_legs(robot)]
+    return [Notice("geometry", f"{text}; is the unit of the robot's file metres?") for text in found if text]
+
+
+def _exit_points(robot: Robot) -> str:
+    if robot.span_m <= _LARGEST_M:
+        return ""
+    return f"leg.exit_point_m: the exit points span {number(robot.span_m)} m, and no cable robot spans {_LARGEST_M:g} m"
+
+
+def _centre_of_mass(robot: Robot) -> str:
+    middle = robot.platform_m.mean(0)
+    arms = np.linalg.norm(robot.platform_m - middle, axis=1).max()
+    mass_at = float(np.linalg.norm(robot.centre_of_mass_m - middle))
+    if not 0 < _OUTSIDE * arms < mass_at:
+        return ""
+    return (
+        f"platform.centre_of_mass_m: the centre of mass is {number(mass_at)} m from the middle of the platform points, "
+        f"which lie within {number(arms)} m of it"
+    )
+
+
+def _home(robot: Robot) -> str:
+    span, farthest = robot.span_m, float(_straight_at_home(robot).max())
+    if not 0 < _FAR * span < farthest:
+        return ""
+    return f"pose.position_m: the home position is {number(farthest)} m from an exit point, {_beyond(span, _FAR)}"
+
+
+def _lengths_of_legs(robot: Robot) -> list[str]:
+    """Of each key of a leg that is longer than the robot lets it be, the first leg."""
+    size = max(robot.span_m, min(float(_straight_at_home(robot).max()), _FAR * robot.span_m))
+    nothing = np.zeros(robot.legs)
+    drum = nothing if robot.drums is None else robot.drums.radius_m
+    pulley = nothing if robot.pulleys is None else robot.pulleys.radius_m
+    limits = (
         ("beyond_exit_m", robot.beyond_m, _FAR),
-        ("drum_radius_m", radius, 0.5),  # a drum as wide as the robot
-        ("pulley_radius_m", rim, 0.5),
-    ):
+        ("drum_radius_m", drum, 0.5),  # a drum as wide as the robot
+        ("pulley_radius_m", pulley, 0.5),
+    )
+    out = []
+    for key, length, many in limits:
         legs = np.flatnonzero(length > many * size)
         if legs.size:
             more = f" and {legs.size - 1} more" if legs.size > 1 else ""
             out.append(f"leg.{key} of wire {legs[0] + 1}{more}: {number(length[legs[0]])} m, {_beyond(size, many)}")
-    return [Notice("geometry", f"{text}; is the unit of the robot's file metres?") for text in out]
+    return out
 
 
 def _straight_at_home(robot: Robot) -> Floats:
