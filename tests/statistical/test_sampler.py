@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.simulated import simulated_tests
 from tests.statistical.targets import TARGETS, Analytic, corners, funnel, gaussian, grid, sixteen_modes
 from wirebayes.effects import catalogue, effect_named
 from wirebayes.inference import convergence
@@ -18,6 +19,7 @@ from wirebayes.inference.sampler import state as sampler_state
 from wirebayes.inference.sampler.ensemble import sample_posterior
 from wirebayes.io import paper
 from wirebayes.model.build import build
+from wirebayes.simulation.synthetic import Bench, Truth
 
 pytestmark = pytest.mark.statistical
 SMALL = Policy(ensembles=4, walkers=48, ess=300.0, rounds=3, round_draws=2304, most_rounds=4, block=24, most_steps=240)
@@ -205,6 +207,19 @@ def test_a_tail_that_the_proposal_overlooked_at_first_comes_out_or_the_fit_is_re
     amplitude = found.flat[:, found.problem.names.index("second_relaxation.A")]
     if found.chains.converged:
         assert abs(amplitude.mean() - 0.0586) < 0.1 * 0.0622  # mean and standard deviation
+
+
+@pytest.mark.parametrize("seed", [6, 7, 12])
+def test_positions_without_an_error_do_not_keep_a_fit_from_converging(seed):
+    """A servo sets them exactly, so the setting error is the end of a funnel.
+
+    The search leaves many places at its wide end, which holds next to nothing; the proposal made too little of them.
+    """
+    truth = {"k1": 9000.0, "B": 2e-3, "U": 0.8, "k2": 0.02, "N": 0.5, "preload": 0.0}
+    servo = Truth({**truth, "sensor_sd": 0.05, "setting_sd": 1e-6})
+    times_s = tuple(np.geomspace(1.0, 1800.0, 40))
+    bench = Bench(length_mm=500.0, resolution_N=0.001, displacements_mm=tuple(range(1, 9)), times_s=times_s)
+    assert fit_problem(build(simulated_tests([bench], servo, seed)), seed).converged
 
 
 def fake(draws):

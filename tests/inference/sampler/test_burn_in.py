@@ -12,8 +12,9 @@ from wirebayes.inference.optimum import Optimum
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import burn_in, proposal
 from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.overlooked import left_by_search, overlooked_nats
 from wirebayes.inference.sampler.points import WeightedPoints
-from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES, SHARES
+from wirebayes.inference.sampler.settings import EXPLORING_SHARES, OUTWEIGHS, ROUGH_SHARES, SHARES
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers
 from wirebayes.numeric.resampling import effective_number
 
@@ -88,7 +89,7 @@ def test_what_the_proposal_overlooks_is_measured_in_nats(shift: float, witness: 
     ratios = np.linspace(-5.0, 5.0, 1001)
     left = None if witness is None else (z, base + ratios + witness)
     learned = Learned(NORMAL, NORMAL, 1, left)
-    found = burn_in.overlooked_nats(learned, z, base + ratios + 100.0 if left is None else base + ratios)
+    found = overlooked_nats(learned, z, base + ratios + 100.0 if left is None else base + ratios)
     assert found == pytest.approx((4.99, 0.0 if witness is None else 4.9 + shift), abs=0.011)
 
 
@@ -98,7 +99,7 @@ def test_a_place_whose_hill_can_hold_next_to_nothing_is_not_overlooked(share: fl
     z, far = np.zeros((1001, D)), np.full((1001, D), 50.0)
     top = np.log(share) + 70.0 - 0.5 * D * np.log(2.0 * np.pi / 0.3)
     learned = Learned(NORMAL, NORMAL, 1, (far, np.full(1001, top - 0.5 * D)))
-    found = burn_in.overlooked_nats(learned, z, NORMAL.log_density(z) + 70.0)
+    found = overlooked_nats(learned, z, NORMAL.log_density(z) + 70.0)
     assert found[1] == pytest.approx(top - 0.5 * D - NORMAL.log_density(far)[0] - 70.0 if counts else 0.0)
 
 
@@ -288,6 +289,49 @@ def test_a_mode_found_by_a_few_walkers_begins_the_run_anew(known: int, modes: in
     assert np.sort(found.learned.start.centres[:, 0]) == pytest.approx([0.0, 10.0], abs=0.1)
     if isinstance(found, BurnIn):
         assert found.round == policy.rounds - 1 and found.learned.previous is None
+
+
+def with_a_far_hill(count: int) -> tuple[Sampling, SimpleNamespace]:
+    """Draws of a normal density; of 400 places that the search left, `count` are of a hill that holds a hundredth."""
+    rng = np.random.default_rng(0)
+    centre, far = np.full(D, 12.0), Mixture(np.ones(1), np.full((1, D), 12.0), 2.0 * np.eye(D)[None], 1e6)
+
+    def density(z: np.ndarray) -> np.ndarray:
+        return np.logaddexp(NORMAL.log_density(z), np.log(0.01) + far.log_density(z))
+
+    z = rng.normal(size=(32, 128, D))
+    kept = Kept((z,), (density(z.reshape(-1, D)).reshape(32, 128),), z[..., 0].size)
+    left = rng.normal(size=(400, D))
+    left[:count] = centre + 2.0 * left[:count]
+    learned = Learned(NORMAL, NORMAL, 1, (left, density(left)), lost=True)
+    walkers = Walkers(z[-1], density(z[-1]), np.random.RandomState(0).get_state())
+    coordinates = SimpleNamespace(order=np.arange(D))
+    return Sampling(walkers, learned, rng, 0, kept), SimpleNamespace(coordinates=coordinates)
+
+
+@pytest.mark.parametrize("is_lost", [True, False])
+def test_what_the_search_left_gets_into_the_next_proposal_where_walkers_have_lost_it(is_lost: bool) -> None:
+    """Then the proposal is no longer too low there, and the fit need not be given up for it."""
+    state, target = with_a_far_hill(40)
+    z, value = state.kept.flat
+    assert overlooked_nats(state.learned, z, value)[1] > OUTWEIGHS
+    state = replace(state, learned=replace(state.learned, lost=is_lost))
+    found = burn_in.again(target, state, Policy())  # type: ignore[arg-type]
+    now = overlooked_nats(found.learned, z, value)[1]
+    assert (now < OUTWEIGHS) is is_lost
+
+
+@pytest.mark.parametrize(("nats", "matters"), [(0.01, True), (-0.01, False)])
+def test_of_what_the_search_left_only_places_that_may_hold_something_get_into_it(nats: float, matters: bool) -> None:
+    """Five of a hundred places, as high as where a hill as wide as the prior would hold next to nothing."""
+    z = np.random.default_rng(1).normal(size=(100, D))
+    value = NORMAL.log_density(z) + 70.0
+    next_to_nothing = 70.0 + np.log(1e-3) - 0.5 * D * (1.0 + np.log(2.0 * np.pi / 0.3))
+    left = z, np.where(np.arange(100) < 5, next_to_nothing + nats, value)
+    found = left_by_search(Learned(NORMAL, NORMAL, 1, left, lost=True), z, value)
+    assert found is not None
+    assert set(found.z[:, 0]) == set(z[0 if matters else 5 :, 0])
+    assert left_by_search(Learned(NORMAL, NORMAL, 1, left), z, value) is None
 
 
 def test_the_frozen_proposal_draws_less_from_its_wide_parts() -> None:

@@ -45,7 +45,7 @@ def looked(
     state = Sampling(Walkers(z[-1], np.zeros(len(z[-1])), None), learned, None, 0)  # type: ignore[arg-type]
     state = replace(state, kept=Kept(blocks, tuple(np.zeros(block.shape[:2]) for block in blocks)))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(burn_in, "overlooked_nats", lambda *given: (overlooked, lost))
+        patch.setattr(stop_rule, "overlooked_nats", lambda *given: (overlooked, lost))
         found = stop_rule.apply(gaussian(D), state, Policy(**(EASY | policy)))  # type: ignore[arg-type]
     assert found.diagnostics is not None
     return found, found.diagnostics
@@ -354,7 +354,7 @@ def test_the_last_look_decides_which_draws_are_weighed(monkeypatch: pytest.Monke
         given.append((z, value))
         return 0.0, 0.0
 
-    monkeypatch.setattr(burn_in, "overlooked_nats", overlooked)
+    monkeypatch.setattr(stop_rule, "overlooked_nats", overlooked)
     learned = Learned(None, None, 1, trusted=True)  # type: ignore[arg-type]
     for steps in (127, 256):
         z = draws(steps)

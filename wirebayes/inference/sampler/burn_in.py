@@ -24,6 +24,7 @@ from wirebayes.inference.optimum import Optimum, distinct
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.sampler import mixture, net, proposal
 from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler.overlooked import left_by_search
 from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.settings import (
@@ -39,7 +40,6 @@ from wirebayes.inference.sampler.settings import (
     LONGEST_SETTLING,
     MORE_COMPONENTS,
     MOST_COMPONENTS,
-    NEXT_TO_NOTHING,
     OVERDISPERSED,
     PASSING_POINTS,
     POINTS,
@@ -49,7 +49,6 @@ from wirebayes.inference.sampler.settings import (
     TO_FIND_MORE,
     USEFUL,
     WARM,
-    WIDEST,
 )
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers, advance, move_of
 from wirebayes.numeric.resampling import effective_number, next_power, truncated_rows
@@ -225,10 +224,15 @@ def _modes_of(target: LogPosterior, start: Mixture) -> Optimum:
 
 
 def _of_kept(target: LogPosterior, state: Sampling, policy: Policy, done: int) -> BurnIn:
-    """Burn-in after so many rounds, with a proposal that was learned from all kept draws."""
+    """Burn-in after so many rounds, with a proposal that was learned from all kept draws.
+
+    What the search left and the proposal overlooked goes into its excess part, too: a mode that walkers have lost is
+    found again, and the wide end of a funnel, which holds next to nothing, is no longer underrated.
+    """
     z, value = state.all_kept.flat
     seen = _weighted_twice(z, value, value)
-    burning = BurnIn(state.walkers, state.learned, state.generator, state.evaluations, done)
+    left = left_by_search(state.learned, z, value)
+    burning = BurnIn(state.walkers, state.learned, state.generator, state.evaluations, done, drawn=left)
     return _with_excess(_fitted(target, burning, policy, *seen), z, value, np.zeros(len(z)))
 
 
@@ -237,38 +241,6 @@ def _as_frozen(learned: Learned) -> Learned:
     if not isinstance(learned.proposal, Proposal):
         return learned
     return replace(learned, proposal=replace(learned.proposal, shares=SHARES))
-
-
-def overlooked_nats(learned: Learned, z: Array, value: Array) -> tuple[float, float]:
-    """How far places that matter lie above what the frozen proposal makes of them, in nats.
-
-    The log of posterior over proposal, less its median over the posterior, is taken at its 99.9 % quantile over kept
-    draws, and at its 99 % quantile over the rough draws that the search left. A neck into which few walkers found their
-    way, and stayed, shows in the first, a mode that they lost in the second. Of the search's draws, those do not count
-    where even a hill as wide as the prior would hold next to nothing: where annealing lost most of its rows, copies of
-    such places are what it ended with.
-
-    Parameters
-    ----------
-    learned : Learned
-        The proposal and, as `witness`, what the search left.
-    z : (n, d) array
-        Kept draws, in the coordinates that are sampled.
-    value : (n,) array
-        Their log posterior densities.
-
-    Returns
-    -------
-    of_kept, of_search : float
-    """
-    over = value - learned.proposal.log_density(z)
-    middle, high = np.quantile(over, [0.5, 0.999])
-    if learned.witness is None:
-        return float(high - middle), 0.0
-    z, value = learned.witness
-    matters = value + z.shape[1] * WIDEST > middle + NEXT_TO_NOTHING
-    left = np.where(matters, value - learned.proposal.log_density(z), middle)
-    return float(high - middle), float(np.quantile(left, 0.99) - middle)
 
 
 def _hard_to_find(learned: Learned) -> bool:

@@ -8,7 +8,7 @@ block, until for every parameter
 - the kept steps span five autocorrelation times, and
 - the nested R-hat with the ensembles as super-chains is at most `Policy.r_hat`, and
 - no region of the posterior is underrated by the frozen proposal so much that one place there outweighs a pool of draws
-  (`burn_in.overlooked_nats`),
+  (`overlooked.overlooked_nats`),
 
 or until `Policy.most_steps`: then the result says *not converged*, and why.
 

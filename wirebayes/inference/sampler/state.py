@@ -59,7 +59,7 @@ class Learned:
     again : int
         So often the proposal was learned again, from kept draws.
     overlooked : float
-        The larger of what `burn_in.overlooked_nats` said at the last look, where that was too much.
+        The larger of what `overlooked.overlooked_nats` said at the last look, where that was too much.
     lost : bool
         Whether it was too much of what the search left: a mode that walkers have lost.
     previous : Proposal or Mixture, optional

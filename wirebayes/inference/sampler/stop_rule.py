@@ -10,7 +10,7 @@ import numpy as np
 from wirebayes.inference.convergence import ENOUGH, farthest_apart, nested_r_hat, slowest_autocorrelation_steps
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import burn_in
+from wirebayes.inference.sampler.overlooked import overlooked_nats
 from wirebayes.inference.sampler.settings import (
     DISAGREE,
     FOR_MORE,
@@ -43,7 +43,7 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     steps, found = values.shape[1], _diagnosed(values)
     beyond = of_search = 0.0
     if state.learned.trusted:
-        of_kept, of_search = burn_in.overlooked_nats(state.learned, *state.all_kept.flat)
+        of_kept, of_search = overlooked_nats(state.learned, *state.all_kept.flat)
         beyond = max(of_kept, of_search)
     counts = beyond if beyond > OUTWEIGHS else 0.0
     learned = replace(state.learned, overlooked=counts, lost=of_search > OUTWEIGHS)
