@@ -16,6 +16,7 @@ import pytest
 
 from analyses.project import readmes
 from wirebayes.cli import COMMANDS, command_function, main
+from wirebayes.effects import CATALOGUE
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.robot.mechanics import schema
 from wirebayes.strict.toml_keys import Keys
@@ -180,6 +181,13 @@ def test_the_readme_shows_what_the_tutorials_run_said():
 
 def tutorial_outputs() -> dict[str, str]:
     return {path.name: path.read_text(encoding="utf-8") for path in (DOCS / "tutorial").glob("*.txt")}
+
+
+def test_the_theory_says_of_every_effect_what_it_is_under_weights():
+    theory = (DOCS / "theory.rst").read_text(encoding="utf-8")
+    table = theory.partition("- under weights\n")[2].partition("\n\n")[0]
+    missing = {name for name in CATALOGUE if f"``{name}``" not in table}
+    assert missing == set(), "an effect needs a row in the table of docs/theory.rst"
 
 
 def test_measured_figures_stand_in_the_texts_as_the_studies_gave_them():

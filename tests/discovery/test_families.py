@@ -7,7 +7,15 @@ import pytest
 
 from tests.simulated import simulated_tests
 from wirebayes.discovery import screening
-from wirebayes.discovery.families import block_ratio, called, families_of, family_sentence, grouped, refitted_probe
+from wirebayes.discovery.families import (
+    PATTERNS,
+    block_ratio,
+    called,
+    families_of,
+    family_sentence,
+    grouped,
+    refitted_probe,
+)
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.effects import CATALOGUE, effect_named
@@ -41,7 +49,7 @@ def test_alike_means_more_than_the_threshold(cos: float, families: list[tuple[st
 def test_a_family_is_called_by_what_its_members_have_in_common() -> None:
     assert called(("toe", "strain_stiffening")) == "elastic curve" and called(("toe",)) == "toe"
     assert called(("screw_wobble", "toe")) == "screw_wobble"  # a user's own effect has no other name
-    assert {n for n in CATALOGUE if called((n, n)) == n} == set()
+    assert {n for n, kind in CATALOGUE.items() if kind.pattern not in PATTERNS} == set(), "an effect needs a pattern"
 
 
 def test_a_family_is_said_as_a_person_who_tests_lines_would() -> None:

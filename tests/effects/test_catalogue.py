@@ -69,6 +69,7 @@ STRENGTH = {
 
 def strong(key):
     name = key.partition("@")[0]
+    assert name in STRENGTH, f"{name} needs amplitudes in STRENGTH"
     return {f"{name}.{k}": v for k, v in STRENGTH[name].items()}
 
 
@@ -129,6 +130,15 @@ FORMULAS = {
     "lost_motion": lambda: chain(offset=lambda j: 0.2 if DIRECTION[j] < 0 else 0.0),
     "guide_friction": lambda: chain(read=lambda y, j, t: y * (1 + 0.05 * DIRECTION[j])),
 }
+
+
+BY_A_TEST_OF_THEIR_OWN = {"superposition", "second_relaxation", "steady_creep", "unrecorded_hold"}
+
+
+def test_every_effect_is_compared_with_a_formula_of_its_own():
+    known = set(FORMULAS) | BY_A_TEST_OF_THEIR_OWN
+    assert set(CATALOGUE) == known, "an effect needs a row in FORMULAS, or a test of its own"
+    assert set(CATALOGUE) == set(STRENGTH), "an effect needs amplitudes in STRENGTH"
 
 
 @pytest.mark.parametrize("key", [k for k in KEYS if k.partition("@")[0] in FORMULAS])

@@ -12,6 +12,7 @@ from analyses.hidden_effects.catalogue import EFFECTS
 from analyses.hidden_effects.optimal import judge
 from analyses.hidden_effects.run import append_line, main, read_lines
 from analyses.hidden_effects.truth import PROTOCOLS
+from wirebayes.effects import CATALOGUE
 from wirebayes.io.experiment_file import read_experiments
 
 SLIP = Spec("single", "paper", ("grip_slip",), 20.0, 0)
@@ -26,6 +27,10 @@ def test_the_full_plan_is_balanced_and_its_keys_differ():
     for delta in (3.0, 5.0, 10.0, 20.0):
         assert sum(s.delta == delta for s in single) == len(single) / 4
     assert {s.protocol for s in single} == set(PROTOCOLS)
+
+
+def test_every_effect_of_the_catalogue_is_hidden_by_the_benchmark():
+    assert set(EFFECTS) == set(CATALOGUE), "an effect needs a row in analyses/hidden_effects/catalogue.py"
 
 
 def test_a_part_of_the_plan_is_made_of_the_same_cases():

@@ -15,6 +15,7 @@ from wirebayes.discovery.power import ALIKE, cosines
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import Refit
 from wirebayes.discovery.tangent import moving_columns, tangent
+from wirebayes.effects import CATALOGUE
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.numeric.typing import Array
@@ -31,21 +32,6 @@ PATTERNS = {
     "position of the screw": "the position is off periodically",
     "length of the sample": "samples of different lengths differ",
 }
-_OF = {
-    "strain_stiffening": "elastic curve", "toe": "elastic curve", "power_strain": "elastic curve",
-    "sensor_nonlinearity": "elastic curve",
-    "second_relaxation": "course of a hold", "steady_creep": "course of a hold", "reading_delay": "course of a hold",
-    "late_clock": "course of a hold", "clamp_transient": "course of a hold",
-    "tension_dependent_rate": "creep from hold to hold",
-    "superposition": "creep from hold to hold", "ageing": "creep from hold to hold",
-    "creep_threshold": "creep from hold to hold", "prior_creep": "creep from hold to hold",
-    "permanent_creep": "creep from hold to hold",
-    "grip_slip": "step at a hold", "unrecorded_hold": "step at a hold",
-    "sensor_drift": "slow drift", "thermal_expansion": "slow drift",
-    "lost_motion": "way back", "guide_friction": "way back",
-    "screw_error": "position of the screw",
-    "fixture_compliance": "length of the sample", "length_dependence": "length of the sample",
-}  # fmt: skip
 
 
 def families_of(
@@ -132,7 +118,9 @@ def noise_ratio(block: LaplaceFit, found: Refit, b: int) -> float:
 
 def called(family: Family) -> str:
     """The family's name: what its members have in common, or the effect itself where it is alone."""
-    return _OF.get(family[0], family[0]) if len(family) > 1 else family[0]
+    best = family[0]
+    pattern = CATALOGUE[best].pattern if best in CATALOGUE else ""  # a user's own effect has none
+    return pattern if pattern and len(family) > 1 else best
 
 
 def family_sentence(members: Mapping[str, float]) -> str:

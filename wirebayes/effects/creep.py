@@ -22,6 +22,7 @@ class PermanentCreep(Effect):
     """
 
     name = "permanent_creep"
+    pattern = "creep from hold to hold"
     place = "amount"
     formula = "permanent"
     scope = "material"
@@ -45,6 +46,7 @@ class Superposition(Effect):
     """
 
     name = "superposition"
+    pattern = "creep from hold to hold"
     place = "elongation"
     formula = "superposition"
     scope = "material"
@@ -68,6 +70,7 @@ class SecondRelaxation(Effect):
     """A second creep mode towards A τ_j(0), time constant T2."""
 
     name = "second_relaxation"
+    pattern = "course of a hold"
     place = "elongation"
     formula = "second_mode"
     scope = "material"
@@ -86,6 +89,7 @@ class SteadyCreep(Effect):
     """An elongation a τ_j(0) t beside the creep, without a plateau."""
 
     name = "steady_creep"
+    pattern = "course of a hold"
     place = "elongation"
     formula = "flow"
     scope = "material"
@@ -105,6 +109,7 @@ class SteadyCreepCarried(Effect):
     """The same flow as a part of the carried creep: what has flowed counts towards the next hold's total."""
 
     name = "steady_creep"
+    pattern = "course of a hold"
     place = "creep"
     formula = "flow_carried"
     scope = "material"
@@ -124,6 +129,7 @@ class TensionDependentRate(Effect):
     """k2 (τ_j(0) / τref)^m; a wire below a hundredth of τref, or slack, counts as at a hundredth."""
 
     name = "tension_dependent_rate"
+    pattern = "creep from hold to hold"
     place = "rate"
     formula = "rate_power"
     scope = "material"
@@ -140,6 +146,7 @@ class Ageing(Effect):
     """a_j (1 + j)^(-a), j the number of earlier holds."""
 
     name = "ageing"
+    pattern = "creep from hold to hold"
     place = "amount"
     formula = "ageing"
     scope = "material"
@@ -155,6 +162,7 @@ class CreepThreshold(Effect):
     """Creep is driven by max(τ - τc, 0)."""
 
     name = "creep_threshold"
+    pattern = "creep from hold to hold"
     place = "drive"
     formula = "threshold"
     no_creep_below = "creep_threshold.tau_c"
@@ -174,6 +182,7 @@ class PriorCreep(Effect):
     """
 
     name = "prior_creep"
+    pattern = "creep from hold to hold"
     place = "before"
     formula = "before"
     scope = "event"

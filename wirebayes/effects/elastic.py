@@ -19,6 +19,7 @@ class StrainStiffening(Effect):
     """τ = k1 s (1 + c s)."""
 
     name = "strain_stiffening"
+    pattern = "elastic curve"
     place = "strain"
     formula = "stiffening"
     scope = "material"
@@ -38,6 +39,7 @@ class Toe(Effect):
     """
 
     name = "toe"
+    pattern = "elastic curve"
     place = "strain"
     formula = "toe"
     scope = "material"
@@ -60,6 +62,7 @@ class ToeOfStrain(Effect):
     """The same as a strain: the whole line straightens, s -> s - c (1 - exp(-s / c)) with c = w / L0."""
 
     name = "toe"
+    pattern = "elastic curve"
     place = "strain"
     formula = "toe_of_strain"
     scope = "material"
@@ -90,6 +93,7 @@ class PowerStrain(Effect):
     """τ = k1 s^(1 + p), strain s in units of the typical one, τref / k1: so k1 stays the stiffness at τref."""
 
     name = "power_strain"
+    pattern = "elastic curve"
     place = "strain"
     formula = "power"
     scope = "material"
@@ -109,6 +113,7 @@ class FixtureCompliance(Effect):
     """S - τ c: the frame or the sensor gives way in proportion to the tension."""
 
     name = "fixture_compliance"
+    pattern = "length of the sample"
     place = "strain"
     formula = "series"
     scope = "instrument"
@@ -130,6 +135,7 @@ class ThermalExpansion(Effect):
     """ℓ (1 + α (T - T_first)), with the logged temperature."""
 
     name = "thermal_expansion"
+    pattern = "slow drift"
     place = "zero_length"
     formula = "thermal"
     scope = "material"
@@ -152,6 +158,7 @@ class LengthDependence(Effect):
 
     which: str = "k1"
     name = "length_dependence"
+    pattern = "length of the sample"
     place = "sample"
     formula = "length_power"
     scope = "material"

@@ -16,6 +16,7 @@ class GripSlip(EventEffect):
     """Zero-tension length + w from hold h on."""
 
     name = "grip_slip"
+    pattern = "step at a hold"
     place = "zero_length"
     formula = "slip"
     amplitudes = (Amplitude("w", "mm", 0.0, Normal(0.0, 0.3)),)
@@ -31,6 +32,7 @@ class UnrecordedHold(EventEffect):
     """Before hold h, T seconds passed at its displacement."""
 
     name = "unrecorded_hold"
+    pattern = "step at a hold"
     place = "wait"
     formula = "wait"
     amplitudes = (Amplitude("T", "s", 0.0, HalfNormal(2.5)),)

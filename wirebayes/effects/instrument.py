@@ -18,6 +18,7 @@ class ReadingDelay(Effect):
     """The first reading of a hold comes t_d seconds late."""
 
     name = "reading_delay"
+    pattern = "course of a hold"
     place = "clock"
     formula = "delay"
     scope = "instrument"
@@ -35,6 +36,7 @@ class LateClock(Effect):
     """All readings of a hold are taken t_d seconds later than recorded, and it lasts t_d longer."""
 
     name = "late_clock"
+    pattern = "course of a hold"
     place = "time"
     formula = "late"
     scope = "instrument"
@@ -51,6 +53,7 @@ class SensorDrift(Effect):
     """Reading + a x elapsed time."""
 
     name = "sensor_drift"
+    pattern = "slow drift"
     place = "reading"
     formula = "drift"
     scope = "instrument"
@@ -66,6 +69,7 @@ class SensorNonlinearity(Effect):
     """Reading τ + a τ²."""
 
     name = "sensor_nonlinearity"
+    pattern = "elastic curve"
     place = "reading"
     formula = "square"
     scope = "instrument"
@@ -81,6 +85,7 @@ class ClampTransient(Effect):
     """Reading τ (1 + a exp(-t / T))."""
 
     name = "clamp_transient"
+    pattern = "course of a hold"
     place = "reading"
     formula = "transient"
     scope = "instrument"
@@ -126,6 +131,7 @@ class ScrewError(Effect):
     longest: float = 6.0
     of_several: bool = False
     name = "screw_error"
+    pattern = "position of the screw"
     place = "position"
     formula = "screw"
     scope = "instrument"
@@ -189,6 +195,7 @@ class LostMotion(_NeedsReversal):
     """After a reversal the position lags by w."""
 
     name = "lost_motion"
+    pattern = "way back"
     place = "position"
     formula = "lost_motion"
     scope = "instrument"
@@ -204,6 +211,7 @@ class GuideFriction(_NeedsReversal):
     """τ (1 ± μ) by direction of motion, relative to the first direction's value."""
 
     name = "guide_friction"
+    pattern = "way back"
     place = "guide"
     formula = "friction"
     scope = "instrument"

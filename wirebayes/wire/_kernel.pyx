@@ -14,7 +14,8 @@ cdef enum:
 
 MOST_EFFECTS = _MOST_EFFECTS
 
-# In the order of `FORMULAS`.
+# In the order of `FORMULAS`; laws of time come last. A new formula also joins the list of its place in `Law`, and has its
+# own branch where that list is gone through.
 cdef enum Formula:
     STIFFENING, TOE, TOE_OF_STRAIN, POWER, SERIES, THERMAL, LENGTH_POWER, PERMANENT, SUPERPOSITION, SECOND_MODE, FLOW, FLOW_CARRIED, RATE_POWER
     AGEING, THRESHOLD, SLIP, BEFORE, WAIT, LATE, DELAY, DRIFT, SQUARE, TRANSIENT, SCREW, LOST_MOTION, FRICTION
@@ -116,7 +117,7 @@ cdef inline Dual zero_of(Wire* wire, Hold* hold, Dual elongation, double warming
         e = wire.at.zero.each[k]
         if wire.formula[e] == THERMAL:
             zero = times(zero, 1.0 + wire.own[e][0] * warming_K)
-        elif hold.order >= wire.number[e]:  # a slip
+        elif wire.formula[e] == SLIP and hold.order >= wire.number[e]:
             zero.v += wire.own[e][0]
     return zero
 
@@ -463,7 +464,7 @@ cdef void take(
             row += 1
         if law.formula[e] == RATE_POWER or law.formula[e] == DELAY:
             wire.own_time = True
-        elif law.formula[e] >= NOT_IN_TIME:
+        elif NOT_IN_TIME <= law.formula[e] <= TWO_MODES:
             wire.timed = True
         elif law.formula[e] == LATE:
             wire.late += wire.own[e][0]

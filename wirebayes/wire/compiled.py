@@ -70,6 +70,9 @@ def _law(
     modified: bool, kept: float, tension_ref_N: float, log_ratio: float, formulas: tuple[tuple[str, int, float], ...]
 ) -> Any:
     """The kernel's law, of which every evaluation of a model needs the same."""
+    for name, _, _ in formulas:
+        if name not in kernel.FORMULAS:
+            raise LookupError(f"the compiled kernel has no formula {name!r}: build it again, as CONTRIBUTING says")
     return kernel.Law(modified, kept, tension_ref_N, log_ratio, formulas)
 
 

@@ -156,6 +156,7 @@ class Effect:
     amplitudes: ClassVar[tuple[Amplitude, ...]]
     sentence: ClassVar[str]
     shows: ClassVar[str] = ""
+    pattern: ClassVar[str] = ""  # what it has in common with others that look like it: a key of `families.PATTERNS`
     adds: ClassVar[bool] = False  # a sum to the reading, of each amplitude times a function of hold and time alone
     formula: ClassVar[str] = ""  # the name of its compiled twin in `wirebayes/wire/_kernel.pyx`, where it has one
     no_creep_below: ClassVar[str] = ""  # the parameter that is a tension below which nothing creeps, where it has one
