@@ -21,7 +21,7 @@ from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
-from wirebayes.io.run_folder import open_run, read_json, write_json
+from wirebayes.io.run_folder import open_run, read_json, write_bytes, write_json
 from wirebayes.json_files.discovery import IntervalJson
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.model.spec import ModelSpec
@@ -32,6 +32,7 @@ from wirebayes.results.mixture import write_mixture
 from wirebayes.results.read_back import load_posterior
 from wirebayes.strict.files import PathLike
 from wirebayes.views.findings import Findings
+from wirebayes.views.posterior import POSTERIOR, SUMMARY
 from wirebayes.views.result import ResultFolder
 from wirebayes.wire.laws import ElasticLaw, History
 
@@ -138,6 +139,8 @@ def discover(
 def write_findings(found: Investigation, output: Path, own_effects: Path | None) -> None:
     """Beside the fits: what is undecided, pictures, and ``discovery.json`` with the final posteriors' amplitudes.
 
+    Where no effect was added the final model is the plain one, whose files stand in both folders.
+
     Parameters
     ----------
     found : Findings
@@ -147,6 +150,7 @@ def write_findings(found: Investigation, output: Path, own_effects: Path | None)
     own_effects : Path or None
         File of a user's own effects.
     """
+    _finals_that_are_plain(found, output)
     _mixtures(found, output)
     _pictures(found, output, own_effects)
     _posterior_amplitudes(found, output)
@@ -156,7 +160,7 @@ def write_findings(found: Investigation, output: Path, own_effects: Path | None)
 
 
 def jobs_of(found: Investigation, spec: ModelSpec, own_effects: Path | None) -> list[Job]:
-    """Plain fit of every experiment, and the final ones.
+    """Plain fit of every experiment, and the final ones that have more effects than it.
 
     Parameters
     ----------
@@ -173,7 +177,7 @@ def jobs_of(found: Investigation, spec: ModelSpec, own_effects: Path | None) -> 
         Where the findings are ambiguous, one for each effect that could be the missing one.
     """
     models = [("plain", JointModel((e,))) for block in found.final for e in block.experiments]
-    models += [("final", model) for model in final_models(found)]
+    models += [("final", model) for model in final_models(found) if model.effects]
     models += [(f"final/{_OTHERS}/{k}", m) for k, m in _others(found)]
     out = []
     for kind, model in models:
@@ -194,6 +198,16 @@ def _others(found: Investigation) -> list[tuple[int, JointModel]]:
     return out
 
 
+def _finals_that_are_plain(found: Investigation, output: Path) -> None:
+    """Store the plain fit as the final one of every experiment that no effect was added to."""
+    for model in final_models(found):
+        for e in () if model.effects else model.experiments:
+            plain, final = (output / e.name / kind for kind in ("plain", "final"))
+            final.mkdir(exist_ok=True)
+            for name in (POSTERIOR, SUMMARY):
+                write_bytes(final / name, (plain / name).read_bytes())
+
+
 def _mixtures(found: Investigation, output: Path) -> None:
     """Say beside each final posterior which other models it shares the probability with."""
     for block, others in zip(found.final, found.undecided, strict=True):
@@ -207,7 +221,7 @@ def _mixtures(found: Investigation, output: Path) -> None:
 def _posterior_amplitudes(found: Investigation, output: Path) -> None:
     """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
     for e in (e for block in found.final for e in block.experiments):
-        summary: SummaryJson = read_json(output / e.name / "final" / "summary.json")
+        summary: SummaryJson = read_json(output / e.name / "final" / SUMMARY)
         parameters = summary["parameters"]
         for name, amplitude in found.report["experiments"][e.name]["amplitudes"].items():
             column = next(c for c in parameters if c.startswith(f"{name}."))
@@ -218,7 +232,7 @@ def _posterior_amplitudes(found: Investigation, output: Path) -> None:
 def _parameters(found: Investigation, output: Path) -> None:
     """Every parameter before and after, as the two posteriors have it."""
     for name, report in found.report["experiments"].items():
-        plain, final = (read_json(output / name / model / "summary.json")["parameters"] for model in ("plain", "final"))
+        plain, final = (read_json(output / name / model / SUMMARY)["parameters"] for model in ("plain", "final"))
         units = {column: entry["unit"] for column, entry in (plain | final).items()}
         report["parameters"] = {
             column: {"unit": unit, "plain": _interval(plain.get(column)), "final": _interval(final.get(column))}
@@ -235,7 +249,7 @@ def _warnings(found: Investigation, output: Path) -> None:
     """What the fits say against themselves joins what the search says; of the same readings it is said once."""
     reports = found.report["experiments"]
     for name, report in reports.items():
-        fits: list[SummaryJson] = [read_json(output / name / model / "summary.json") for model in ("plain", "final")]
+        fits: list[SummaryJson] = [read_json(output / name / model / SUMMARY) for model in ("plain", "final")]
         plain, final = (from_json(summary["warnings"]) for summary in fits)
         alone = [notice.of("the final model") for notice in final if notice not in plain]
         report["warnings"] = to_json([*from_json(report["warnings"]), *plain, *alone])
