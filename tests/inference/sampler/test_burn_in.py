@@ -225,7 +225,7 @@ def test_kept_draws_are_learned_from_as_burn_in(
         return state
 
     monkeypatch.setattr(burn_in, "_fitted", fitted)
-    z = np.repeat([0.0, 1.0, 1.0, 1.0], 10)[:, None, None] * np.ones((1, 25, 1))  # as often as they are dense
+    z = np.repeat([0.0, 1.0, 1.0, 1.0], 10)[:, None, None] * np.ones((1, 25, D))  # as often as they are dense
     kept = Kept((z[:4], z[4:]), tuple(np.log(3.0) * part[..., 0] for part in (z[:4], z[4:])))
     learned = Learned(NORMAL, NORMAL, 1, again=2, overlooked=overlooked)
     walkers = SimpleNamespace(positions=z[-1])
@@ -303,35 +303,56 @@ def with_a_far_hill(count: int) -> tuple[Sampling, SimpleNamespace]:
     kept = Kept((z,), (density(z.reshape(-1, D)).reshape(32, 128),), z[..., 0].size)
     left = rng.normal(size=(400, D))
     left[:count] = centre + 2.0 * left[:count]
-    learned = Learned(NORMAL, NORMAL, 1, (left, density(left)), lost=True)
+    learned = Learned(NORMAL, NORMAL, 1, (left, density(left)))
     walkers = Walkers(z[-1], density(z[-1]), np.random.RandomState(0).get_state())
     coordinates = SimpleNamespace(order=np.arange(D))
     return Sampling(walkers, learned, rng, 0, kept), SimpleNamespace(coordinates=coordinates)
 
 
-@pytest.mark.parametrize("is_lost", [True, False])
-def test_what_the_search_left_gets_into_the_next_proposal_where_walkers_have_lost_it(is_lost: bool) -> None:
+@pytest.mark.parametrize("remembered", [True, False])
+def test_what_the_search_left_gets_into_a_proposal_that_overlooks_it(
+    remembered: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Then the proposal is no longer too low there, and the fit need not be given up for it."""
     state, target = with_a_far_hill(40)
     z, value = state.kept.flat
     assert overlooked_nats(state.learned, z, value)[1] > OUTWEIGHS
-    state = replace(state, learned=replace(state.learned, lost=is_lost))
+    if not remembered:
+        monkeypatch.setattr(burn_in, "left_by_search", lambda learned, middle: None)
     found = burn_in.again(target, state, Policy())  # type: ignore[arg-type]
     now = overlooked_nats(found.learned, z, value)[1]
-    assert (now < OUTWEIGHS) is is_lost
+    assert (now < OUTWEIGHS) is remembered
+
+
+@pytest.mark.parametrize("last", [True, False])
+def test_the_last_round_of_burn_in_asks_what_the_search_left(last: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the usual ratio of posterior to proposal among its draws, which is e here."""
+    asked: list[float] = []
+    Watched(monkeypatch, np.full(5000, 1.0))
+    monkeypatch.setattr(burn_in, "left_by_search", lambda learned, middle: asked.append(middle))
+    burn_in.burn_in_round(None, burning(round=7 if last else 0), Policy(rounds=3, most_rounds=9))  # type: ignore[arg-type]
+    assert asked == ([pytest.approx(1.0)] if last else [])
 
 
 @pytest.mark.parametrize(("nats", "matters"), [(0.01, True), (-0.01, False)])
 def test_of_what_the_search_left_only_places_that_may_hold_something_get_into_it(nats: float, matters: bool) -> None:
     """Five of a hundred places, as high as where a hill as wide as the prior would hold next to nothing."""
     z = np.random.default_rng(1).normal(size=(100, D))
-    value = NORMAL.log_density(z) + 70.0
-    next_to_nothing = 70.0 + np.log(1e-3) - 0.5 * D * (1.0 + np.log(2.0 * np.pi / 0.3))
-    left = z, np.where(np.arange(100) < 5, next_to_nothing + nats, value)
-    found = left_by_search(Learned(NORMAL, NORMAL, 1, left, lost=True), z, value)
+    middle = 70.0
+    next_to_nothing = middle + np.log(1e-3) - 0.5 * D * (1.0 + np.log(2.0 * np.pi / 0.3))
+    overlooked = NORMAL.log_density(z) + middle + OUTWEIGHS + 1.0
+    left = z, np.where(np.arange(100) < 5, next_to_nothing + nats, overlooked)
+    found = left_by_search(Learned(NORMAL, NORMAL, 1, left), middle)
     assert found is not None
     assert set(found.z[:, 0]) == set(z[0 if matters else 5 :, 0])
-    assert left_by_search(Learned(NORMAL, NORMAL, 1, left), z, value) is None
+
+
+@pytest.mark.parametrize(("nats", "some"), [(0.01, True), (-0.01, False)])
+def test_the_search_is_asked_where_a_place_of_its_own_outweighs_a_pool(nats: float, some: bool) -> None:
+    z = np.random.default_rng(1).normal(size=(100, D))
+    left = z, NORMAL.log_density(z) + 70.0 + OUTWEIGHS + nats
+    assert (left_by_search(Learned(NORMAL, NORMAL, 1, left), 70.0) is not None) is some
+    assert left_by_search(Learned(NORMAL, NORMAL, 1), 70.0) is None
 
 
 def test_the_frozen_proposal_draws_less_from_its_wide_parts() -> None:

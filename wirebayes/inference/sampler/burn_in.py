@@ -128,7 +128,8 @@ def burn_in_round(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn
     if acceptance >= USEFUL:
         seen = _weighted_twice(z, value, base)
         state = _fitted(target, state, policy, *seen, points=POINTS if last else PASSING_POINTS)
-        state = _with_excess(state, z, value, weight)
+        left = left_by_search(state.learned, middle) if last else None
+        state = _with_excess(state, z, value, weight, left)
     # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
     steps = int(np.clip(np.exp(high - middle), 1, LONGEST_SETTLING))
     return _frozen(target, state, policy, (z, value, base), steps) if last else state
@@ -147,13 +148,25 @@ def _frozen(
     return Sampling(settled.walkers, learned, state.generator, state.evaluations + settled.evaluations)
 
 
-def _with_excess(state: BurnIn, z: Array, value: Array, log_weight: Array) -> BurnIn:
-    """The proposal with a part for what it makes too little of, as these places and those of earlier rounds show."""
+def _with_excess(
+    state: BurnIn, z: Array, value: Array, log_weight: Array, left: WeightedPoints | None = None
+) -> BurnIn:
+    """The proposal with a part for what it makes too little of.
+
+    Parameters
+    ----------
+    state : BurnIn
+        Its places of earlier rounds are looked at, too.
+    z, value, log_weight : arrays
+        Places (n, d), their log densities and weights.
+    left : WeightedPoints, optional
+        Places that the search left, with their log densities as one more column.
+    """
     drawn = WeightedPoints.weighted(np.column_stack([z, value]), log_weight)
     drawn = drawn.worth(effective_number(drawn.weight))
-    if state.drawn is not None:
-        drawn = state.drawn.joined(drawn)
-        drawn = WeightedPoints(drawn.z[-REMEMBERED:], drawn.weight[-REMEMBERED:])
+    for others in (state.drawn, left):
+        drawn = drawn if others is None else others.joined(drawn)
+    drawn = WeightedPoints(drawn.z[-REMEMBERED:], drawn.weight[-REMEMBERED:])
     state = replace(state, drawn=drawn)
     if not isinstance(state.learned.proposal, Proposal):
         return state
@@ -231,9 +244,11 @@ def _of_kept(target: LogPosterior, state: Sampling, policy: Policy, done: int) -
     """
     z, value = state.all_kept.flat
     seen = _weighted_twice(z, value, value)
-    left = left_by_search(state.learned, z, value)
-    burning = BurnIn(state.walkers, state.learned, state.generator, state.evaluations, done, drawn=left)
-    return _with_excess(_fitted(target, burning, policy, *seen), z, value, np.zeros(len(z)))
+    burning = BurnIn(state.walkers, state.learned, state.generator, state.evaluations, done)
+    fitted = _fitted(target, burning, policy, *seen)
+    middle = np.median(value - fitted.learned.proposal.log_density(z))
+    left = left_by_search(fitted.learned, float(middle))
+    return _with_excess(fitted, z, value, np.zeros(len(z)), left)
 
 
 def _as_frozen(learned: Learned) -> Learned:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.inference.sampler.points import WeightedPoints
-from wirebayes.inference.sampler.settings import NEXT_TO_NOTHING, WIDEST
+from wirebayes.inference.sampler.settings import NEXT_TO_NOTHING, OUTWEIGHS, WIDEST
 from wirebayes.inference.sampler.state import Learned
 from wirebayes.numeric.typing import Array
 
@@ -33,36 +33,38 @@ def overlooked_nats(learned: Learned, z: Array, value: Array) -> tuple[float, fl
     """
     over = value - learned.proposal.log_density(z)
     middle, high = np.quantile(over, [0.5, 0.999])
-    if learned.witness is None:
-        return float(high - middle), 0.0
-    z, value = learned.witness
-    left = np.where(_matters(z, value, middle), value - learned.proposal.log_density(z), middle)
-    return float(high - middle), float(np.quantile(left, 0.99) - middle)
+    return float(high - middle), _nats_of_search(learned, middle)
 
 
-def left_by_search(learned: Learned, z: Array, value: Array) -> WeightedPoints | None:
-    """The places that matter of those that the search left, where walkers have lost some of them.
+def left_by_search(learned: Learned, middle: float) -> WeightedPoints | None:
+    """The places that matter of those that the search left, where the proposal overlooks some of them.
 
     All of them: a proposal that was told only what it overlooks now would overlook others next time.
 
     Parameters
     ----------
     learned : Learned
-    z : (n, d) array
-        Kept draws.
-    value : (n,) array
-        Their log densities.
+    middle : float
+        The usual log of posterior over proposal.
 
     Returns
     -------
     WeightedPoints or None
         With their log densities as one more column.
     """
-    if not learned.lost or learned.witness is None:
+    if learned.witness is None or _nats_of_search(learned, middle) <= OUTWEIGHS:
         return None
-    middle = np.median(value - learned.proposal.log_density(z))
     places = np.column_stack(learned.witness)
     return WeightedPoints.equal(places[_matters(*learned.witness, middle)])
+
+
+def _nats_of_search(learned: Learned, middle: float) -> float:
+    """How far what the search left lies above what the proposal makes of it."""
+    if learned.witness is None:
+        return 0.0
+    z, value = learned.witness
+    left = np.where(_matters(z, value, middle), value - learned.proposal.log_density(z), middle)
+    return float(np.quantile(left, 0.99) - middle)
 
 
 def _matters(z: Array, value: Array, middle: float) -> NDArray[np.bool_]:
