@@ -70,8 +70,8 @@ STUDIES = {
     ),
     "discover_hidden": (
         "-m analyses.hidden_effects --size small --answer api --simulations 199 --judge-draws 40 --kinds single "
-        "without foreign two three mixed periodic --seed 5006 5007 --protocols paper unloading uneven dense "
-        "temperature slack --output {folder}",
+        "without foreign two three mixed periodic --seed 5006 5007 5008 5011 --protocols paper unloading "
+        "uneven dense temperature slack --output {folder}",
         "scores.json",
     ),
     # on a machine that does nothing else
