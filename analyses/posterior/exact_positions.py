@@ -79,12 +79,15 @@ def main() -> None:
         found = answered(__file__, given, tree)
         evaluations, inside = np.array(found["evaluations"]), np.array(found["inside"])
         shares = ", ".join(f"{n} {100 * s:.0f} %" for n, s in zip(PARAMETERS, inside.mean(axis=0), strict=True))
-        print(f"{name}: {sum(found['converged'])} of {len(evaluations)} converged")
-        print(f"  evaluations {np.median(evaluations):.0f} (median), {evaluations.max()} at most")
-        print(f"  90 % intervals hold {100 * inside.mean():.1f} % of the true values: {shares}", flush=True)
+        print(
+            f"- {name}: {sum(found['converged'])} of {len(evaluations)} converged, after {np.median(evaluations):.0f} "
+            f"evaluations (median) and {evaluations.max()} at most; 90 % intervals hold {100 * inside.mean():.1f} % of "
+            f"the true values ({shares})",
+            flush=True,
+        )
         total[name] = evaluations.sum()
     if options.against:
-        print(f"evaluations now over before: {total['now'] / total['before']:.2f} in all")
+        print(f"- evaluations now over before: {total['now'] / total['before']:.2f} in all")
 
 
 if __name__ == "__main__":
