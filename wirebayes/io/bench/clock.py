@@ -1,4 +1,4 @@
-"""Times as seconds: plain numbers in a unit, clocks (m:ss, h:mm:ss), dates with clocks; midnight passes."""
+"""Times as seconds: clocks (m:ss, h:mm:ss, 1 h 30 min), dates with clocks; midnight passes."""
 
 import re
 from collections.abc import Sequence
@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.errors import shown
+from wirebayes.io.bench.compound_times import is_spelt, spelt_s
 from wirebayes.io.bench.quantities import Unit
-from wirebayes.io.bench.sheet import MONTHS, is_moment, is_value, moment
+from wirebayes.io.bench.sheet import MONTHS, is_moment, is_number, is_value, moment
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
 
@@ -18,6 +19,8 @@ _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
 _PUT_BACK = 3600.0  # clocks are put back by an hour in autumn
 _LATE = 3.0  # times the least time between readings: nobody who counts from zero begins so late
 _LAST_MONTH = 12  # a larger number in a date is a day
+CALLED = {60.0: "minutes and seconds", 3600.0: "hours and minutes"}  # by the seconds of one of the first part
+_WRITTEN = {60.0: "mm:ss", 3600.0: "hh:mm"}  # the same, as a unit of `--map`
 UNDERSTOOD = (
     "a time such as 0:01:30 or 10:01:30 AM, or with a date such as 2024-05-31 10:01:30, 2024-05-31T10:01:30+02:00, "
     "20240531 10:01:30, 31.05.2024 10:01:30, 05/31/2024 10:01:30 AM or 31-May-2024 10:01:30"
@@ -32,6 +35,17 @@ def looks_like_a_moment(cell: str) -> bool:
 def has_moments(table: RawTable, column: int) -> bool:
     """Whether a column holds clocks or dates."""
     return any(is_moment(cell) for cell in table.column(column))
+
+
+def is_clock(table: RawTable, column: int, unit: Unit | None) -> bool:
+    """Whether a column holds clocks or dates, or is said to.
+
+    Parameters
+    ----------
+    unit : Unit or None
+        Of the column.
+    """
+    return (unit is not None and unit.clock is not None) or has_moments(table, column)
 
 
 def has_dates(table: RawTable, column: int) -> bool:
@@ -59,14 +73,13 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
     InputError
         A cell is no clock; `Undecided` where ``a:b`` may be minutes or hours.
     """
-    moments = _moments(table, column)
+    if any(map(is_spelt, table.column(column))):
+        return _spelt(table, column), False
+    moments = _moments(table, column, unit)
     # what follows a date or stands before AM is of the day, and leaves no doubt
     of_clock = [m["date"] is None and m["half"] is None for m in moments]
     short = next((i for i, m in enumerate(moments) if of_clock[i] and m["third"] is None), None)
-    leading = 3600.0
-    if short is not None:
-        fractions = any(m["fraction"] for m, bare in zip(moments, of_clock, strict=True) if bare and m["third"] is None)
-        leading = _leading(table, column, unit, short, fractions)
+    leading = 3600.0 if short is None else _leading(table, column, unit, moments, short)
     values = np.array([_value(m, leading if bare else 3600.0) for m, bare in zip(moments, of_clock, strict=True)])
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
@@ -93,19 +106,60 @@ def midnights(time_s: NDArray[np.float64]) -> int:
     return int(time_s.max() // _DAY)
 
 
-def _moments(table: RawTable, column: int) -> list[re.Match[str]]:
+def _spelt(table: RawTable, column: int) -> NDArray[np.float64]:
+    """Seconds of cells that name their units; nothing is zero in every unit."""
+    values = [0.0 if row.cell(column) == "0" else spelt_s(row.cell(column)) for row in table.rows]
+    for row, value in zip(table.rows, values, strict=True):
+        if value is None:
+            raise table.complain(
+                row.line, column, shown(row.cell(column)), "a time such as 1 h 30 min, 2 min 5 s or 30 s"
+            )
+    return np.array(values, dtype=float)
+
+
+def _moments(table: RawTable, column: int, unit: Unit | None) -> list[re.Match[str]]:
     """The parts of each cell; either all have a date, or none, and likewise an offset from UTC."""
+    joint = unit.clock.joint if unit is not None and unit.clock is not None else ":"
+    cells = [_with_colons(cell, joint) for cell in table.column(column)]
+    if unit is not None and all(map(is_number, cells)):
+        raise _no_clock(table, column, unit)
     moments: list[re.Match[str]] = []
-    for row in table.rows:
-        found = moment(row.cell(column))
+    for row, cell in zip(table.rows, cells, strict=True):
+        found = moment(cell)
         if found is None or found["first"] is None or (found["half"] and not 1 <= int(found["first"]) <= 12):
             raise table.complain(row.line, column, shown(row.cell(column)), UNDERSTOOD)
+        if max(int(found["second"]), int(found["third"] or 0)) >= 60:
+            raise table.complain(
+                row.line, column, shown(row.cell(column)), "minutes and seconds below 60 after the first number"
+            )
         moments.append(found)
         for part, called in (("date", "a date"), ("zone", "an offset from UTC")):
             if (found[part] is None) != (moments[0][part] is None):
                 expected = f"a time with{'out' * (moments[0][part] is None)} {called}, as in the lines before"
                 raise table.complain(row.line, column, shown(row.cell(column)), expected)
     return moments
+
+
+def _with_colons(cell: str, joint: str) -> str:
+    """A clock with colons between its parts, in place of points, commas or dashes where the header has such a sign."""
+    signs = {".": ".,", ",": ".,", "-": "-\u2013", "\u2013": "-\u2013"}.get(joint)
+    if signs is None or not re.fullmatch(rf"\d+([{signs}]\d\d){{1,2}}", cell):
+        return cell
+    return re.sub(rf"[{signs}]", ":", cell)
+
+
+def _no_clock(table: RawTable, column: int, unit: Unit) -> Undecided:
+    """The question what plain numbers mean under a header that speaks of clocks."""
+    name, first = table.header[column], table.rows[0]
+    units = {"s": "seconds", "min": "minutes", "h": "hours", "d": "days, as spreadsheets count"}
+    leading = None if unit.clock is None else unit.clock.leading_s
+    if leading and all(_with_colons(cell, ".") != cell for cell in table.column(column)):
+        units = {_WRITTEN[leading].replace(":", "."): CALLED[leading], **units}
+    return Undecided(
+        f"{table.sheet.path}, {table.place(first.line, column)}: found {first.cell(column)!r} under {unit.text!r}",
+        "the unit of time",
+        {f"--map {name}=time [{text}]": called for text, called in units.items()},
+    )
 
 
 def _value(found: re.Match[str], leading: float) -> float:
@@ -115,7 +169,7 @@ def _value(found: re.Match[str], leading: float) -> float:
     if found["half"]:  # 12 AM is midnight, 12 PM noon
         first = first % 12 + 12 * (found["half"] in "pP")
     if found["third"] is None:
-        return leading * first + leading / 60.0 * second + fraction - _offset(found["zone"])
+        return leading * first + leading / 60.0 * (second + fraction) - _offset(found["zone"])
     return 3600.0 * first + 60.0 * second + int(found["third"]) + fraction - _offset(found["zone"])
 
 
@@ -127,18 +181,28 @@ def _offset(zone: str | None) -> float:
     return (1.0 if zone[0] == "+" else -1.0) * (3600.0 * int(digits[:2]) + 60.0 * int(digits[2:]))
 
 
-def _leading(table: RawTable, column: int, unit: Unit | None, row: int, fractions: bool) -> float:
-    """Seconds of one of the first part of ``a:b``."""
-    if unit is not None and unit.clock in (60.0, 3600.0):
-        return unit.clock
-    if fractions:
+def _leading(table: RawTable, column: int, unit: Unit | None, moments: Sequence[re.Match[str]], short: int) -> float:
+    """Seconds of one of the first part of ``a:b``: as the header says, or as only one reading of the cells has it.
+
+    A fraction is one of seconds. Beside cells ``a:b:c`` one of the two makes times fall where the other does not.
+    """
+    if unit is not None and unit.clock is not None and unit.clock.leading_s is not None:
+        return unit.clock.leading_s
+    if any(m["fraction"] for m in moments if m["third"] is None):
         return 60.0
+    falls = {leading: sum(np.diff([_value(m, leading) for m in moments]) < 0.0) for leading in CALLED}
+    fewest = min(falls, key=lambda leading: falls[leading])
+    if any(falls[leading] > falls[fewest] for leading in CALLED):
+        return fewest
     name = table.header[column]
     raise Undecided(
-        f"{table.sheet.path}, {table.place(table.rows[row].line, column)}: found {table.rows[row].cell(column)!r}, "
-        "which is minutes and seconds or hours and minutes",
+        f"{table.sheet.path}, {table.place(table.rows[short].line, column)}: found "
+        f"{table.rows[short].cell(column)!r}, which is minutes and seconds or hours and minutes",
         "which",
-        {f"--map {name}=time [mm:ss]": "minutes and seconds", f"--map {name}=time [hh:mm]": "hours and minutes"},
+        {
+            f"--map {name}=time [{'mm:ss' if leading == 60.0 else 'hh:mm'}]": called
+            for leading, called in CALLED.items()
+        },
     )
 
 

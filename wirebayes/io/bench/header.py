@@ -2,14 +2,18 @@
 
 import re
 
+from wirebayes.io.bench.compound_times import announced
 from wirebayes.io.bench.quantities import ROLES, Role, Unit, is_foreign, quantity_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.words import LETTERS, RIG_WORDS, SAMPLE_WORDS, last_named, plain_letters, speaks_of, words_in
 
 NO_UNIT = ("", "-", "–", "1")  # what stands in a row of units where there is none
 UNIT_IN_BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
-_UNIT_FIRST = re.compile(r"(seconds|minutes|hours|sekunden|minuten|stunden|secondes|heures|segundos|minutos)\b", re.I)
-_TAILS = (r"(.+?)\s*/\s*(\S+)$", r"(.+),\s*(\S+)$", r"(.+?)\s+in\s+(\S+)$", r"(.+)[_\s]+(\S+)$")
+_UNIT_FIRST = re.compile(
+    r"(seconds|minutes|hours|sekunden|minuten|stunden|secondes|heures|segundos|minutos)(?!\S)", re.I
+)
+_BEFORE_UNIT = re.compile(r"\s*/\s*|,\s*|\s+in\s+|[_\s]+")
+_IN = re.compile(r".*\s(?:in|en|em)\s+")  # what a unit in brackets may begin with: durations in minutes
 
 
 def is_of_sample(table: RawTable, index: int, role: Role) -> bool:
@@ -45,12 +49,16 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
     A time may begin with its unit in full: hours at load.
     """
     bracket = UNIT_IN_BRACKETS.match(header)
-    if bracket and quantity_unit(bracket[2], role):
-        return bracket[1], quantity_unit(bracket[2], role)
-    for pattern in _TAILS:
-        tail = re.match(pattern, header)
-        if tail and quantity_unit(tail[2], role):
-            return tail[1], quantity_unit(tail[2], role)
+    in_brackets = quantity_unit(_IN.sub("", bracket[2]), role) if bracket else None
+    if bracket and in_brackets:
+        return bracket[1], in_brackets
+    for sign in _BEFORE_UNIT.finditer(header):
+        unit = quantity_unit(header[sign.end() :], role)
+        if unit and sign.start():
+            return header[: sign.start()], unit
+    whole = announced(header) if role == "time" else None
+    if whole:
+        return header, Unit(header, clock=whole)
     first = _UNIT_FIRST.match(header) if role == "time" else None
     return header, quantity_unit(first[1], role) if first else None
 
@@ -108,7 +116,8 @@ def is_of_rig(table: RawTable, index: int, role: Role) -> bool:
     """
     name, unit = name_and_unit(table.header[index], role)
     unit = quantity_unit(table.units[index], role) or unit
-    return unit is not None and bool(set(words_in(name)) & set(RIG_WORDS.get(role, ())))
+    named = words_in(name) & {word for known in RIG_WORDS.get(role, ()) for word in (known, known + "s")}
+    return unit is not None and bool(named)
 
 
 def is_called_of_sample(table: RawTable, index: int, role: Role) -> bool:

@@ -8,6 +8,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from wirebayes.io.bench.compound_times import Announced, announced
+
 Role = Literal["hold", "displacement", "time", "tension", "temperature"]
 ROLES: tuple[Role, ...] = get_args(Role)
 UNITS: dict[Role, str] = {"displacement": "mm", "time": "s", "tension": "N", "temperature": "°C"}
@@ -17,18 +19,6 @@ COMMON: dict[Role, tuple[str, ...]] = {
 }  # fmt: skip
 # What strains and stresses may be in, where a column of that name says no unit; or it is a length or a force after all.
 OF_SAMPLE: dict[Role, tuple[str, ...]] = {"displacement": ("mm/mm", "%", "mm"), "tension": ("MPa", "N")}
-# seconds that the first number of a two-part clock counts; three parts leave no doubt
-CLOCKS = {
-    "mm:ss": 60.0,
-    "m:ss": 60.0,
-    "min:s": 60.0,
-    "min:sec": 60.0,
-    "h:min": 3600.0,
-    "hh:mm": 3600.0,
-    "h:mm": 3600.0,
-    "hh:mm:ss": 1.0,
-    "h:mm:ss": 1.0,
-}
 
 # Spellings that pint does not know, or knows as something else.
 _SPELLINGS = {
@@ -69,8 +59,8 @@ class Unit:
         As it was written.
     factor, offset : float
         Of a value in the unit, to have it in ours.
-    clock : float or None
-        Where values are written ``a:b`` or ``a:b:c``: seconds of one of the first part of two.
+    clock : Announced or None
+        How clocks are written, such as ``a:b``, where values are none of plain numbers.
     is_mass : bool
         A mass that stands for its weight.
     of_sample : bool
@@ -80,7 +70,7 @@ class Unit:
     text: str
     factor: float = 1.0
     offset: float = 0.0
-    clock: float | None = None
+    clock: Announced | None = None
     is_mass: bool = False
     of_sample: bool = False
 
@@ -100,8 +90,9 @@ def quantity_unit(text: str, role: Role) -> Unit | None:
     text = text.strip()
     if role == "hold":
         return None
-    if role == "time" and text.lower() in CLOCKS:
-        return Unit(text, clock=CLOCKS[text.lower()])
+    clock = announced(text) if role == "time" else None
+    if clock is not None:
+        return Unit(text, clock=clock)
     bare = text.lstrip("-−").strip()
     sign = -1.0 if bare != text else 1.0
     share = _of_sample(bare, role)

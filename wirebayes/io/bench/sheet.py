@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from wirebayes.io.bench.compound_times import is_spelt
+
 _SPACES = " \u00a0\u2009\u202f"
 _NUMBER = re.compile(rf"[+\-\u2212]?(\d{{1,3}}([.,'\u2019{_SPACES}]\d{{3}})+|\d*)([.,]\d*)?([eE][+-]?\d+)?")
 # By the first three letters of their names in English and German.
@@ -101,8 +103,8 @@ def moment(cell: str) -> re.Match[str] | None:
 
 
 def is_moment(cell: str) -> bool:
-    """Whether a cell looks like a date or a clock."""
-    return moment(cell) is not None
+    """Whether a cell looks like a date, a clock or a time in several units."""
+    return moment(cell) is not None or is_spelt(cell)
 
 
 def is_measured(cells: Sequence[str]) -> bool:

@@ -121,7 +121,7 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     texts: dict[Role, list[str]] = {
         role: _numbers(table, column, decimal)
         for role, column in columns.items()
-        if role != "hold" and not (role == "time" and clock.has_moments(table, column.index))
+        if role != "hold" and not (role == "time" and clock.is_clock(table, column.index, column.unit))
     }
     values: dict[Role, Floats] = {role: _converted(columns[role], text) for role, text in texts.items()}
     values["time"], of_day = _times(table, columns["time"], values.get("time"), notes)
@@ -165,6 +165,8 @@ def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> 
         unit = "" if stated or column.unit is None else f" in {column.unit.text}"
         how = " (sign turned)" if column.unit and column.unit.factor < 0 else ""
         how += " (its weight)" if column.unit and column.unit.is_mass else ""
+        clocks = column.unit.clock if column.unit else None
+        how += f" ({clock.CALLED[clocks.leading_s]})" if clocks and clocks.leading_s else ""
         how += f" (times the {_SIZE[role]})" if column.unit and column.unit.of_sample else ""
         parts.append(f"{role} from {column.header!r}{unit}{how}")
     comma = ", decimal comma" if decimal == "comma" else ""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench.clock import has_moments, seconds
+from wirebayes.io.bench.clock import is_clock, seconds
 from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.numeric.typing import Floats
@@ -45,7 +45,7 @@ def clock_of(table: RawTable, column: int, unit: Unit | None) -> Clock | None:
     cells = [cell.replace(",", ".") for cell in table.column(column)]
     places = max(len(cell.partition(".")[2]) for cell in cells)
     try:
-        if has_moments(table, column):
+        if is_clock(table, column, unit):
             return Clock(seconds(table, column, unit)[0], 10.0**-places)
         values = np.array([float(cell) for cell in cells])
     except (InputError, ValueError):

@@ -57,10 +57,12 @@ SAMPLE_WORDS: dict[Role, tuple[str, ...]] = {
         "应力", "応力",
     ),
 }  # fmt: skip
-# What a rig calls its weights, and the gauge that reads the wire: only where no column speaks of the quantity itself.
+# What a rig calls its weights, the gauge that reads the wire, and how long a weight has hung: only where no column
+# speaks of the quantity itself.
 RIG_WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok"),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
+    "time": ("duration", "dauer", "durata", "duracion", "duracao", "duur"),
 }  # fmt: skip
 # What stands before a statistic of a column, below its readings.
 STATISTICS = {

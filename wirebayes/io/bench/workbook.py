@@ -81,7 +81,7 @@ def _text(cell: Any) -> str:
     if isinstance(value, time) and "s" not in str(cell.number_format):
         return f"{value.hour}:{value.minute:02d}"  # typed without seconds: hours and minutes, or what?
     if isinstance(value, timedelta):
-        hours, rest = divmod(value.total_seconds(), 3600.0)
+        hours, rest = divmod(round(value.total_seconds(), 6), 3600.0)
         minutes, seconds = divmod(rest, 60.0)
         return f"{hours:.0f}:{minutes:02.0f}:{seconds:09.6f}"
     if isinstance(value, datetime):

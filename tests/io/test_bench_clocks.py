@@ -1,0 +1,126 @@
+"""Times written in two units or three: hours and minutes, minutes and seconds, with colons, points, dashes or words."""
+
+import pytest
+
+from tests.io.bench_files import convert
+from wirebayes.errors import InputError
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.undecided import Choices, Undecided
+
+ABOUT = About("wire", "line", 1000.0)
+
+
+def bench_file(tmp_path, header, cells):
+    path = tmp_path / "raw.csv"
+    sign = "," if "," in cells[0] else "."
+    rows = [f"{hold};{hold};{cell};{hold}{sign}{9 - i}\n" for hold in (1, 2) for i, cell in enumerate(cells)]
+    path.write_text(f"Hold;Displacement [mm];{header};Force [N]\n" + "".join(rows))
+    return path
+
+
+def times_of(tmp_path, header, cells, **choices):
+    """Times in s of the first hold."""
+    made = convert(bench_file(tmp_path, header, cells), ABOUT, Choices(**choices))
+    return [row[2] for row in made.rows[: len(cells)]]
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["Time [h-min]", "Time (h:min)", "Time hh:mm", "Zeit [Std:Min]", "Time (hours and minutes)", "Time in h:mm",
+     "Zeit in Stunden und Minuten", "Temps (h:min)", "Duration [h min]", "Hours:minutes"],
+)  # fmt: skip
+def test_a_header_says_that_clocks_are_hours_and_minutes(tmp_path, header):
+    assert times_of(tmp_path, header, ["0:00", "0:30", "26:05"]) == [0.0, 1800.0, 93900.0]
+
+
+@pytest.mark.parametrize("header", ["Time [min:ss]", "Time [min-s]", "Time m:s", "Dauer (Minuten und Sekunden)"])
+def test_a_header_says_that_clocks_are_minutes_and_seconds(tmp_path, header):
+    assert times_of(tmp_path, header, ["0:00", "0:30", "75:05.5"]) == [0.0, 30.0, 4505.5]
+
+
+def test_what_clocks_were_taken_for_is_said(tmp_path):
+    notes = convert(bench_file(tmp_path, "Time [h-min]", ["0:00", "0:30"]), ABOUT, Choices()).notes
+    assert "time from 'Time [h-min]' (hours and minutes)" in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("header", "cells"),
+    [
+        ("Time [hh.mm]", ["0.00", "0.30", "1.05"]),
+        ("Time [hh.mm]", ["0,00", "0,30", "1,05"]),
+        ("Time [h-min]", ["0-00", "0-30", "1-05"]),
+    ],
+)
+def test_points_and_dashes_divide_clocks_where_the_header_has_them(tmp_path, header, cells):
+    assert times_of(tmp_path, header, cells) == [0.0, 1800.0, 3900.0]
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ("0h00", "0h01m30", "1h05"),
+        ("0 h 0 min", "0 h 1 min 30 s", "1 h 5 min"),
+        ("0", "90 s", "1 h 5 min"),
+        ("0'00''", "1'30''", "65'0''"),
+        ("0 m 0 s", "1 m 30 s", "65 m"),
+    ],
+)
+def test_cells_that_name_their_units_need_no_header(tmp_path, cells):
+    assert times_of(tmp_path, "Time", cells) == [0.0, 90.0, 3900.0]
+
+
+@pytest.mark.parametrize(
+    ("cells", "seconds"),
+    [(("0:30", "59:30", "1:00:30"), [30.0, 3570.0, 3630.0]), (("0:30", "0:30:30", "0:31"), [1800.0, 1830.0, 1860.0])],
+)
+def test_beside_clocks_of_three_parts_those_of_two_are_what_makes_times_rise(tmp_path, cells, seconds):
+    assert times_of(tmp_path, "Time", cells) == seconds
+
+
+@pytest.mark.parametrize("header", ["Time (durations in minutes)", "Duration in minutes", "Durée (min)", "Dauer [min]"])
+def test_durations_are_times(tmp_path, header):
+    assert times_of(tmp_path, header, ["0", "5", "30"]) == [0.0, 300.0, 1800.0]
+
+
+def test_a_column_called_time_stands_before_one_called_duration(tmp_path):
+    path = tmp_path / "raw.csv"
+    path.write_text("x [mm];Time [s];Hold duration [s];F [N]\n1;0;60;2.0\n1;30;60;1.9\n1;60;60;1.8\n")
+    assert [row[2] for row in convert(path, ABOUT, Choices()).rows] == [0.0, 30.0, 60.0]
+
+
+@pytest.mark.parametrize(
+    ("header", "cells", "first"),
+    [
+        ("Time [hh:mm]", ["0", "5", "30"], "s"),
+        ("Hours:minutes", ["0", "0.5", "1.5"], "s"),
+        ("Time h:mm:ss", ["0", "0.5", "1.5"], "s"),
+        ("Time (h:min)", ["0.00", "0.30", "1.05"], "hh.mm"),
+        ("Time (h, min)", ["0,00", "0,30", "1,05"], "hh.mm"),
+        ("Time [min:s]", ["0.00", "0.30", "1.05"], "mm.ss"),
+    ],
+)
+def test_plain_numbers_under_a_clock_are_asked_about(tmp_path, header, cells, first):
+    """They had been read as seconds."""
+    with pytest.raises(Undecided, match=r"line 2, column 3 .*: found '0") as refused:
+        times_of(tmp_path, header, cells)
+    assert next(iter(refused.value.answers)) == f"--map {header}=time [{first}]"
+    factors = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
+    for answer in refused.value.answers:
+        unit = answer[answer.rindex("[") + 1 : -1]
+        made = convert(bench_file(tmp_path, header, cells), ABOUT, Choices().with_option(answer))
+        clock = {"hh.mm": 3900.0, "mm.ss": 65.0}.get(unit)
+        assert made.rows[2][2] == pytest.approx(clock or factors[unit] * float(cells[2].replace(",", ".")))
+
+
+@pytest.mark.parametrize("cells", [("0:00", "0:60"), ("0:00:00", "0:00:60"), ("0:00:00", "0:60:00")])
+def test_a_clock_counts_to_59(tmp_path, cells):
+    with pytest.raises(
+        InputError, match=rf"line 3, column 3 \(Time \[hh:mm\]\): found '{cells[1]}', expected .*below 60"
+    ):
+        times_of(tmp_path, "Time [hh:mm]", cells)
+    assert times_of(tmp_path, "Time [hh:mm]", [cell.replace("60", "59") for cell in cells])
+
+
+def test_a_cell_without_its_unit_among_cells_with_theirs_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"line 4, column 3 \(Time\): found '2', expected a time such as 1 h 30 min"):
+        times_of(tmp_path, "Time", ["0", "1 h 30 min", "2"])

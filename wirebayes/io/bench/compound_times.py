@@ -1,0 +1,68 @@
+"""Times in two units or three: as headers announce them (h-min, hh:mm:ss), and as cells spell them (1 h 30 min)."""
+
+import re
+from dataclasses import dataclass
+
+_HOURS = r"hh?|hrs?|hours?|std\.?|stunden?|heures?|horas?|ore"
+_MINUTES = r"mm?|mn|mins?\.?|minut[eo]s?|minuten|minuti"
+_SECONDS = r"ss?|secs?\.?|seconds?|sek\.?|sekunden?|secondes?|segundos?|secondi"
+_AND = r"\s+(?:and|und|et|y|e|en)\s+"
+_JOINT = rf"(?:{_AND}|\s*[:.,'\-–_]\s*|\s+)"
+_FRACTION = r"(?:[.,](?:f+|0+|x+|z+|s+|ms))?"
+_ANNOUNCED = re.compile(
+    rf"(?P<hours>{_HOURS})(?P<of_hours>{_JOINT})(?:{_MINUTES})(?P<seconds>{_JOINT}(?:{_SECONDS}){_FRACTION})?"
+    rf"|(?:{_MINUTES})(?P<of_minutes>{_JOINT})(?:{_SECONDS}){_FRACTION}",
+    re.IGNORECASE,
+)
+_SPELT = re.compile(
+    rf"(?:(?P<hours>\d+)\s*(?:{_HOURS})[\s,]*)?(?:(?P<minutes>\d+)\s*(?:{_MINUTES}|['′])[\s,]*)?"
+    rf"(?:(?P<seconds>\d+(?:[.,]\d+)?)\s*(?:{_SECONDS}|''|[\"″]))?(?P<rest>\d{{1,2}})?",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class Announced:
+    """What a header says of the clocks under it.
+
+    Attributes
+    ----------
+    leading_s : float or None
+        Of the first part where cells have two; None where they have three.
+    joint : str
+        What stands between the first two parts.
+    """
+
+    leading_s: float | None
+    joint: str
+
+
+def announced(text: str) -> Announced | None:
+    """How a text such as ``h-min`` or ``hh:mm:ss`` says that clocks are written; None where it does not."""
+    found = _ANNOUNCED.fullmatch(text)
+    if found is None:
+        return None
+    if found["hours"] is None:
+        return Announced(60.0, found["of_minutes"])
+    return Announced(None if found["seconds"] else 3600.0, found["of_hours"])
+
+
+def spelt_s(cell: str) -> float | None:
+    """Seconds of a cell that names its units, as ``1 h 30 min``, ``1h30``, ``2'30''`` or ``30 s``; None of others."""
+    found = _SPELT.fullmatch(cell)
+    if found is None or not any(found.group("hours", "minutes", "seconds")):
+        return None
+    rest = found["rest"]
+    if rest and found["seconds"]:
+        return None
+    of_rest = 1.0 if found["minutes"] else 60.0  # the next smaller unit
+    hours, minutes, seconds = (
+        float((found[part] or "0").replace(",", ".")) for part in ("hours", "minutes", "seconds")
+    )
+    return 3600.0 * hours + 60.0 * minutes + seconds + of_rest * float(rest or 0)
+
+
+def is_spelt(cell: str) -> bool:
+    """Whether a cell names a time in two units or more; one of a single unit may be any quantity with its unit."""
+    found = _SPELT.fullmatch(cell)
+    return found is not None and sum(map(bool, found.groups())) > 1 and spelt_s(cell) is not None
