@@ -188,6 +188,26 @@ def test_samples_of_one_material_refer_to_one_length_and_one_tension() -> None:
     assert priors["k1[other]"].median() == pytest.approx(priors["k1[line]"].median() * 4.0 / np.sqrt(2.0))
 
 
+@pytest.mark.parametrize(
+    ("first", "reference", "chosen"),
+    [
+        ((1.0, 16.0), 3.9, 1.0),  # by ratio: 4 stands in the middle
+        ((1.0, 16.0), 4.1, 16.0),
+        ((-3.0, 100.0), 4.0, 100.0),
+        ((-3.0, 0.0), 4.0, 4.0),
+    ],
+)
+def test_the_tested_tension_is_the_hold_s_that_is_nearest_to_the_reference(first, reference, chosen) -> None:
+    sample = build([short()]).samples[0]
+    readings = np.full_like(sample.readings, 4.0)  # later readings, and those of a hold that was not recorded
+    readings[[0, 2], 0, 0] = first
+    model = replace(sample.model, tension_ref_N=reference)
+    assert replace(sample, readings=readings, model=model).tested_tension_N == chosen
+    if first[0] > 0.0:
+        weights = replace(sample.protocol, setting=np.array([first[0], 4.0, first[1]]), control="force")
+        assert replace(sample, protocol=weights, model=model).tested_tension_N == chosen
+
+
 def test_an_event_acts_in_its_own_test_alone() -> None:
     here, anywhere = GripSlip(hold=3, test="b"), GripSlip(hold=3)
     problem = build([short("a"), short("b")], [here, anywhere, effect_named("superposition")])

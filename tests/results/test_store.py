@@ -47,6 +47,8 @@ def test_the_summary_s_figures_of_a_fresh_sample_include_all_effects_of_the_wire
     here = joint.samples[1]
     summary = store.save_posterior(fitted, tmp_path, {}, sample=here)
     derived, load = summary["derived"], summary["derived"]["tension_N"]
+    assert load == summary["extrapolation"]["tension_N"] == here.tested_tension_N
+    assert load in here.readings[:, 0, 0]
 
     def creep(own, t):
         mode = own["second_relaxation.A"] * load * (1 - np.exp(-t / own["second_relaxation.T2"]))

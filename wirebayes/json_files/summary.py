@@ -23,7 +23,10 @@ class Parameter(Mixed):
 
 
 class Derived(TypedDict):
-    """Of a fresh sample under a constant `tension_N`; None where a draw has no finite value, as of endless creep."""
+    """Of a fresh sample under a constant `tension_N` that was tested.
+
+    None where a draw has no finite value, as of endless creep.
+    """
 
     tension_N: float
     creep_2min_mm: Statistics | None

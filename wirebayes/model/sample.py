@@ -53,6 +53,18 @@ class Sample:
         """Median duration of the recorded holds (a second where all readings are at time zero)."""
         return float(np.median(self.protocol.duration_s[self.protocol.recorded])) or 1.0
 
+    @property
+    def tested_tension_N(self) -> float:
+        """Of the tensions with which recorded holds begin, the one nearest to the reference.
+
+        The reference, a geometric mean, may lie far from all that was tested. Where no hold begins under tension it
+        stands in.
+        """
+        begun = self.protocol.setting if self.protocol.control == "force" else self.readings[:, 0, 0]
+        tested = begun[self.protocol.recorded & (begun > 0.0)]
+        reference = self.model.tension_ref_N
+        return float(min(tested, key=lambda tension: abs(np.log(tension / reference)), default=reference))
+
 
 def at_length(own: Mapping[str, Array], effects: Sequence[Effect], ratio: float, exponent: Any) -> dict[str, Array]:
     """Parameters of a sample of another length than the reference: whatever is an elongation of the wire has grown.

@@ -201,8 +201,8 @@ def _held_out(tables: Tables, gallery: Gallery) -> Section:
 
 def _creep(tables: Tables, gallery: Gallery) -> Section:
     words = Text(
-        "The units of B and k2 depend on the exponents, so elongations are compared: creep of a fresh sample at the "
-        "geometric mean of its measured tensions, held constant."
+        "The units of B and k2 depend on the exponents, so elongations are compared: creep of a fresh sample under a "
+        "constant tension, the one with which a hold began that is nearest to the geometric mean of all readings."
     )
     caption = "Only 2 min lies within what was measured; an hour and a day are extrapolated."
     return Section(

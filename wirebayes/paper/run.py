@@ -178,7 +178,7 @@ def _rows(
     out: dict[str, list[Row]] = {"posterior": [], "creep": [], "held_out": [], "sampling": []}
     for likelihood in LIKELIHOODS:
         draws = full[likelihood].draws
-        tension = round(full[likelihood].sample.model.tension_ref_N, 3)
+        tension = full[likelihood].sample.tested_tension_N
         prior = _prior_draws(e, likelihood, seed)
         out["posterior"] += verdicts.verdict_rows(e.name, likelihood, draws, prior, published)
         out["creep"] += verdicts.creep_rows(e.name, likelihood, draws, published, tension, e.length_mm)

@@ -86,7 +86,7 @@ def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
             for i, s in enumerate(fit.problem.samples):
                 own = unit_of(name, first.model.effects, [s.protocol.control])
                 parameters[f"{name}[{s.name}]"] = {"unit": own, **statistics(values[..., i])}
-    tension = round(first.model.tension_ref_N, 3)
+    tension = first.tested_tension_N
     wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
     chains = fit.chains
     return {

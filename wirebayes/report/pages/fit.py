@@ -287,8 +287,8 @@ def _derived(summary: SummaryJson) -> Table:
         for name, band, otherwise in rows
     ]
     caption = (
-        f"A fresh sample under a constant {derived['tension_N']:g} N, with all fitted effects of the wire and without "
-        "those of the bench."
+        f"A fresh sample under a constant {derived['tension_N']:g} N, with which a hold began; with all fitted effects "
+        "of the wire and without those of the bench."
     )
     caption = f"{caption} {summary['extrapolation']['warning']}".strip()
     return Table(["quantity", "median", "90 % interval"], lines, caption)
