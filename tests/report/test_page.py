@@ -87,6 +87,16 @@ def read(path: Path) -> Reader:
     return page
 
 
+def said_twice(words: str) -> set[str]:
+    """Runs of nine words that stand in two sentences of a page."""
+    lines = [line.split() for line in re.split(r"\n|(?<=[.;:]) ", words)]
+    each = [{" ".join(line[i : i + 9]) for i in range(len(line) - 8)} for line in lines]
+    found = set[str]()
+    for i, runs in enumerate(each):
+        found |= runs & set().union(*each[:i])
+    return found
+
+
 @pytest.mark.parametrize(
     ("value", "digits", "text"),
     [
@@ -185,7 +195,7 @@ def test_the_page_of_a_fit_tells_known_from_unknown(fitted):
     assert "8 holds and 1 not recorded, 40 readings." in page.words
     assert "Tensions from 1.21 to 15.9 N." in page.words
     assert len(page.images) == 2 * (3 + 1) + 1  # readings, residuals, creep; all pairs; the curve of the chain
-    assert "k1 (N)" in page.words and "stiffness: the tension per unit of strain" in page.words
+    assert "stiffness: the tension per unit of strain" in page.words
     assert "chain/posterior.nc" in page.anchors
     assert "What the data determine" in page.words and "Creep after 24 h at" in page.words
     assert page.words.count("not checked against the readings") == 2
@@ -216,6 +226,27 @@ def test_a_fit_that_did_not_converge_says_so_first(fitted, tmp_path):
         for claim in ("What the readings determine (90", summary["extrapolation"]["sentence"]):
             assert (claim in words) is check["passed"]
         assert summary["extrapolation"]["warning"] in words
+
+
+def test_the_pages_of_a_fit_and_a_discovery_say_each_thing_once(fitted, tmp_path):
+    fit = folder_of(tmp_path / "fit", "fit")
+    (fit / "chain").symlink_to(fitted / "chain")
+    page = read(write_page(fit))
+    assert page.words.count("stretch that the wire already had at displacement zero") == 1
+    assert said_twice(page.words) == set()
+    sentence = "the residuals of the plain model bend with the displacement of the wire"
+    pattern = [{"covariate": "displacement", "hold": None, "p": 0.001, "sentence": f"wire-a: {sentence}"}]
+    content = {"version": 2, "experiments": {"wire-a": DISCOVERY | {"where": pattern}}, "warnings": []}
+    found = folder_of(tmp_path / "found", "discover", discovery=content)
+    (found / "wire-a").mkdir()
+    (found / "wire-a" / "where-displacement.svg").write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
+    assert "stretch that the wire already had" in read(write_page(found)).words  # in the glossary: no table says it
+    for model in ("plain", "final"):
+        (found / "wire-a" / model).symlink_to(fitted / "chain")
+    page = read(write_page(found))
+    assert page.words.count(sentence) == 1 and "Residuals of the plain model by displacement." in page.words
+    assert page.words.count("stretch that the wire already had") == 1
+    assert said_twice(page.words) == set()
 
 
 def test_a_fit_with_effects_of_the_users_own_runs_none_of_their_code(fitted, tmp_path):

@@ -66,7 +66,11 @@ _IN_WORDS = (
 
 
 def meaning(
-    terms: Iterable[str] = (), effects: Iterable[str] = (), own: Mapping[str, Effect] | None = None, model: bool = True
+    terms: Iterable[str] = (),
+    effects: Iterable[str] = (),
+    own: Mapping[str, Effect] | None = None,
+    model: bool = True,
+    symbols: bool = True,
 ) -> Section:
     """The folded section that ends a page: the model, its symbols, the effects named on the page and other terms.
 
@@ -79,12 +83,14 @@ def meaning(
     own : mapping of name to Effect, optional
         Effects that the catalogue does not have.
     model : bool
-        Explain the model's equation and symbols.
+        Explain the model's equation.
+    symbols : bool
+        And its symbols, which a table of parameters on the page may have explained.
     """
     blocks: list[Block] = []
     if model:
-        symbols = [(f"{n}{_unit(unit_of(n))}", f"{sentence}.") for n, sentence in SYMBOLS.items()]
-        blocks += [Text(_IN_WORDS), Definitions("Symbols", symbols, _LAWS)]
+        named_symbols = [(f"{n}{_unit(unit_of(n))}", f"{sentence}.") for n, sentence in SYMBOLS.items()]
+        blocks += [Text(_IN_WORDS), Definitions("Symbols", named_symbols if symbols else [], _LAWS)]
     names = list(dict.fromkeys(effect.split("@")[0].split(".")[0] for effect in effects))
     known = {**CATALOGUE, Discrepancy.name: Discrepancy, **{n: type(e) for n, e in (own or {}).items()}}
     named = [(spoken(name), _effect(known[name])) for name in names if name in known]

@@ -54,7 +54,8 @@ def discover_page(folder: Path, configuration: dict[str, Any]) -> Page:
     lead = " ".join(sentences[:_MOST_SENTENCES])
     named = [e for v in found.values() for e in (*v["effects"], *v["probabilities"], *v["power"], *v.get("group", []))]
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
-    sections.append(meaning(_TERMS, named))
+    explained = all(_has_parameters(folder / name) for name in found)
+    sections.append(meaning(_TERMS, named, symbols=not explained))
     return Page("What the model is missing", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
@@ -171,12 +172,16 @@ def _means(name: str) -> str:
     return SYMBOLS.get(name) or (f"of the effect {spoken(effect)}" if effect != name else "–")
 
 
+def _has_parameters(folder: Path) -> bool:
+    """Whether an experiment's models are there to be compared."""
+    return all((folder / model / "summary.json").is_file() for model in ("plain", "final"))
+
+
 def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
     """Every parameter before and after what was found joined the model."""
-    files = [folder / model / "summary.json" for model in ("plain", "final")]
-    if not all(file.is_file() for file in files):
+    if not _has_parameters(folder):
         return []
-    summaries: list[SummaryJson] = [read_json(file) for file in files]
+    summaries: list[SummaryJson] = [read_json(folder / model / "summary.json") for model in ("plain", "final")]
     plain, final = (summary["parameters"] for summary in summaries)
     if v["verdict"] == "nothing-missing":
         return [_plain_parameters(plain)]
@@ -218,9 +223,9 @@ _BEFORE_AND_AFTER = (
 
 
 def _patterns(v: ExperimentFindings) -> dict[str, str]:
-    """What the picture of each pattern shows."""
+    """What the picture of each pattern shows; what is to be seen in it stands under where the two disagree."""
     return {
-        f"where-{w['covariate'].replace(' ', '-')}": f"Residuals of the plain model: {w['sentence']}"
+        f"where-{w['covariate'].replace(' ', '-')}": f"Residuals of the plain model by {w['covariate']}."
         for w in v.get("where", [])
     }
 

@@ -66,7 +66,8 @@ def fit_page(folder: Path, configuration: dict[str, Any]) -> Page:
             sections.append(section(stored, prior, summary))
     lead = " ".join(sentences[:_MOST_SENTENCES])
     sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
-    sections.append(meaning(("hold", "90 % interval", "prior", "contraction"), effects, effects))
+    from_summaries = bool(configuration.get("own_effects"))  # without the table that explains each parameter
+    sections.append(meaning(("hold", "90 % interval", "prior"), effects, effects, symbols=from_summaries))
     return Page("What the readings determine", lead, sections, f"Seed {configuration.get('seed')}.")
 
 
@@ -154,10 +155,10 @@ def _pictures(stored: Stored, sampled: dict[str, Array], summary: SummaryJson, t
 
 
 def _continued(summary: SummaryJson, trusted: bool) -> str:
-    """What the picture of the creep that goes on says, with what speaks against it."""
-    ahead = summary["extrapolation"]
-    caption = ahead["sentence"] if trusted else "The model that this band continues does not describe the readings."
-    return f"{caption} {ahead['warning']}".strip()
+    """What the picture of the creep that goes on says; how far that is stands with the numbers above it."""
+    if trusted:
+        return summary["extrapolation"]["sentence"]
+    return "The model that this band continues does not describe the readings."
 
 
 def _next(summary: SummaryJson) -> str:
