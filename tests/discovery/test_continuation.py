@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from wirebayes.discovery import ascent, continuation, noise_integral, path_weights, refit, screening
 from wirebayes.discovery.ascent import PathEvidence, Start, lead, start
 from wirebayes.discovery.continuation import Continuation, strengths
-from wirebayes.discovery.ladders import AmplitudePath, ladders
+from wirebayes.discovery.ladders import AmplitudePath, _LadderEnds, _rungs, ladders
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.name_evidence import weigh_names
 from wirebayes.discovery.noise_integral import RATIOS
@@ -42,6 +42,14 @@ def block_of(folder: Path, truth: dict[str, float], effects: list[Effect], seed:
 def scanned(block: LaplaceFit, kinds: dict[str, type[Effect]]) -> tuple[list, list, Scan]:
     trials, candidates = screening.candidate_probes([block], kinds)
     return trials, candidates, scan(expand(block.target, block.modes.z[:1], trials))
+
+
+@pytest.mark.parametrize(("widest", "rungs"), [(2.0, 2), (2.01, 3), (64.0, 7), (64.1, 8), (1e4, 8)])
+def test_rungs_are_a_factor_of_two_apart_unless_they_would_be_more_than_eight(widest: float, rungs: int) -> None:
+    ends = [_LadderEnds(None, 0.5, 0.5 * widest), _LadderEnds(None, -3.0, -3.0 * widest / 2.0)]  # type: ignore[arg-type]
+    made = _rungs(ends)
+    assert made.shape == (rungs, 2)
+    assert made[[0, -1]] == pytest.approx(np.array([[0.5, -3.0], [0.5 * widest, -1.5 * widest]]))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from analyses.robots.hanging import compared, drawn
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import schema
-from wirebayes.robot.motion import hanging, inverse
+from wirebayes.robot.motion import hanging, inverse, nearest_balance
 from wirebayes.robot.pose.orientation import balanced_orientation
 
 FREE = np.nan
@@ -107,3 +107,14 @@ def test_three_hundred_drawn_robots_agree_with_the_energy_minimiser():
     hung = [one for one in found if one is not None]
     assert len(hung) >= 300
     assert max(max(one) for one in hung) < 1e-6
+
+
+@pytest.mark.parametrize(("hindrance", "goes_on"), [(0.99e-6, False), (1.01e-6, True)])
+def test_a_bound_is_left_where_it_keeps_a_search_from_its_goal_by_more_than_rounding(four, hindrance, goes_on):
+    search = nearest_balance._Search.beginning(four, np.tile(four.home_m, (2, 1)), np.tile(np.eye(3), (2, 1, 1)))
+    search.bound[:, 2] = 1
+    each = np.array([[0.0, 0.0, hindrance, 0.0]] * 2)
+    rest = np.array([True, False])  # only what has come to rest lets go
+    assert search.let_go(np.arange(2), rest, each).tolist() == [goes_on, False]
+    assert search.bound[:, 2].tolist() == [0 if goes_on else 1, 1]
+    assert not search.let_go(np.arange(2), rest, each).any() or not goes_on  # never twice: that would be a circle

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from tests.robot.test_unheld_home import six_wires
 from wirebayes.errors import InputError
@@ -26,13 +27,18 @@ SD_N = 0.02
 
 @pytest.fixture(scope="module")
 def session():
-    """Six holds of a platform on six wires: poses, joint values of wires that do not creep, and their tensions."""
+    """Holds of a platform on six wires: poses, joint values of wires that do not creep, and their tensions."""
+    return _session(1.0)
+
+
+def _session(spread, line=LINE):
+    """The same, at poses so many times as far from home."""
     robot, rng = six_wires(), np.random.default_rng(5)
-    x = robot.home_m + rng.uniform(-0.3, 0.3, (HOLDS, 3))
-    turn = rng.uniform(-0.03, 0.03, (HOLDS, 3))
+    x = robot.home_m + spread * rng.uniform(-0.3, 0.3, (HOLDS, 3))
+    turn = spread * rng.uniform(-0.03, 0.03, (HOLDS, 3))
     tau = inverse.tensions(robot, x, matrix(turn))
     assert np.isfinite(tau).all()
-    joint = inverse.commands(robot, for_robot(robot, LINE.centre()), x, matrix(turn), tau).joint_m
+    joint = inverse.commands(robot, for_robot(robot, line.centre()), x, matrix(turn), tau).joint_m
     cells = {"hold": np.arange(1, HOLDS + 1)}
     cells |= dict(zip(("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"), np.hstack([x, turn]).T, strict=True))
     cells |= {"duration_s": np.full(HOLDS, 60.0)}
@@ -73,6 +79,33 @@ def test_columns_in_the_place_of_each_other_are_named(session, kind):
     two, five = kind.format(2), kind.format(5)
     with pytest.raises(InputError, match=f"columns {two} and {five}: .* in the place of each other"):
         _read(robot, cells | {two: cells[five], five: cells[two]})
+
+
+@pytest.mark.parametrize(("mixed", "refused"), [(1 / 6 - 0.001, True), (1 / 6 + 0.001, False)])
+@pytest.mark.parametrize("kind", ["joint_{}_m", "tension_{}_N"])
+def test_columns_are_mixed_up_where_in_each_other_s_place_they_are_five_times_better(kind, mixed, refused):
+    """Of their difference a share is left in each other's place, and the rest where they stand."""
+    stiff = replace(LINE, parameters={**LINE.parameters, "k1": np.full(2, 1e12)})  # lengths to poses are exact
+    robot, cells = _session(1.0, stiff)
+    two, four = (np.array(cells[kind.format(i)]) for i in (2, 4))
+    cells |= {kind.format(2): four + mixed * (two - four), kind.format(4): two + mixed * (four - two)}
+    if kind.startswith("joint"):
+        cells = _tensions(cells, lambda tension: np.full(HOLDS, np.nan))
+    with pytest.raises(InputError, match="in the place of each other") if refused else contextlib.nullcontext():
+        _read(robot, cells)
+
+
+@pytest.mark.parametrize(("share", "refused"), [(0.0099, False), (0.0101, True)])
+def test_joint_values_are_another_wire_s_where_they_are_a_hundredth_of_the_robot_off(share, refused):
+    def apart(spread):
+        robot, cells = _session(spread)
+        return np.std(cells["joint_2_m"] - cells["joint_5_m"]) / robot.span_m
+
+    robot, cells = _session(brentq(lambda spread: apart(spread) - share, 0.001, 1.0))
+    swapped = cells | {"joint_2_m": cells["joint_5_m"], "joint_5_m": cells["joint_2_m"]}
+    unread = _tensions(swapped, lambda tension: np.full(HOLDS, np.nan))
+    with pytest.raises(InputError, match="in the place of each other") if refused else contextlib.nullcontext():
+        _read(robot, unread)
 
 
 def test_reference_lengths_that_err_are_no_mix_up(session):

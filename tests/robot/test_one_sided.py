@@ -130,3 +130,12 @@ def test_a_direction_that_is_not_finite_is_no_support(monkeypatch):
     jacobian = statics.wire_jacobian
     monkeypatch.setattr(one_sided.statics, "wire_jacobian", lambda *given: jacobian(*given) * np.nan)
     assert not one_sided.held(robot, wires, pose, lengths).any()
+
+
+@pytest.mark.parametrize(("share", "stable"), [(0.99e-9, False), (1.01e-9, True)])
+@pytest.mark.parametrize("touching", [True, False])
+def test_a_balance_is_held_where_its_least_stiffness_is_more_than_rounding(share, stable, touching, monkeypatch):
+    """A thousand-millionth of the largest: less is that of one without any."""
+    bounds = np.array([touching]), np.array([share * 5e4]), np.array([5e4])
+    monkeypatch.setattr(one_sided, "_bounds", lambda *given: bounds)
+    assert one_sided.held(*[None] * 4).tolist() == [touching and stable]

@@ -156,7 +156,7 @@ def _along(sample: Sample, left: Floats, finding: Disagreement, x: Floats) -> Fi
     axis.set_xlabel(_LABELS[finding["covariate"]])
     unit = READ_UNIT[sample.protocol.control]
     axis.set_ylabel(f"measured − plain model ({unit})" + (",\nless its hold's mean" if within else ""))
-    axis.set_title("\n".join(textwrap.wrap(finding["sentence"], 60)), loc="left", fontsize=9)
+    axis.set_title(sample.name, loc="left", fontsize=9)
     axis.legend(fontsize=8, frameon=False)
     return figure
 
