@@ -5,17 +5,16 @@ a warning here.
 """
 
 from collections.abc import Callable, Set
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.io import gross_events
+from wirebayes.io.checked_test import CheckedTest
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import READ, times_run_on
+from wirebayes.io.zero_shifts import zero_shift
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
-from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Control, Protocol
 
 RUN_ON = 0.01  # two holds of four readings: rarer orders of honest times are not worth a silence
@@ -35,56 +34,6 @@ ONE_HOLD = (
     "one hold does not tell k1 and the preload apart: the priors decide both; state what is known, as preload_mm (0 "
     "where displacements count from the zero-tension length), [prior.preload] or [prior.k1]"
 )
-
-
-@dataclass(frozen=True)
-class CheckedTest:
-    """One test as the checks see it.
-
-    Attributes
-    ----------
-    protocol : Protocol
-    values : (H, R) array
-        What was read, N, or mm where the tension was set; padded as the protocol is.
-    resolution : float
-        0 where it is not stated.
-    """
-
-    protocol: Protocol
-    values: Floats
-    resolution: float
-
-    @property
-    def each(self) -> list[Floats]:
-        """The readings of each recorded hold."""
-        return [row[mask] for row, mask in zip(self.values, self.protocol.mask, strict=True) if mask.any()]
-
-    @property
-    def setting(self) -> Floats:
-        """Of each recorded hold."""
-        return self.protocol.setting[self.protocol.recorded]
-
-    @property
-    def number(self) -> NDArray[np.int64]:
-        """Of each recorded hold."""
-        return self.protocol.number[self.protocol.recorded]
-
-    @property
-    def unit(self) -> str:
-        """Of what was read."""
-        return READ_UNIT[self.protocol.control]
-
-    @property
-    def means(self) -> Floats:
-        """Of each recorded hold."""
-        return np.array([row.mean() for row in self.each])
-
-    @property
-    def noise(self) -> float:
-        """Standard deviation of a reading beside the course of its hold; rounding at least."""
-        bends = [np.diff(row, 2) / np.sqrt(6.0) for row in self.each if len(row) > 2]
-        spread = float(np.median(np.abs(np.concatenate(bends)))) / 0.6745 if bends else 0.0
-        return max(spread, self.resolution / np.sqrt(12.0))
 
 
 def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Notice]:
@@ -339,9 +288,10 @@ CHECKS: dict[Control, tuple[Callable[[CheckedTest], str], ...]] = {
         strain_scale,
         outlier,
         jump_within_a_hold,
+        zero_shift,
         rising,
         off_grid,
         repeated,
     ),
-    "force": (run_on_times, elongation, strain_scale, outlier, jump_within_a_hold, off_grid, repeated),
+    "force": (run_on_times, elongation, strain_scale, outlier, jump_within_a_hold, zero_shift, off_grid, repeated),
 }

@@ -1,0 +1,60 @@
+"""One test as checks of its readings see it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.numeric.typing import Floats
+from wirebayes.wire.control import READ_UNIT
+from wirebayes.wire.protocol import Protocol
+
+
+@dataclass(frozen=True)
+class CheckedTest:
+    """One test as the checks see it.
+
+    Attributes
+    ----------
+    protocol : Protocol
+    values : (H, R) array
+        What was read, N, or mm where the tension was set; padded as the protocol is.
+    resolution : float
+        0 where it is not stated.
+    """
+
+    protocol: Protocol
+    values: Floats
+    resolution: float
+
+    @property
+    def each(self) -> list[Floats]:
+        """The readings of each recorded hold."""
+        return [row[mask] for row, mask in zip(self.values, self.protocol.mask, strict=True) if mask.any()]
+
+    @property
+    def setting(self) -> Floats:
+        """Of each recorded hold."""
+        return self.protocol.setting[self.protocol.recorded]
+
+    @property
+    def number(self) -> NDArray[np.int64]:
+        """Of each recorded hold."""
+        return self.protocol.number[self.protocol.recorded]
+
+    @property
+    def unit(self) -> str:
+        """Of what was read."""
+        return READ_UNIT[self.protocol.control]
+
+    @property
+    def means(self) -> Floats:
+        """Of each recorded hold."""
+        return np.array([row.mean() for row in self.each])
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a reading beside the course of its hold; rounding at least."""
+        bends = [np.diff(row, 2) / np.sqrt(6.0) for row in self.each if len(row) > 2]
+        spread = float(np.median(np.abs(np.concatenate(bends)))) / 0.6745 if bends else 0.0
+        return max(spread, self.resolution / np.sqrt(12.0))

@@ -1,0 +1,101 @@
+"""Another zero from some hold on: readings that step between two holds by what the other moves do not explain.
+
+A sensor that is zeroed anew takes the same from every reading after it, and so does, nearly, a wire that slips. What a
+move adds to the readings changes slowly along the test, so that such a step stands out; one that the next move takes
+back is an error of a single setting.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wirebayes.io.checked_test import CheckedTest
+from wirebayes.numeric.typing import Floats
+
+FEWEST = 6  # moves one way, which show what a move adds
+STANDS_OUT = 4.0  # times what nine in ten of the other moves are off by
+OF_A_MOVE = 0.25  # of what the usual move adds: smaller steps are the model check's affair
+TAKEN_BACK = 0.5  # of it, by the move before or after
+BESIDE = 0.5  # of it that the readings next to the first and the last show too, or one of these is wrong
+SLACK, NOISE = 0.02, 5.0  # of the largest reading, and noise levels: a wire with less may be slack
+
+
+@dataclass(frozen=True)
+class _Moves:
+    """Moves between neighbouring holds that go on the way of the move before.
+
+    Attributes
+    ----------
+    hold : (m,) array of int
+        The recorded hold that each leads to.
+    added, inner : (m,) arrays
+        What it adds to the readings: to the first after the last, and to the one next to either.
+    moved, middle : (m,) arrays
+        By how much the setting changes, and its middle.
+    """
+
+    hold: NDArray[np.int64]
+    added: Floats
+    inner: Floats
+    moved: Floats
+    middle: Floats
+
+    def off(self, added: Floats) -> Floats:
+        """What is added beyond the course: of a unit of a move, a straight line by the medians of Theil and Sen."""
+        first, second = np.triu_indices(len(added), 1)
+        each = added / self.moved
+        apart = self.middle[second] != self.middle[first]
+        slopes = (each[second] - each[first])[apart] / (self.middle[second] - self.middle[first])[apart]
+        slope = float(np.median(slopes)) if slopes.size else 0.0
+        return np.asarray(added - self.moved * (slope * self.middle + np.median(each - slope * self.middle)))
+
+
+def zero_shift(readings: CheckedTest) -> str:
+    """The step between two holds that stands out most from what the moves beside it add, in a sentence."""
+    found = [shift for way in (1.0, -1.0) if (shift := _shift(_moves(readings, way), readings.noise)) is not None]
+    if not found:
+        return ""
+    _, hold, step, expected = max(found)
+    what = "tension" if readings.protocol.control == "displacement" else "displacement"
+    before, after = readings.number[hold - 1], readings.number[hold]
+    return (
+        f"from hold {before} to hold {after} the {what} changes by {step:.3g} {readings.unit}, where the other moves "
+        f"make it {expected:.3g} {readings.unit}, and the difference stays: was the sensor zeroed there, did the wire "
+        "slip, or is time or a move not recorded? correct the readings from there on, or leave them out"
+    )
+
+
+def _moves(readings: CheckedTest, way: float) -> _Moves:
+    """The moves of one way; a move after a reversal shows friction, and one of a slack wire nothing."""
+    begins, ends = (np.array([row[at] for row in readings.each]) for at in (0, -1))
+    second, last_but_one = np.array([(row[:2][-1], row[-2:][0]) for row in readings.each]).T
+    moved = np.diff(readings.setting)
+    this_way = np.sign(moved) == way
+    used = this_way & np.concatenate([[True], this_way[:-1]])
+    used &= np.diff(np.flatnonzero(readings.protocol.recorded)) == 1
+    if readings.protocol.control == "displacement":
+        taut = max(SLACK * float(begins.max()), NOISE * readings.noise)
+        used &= np.minimum(begins[1:], ends[:-1]) > taut
+    at = np.flatnonzero(used)
+    middle = readings.setting[:-1] + 0.5 * moved
+    added, inner = begins[1:] - ends[:-1], second[1:] - last_but_one[:-1]
+    return _Moves(at + 1, added[at], inner[at], moved[at], middle[at])
+
+
+def _shift(moves: _Moves, noise: float) -> tuple[float, int, float, float] | None:
+    """How far the step that stands out most does so, its hold, what it adds, and what was expected of it."""
+    if len(moves.hold) < FEWEST:
+        return None
+    off, inner = moves.off(moves.added), moves.off(moves.inner)
+    own = max(float(np.median(np.abs(off))) / 0.6745, np.sqrt(2.0) * noise)
+    usual = float(np.median(np.abs(moves.added)))
+    found = []
+    for i in np.flatnonzero(np.abs(off) > OF_A_MOVE * usual):
+        size, sign = abs(off[i]), np.sign(off[i])
+        excess = float(size / max(np.quantile(np.abs(np.delete(off, i)), 0.9), own))
+        taken_back = (-sign * off[np.abs(moves.hold - moves.hold[i]) == 1]).max(initial=0.0)
+        stays = taken_back <= TAKEN_BACK * size and sign * inner[i] >= BESIDE * size
+        if excess > STANDS_OUT and stays:
+            found.append((excess, int(moves.hold[i]), float(moves.added[i]), float(moves.added[i] - off[i])))
+    return max(found, default=None)
