@@ -10,6 +10,7 @@ from analyses.field.recordings import Drive, imported
 from analyses.field.recordings import record as recorded
 from tests.io.bench_files import convert
 from wirebayes.io.bench.about import About
+from wirebayes.io.bench.continuous import _slow
 from wirebayes.io.bench.plateaus import plateaus
 from wirebayes.io.bench.thinning import KEPT, MOST, kept_readings
 from wirebayes.io.bench.undecided import Choices
@@ -136,6 +137,25 @@ def test_a_wire_that_creeps_while_it_moves_is_the_models_that_jumps(drive, tmp_p
     left = [hold.tension_N - e[m] for hold, e, m in zip(made.experiment.holds, expected, protocol.mask, strict=True)]
     assert len(left) == len(levels)
     assert np.abs(np.concatenate(left)).max() < (0.005 if drive.speed > 0.1 else 0.02)
+
+
+@pytest.mark.parametrize(("move_s", "warned"), [(6.0, False), (60.0, True)])
+def test_moves_that_are_slow_beside_their_holds_are_said_to_be_no_part_of_the_model(move_s, warned, tmp_path):
+    drive = Drive(speed=1.0 / move_s, noise_mm=0.0)
+    made = recorded(WIRE, 1300.0, [1.0, 2.0, 3.0, 4.0, 5.0], drive, np.random.default_rng(1))
+    path = tmp_path / "raw.csv"
+    rows = (f"{t:.3f},{x:.4f},{f:.4f}\n" for t, x, f in zip(*made, strict=True))
+    path.write_text("Time (s),Displacement (mm),Force (N)\n" + "".join(rows))
+    said = wb.import_bench(path, length_mm=1300.0, output=tmp_path / "out").summary()["warnings"]
+    assert [notice["kind"] for notice in said] == ["left-out"] * warned
+    if warned:
+        assert said[0]["text"].startswith("raw: moves took 57.9 s, 48 % of their holds (medians): what the wire does")
+
+
+@pytest.mark.parametrize(("moves_s", "warned"), [([9.9, 9.9, 90.0], False), ([1.0, 10.1, 10.1], True)])
+def test_moves_are_slow_from_a_tenth_of_their_holds_on(moves_s, warned):
+    """At a tenth parameters are as right as their intervals; at a fifth the creep rate is up to 4 deviations off."""
+    assert bool(_slow(np.array(moves_s), np.full(3, 100.0))) == warned
 
 
 def test_a_hold_that_is_reached_between_two_readings_begins_between_them(tmp_path):

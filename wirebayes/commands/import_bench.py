@@ -233,7 +233,7 @@ def _write(folder: Path, tests: Sequence[tuple[Path, Converted]]) -> None:
             "holds": len(experiment.recorded_holds),
             "readings": sum(h.time_s.size for h in experiment.holds),
             "notes": test.notes,
-            "warnings": to_json(data_checks.of_experiment(experiment)),
+            "warnings": to_json([*test.warnings, *data_checks.of_experiment(experiment)]),
         }
         write_text(folder / f"{experiment.name}.toml", tables[-1])
     if len(tests) > 1:

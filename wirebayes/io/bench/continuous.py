@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError
 from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
 from wirebayes.io.bench.recorded import CONTINUOUS, PAUSE, Cut, Readings, level_of
+from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import counted
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
 LONG = 10  # times as many readings: shorter holds have none to spare
-AFTER_MOVE = 0.1  # of a hold at most is left out after a slow move
+AFTER_MOVE = (
+    0.1  # of a hold at most is left out after a slow move; of slower ones k2 is off by up to 5 standard deviations
+)
 SLACK = 0.05  # of what is read in the hold: a rest before it with less says nothing of the wire
 COVERED = 0.5  # of the readings in holds; a recording with less is a pull, not a test of holds
 
@@ -37,16 +40,24 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
         raise _too_few(readings, found_holds, kept)
     if len(found_holds) == 1:
         _check_only_hold(readings, found_holds[0])
-    lefts = [0, *(p.left - 1 for p in found_holds[:-1])]
-    moves = [float(time[p.begin] - time[left]) for p, left in zip(found_holds, lefts, strict=True)]
-    zeros = [_moved(x, time, left, p) for p, left in zip(found_holds, lefts, strict=True)]
-    moves[0] = min(moves[0], 2.0 * (float(time[found_holds[0].begin]) - zeros[0]))  # without a rest before the test
+    moves, zeros = _moves_to(x, time, found_holds)
     rows = [_after_move(time, p, move) for p, move in zip(found_holds, moves, strict=True)]
     since = [time[r] - zero for r, zero in zip(rows, zeros, strict=True)]
     last_s = float(time[found_holds[-1].left - 1])
     ends: list[float | None] = [end - zero for end, zero in zip([*zeros[1:], last_s], zeros, strict=True)]
     notes = [*resets, *_notes(readings, len(rows), kept, float(np.median(moves)))]
-    return Cut(rows, list(range(1, len(rows) + 1)), [level_of(x[r]) for r in rows], since, ends, True, notes, time)
+    slow = _slow(np.array(moves), np.array([time[p.end - 1] - time[p.begin] for p in found_holds]))
+    levels = [level_of(x[r]) for r in rows]
+    return Cut(rows, list(range(1, len(rows) + 1)), levels, since, ends, True, notes, time, slow)
+
+
+def _moves_to(x: Floats, time: Floats, found_holds: Sequence[Plateau]) -> tuple[list[float], list[float]]:
+    """How long the move to each hold took, and when the hold begins."""
+    lefts = [0, *(p.left - 1 for p in found_holds[:-1])]
+    moves = [float(time[p.begin] - time[left]) for p, left in zip(found_holds, lefts, strict=True)]
+    zeros = [_moved(x, time, left, p) for p, left in zip(found_holds, lefts, strict=True)]
+    moves[0] = min(moves[0], 2.0 * (float(time[found_holds[0].begin]) - zeros[0]))  # without a rest before the test
+    return moves, zeros
 
 
 def _check_rising(readings: Readings) -> None:
@@ -67,6 +78,19 @@ def _notes(readings: Readings, holds: int, kept: int, move_s: float) -> list[str
         f"each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
         f"{move_s:.3g} s (median), and readings as soon after one are left out",
     ]
+
+
+def _slow(moves_s: Floats, held_s: Floats) -> tuple[Notice, ...]:
+    """That most moves, (H,), took longer than the share of their holds, (H,), that is left out after them."""
+    if np.median(moves_s / held_s) <= AFTER_MOVE:
+        return ()
+    text = (
+        f"moves took {np.median(moves_s):.3g} s, {100.0 * np.median(moves_s / held_s):.0f} % of their holds (medians): "
+        "what the wire does while it moves is taken as one step in the middle of the move, which is right for moves of "
+        f"up to {100.0 * AFTER_MOVE:.0f} % of a hold; beyond, creep rates may be off by more than their intervals say, "
+        "and discover may name effects that the moves made: move faster or hold longer"
+    )
+    return (Notice("left-out", text),)
 
 
 def _check_only_hold(readings: Readings, hold: Plateau) -> None:

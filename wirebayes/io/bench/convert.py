@@ -30,6 +30,7 @@ from wirebayes.io.bench.undecided import Choices
 from wirebayes.io.bench.words import known_words
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import OPTIONAL, REQUIRED
+from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import listed
 from wirebayes.wire.protocol import Control
@@ -49,6 +50,8 @@ class Converted:
         What was understood and done, in sentences.
     recording : Recording or None
         Everything that was recorded, where the file counts time from the beginning of the test.
+    warnings : tuple of Notice
+        What of the recording has no place in the experiment.
     """
 
     experiment: Experiment
@@ -56,6 +59,7 @@ class Converted:
     header: tuple[str, ...]
     notes: list[str]
     recording: "Recording | None"
+    warnings: tuple[Notice, ...]
 
 
 @dataclass(frozen=True)
@@ -139,7 +143,7 @@ def _convert(table: RawTable, about: About, choices: Choices) -> Converted:
         since = holds.clock_s - holds.clock_s[0]
         starts = np.array([since[of_hold[0]] - t[0] for of_hold, t in zip(holds.rows, holds.time_s, strict=True)])
         recording = Recording(since, values["displacement"], values["tension"], starts)
-    return Converted(experiment, rows, header, notes, recording)
+    return Converted(experiment, rows, header, notes, recording, holds.warnings)
 
 
 def _control(recorded: Recorded) -> Control:

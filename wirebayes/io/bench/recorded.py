@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import UNITS
+from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 
 Complain = Callable[[int, str, str, str], InputError]  # row, role, found, expected
@@ -75,6 +76,8 @@ class Cut:
         What was done, in sentences.
     clock_s : (r,) array
         Times of all rows as they were read, pieces of a recording joined.
+    warnings : tuple of Notice
+        What of the recording has no place in holds.
     """
 
     rows: list[NDArray[np.int64]]
@@ -85,6 +88,7 @@ class Cut:
     of_test: bool
     notes: list[str]
     clock_s: Floats
+    warnings: tuple[Notice, ...] = ()
 
 
 def restarts(readings: Readings) -> NDArray[np.bool_]:
