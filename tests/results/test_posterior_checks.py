@@ -72,6 +72,13 @@ def test_a_stiffness_outside_its_prior_is_named(simulated):
     assert posterior_checks.unlikely_stiffness(draws(simulated.problem, k1=stiff), rope) == ""
 
 
+@pytest.mark.parametrize(("away", "named"), [(3.69, False), (3.71, True), (-3.71, True)])
+def test_a_stiffness_is_far_outside_from_3_7_standard_deviations_of_its_logarithm_on(away, named):
+    prior = {"k1": 500.0 * np.exp([-0.5, 0.5])}
+    said = posterior_checks.unlikely_stiffness({"k1": np.full(3, 500.0 * np.exp(0.5 * away))}, prior)
+    assert bool(said) == named
+
+
 def test_a_posterior_that_is_the_prior_is_named(simulated):
     problem = simulated.problem
     one, other = (problem.prior.rvs(4000, np.random.default_rng(seed)) for seed in (0, 1))
