@@ -117,12 +117,20 @@ def test_tension_rises_in_four_of_five_holds_and_by_two_noise_levels(rises, warn
         ([5.0, 4.9, 5.102, 5.102, 5.102], 0.0, True),
         ([5.0, 4.9, 5.9, 5.6, 5.3, 5.098], 0.0, False),  # a fifth of it is left
         ([5.0, 4.9, 5.9, 5.6, 5.3, 5.102], 0.0, True),
-        ([4.7, 4.7, 6.7, 6.997], 0.1, True),  # against the hold's course, to three noise levels
-        ([4.7, 4.7, 6.7, 7.003], 0.1, False),
+        ([4.0, 4.4, 5.5, 5.397], 0.1, True),  # against the hold's course, to three noise levels
+        ([4.0, 4.4, 5.5, 5.403], 0.1, False),
+        ([5.0, 4.9, 4.405, 4.3], 0.0, False),  # five times as fast as that goes
+        ([5.0, 4.9, 4.395, 4.3], 0.0, True),
     ],
 )
 def test_a_jump_stands_out_from_noise_and_from_its_hold_and_stays(row, noise, jumps):
-    assert (data_checks._jump(np.array(row), noise) is not None) == jumps
+    assert (data_checks._jump(np.array(row), np.arange(len(row)), noise) is not None) == jumps
+
+
+@pytest.mark.parametrize(("pause_s", "jumps"), [(1.0, True), (40.0, False)])
+def test_much_creep_in_a_long_pause_is_no_jump(pause_s, jumps):
+    times = np.cumsum([0.0, 1.0, 1.0, pause_s, 1.0, 1.0])
+    assert (data_checks._jump(np.array([5.0, 4.9, 4.8, 4.0, 3.99, 3.98]), times, 0.01) is not None) == jumps
 
 
 @pytest.mark.parametrize(("readings", "warned"), [([5.0, 4.9, 4.9, 4.9], False), ([5.0, 4.9, 4.8, 4.8], True)])

@@ -52,10 +52,10 @@ def test_a_hold_goes_on_unread_beyond_half_of_what_was_read_and_two_of_its_pause
     assert bool(holds._unread_ends(times, [times_s[-1] + after_s, None], "displacement")) == said
 
 
-@pytest.mark.parametrize(("falling", "refused"), [(4, False), (5, True)])
+@pytest.mark.parametrize(("falling", "refused"), [(10, False), (11, True)])
 def test_rows_stand_the_other_way_round_where_most_times_fall(falling, refused, tmp_path):
-    """Of eight steps in time within one hold."""
-    times = np.cumsum([0, *([3] * (8 - falling)), *([-1] * falling)])
+    """Of twenty steps in time within one hold."""
+    times = np.cumsum([0, *([3] * (20 - falling)), *([-1] * falling)])
     rows = [(1, 1.0, t, 5.0) for t in times + 90]
     expected = "the oldest first" if refused else "times that rise"
     with pytest.raises(InputError, match=expected):
@@ -80,8 +80,8 @@ def test_a_position_is_a_machine_s_beyond_a_tenth_of_the_length_and_twice_the_te
     ("second", "refused"),
     [
         ([1.0, 2.0, 3.0, 4.0, 5.0], True),
-        ([1.9, 3.0, 4.0, 5.0], True),  # begins a quarter of the range from where the first began
-        ([2.1, 3.0, 4.0, 5.0], False),
+        ([1.95, 3.0, 4.0, 5.0], True),  # begins a quarter of the range from where the first began
+        ([2.05, 3.0, 4.0, 5.0], False),
         ([1.0, 2.0, 3.1], True),  # and goes over half of it
         ([1.0, 2.0, 2.9], False),
     ],
@@ -100,14 +100,14 @@ def test_a_column_names_specimens_where_the_same_test_begins_again(second, refus
 @pytest.mark.parametrize(
     ("chances", "drifts", "decided"),
     [
-        ((0.9e-3, 1.0), (0.5, 0.1), "force"),  # the displacement has a trend
-        ((1.1e-3, 1.0), (0.5, 0.1), "displacement"),
+        ((0.95e-3, 1.0), (0.5, 0.1), "force"),  # the displacement has a trend
+        ((1.05e-3, 1.0), (0.5, 0.1), "displacement"),
         ((0.0, 0.0), (0.301, 0.1), "force"),  # three times as much drift decides
         ((0.0, 0.0), (0.299, 0.1), "asked"),
         ((0.0, 0.0), (0.1, 0.301), "displacement"),
         ((0.0, 0.0), (0.1, 0.299), "asked"),
-        ((0.0, 1.1e-3), (0.1, 0.1), "displacement"),  # the tension has none
-        ((0.0, 0.9e-3), (0.1, 0.1), "asked"),
+        ((0.0, 1.05e-3), (0.1, 0.1), "displacement"),  # the tension has none
+        ((0.0, 0.95e-3), (0.1, 0.1), "asked"),
         ((0.0, 0.0), (0.0199, 0.02), "displacement"),  # neither drifts as anything creeps
         ((0.0, 0.0), (0.0201, 0.02), "asked"),
     ],

@@ -27,6 +27,7 @@ ISOLATED = 10.0  # times as far from its neighbours as nine in ten readings
 GROSS = 0.2  # of the range of all other tensions; smaller ones are the model check's affair
 RISING_HOLDS, RISING_SHARE, RISE = 5, 0.8, 2.0  # holds on loading, share that rise, rise in noise levels: not by chance
 JUMP, JUMP_STAYS = 2.0, 0.2  # times the changes before and after it; share of it that is left to the hold's end
+FASTER = 5.0  # times the speed of the changes before and after it, which neither creep gains and loses nor a misprint
 COPIED = 3  # different readings that agree one by one at two displacements: not by chance
 OFF_GRID = 0.5  # share of the changes between readings that are smaller than half the resolution
 
@@ -216,37 +217,40 @@ def rising(readings: CheckedTest) -> str:
 
 
 def jump_within_a_hold(readings: CheckedTest) -> str:
-    """A change from one reading to the next against its hold's course, which stays: no wire does that by itself."""
+    """A change from one reading to the next out of its hold's course, which stays: no wire does that by itself."""
     control = readings.protocol.control
     for j, row in enumerate(readings.each):
-        at = _jump(row, readings.noise)
+        time = readings.protocol.time_s[readings.protocol.recorded][j]
+        at = _jump(row, time[: len(row)], readings.noise)
         if at is None:
             continue
-        time = readings.protocol.time_s[readings.protocol.recorded][j]
         moved = (
-            "if the wire was tightened or let out, begin a new hold there, with the displacement it then had"
+            "if the wire was tightened or let out, begin a new hold there, with the displacement it then had; if the "
+            "sensor was zeroed, correct the readings from there on"
             if control == "displacement"
             else "if the gauge or the hook was touched, correct the readings from there on"
         )
         return (
             f"{READ[control].split('_')[0]} jumps from {row[at]:.5g} to {row[at + 1]:.5g} {readings.unit} between "
-            f"{time[at]:g} and {time[at + 1]:g} s of hold {readings.number[j]}, against the hold's course, and stays "
+            f"{time[at]:g} and {time[at + 1]:g} s of hold {readings.number[j]}, out of the hold's course, and stays "
             f"there: {moved}"
         )
     return ""
 
 
-def _jump(row: Floats, noise: float) -> int | None:
-    """The reading of a hold (r,) after which it jumps, if it does.
+def _jump(row: Floats, time_s: Floats, noise: float) -> int | None:
+    """The reading of a hold (r,) after which it jumps, if it does: against the hold's course, or faster than that goes.
 
     Creep may be over after the first reading, and the last one may be a misprint.
     """
     change = np.diff(row)
+    speed = np.abs(change) / np.diff(time_s)
     for i in range(1, len(change) - 1):
-        beside = np.abs(change[[i - 1, i + 1]])
-        course = (change.sum() - change[i]) * np.sign(change[i])
-        stays = ((row[i + 1 :] - row[i]) * np.sign(change[i]) > JUMP_STAYS * abs(change[i])).all()
-        if abs(change[i]) > max(ISOLATED * noise, JUMP * beside.max()) and course <= FLAT * noise and stays:
+        size, beside = abs(change[i]), [i - 1, i + 1]
+        against = (change.sum() - change[i]) * np.sign(change[i]) <= FLAT * noise
+        out_of_course = against or speed[i] > FASTER * speed[beside].max()
+        stays = ((row[i + 1 :] - row[i]) * np.sign(change[i]) > JUMP_STAYS * size).all()
+        if size > max(ISOLATED * noise, JUMP * np.abs(change[beside]).max()) and out_of_course and stays:
             return i
     return None
 
