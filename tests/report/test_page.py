@@ -365,6 +365,7 @@ def test_the_page_of_a_check_says_what_is_odd_and_what_the_test_cannot_tell(tmp_
     page = read(write_page(folder_of(tmp_path / "out", "check", check=content)))
     assert "Hold 2 repeats hold 1." in page.words and "0.00123" in page.words
     assert "it does not determine k1, it would show" in page.words and "k1 is about" not in page.words
+    assert page.words.count("stiffness: the tension per unit of strain") == 1
     assert (
         "Effects it cannot show: guide friction." in page.words
         and "Parameters it does not determine: k1." in page.words

@@ -57,7 +57,7 @@ def check_page(folder: Path, configuration: dict[str, Any]) -> Page:
     found = checked["experiments"]
     sections = [Section(name, _checked(e, _picture(folder, name))) for name, e in found.items()]
     effects = [effect for e in found.values() for effect in e["effects"]]
-    sections += [files, meaning(("hold", "90 % interval", "prior"), effects)]
+    sections += [files, meaning(("hold", "90 % interval", "prior"), effects, symbols=False)]
     lead = " ".join(check_in_a_sentence(name, e) for name, e in list(found.items())[:_MOST_SENTENCES])
     return Page("What this test can determine", lead, sections, f"Seed {configuration.get('seed')}.")
 
