@@ -199,10 +199,7 @@ def _leading(table: RawTable, column: int, unit: Unit | None, moments: Sequence[
         f"{table.sheet.path}, {table.place(table.rows[short].line, column)}: found "
         f"{table.rows[short].cell(column)!r}, which is minutes and seconds or hours and minutes",
         "which",
-        {
-            f"--map {name}=time [{'mm:ss' if leading == 60.0 else 'hh:mm'}]": called
-            for leading, called in CALLED.items()
-        },
+        {f"--map {name}=time [{_WRITTEN[leading]}]": called for leading, called in CALLED.items()},
     )
 
 

@@ -17,9 +17,8 @@ from wirebayes.sentences import counted
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
 LONG = 10  # times as many readings: shorter holds have none to spare
-AFTER_MOVE = (
-    0.1  # of a hold at most is left out after a slow move; of slower ones k2 is off by up to 5 standard deviations
-)
+# of a hold at most is left out after a slow move; of slower ones k2 is off by up to 5 standard deviations
+AFTER_MOVE = 0.1
 SLACK = 0.05  # of what is read in the hold: a rest before it with less says nothing of the wire
 COVERED = 0.5  # of the readings in holds; a recording with less is a pull, not a test of holds
 
