@@ -1,17 +1,22 @@
 """`wirebayes plan`: from a plan file, from readings, from a fit and from findings that could not decide."""
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 import wirebayes as wb
 from wirebayes.cli import main
 from wirebayes.commands import plan as module
 from wirebayes.commands import plan_content
+from wirebayes.commands.wires import robot_of
 from wirebayes.effects import CATALOGUE
 from wirebayes.io.run_folder import write_json
 from wirebayes.robot.mechanics import schema
 
+FIELD = Path(__file__).parents[1] / "robot" / "field"
 FEW = wb.Policy(walkers=32, ess=100, rounds=2, most_rounds=2, round_draws=512, block=8, most_steps=16, r_hat=99)
 PLAN = """budget_min = 4.0
 robot = "linear-7"
@@ -83,6 +88,13 @@ def test_a_robot_on_wires_of_its_own_is_said_to_be_changed_by_no_test(plan_file,
     printed = capsys.readouterr()
     assert "no test of this line changes the drift of" in printed.err and "drift of the robot" not in printed.out
     assert "drift in 1 h" not in (out / "report.html").read_text()
+
+
+def test_what_speaks_against_a_robots_file_stands_in_the_plan_that_moves_it():
+    cube = robot_of(FIELD / "balanced-home" / "cube4.toml")
+    far = replace(cube, beyond_m=np.full(4, 1e4))
+    assert [one.kind for one in plan_content._of_robot(far)] == ["geometry", "unheld"]
+    assert plan_content._of_robot(schema.read_robot_file("linear-7")) == []
 
 
 def test_a_plan_file_is_ranked_within_its_budget(plan_file, tmp_path, capsys):

@@ -110,6 +110,19 @@ def test_a_home_pose_that_nothing_holds_has_no_joint_values(run):
     assert "No tensions" in (out / "report.html").read_text()
 
 
+def test_a_home_that_balance_turns_is_said_and_a_trajectory_goes_on_from_its_calibrated_robot(run, tmp_path):
+    folder = FIELD / "balanced-home"
+    options = ("--tension-sd", "0.05", "--anchor-sd", "5", "--draws", "10")
+    _, said, found, out = _calibrate(run, folder / "cube4.toml", folder / "session.csv", *options)
+    assert found["usable"] and "write [0.1578, -0.2825, " in said
+    assert sum("hangs 18.5 degrees away" in one["text"] for one in found["warnings"]) == 1
+    path, calibrated = tmp_path / "path.csv", out.rename(tmp_path / "calibrated")
+    path.write_text("time_s,x_m,y_m,z_m\n0,0.5,0.3,2.0\n60,0.3,0.3,2.0\n")
+    options = ("--trajectory", path, "--calibration", calibrated, "--draws", "4")
+    code, said, _, _ = run("pose", calibrated / "robot.toml", *options)
+    assert code == 0, said
+
+
 def test_straight_lengths_in_place_of_whole_wires_are_refused(run):
     code, said, _, _ = run(
         "pose", "hangprinter-4", "--joints", FIELD / "firmware-lengths-absurd" / "firmware-lengths.csv"

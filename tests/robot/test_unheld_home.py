@@ -1,21 +1,24 @@
 """A home orientation that nothing holds: how near to it the platform hangs, and that it is said."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from wirebayes.answers import terminal
 from wirebayes.commands.asked_pose import asked_place
-from wirebayes.commands.wires import folder_of
+from wirebayes.commands.wires import folder_of, robot_of
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import sag, schema
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.motion import hanging
+from wirebayes.robot.motion import hanging, home
 from wirebayes.robot.pose import orientation
 from wirebayes.robot.pose.orientation import balanced_orientation
 from wirebayes.sentences import coordinates
+
+FIELD = Path(__file__).parent / "field"
 
 
 def six_wires(centre_of_mass_m=(0.02, 0.01, -0.05), turned_rad=(0.0, 0.0, 0.0)) -> Robot:
@@ -43,22 +46,60 @@ def six_wires(centre_of_mass_m=(0.02, 0.01, -0.05), turned_rad=(0.0, 0.0, 0.0)) 
 def test_a_home_orientation_that_nothing_holds_is_said_with_its_distance(wrong, degrees):
     robot = six_wires(**wrong)
     found = balanced_orientation(robot, robot.home_m, None)
-    assert f"hangs {degrees} degrees away" in found.turned_away and "pose.rotation_vector_rad" in found.turned_away
+    (said,) = found.turned_away
+    assert f"hangs {degrees} degrees away" in said.text and "pose.rotation_vector_rad" in said.text
+    assert home.home_notices(robot) == [said]
     assert "nearest to the home orientation" in found.found["sentence"]
 
 
 def test_what_is_held_or_asked_for_is_no_warning():
     robot = six_wires()
-    assert balanced_orientation(robot, robot.home_m, None).turned_away == ""
+    assert balanced_orientation(robot, robot.home_m, None).turned_away == ()
     tilted = six_wires(centre_of_mass_m=(1.5, 0.01, -0.05))
-    assert balanced_orientation(tilted, tilted.home_m, np.array([np.nan, 0.1, np.nan])).turned_away == ""
+    assert balanced_orientation(tilted, tilted.home_m, np.array([np.nan, 0.1, np.nan])).turned_away == ()
 
 
 @pytest.mark.parametrize(("degrees", "said"), [(0.999, False), (1.001, True)])
 def test_a_tilt_that_no_eye_sees_is_no_warning(degrees, said):
     rotation = turning.matrix(np.array([0.0, np.radians(degrees), 0.0]))
-    assert bool(orientation._turned_away(six_wires(), rotation)) == said
-    assert not orientation._turned_away(replace(six_wires(), freedom="pose", exit_m=np.zeros((5, 3))), rotation)
+    assert bool(home.turned_away(six_wires(), rotation)) == said
+
+
+def four_wires(stated_rad=(0.0, 0.0, 0.0)) -> Robot:
+    """Four wires as a command has them: balance turns the platform by 18 degrees where it is to be level."""
+    robot = schema.read_robot_file(FIELD / "under-actuated" / "cube4-off.toml")
+    return robot_of(replace(robot, home_rotation_rad=np.array(stated_rad)))
+
+
+def test_a_home_orientation_that_balance_replaces_is_said_with_both():
+    robot = four_wires()
+    (said,) = home.home_notices(robot)
+    assert said.kind == "unheld" and said.text.startswith("balance, to which 4 wires leave the orientation")
+    assert "hangs 18.5 degrees away" in said.text and "write [0.1578, -0.2825, -0.0008322] there" in said.text
+    assert balanced_orientation(robot, robot.home_m, None).turned_away == (said,)
+    assert home.home_notices(four_wires((0.1578, -0.2825, -0.0008322))) == []
+
+
+def test_elsewhere_or_asked_for_the_orientation_of_fewer_wires_is_no_warning():
+    robot = four_wires()
+    assert balanced_orientation(robot, robot.home_m - [0.1, 0.0, 0.0], None).turned_away == ()
+    assert balanced_orientation(robot, robot.home_m, np.array([np.nan, np.nan, 0.0])).turned_away == ()
+
+
+@pytest.mark.parametrize(("degrees", "said"), [(0.99, False), (1.01, True)])
+def test_what_balance_changes_by_less_than_an_eye_sees_is_no_warning(degrees, said):
+    balance = turning.matrix(four_wires().home_rotation_rad)
+    beside = turning.vector((turning.matrix(np.array([np.radians(degrees), 0.0, 0.0])) @ balance)[None])[0]
+    assert bool(home.home_notices(four_wires(beside))) == said
+
+
+def test_a_home_position_without_balance_is_said_with_its_metres():
+    robot = replace(two_wires(), home_m=np.array([0.2, 0.05, -0.6]))
+    (said,) = home.home_notices(robot)
+    assert said.kind == "unheld" and "is 0.05 m away, (0.2, 0, -0.6) m" in said.text
+    (nowhere,) = home.home_notices(replace(robot, home_m=np.array([0.2, 0.0, 0.4])))
+    assert nowhere.text.endswith("the home pose of the robot's file (pose)")
+    assert home.home_notices(two_wires()) == []
 
 
 def test_a_wire_at_its_bound_is_let_go_where_that_leads_nearer():

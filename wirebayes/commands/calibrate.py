@@ -291,7 +291,7 @@ def _write_robot(path: Path, given: RobotLike, calibrated: Robot) -> Robot:
         return calibrated
     text = with_points(schema.robot_text(Path(given)), calibrated)
     path.write_text(text, encoding="utf-8")
-    return schema.parse(text, str(path))
+    return robot_of(schema.parse(text, str(path)))
 
 
 def calibrated_of(

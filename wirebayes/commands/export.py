@@ -11,6 +11,7 @@ from wirebayes.notice import Notice, to_json
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts
+from wirebayes.robot.motion.home import home_notices
 from wirebayes.robot.motion.plausible import robot_notices
 from wirebayes.strict.files import PathLike
 from wirebayes.views.export import Export
@@ -110,4 +111,6 @@ def _warnings(robot: Robot, line: WireDraws, contents: Mapping[str, str]) -> lis
     if "robot.xml" not in contents:
         text = "no robot.xml, robot.urdf and robot.sdf: no tensions within the bounds hold the home pose"
         out.append(Notice("unheld", text))
+    else:
+        out += home_notices(robot)
     return out

@@ -20,6 +20,8 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import drift
+from wirebayes.robot.motion.home import home_notices
+from wirebayes.robot.motion.plausible import robot_notices
 
 _ROBOT_DRAWS = 60  # of the posterior of each simulated test that moves a robot
 
@@ -105,7 +107,7 @@ def plan_content(rows: list[JudgedProtocol], request: PlanRequest, machine: Robo
         },
         "robot": None if machine is None else machine.name,
         "protocols": rows,
-        "warnings": to_json([*_over_budget(rows[0], request.budget_min), *_unchanged(machine), *guess.doubts]),
+        "warnings": to_json([*_over_budget(rows[0], request.budget_min), *_of_robot(machine), *guess.doubts]),
     }
 
 
@@ -116,15 +118,18 @@ def _over_budget(best: JudgedProtocol, budget_min: float | None) -> list[Notice]
     return [Notice("budget", f"no test is done within {budget_min:g} min")]
 
 
-def _unchanged(machine: Robot | None) -> list[Notice]:
-    """That the drift of a robot does not depend on the line that is tested, if so."""
-    if machine is None or not machine.is_on_given_wires:
+def _of_robot(machine: Robot | None) -> list[Notice]:
+    """What speaks against the file of a robot, and that its drift does not depend on the line that is tested, if so."""
+    if machine is None:
         return []
+    out = [*robot_notices(machine), *home_notices(machine)]
+    if not machine.is_on_given_wires:
+        return out
     text = (
         f"no test of this line changes the drift of {machine.name}: its file gives the parameters of all its wires; "
         "leave them out, or write fitted = true under [wires.NAME]"
     )
-    return [Notice("left-out", text)]
+    return [*out, Notice("left-out", text)]
 
 
 def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) -> RobotDrift:

@@ -119,7 +119,10 @@ def at_home(robot: Robot) -> Robot:
     if not robot.is_underactuated or np.isfinite(inverse.tensions(robot, x, R)).all():
         return robot
     found = hang(robot, x, R)
-    return replace(robot, home_rotation_rad=turning.vector(found.rotation)[0]) if found.held[0] else robot
+    if not found.held[0]:
+        return robot
+    balance = turning.vector(found.rotation)[0]
+    return replace(robot, home_rotation_rad=balance, stated_turn_rad=robot.home_rotation_rad)
 
 
 def chosen(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> Floats:

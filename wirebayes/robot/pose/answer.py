@@ -152,8 +152,7 @@ def _warnings(held: _Held, courses: dict[float, Course], stable: bool, turned: O
     out = _weak(held.commands)
     for spread, course in courses.items():
         out += stability.stability_warnings(course, spread, stable)
-    if turned.turned_away:
-        out.append(Notice("unheld", turned.turned_away))
+    out += turned.turned_away
     if turned.refused:
         out.append(Notice("geometry", turned.refused))
     out += plausible.robot_notices(held.robot) + plausible.strain_notices(held.robot, held.line, held.tension_N[0])

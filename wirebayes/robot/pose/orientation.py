@@ -5,17 +5,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.json_files.pose import OrientationFound
+from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
+from wirebayes.robot.motion.home import turned_away
 from wirebayes.sentences import coordinates, listed
 
 COMPONENTS = ("rx", "ry", "rz")
 _COUNT = {1: "one", 2: "two"}  # in words, as sentences have it
 _ROUNDING = 1e-6  # of the robot's span: what a position written with six digits may be off
-_TURNED_AWAY = 1.0  # degrees from the home orientation: nobody levels a platform by eye to much better
 _SAME = 5e-5  # rad: a component that balance decides and that was asked for to four decimals is as asked for
 
 
@@ -37,8 +38,8 @@ class Orientation:
         What was asked for and cannot be had; empty where all was had.
     nearest_m : (3,) array or None
         The nearest position at which the platform hangs, where it cannot at the one requested.
-    turned_away : str
-        How far the platform hangs from a home orientation that nothing holds, though the wires could command it.
+    turned_away : tuple of Notice
+        How far the platform hangs from a home orientation that nothing holds.
     """
 
     position_m: Floats
@@ -46,7 +47,7 @@ class Orientation:
     found: OrientationFound | None = None
     sentence: str = ""
     refused: str = ""
-    turned_away: str = ""
+    turned_away: tuple[Notice, ...] = ()
     nearest_m: Floats | None = None
 
 
@@ -91,7 +92,8 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
                 return Orientation(position_m, near, None, _out_of_reach(asked, had, found))
             found = part
     there = _described(robot, position_m, found, asked, had)
-    return replace(there, turned_away=_turned_away(robot, there.rotation)) if asked_rad is None else there
+    meant = asked_rad is None and not (robot.is_underactuated and np.any(position_m != robot.home_m))
+    return replace(there, turned_away=tuple(turned_away(robot, there.rotation))) if meant else there
 
 
 def by_lines(robot: Robot) -> OrientationFound:
@@ -115,19 +117,6 @@ def by_lines(robot: Robot) -> OrientationFound:
         "sentence": f"{robot.joints} winches with {robot.legs} lines command {robot.joints} of {robot.freedoms} "
         "degrees of freedom; the lines' lengths and balance decide the orientation.",
     }
-
-
-def _turned_away(robot: Robot, rotation: Floats) -> str:
-    """By how much a platform on wires enough hangs away from home; empty where that is little, or all one can have."""
-    home = turning.matrix(robot.home_rotation_rad)
-    away = float(np.degrees(np.linalg.norm(turning.vector((rotation @ home.T)[None])[0])))
-    if robot.is_underactuated or away < _TURNED_AWAY:
-        return ""
-    return (
-        "no tensions within the bounds hold the rotation that the robot's file asks for (pose.rotation_vector_rad): "
-        f"the platform hangs {away:.3g} degrees away from it; check that rotation (rad), the centre of mass and the "
-        "points (m)"
-    )
 
 
 def _clear(robot: Robot, x: Floats, R: Floats) -> bool:

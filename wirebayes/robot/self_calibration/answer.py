@@ -19,7 +19,7 @@ from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.mechanics.winches import of_each_winch
-from wirebayes.robot.motion import control, hanging, inverse, plausible
+from wirebayes.robot.motion import control, hanging, home, inverse, plausible
 from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import GROSS, LengthPosterior, corrected_joints, length_posterior
@@ -87,6 +87,7 @@ def lengths_report(
                 *contradicted,
                 *sensors.sensor_notices(at_fault),
                 *plausible.robot_notices(robot),
+                *home.home_notices(robot),
                 *doubts(robot, prior.line),
             ]
         ),

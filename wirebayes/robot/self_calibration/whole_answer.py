@@ -20,7 +20,7 @@ from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.mechanics.winches import of_each_winch
-from wirebayes.robot.motion import inverse, plausible
+from wirebayes.robot.motion import home, inverse, plausible
 from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
@@ -318,7 +318,8 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
 
 
 def _warnings(verdict: _Verdict) -> list[Notice]:
-    found, out = verdict.found, plausible.robot_notices(verdict.found.unknowns.robot)
+    found, robot = verdict.found, verdict.found.unknowns.robot
+    out = [*plausible.robot_notices(robot), *home.home_notices(robot)]
     if not found.converged:
         text = "not converged: do not use these values; read more poses, or check the readings and the stated errors"
         out.append(Notice("not-converged", text))

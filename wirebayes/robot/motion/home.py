@@ -1,0 +1,61 @@
+"""The home pose of a robot's file where nothing holds it: how far from there the platform hangs."""
+
+import numpy as np
+
+from wirebayes.notice import Notice
+from wirebayes.numeric.typing import Floats
+from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.motion import hanging, inverse
+from wirebayes.sentences import coordinates
+
+_TURNED_AWAY = 1.0  # degrees from the home orientation: nobody levels a platform by eye to much better
+
+
+def turned_away(robot: Robot, rotation: Floats) -> list[Notice]:
+    """That the platform hangs away from the orientation of the robot's file, if so.
+
+    Parameters
+    ----------
+    robot : Robot
+    rotation : (3, 3) array
+        How the platform hangs at a position where the file's orientation was meant.
+    """
+    stated = robot.home_rotation_rad if robot.stated_turn_rad is None else robot.stated_turn_rad
+    away = float(np.degrees(np.linalg.norm(turning.vector((rotation @ turning.matrix(stated).T)[None])[0])))
+    if away < _TURNED_AWAY:
+        return []
+    why, accepted = "no tensions within the bounds hold", ""
+    if robot.is_underactuated:
+        why = f"balance, to which {robot.legs} wires leave the orientation, does not give"
+        accepted = f"write [{coordinates(turning.vector(rotation[None])[0], 4)}] there if that is meant, else "
+    text = (
+        f"{why} the rotation that the robot's file asks for (pose.rotation_vector_rad): the platform hangs {away:.3g} "
+        f"degrees away from it; {accepted}check that rotation (rad), the centre of mass and the points (m)"
+    )
+    return [Notice("unheld", text)]
+
+
+def home_notices(robot: Robot) -> list[Notice]:
+    """That nothing holds the home pose of the robot's file, with the degrees or metres to the nearest balance.
+
+    Parameters
+    ----------
+    robot : Robot
+        `hanging.at_home` has turned it where balance decides the orientation.
+    """
+    x, R = robot.home_m, turning.matrix(robot.home_rotation_rad)
+    if np.isfinite(inverse.tensions(robot, x[None], R[None])).all():
+        return turned_away(robot, R)
+    if robot.freedom == "pose" and robot.plane is None:
+        found = hanging.hang(robot, x[None], R)
+        if found.held[0]:
+            return turned_away(robot, found.rotation[0])
+    text = "no tensions within the bounds hold the home pose of the robot's file (pose)"
+    near = hanging.nearest_position(robot, x, R) if robot.motions is None else None
+    if near is not None:
+        far = float(np.linalg.norm(near - x))
+        text += (
+            f"; the nearest position that was found to have a balance is {far:.3g} m away, ({coordinates(near, 5)}) m"
+        )
+    return [Notice("unheld", text)]
