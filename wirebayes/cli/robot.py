@@ -194,31 +194,34 @@ def calibrate_command(
     wirebayes calibrate robot.toml log.csv --wires DIR --anchor-sd 50 --output out/anchors
     """
     from wirebayes.cli.answer import conclude
+    from wirebayes.cli.progress import progress
     from wirebayes.commands.calibrate import calibrate as run
     from wirebayes.commands.wires import named_lines
     from wirebayes.views.result import Given
 
-    found = run(
-        robot,
-        readings,
-        named_lines(wires),
-        tension_sd=tension_sd,
-        tilt_sd=tilt_sd,
-        reference_sd=reference_sd,
-        tension_bias=tension_bias,
-        anchor_sd=anchor_sd,
-        platform_sd=platform_sd,
-        pose_sd=pose_sd,
-        drum_sd=drum_sd,
-        joint_sd=joint_sd,
-        next_poses=next_poses,
-        specimen_spread=spread,
-        draws=draws,
-        experiment=experiment,
-        own_effects=own_effects,
-        seed=seed,
-        output=folder_for("calibrate", robot, output),
-    )
+    with progress() as report:
+        found = run(
+            robot,
+            readings,
+            named_lines(wires),
+            tension_sd=tension_sd,
+            tilt_sd=tilt_sd,
+            reference_sd=reference_sd,
+            tension_bias=tension_bias,
+            anchor_sd=anchor_sd,
+            platform_sd=platform_sd,
+            pose_sd=pose_sd,
+            drum_sd=drum_sd,
+            joint_sd=joint_sd,
+            next_poses=next_poses,
+            specimen_spread=spread,
+            draws=draws,
+            experiment=experiment,
+            own_effects=own_effects,
+            seed=seed,
+            output=folder_for("calibrate", robot, output),
+            progress=report,
+        )
     for line in found.messages:
         typer.echo(line, err=True)
     conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)

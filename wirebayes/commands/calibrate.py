@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.commands.options import above_zero, check_seed, check_spread, from_zero, path_of
+from wirebayes.commands.options import Progress, above_zero, check_seed, check_spread, from_zero, path_of, silent
 from wirebayes.commands.wires import (
     RobotLike,
     Wires,
@@ -66,6 +66,7 @@ def calibrate(
     own_effects: PathLike | None = None,
     seed: int = 0,
     output: PathLike | None = None,
+    progress: Progress = silent,
 ) -> Calibration:
     """Estimate a robot's lengths, geometry and poses from joint values, tensions and whatever else was read.
 
@@ -113,6 +114,7 @@ def calibrate(
     seed : int
     output : path, optional
         Folder for the results.
+    progress : function of name, done and total, optional
 
     Returns
     -------
@@ -160,7 +162,7 @@ def calibrate(
             prior = LengthPrior(
                 line, 1e-3 * max(given.reference_mm, _EXACT_MM), typical_spread(line, specimen_spread), bias_sd_N=bias
             )
-            found, known, whole = _estimated(machine, prior, given, (session, values), seed, next_poses)
+            found, known, whole = _estimated(machine, prior, given, (session, values), seed, next_poses, progress)
             calibrated = machine if whole is None else whole
             if found["usable"] and whole is not None:
                 calibrated = _write_robot(run.directory / ROBOT, robot, whole)
@@ -254,15 +256,16 @@ def _estimated(
     read: tuple[Session, Floats],
     seed: int,
     visits: int,
+    progress: Progress,
 ) -> tuple[CalibrateJson, Calibrated, Robot | None]:
     """The content of ``calibration.json``, the posterior, and the whole robot where more than lengths is estimated."""
     errors = given.stated(robot, read[0])
     with computing(), np.errstate(all="ignore"):  # what cannot be computed is not converged, and said so
         if errors is None:
-            found, known = lengths_report(robot, prior, *read, seed, visits)
+            found, known = lengths_report(robot, prior, *read, seed, visits, progress)
             return found, known, None
         requests = given.pose_mm is None
-        whole = whole_answer.calibration_report(robot, prior, errors, *read, seed, requests, visits)
+        whole = whole_answer.calibration_report(robot, prior, errors, *read, seed, requests, visits, progress)
         return whole.content, whole.known, whole.robot
 
 

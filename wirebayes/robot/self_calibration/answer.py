@@ -25,6 +25,7 @@ from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import GROSS, LengthPosterior, corrected_joints, length_posterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about
+from wirebayes.robot.self_calibration.whole import Progress, progress_of
 from wirebayes.sentences import number
 
 CANDIDATES = 200  # in the workspace: the best of them come within a few percent of the best there are
@@ -34,7 +35,13 @@ _FAR = 10.0
 
 
 def lengths_report(
-    robot: Robot, prior: LengthPrior, session: Session, readings: Floats, seed: int = 0, visits: int = 5
+    robot: Robot,
+    prior: LengthPrior,
+    session: Session,
+    readings: Floats,
+    seed: int = 0,
+    visits: int = 5,
+    progress: Progress = lambda name, done, total: None,
 ) -> tuple[CalibrateJson, Calibrated]:
     """Calibrate one robot and say how far the answer can be trusted.
 
@@ -48,6 +55,7 @@ def lengths_report(
     seed : int
     visits : int
         Number of poses to propose.
+    progress : function of name, done and total
 
     Returns
     -------
@@ -56,8 +64,9 @@ def lengths_report(
     known : Calibrated
         What a history can start from.
     """
-    known = length_posterior(robot, prior, session, readings[None])
-    plain = length_posterior(robot, replace(prior, creeps=False), session, readings[None])
+    known = length_posterior(robot, prior, session, readings[None], progress=progress_of(progress, "lengths"))
+    hooke = replace(prior, creeps=False)
+    plain = length_posterior(robot, hooke, session, readings[None], progress=progress_of(progress, "without creep"))
     given: CalibrationPrior = {"reference_sd_mm": 1e3 * prior.reference_sd_m, "specimen_spread": prior.spread}
     if prior.bias_sd_N > 0:
         given["tension_bias_sd_N"] = prior.bias_sd_N

@@ -4,6 +4,7 @@ The posterior is Gaussian about its mode, found by Gauss-Newton over the whole l
 creep model makes readings at different times speak of the same unknowns.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -82,6 +83,7 @@ def length_posterior(
     readings: Floats,
     iterations: int = 40,
     patience: int = PATIENT,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> LengthPosterior:
     """Posterior of the wires' lengths from standardised readings of one session on ``m`` robots.
 
@@ -96,6 +98,7 @@ def length_posterior(
         Levenberg-Marquardt steps at most.
     patience : int
         Steps from which on the search is given up where the readings contradict the robot grossly.
+    progress : function of a share between 0 and 1
 
     Returns
     -------
@@ -103,11 +106,12 @@ def length_posterior(
     """
     mean, cov = prior.moments(robot.legs)
     root = np.asarray(np.linalg.cholesky(cov), np.float64)
-    target = _Target(robot, prior, session, readings, mean, root)
+    target = _Target(robot, prior, session, readings, mean, root, progress)
     # Unknowns in units of their prior; references first brought near by the geometry of measured tensions.
     white = np.zeros((len(readings), len(mean)))
     white[:, : robot.legs] = starting_references(robot, prior, session, readings) / prior.reference_sd_m
     mode = _mode(target, white, iterations, patience)
+    progress(1.0)
     here = mode.here
     J, G, P = target.derivatives(mode.white, here)
     spread = inv(np.swapaxes(J, 1, 2) @ J + np.eye(len(mean)))
@@ -142,6 +146,7 @@ class _Target:
     readings: Floats
     mean: Floats
     root: Floats
+    progress: Callable[[float], None]
 
     def predicted(self, white: Floats, near: tuple[Floats, Floats] | None = None) -> PredictedSession:
         """What unknowns ``(m, d)`` lead to; `near` are poses at the beginning of every hold."""
@@ -176,9 +181,11 @@ def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mo
     m, d = white.shape
     here = target.predicted(white)
     cost = target.cost(here, white)
-    converged, ended, moved, damping = np.zeros(m, bool), np.zeros(m, bool), np.ones(m, bool), np.full(m, 1e-3)
+    moved, damping = np.ones(m, bool), np.full(m, 1e-3)
+    converged, ended = ~moved, ~moved
     J = np.zeros((m, target.readings.shape[1], d))
     for taken in range(iterations):
+        target.progress(taken / iterations)
         open_ = np.flatnonzero(~ended & moved)  # where a step failed, the derivatives stay: they are the work
         if len(open_):
             J[open_] = target.derivatives(white[open_], _part(here, open_))[0]

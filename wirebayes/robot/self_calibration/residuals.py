@@ -14,6 +14,9 @@ _LEAST_DEGREES = 1.0  # weight of `_FLOOR` beside the readings, in degrees of fr
 # Where nobody read tensions, their scatter explains what errors of lengths would: half a millimetre of five metres is
 # then thought of these, as drums that wind layers have them, unless ten readings or more say otherwise.
 _BLIND, _BLIND_DEGREES = 1e-4, 10.0
+# Of the span: loops that stay so far open belong to another robot, in another unit or another order. Layers on a drum
+# and a printer's anchors that are off by a decimetre leave less.
+_LOST = 0.01
 
 
 def trust(found: Whole) -> float:
@@ -44,6 +47,18 @@ def misfit(found: Whole) -> float:
     e = found.equations
     read = [e.residual[:, part][e.known[:, part]] for name, part in e.rows.items() if name != "balance"]
     return float(np.mean(np.concatenate(read) ** 2))
+
+
+def length_rms_m(found: Whole) -> float:
+    """Root mean square of what is left of the loops, along one line each, m."""
+    e = found.equations
+    left = e.residual[:, e.rows["loop"]] * found.noise.joint_m / found.unknowns.robot.lines
+    return float(np.sqrt(np.mean(left**2)))
+
+
+def lost(found: Whole) -> bool:
+    """Whether nothing near the robot, however it errs, has these joint values."""
+    return not length_rms_m(found) <= _LOST * found.unknowns.robot.span_m
 
 
 def usual_joint(robot: Robot, holds: Holds) -> tuple[float, float]:

@@ -14,11 +14,11 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.equations import Holds, State, moved, scale
 from wirebayes.robot.self_calibration.posterior import Whole
-from wirebayes.robot.self_calibration.residuals import trust
+from wirebayes.robot.self_calibration.residuals import lost, trust
 from wirebayes.robot.self_calibration.strain import stretch
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.robot.self_calibration.whole import estimate, with_levels
+from wirebayes.robot.self_calibration.whole import Progress, estimate, progress_of, with_levels
 
 _TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
 _WEAK = 1e-2  # pull towards the workspace and the home orientation, beside lengths
@@ -150,7 +150,12 @@ class _PoseSearch:
         return np.nan_to_num((gap**2).sum(1) + (out**2).sum(1), nan=np.inf)
 
 
-def best(unknowns: Unknowns, holds: Holds, rng: np.random.Generator) -> Whole:
+def best(
+    unknowns: Unknowns,
+    holds: Holds,
+    rng: np.random.Generator,
+    progress: Progress = lambda name, done, total: None,
+) -> Whole:
     """The posterior from the likeliest of several starts: about the file's geometry, and about others near it.
 
     Parameters
@@ -158,9 +163,15 @@ def best(unknowns: Unknowns, holds: Holds, rng: np.random.Generator) -> Whole:
     unknowns : Unknowns
     holds : Holds
     rng : numpy Generator
+    progress : function of name, done and total
     """
     unknowns = with_levels(unknowns, holds)
-    found = estimate(unknowns, holds, seed(unknowns, holds, np.zeros(unknowns.count), rng))
+
+    def from_start(white: Floats, number: int) -> Whole:
+        watched = progress_of(progress, f"start {number}")
+        return estimate(unknowns, holds, seed(unknowns, holds, white, rng), watched)
+
+    found = from_start(np.zeros(unknowns.count), 1)
     for k in range(_OTHERS):
         if found.converged and trust(found) >= SIGNIFICANT:
             break
@@ -168,8 +179,8 @@ def best(unknowns: Unknowns, holds: Holds, rng: np.random.Generator) -> Whole:
         if k > 0:
             white = np.zeros(unknowns.count)
             white[: unknowns.slices["drum"].start] = 0.5 * rng.standard_normal(unknowns.slices["drum"].start)
-        other = estimate(unknowns, holds, seed(unknowns, holds, white, rng))
-        if not other.converged and other.evidence > found.evidence:  # likelier, and only short of rounds
+        other = from_start(white, k + 2)
+        if not (other.converged or lost(other)) and other.evidence > found.evidence:  # likelier, only short of rounds
             other = estimate(unknowns, holds, other.state)
         if other.converged > found.converged or other.evidence > found.evidence:
             found = other

@@ -5,6 +5,7 @@ are, given that one, it is the one; where that is true of several, the readings 
 have more errors than one: where none explains all, one that explains most of it is still named.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,8 +23,6 @@ from wirebayes.robot.self_calibration.whole import estimate
 LEAST_HOLDS = 2  # read: at a single one an error of a sensor and one of a length look the same
 _TRIES, _STILL = 3, 0.5  # searches, and standard deviations: along a narrow valley the last steps change little
 MOST = 0.8  # of what contradicts: two sensors as bad as each other explain half of it each
-
-
 _NEARLY_ALL = 99.5  # percent, which are rounded to all of it
 
 
@@ -82,13 +81,14 @@ def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
     return Suspects(score / own, own**-0.5, float(chdtrc(w, max(total, 0.0))), alone, share)
 
 
-def suspects(found: Whole, holds: Holds) -> Suspects | None:
+def suspects(found: Whole, holds: Holds, progress: Callable[[float], None] = lambda share: None) -> Suspects | None:
     """Estimate an error of every sensor beside all else; None where they have one already, or nothing converged.
 
     Parameters
     ----------
     found : Whole
     holds : Holds
+    progress : function of a share between 0 and 1
     """
     unknowns = found.unknowns
     read = np.isfinite(holds.tension_N)
@@ -105,7 +105,7 @@ def suspects(found: Whole, holds: Holds) -> Suspects | None:
     sensors, state = slice(at.stop - legs, at.stop), replace(found.state, white=white)
     bias, covariance = np.full(legs, np.inf), np.eye(legs)
     for _ in range(_TRIES):
-        other = estimate(free, holds, state)
+        other = estimate(free, holds, state, progress)
         before, bias, state = bias, widest * other.state.white[sensors], other.state
         covariance = widest**2 * other.covariance[sensors, sensors]
         still = np.abs(bias - before) < _STILL * np.sqrt(np.diag(covariance))

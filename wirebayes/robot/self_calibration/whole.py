@@ -4,6 +4,7 @@ Levenberg-Marquardt over robot and holds together, the holds eliminated one by o
 then ever smaller ones, lead from rough geometry to the mode.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,11 +16,16 @@ from wirebayes.robot.self_calibration.descent import descend
 from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds, Noise, State, linearised
 from wirebayes.robot.self_calibration.holds_creep import ROUGHLY, creep_of
 from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
-from wirebayes.robot.self_calibration.residuals import noise_shown, usual_joint
+from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, noise_shown, usual_joint
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
+Progress = Callable[[str, float, float], None]  # of name, done and total
+
 _ROUNDS = 60  # of noise and creep: most end in ten
+# Rounds after which a search is given up whose loops are open by so much of the span: they close no more. Of sessions
+# that fit, however rough, they are open by a twentieth at most then; some go astray later and come back.
+_PATIENT, _HOPELESS = 5, 0.1
 _SOFT = 0.03  # of what is known best of tensions
 _WHOLE_ROUNDS = 3  # before creep goes half the way only
 _STILL = 0.05  # of every unknown's standard deviation
@@ -51,8 +57,15 @@ def with_levels(unknowns: Unknowns, holds: Holds) -> Unknowns:
     return replace(unknowns, errors=replace(unknowns.errors, level_N=_LEVEL * (rule.highest_N - rule.lowest_N)))
 
 
-def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
-    """The posterior next to a start.
+def progress_of(progress: Progress, name: str) -> Callable[[float], None]:
+    """The progress of one search, of which only the share is known that is done."""
+    return lambda share: progress(name, share, 1.0)
+
+
+def estimate(
+    unknowns: Unknowns, holds: Holds, state: State, progress: Callable[[float], None] = lambda share: None
+) -> Whole:
+    """The posterior next to a start; not converged where nothing near the robot has such joint values.
 
     Parameters
     ----------
@@ -60,6 +73,7 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
     holds : Holds
     state : State
         A rough guess.
+    progress : function of a share between 0 and 1
     """
     noise = _before_reading(unknowns, holds)
     creep = creep_of(unknowns, holds, state, roughly=ROUGHLY)
@@ -68,17 +82,22 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State) -> Whole:
         noise = replace(noise, balance=_shown(unknowns, holds, noise, state, creep, "balance"))
         if np.isfinite(holds.tension_N).any():
             noise = replace(noise, joint_m=_shown(unknowns, holds, noise, state, creep, "loop"))
-    return _at_rest(unknowns, holds, noise, state, creep)
+    found = _at_rest(unknowns, holds, noise, state, creep, progress)
+    progress(1.0)
+    return replace(found, converged=found.converged and not lost(found))
 
 
-def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> Whole:
+def _at_rest(
+    unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, progress: Callable[[float], None]
+) -> Whole:
     """State, noise and creep in turns, each from the others, until none of them moves on."""
     rounds: list[tuple[Floats, Floats]] = []
     passed, roughly, cost = [state], ROUGHLY, np.inf
     last = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])[0]
     usual = usual_joint(unknowns.robot, holds)
     unit_N = holds.session.tension_sd_N if np.isfinite(holds.tension_N).any() else noise.pull_N
-    for _ in range(_ROUNDS):
+    for taken in range(_ROUNDS):
+        progress(taken / _ROUNDS)
         since = passed[-1]
         creep = creep_of(unknowns, holds, since, creep, roughly)
         down = descend(unknowns, holds, noise, state, creep, since)
@@ -92,6 +111,8 @@ def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep
         level = np.abs(shown - rounds[-1][0]).max() < _SETTLED and abs(cost - found.cost) < _LEVEL_FIT
         if level and moved_on < _STILL:
             return found
+        if taken + 1 == _PATIENT and length_rms_m(found) > _HOPELESS * unknowns.robot.span_m:
+            break
         cost = found.cost
         roughly = max(_FINEST, min(_STEADY * moved_on, ROUGHLY * _FINER ** len(rounds)))
         passed = onward(passed, state, sd, unit_N) if len(rounds) > _WHOLE_ROUNDS else [state]

@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtr
 
 from wirebayes.json_files.calibrate import (
     CalibratedPoses,
@@ -27,19 +26,15 @@ from wirebayes.robot.self_calibration.equations import Holds, moved
 from wirebayes.robot.self_calibration.identified import Identified, identified
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.posterior import Whole
-from wirebayes.robot.self_calibration.residuals import misfit, trust
-from wirebayes.robot.self_calibration.seeds import best
-from wirebayes.robot.self_calibration.sensors import Suspects, suspects
+from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, misfit, trust
+from wirebayes.robot.self_calibration.search import Searched, searched
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval_about, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole import estimate
+from wirebayes.robot.self_calibration.whole import Progress, estimate, progress_of
 
-_RATHER = 3.0  # times smaller errors of the loops, before stated poses are taken for requests
-_WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
 _UNEVEN = 0.05  # of the weight: balance that fails by more shows that something else held the platform
-_UNSEEN = 1e-3  # of the weight: as long as the balance fails by less, no sensor is looked at
 
 
 @dataclass(frozen=True)
@@ -80,6 +75,7 @@ def calibration_report(
     seed: int = 0,
     requests: bool = False,
     visits: int = 5,
+    progress: Progress = lambda name, done, total: None,
 ) -> WholeAnswer:
     """Calibrate a whole robot and say how far the answer can be trusted.
 
@@ -99,21 +95,14 @@ def calibration_report(
         Stated poses may turn out to be requests, which the robot followed as well as it could.
     visits : int
         Number of poses to propose.
+    progress : function of name, done and total
     """
-    unknowns, holds = Unknowns(robot, prior, errors), holds_of(robot, session, readings)
     rng = np.random.default_rng(seed)
-    found = best(unknowns, holds, rng)
-    found, holds, requested = _rather_requests(found, holds, rng, requests)
-    p = trust(found)
-    at_fault = _at_fault(found, holds, p)
-    inexact = errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
-    if inexact:  # how far from exact the joint values are tells more than that there is no answer
-        unknowns = replace(unknowns, errors=replace(errors, joint_m=None))
-        found = best(unknowns, holds, rng)
-    seen = identified(found)
+    holds = holds_of(robot, session, readings)
+    search = searched(Unknowns(robot, prior, errors), holds, rng, requests, progress)
+    found, holds, seen = search.found, search.holds, identified(search.found)
     ahead = next_poses(found, holds, visits, rng) if found.converged else NextPoses(np.empty((0, 3)), np.empty(0))
-    s = summarised(found)
-    verdict = _Verdict(found, p, seen, at_fault, inexact=inexact, requested=requested)
+    s, verdict = summarised(found), _Verdict(search, seen)
     content: CalibrateJson = {
         "version": 2,
         "robot": robot.name,
@@ -126,13 +115,13 @@ def calibration_report(
         "references_m": interval_about(*s.reference_m),
         "poses": _poses(s, session),
         "misfit": misfit(found),
-        "length_rms_mm": _length_rms(found),
+        "length_rms_mm": 1e3 * length_rms_m(found),
         "joint_sd_mm": 1e3 * found.noise.joint_m,
         "identified": _identified(seen),
         "usable": verdict.usable,
-        "sensors_at_fault": sensors.sensors_json(at_fault),
+        "sensors_at_fault": sensors.sensors_json(search.at_fault),
         "with_creep_model": _lengths(found, s),
-        "by_hooke_alone": _by_hooke_alone(found, holds, prior),
+        "by_hooke_alone": _by_hooke_alone(found, holds, prior, progress),
         **_now(robot, found, s, verdict.usable),
         "observability": _observability(seen),
         "next_positions_m": ahead.position_m,
@@ -140,7 +129,7 @@ def calibration_report(
         "warnings": to_json(
             [
                 *_warnings(verdict),
-                *sensors.sensor_notices(at_fault),
+                *sensors.sensor_notices(search.at_fault),
                 *doubts(robot, prior.line),
             ]
         ),
@@ -150,24 +139,10 @@ def calibration_report(
 
 @dataclass(frozen=True)
 class _Verdict:
-    """What decides whether the values may be set in a controller.
+    """What decides whether the values may be set in a controller."""
 
-    Attributes
-    ----------
-    p : float
-        Probability of readings and references that contradict model and priors as much.
-    inexact : bool
-        Joint values that were taken as exact are not.
-    requested : bool
-        Stated poses were taken for requests.
-    """
-
-    found: Whole
-    p: float
+    search: Searched
     seen: Identified
-    at_fault: Suspects | None
-    inexact: bool
-    requested: bool
 
     @property
     def learnt(self) -> bool:
@@ -177,53 +152,15 @@ class _Verdict:
     @property
     def uneven(self) -> bool:
         """Whether the tensions do not carry the weight."""
-        return self.found.noise.balance > _UNEVEN
+        return self.search.found.noise.balance > _UNEVEN
 
     @property
     def usable(self) -> bool:
         """Whether the values are known and nothing contradicts them."""
-        biased = self.at_fault is not None and self.at_fault.p_none < SIGNIFICANT
-        explained = self.p >= SIGNIFICANT and not (self.inexact or self.uneven or biased)
-        return bool(self.found.converged and self.learnt and explained)
-
-
-def _at_fault(found: Whole, holds: Holds, p: float) -> Suspects | None:
-    """Which sensor would explain what contradicts; None where nothing does."""
-    contradicted = p < SIGNIFICANT or found.noise.balance > _UNSEEN
-    return suspects(found, holds) if contradicted else None
-
-
-def _rather_requests(found: Whole, holds: Holds, rng: np.random.Generator, allowed: bool) -> tuple[Whole, Holds, bool]:
-    """What is found without the poses, where they are commands or contradict the joint values: they were requests."""
-    too_good = _too_good(found)
-    if not holds.placed.any() or not (too_good or (allowed and found.unknowns.errors.pose_m == 0)):
-        return found, holds, False
-    session = holds.session
-    nowhere = replace(
-        session,
-        position_m=np.full_like(session.position_m, np.nan),
-        rotation=np.full(session.rotation.shape, np.nan),
-    )
-    blind = replace(holds, session=nowhere)
-    state = replace(found.state, white=np.zeros_like(found.state.white))
-    other = estimate(found.unknowns, blind, state)
-    clearer = other.noise.joint_m * _RATHER < found.noise.joint_m and trust(other) >= SIGNIFICANT
-    if too_good or (other.converged and clearer):
-        return other, blind, True
-    return found, holds, False
-
-
-def _too_good(found: Whole) -> bool:
-    """Whether estimates that the readings determine well lie nearer to the robot's file than its stated errors allow.
-
-    Then the joint values were computed from the poses and the file: they are commands, and say nothing of where the
-    robot went.
-    """
-    part = np.r_[0 : found.unknowns.slices["wires"].start, found.unknowns.references]
-    values, vectors = np.linalg.eigh(found.covariance[np.ix_(part, part)])
-    seen = np.sqrt(np.maximum(values, 0.0)) < _WELL
-    deviations = vectors[:, seen].T @ found.state.white[part]
-    return bool(seen.any() and chdtr(int(seen.sum()), float(deviations @ deviations)) < _CHANCE)
+        search = self.search
+        biased = search.at_fault is not None and search.at_fault.p_none < SIGNIFICANT
+        explained = search.p >= SIGNIFICANT and not (search.inexact or self.uneven or biased)
+        return bool(search.found.converged and self.learnt and explained)
 
 
 def _prior(robot: Robot, prior: LengthPrior, errors: StatedErrors, session: Session) -> CalibrationPrior:
@@ -247,13 +184,6 @@ def _poses(s: Summary, session: Session) -> EstimatedPoses:
     return {"hold": np.asarray(numbers, float).tolist(), **interval_about(mean, sd, half)}
 
 
-def _length_rms(found: Whole) -> float:
-    """Root mean square of what is left of the loops, along one line each, mm."""
-    e = found.equations
-    left = e.residual[:, e.rows["loop"]] * found.noise.joint_m / found.unknowns.robot.lines
-    return 1e3 * float(np.sqrt(np.mean(left**2)))
-
-
 def _lengths(found: Whole, s: Summary) -> EstimatedLengths:
     out: EstimatedLengths = {
         "converged": found.converged,
@@ -268,10 +198,10 @@ def _lengths(found: Whole, s: Summary) -> EstimatedLengths:
     return out
 
 
-def _by_hooke_alone(found: Whole, holds: Holds, prior: LengthPrior) -> EstimatedLengths:
+def _by_hooke_alone(found: Whole, holds: Holds, prior: LengthPrior, progress: Progress) -> EstimatedLengths:
     """What would be found if the wires did not creep."""
     without = replace(found.unknowns, prior=replace(prior, creeps=False))
-    plain = estimate(without, holds, found.state)
+    plain = estimate(without, holds, found.state, progress_of(progress, "without creep"))
     return _lengths(plain, summarised(plain))
 
 
@@ -318,34 +248,45 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
 
 
 def _warnings(verdict: _Verdict) -> list[Notice]:
-    found, robot = verdict.found, verdict.found.unknowns.robot
+    search, found = verdict.search, verdict.search.found
+    robot = found.unknowns.robot
     out = [*plausible.robot_notices(robot), *home.home_notices(robot)]
     if not found.converged:
-        text = "not converged: do not use these values; read more poses, or check the readings and the stated errors"
+        text = f"not converged: do not use these values; {_not_converged(found)}"
         out.append(Notice("not-converged", text))
-    if verdict.requested:
+    if search.requested:
         text = (
             "the stated poses are those that the joint values were computed for, or contradict the readings: they are "
             "taken for requests, and the poses as unknown; give --pose-sd if they were measured"
         )
         out.append(Notice("data", text))
-    if found.converged and verdict.inexact:
+    if found.converged and search.inexact:
         text = (
             f"geometry, taken as exact, and joint values agree to {1e3 * found.noise.joint_m:.2g} mm only: do not use "
             "these values; give --anchor-sd, or --joint-sd if the joint values are that uncertain"
         )
         out.append(Notice("misfit", text))
-    elif found.converged and verdict.p < SIGNIFICANT:
-        out.append(unlikely(verdict.p))
+    elif found.converged and search.p < SIGNIFICANT:
+        out.append(unlikely(search.p))
     if found.converged and not verdict.learnt:
         out.append(unlearnt(1e3 * found.unknowns.prior.reference_sd_m))
-    if verdict.uneven:
+    if verdict.uneven and not lost(found):  # else nothing is known of the tensions
         text = (
             f"the tensions leave {100 * found.noise.balance:.2g} % of the weight unbalanced: the platform was held by "
             "something else, or the tensions are not those of the wires; do not use these values"
         )
         out.append(Notice("misfit", text))
     return out
+
+
+def _not_converged(found: Whole) -> str:
+    """What to do about a search that found no mode."""
+    if not lost(found):
+        return "read more poses, or check the readings and the stated errors"
+    return (
+        f"the joint values are {length_rms_m(found):.2g} m (root mean square) from what robot and stated errors allow; "
+        "check their units and signs, the order of the columns, and the robot's file"
+    )
 
 
 def _known(found: Whole, session: Session) -> Calibrated:

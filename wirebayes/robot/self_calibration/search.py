@@ -1,0 +1,109 @@
+"""The search for a whole robot: stated poses as they are or as requests, joint values as exact or not, sensors."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtr
+
+from wirebayes.robot.self_calibration.equations import Holds
+from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.residuals import lost, trust
+from wirebayes.robot.self_calibration.seeds import best
+from wirebayes.robot.self_calibration.sensors import Suspects, suspects
+from wirebayes.robot.self_calibration.trust import SIGNIFICANT
+from wirebayes.robot.self_calibration.unknowns import Unknowns
+from wirebayes.robot.self_calibration.whole import Progress, estimate, progress_of
+
+_RATHER = 3.0  # times smaller errors of the loops, before stated poses are taken for requests
+_WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
+_UNSEEN = 1e-3  # of the weight: as long as the balance fails by less, no sensor is looked at
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What was found of a whole robot, and under which assumptions.
+
+    Attributes
+    ----------
+    found : Whole
+    holds : Holds
+        Without the stated poses where they were taken for requests.
+    p : float
+        Probability of readings and references that contradict model and priors as much.
+    at_fault : Suspects or None
+        Which sensor would explain what contradicts; None where nothing does, or nothing that a sensor could.
+    inexact : bool
+        Joint values that were taken as exact are not.
+    requested : bool
+        Stated poses were taken for requests.
+    """
+
+    found: Whole
+    holds: Holds
+    p: float
+    at_fault: Suspects | None
+    inexact: bool
+    requested: bool
+
+
+def searched(
+    unknowns: Unknowns,
+    holds: Holds,
+    rng: np.random.Generator,
+    requests: bool,
+    progress: Progress,
+) -> Searched:
+    """Find a whole robot from a session.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+    rng : numpy Generator
+        Draws the starts.
+    requests : bool
+        Stated poses may turn out to be requests, which the robot followed as well as it could.
+    progress : function of name, done and total
+    """
+    found = best(unknowns, holds, rng, progress)
+    found, holds, requested = _rather_requests(found, holds, requests, progress)
+    p, at_fault = trust(found), None
+    if (p < SIGNIFICANT or found.noise.balance > _UNSEEN) and not lost(found):
+        at_fault = suspects(found, holds, progress_of(progress, "sensors"))
+    inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
+    if inexact:  # how far from exact the joint values are tells more than that there is no answer
+        found = best(replace(unknowns, errors=replace(unknowns.errors, joint_m=None)), holds, rng, progress)
+    return Searched(found, holds, p, at_fault, inexact, requested)
+
+
+def _rather_requests(found: Whole, holds: Holds, allowed: bool, progress: Progress) -> tuple[Whole, Holds, bool]:
+    """What is found without the poses, where they are commands or contradict the joint values: they were requests."""
+    too_good = _too_good(found)
+    if not holds.placed.any() or not (too_good or (allowed and found.unknowns.errors.pose_m == 0)):
+        return found, holds, False
+    session = holds.session
+    nowhere = replace(
+        session,
+        position_m=np.full_like(session.position_m, np.nan),
+        rotation=np.full(session.rotation.shape, np.nan),
+    )
+    blind = replace(holds, session=nowhere)
+    state = replace(found.state, white=np.zeros_like(found.state.white))
+    other = estimate(found.unknowns, blind, state, progress_of(progress, "poses as requests"))
+    clearer = other.noise.joint_m * _RATHER < found.noise.joint_m and trust(other) >= SIGNIFICANT
+    if too_good or (other.converged and clearer):
+        return other, blind, True
+    return found, holds, False
+
+
+def _too_good(found: Whole) -> bool:
+    """Whether estimates that the readings determine well lie nearer to the robot's file than its stated errors allow.
+
+    Then the joint values were computed from the poses and the file: they are commands, and say nothing of where the
+    robot went.
+    """
+    part = np.r_[0 : found.unknowns.slices["wires"].start, found.unknowns.references]
+    values, vectors = np.linalg.eigh(found.covariance[np.ix_(part, part)])
+    seen = np.sqrt(np.maximum(values, 0.0)) < _WELL
+    deviations = vectors[:, seen].T @ found.state.white[part]
+    return bool(seen.any() and chdtr(int(seen.sum()), float(deviations @ deviations)) < _CHANCE)
