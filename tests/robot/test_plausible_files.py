@@ -27,8 +27,8 @@ def test_no_robot_that_was_built_or_drawn_up_is_suspected(name):
     assert _warned(schema.read_robot_file(name)) == []
 
 
-def _scaled(factor):
-    robot = six_wires()
+def _scaled(factor, robot=None):
+    robot = robot or six_wires()
     lengths = ("exit_m", "platform_m", "centre_of_mass_m", "home_m", "lower_m", "upper_m")
     return replace(robot, **{name: factor * getattr(robot, name) for name in lengths})
 
@@ -36,9 +36,71 @@ def _scaled(factor):
 @pytest.mark.parametrize("share", [0.999, 1.001])
 def test_a_robot_larger_than_any_is_suspected(share):
     """Everything in millimetres: its size alone shows it."""
-    said = _warned(_scaled(share * 1000.0 / six_wires().span_m))
+    said = _warned(replace(_scaled(share * 1000.0 / six_wires().span_m), mass_kg=1e6))
     assert bool(said) == (share > 1)
     assert all(text.startswith("leg.exit_point_m") for text in said)
+
+
+def _desk(span_m, mass_kg):
+    """Six wires over a desk of so many "metres", on a platform without extent."""
+    robot = _scaled(span_m / six_wires().span_m)
+    return replace(robot, mass_kg=mass_kg, platform_m=np.zeros((6, 3)), centre_of_mass_m=np.zeros(3))
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_a_wide_robot_whose_platform_weighs_less_than_a_rope_is_suspected(share):
+    for robot in (_desk(400.0, 4.0 / share), _desk(share * 50.0, 0.1)):
+        said = _warned(robot)
+        assert bool(said) == (share > 1)
+        assert all(text.startswith("leg.exit_point_m") and "a thin rope" in text for text in said)
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+def test_a_platform_that_weighs_less_than_a_frame_as_broad_is_suspected(share):
+    robot = six_wires()
+    points = robot.platform_m - robot.platform_m.mean(0)
+    points = points / np.linalg.norm(points, axis=1).max()
+    arms_mass = ((20.0, 20.0 / share), (share * 5.0, 4.0))
+    for arms, mass in arms_mass:
+        broad = replace(
+            robot, platform_m=arms * points, mass_kg=mass, exit_m=10 * robot.exit_m, centre_of_mass_m=np.zeros(3)
+        )
+        said = _warned(broad)
+        assert bool(said) == (share > 1)
+        assert all(text.startswith("leg.platform_point_m") and f"{mass:.3g}"[:4] in text for text in said)
+
+
+@pytest.mark.parametrize("share", [0.999, 1.001])
+@pytest.mark.parametrize("key", ["drum_radius_m", "pulley_radius_m"])
+def test_a_wheel_larger_than_any_is_suspected_in_a_large_robot_too(key, share):
+    base, one, radius = replace(_scaled(20.0), mass_kg=1e6), np.ones(6), np.full(6, share * 5.0)
+    drums, pulleys = Drums(radius, *[one] * 5), Pulleys(radius, np.tile([0.0, 0.0, 1.0], (6, 1)))
+    said = _warned(replace(base, drums=drums) if key == "drum_radius_m" else replace(base, pulleys=pulleys))
+    assert bool(said) == (share > 1)
+    where = f"leg.{key} of wire 1 and 5 more: "
+    assert all(text.startswith(where) and "none has a radius of more than 5 m" in text for text in said)
+
+
+@pytest.mark.parametrize(("span_m", "arms_m", "mass_kg"), [(600.0, 6.7, 3e4), (150.0, 0.3, 20.0), (15.0, 0.9, 91.0)])
+def test_large_robots_that_were_built_are_not_suspected(span_m, arms_m, mass_kg):
+    """The receiver's cabin of the FAST telescope, a camera above a stadium, CoGiRo."""
+    robot = _scaled(span_m / six_wires().span_m)
+    points = arms_m / 0.35 * six_wires().platform_m
+    assert _warned(replace(robot, mass_kg=mass_kg, platform_m=points, centre_of_mass_m=np.zeros(3))) == []
+
+
+@pytest.mark.parametrize("name", ["cogiro-desk", "sled-4", "linear-6", "linear-7", "hangprinter-4"])
+def test_a_workshops_robot_in_millimetres_is_suspected_by_key(name):
+    said = _warned(_scaled(1000.0, schema.read_robot_file(name)))
+    keys = [text.partition(":")[0] for text in said]
+    assert keys[0] == "leg.exit_point_m"
+    assert ("leg.platform_point_m" in keys) == (name != "hangprinter-4")
+
+
+def test_platform_points_in_millimetres_are_not_blamed_on_the_home_position():
+    robot = six_wires()
+    said = _warned(replace(robot, platform_m=1000.0 * robot.platform_m))
+    assert [text.partition(":")[0] for text in said] == ["leg.platform_point_m"]
 
 
 @pytest.mark.parametrize("share", [0.999, 1.001])

@@ -1,6 +1,7 @@
 """Which tension sensor is at fault: tests at their thresholds, rates on drawn estimates, and a drawn robot."""
 
 import contextlib
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -82,6 +83,8 @@ def test_several_bad_sensors_are_said_without_a_name():
     found = weighed(*_estimate(np.array([20.0, 20.0, 0, 0]), np.eye(4)), PRIOR_N)
     assert [notice.text[:24] for notice in sensor_notices(found)] == ["several tension sensors "]
     assert sensors_json(found)["wires"] == []
+    unknown = replace(found, p_none=np.nan)  # of a search that ended nowhere
+    assert sensor_notices(unknown) == [] and unknown.wires == []
 
 
 @pytest.mark.parametrize(("read", "looked_at"), [(1, 0), (2, 1)])

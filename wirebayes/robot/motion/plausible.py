@@ -1,7 +1,8 @@
 """What cannot be meant: joint values and robots' files in the wrong unit, straight lengths where the wire is meant.
 
 Joint values are refused; of a robot's file, which may describe an unusual robot, there is a warning for each key. Its
-rules compare what the file says with what else it says: they hold at any scale, but for the largest robot there is.
+rules compare what the file says with what else it says; where a whole file is in millimetres only what is known of
+robots that were built shows it: how large, and how heavy for their size, robots, platforms, drums and pulleys are.
 """
 
 from collections.abc import Sequence
@@ -26,6 +27,11 @@ _FAR = 10.0  # times the robot's size: no wire is so long, and of millimetres th
 _TWICE = 2.0  # times its length: no wire stretches so far, but a wire of two lines looks so where one line was given
 _RIGID = 1e6  # times the weight: the wires' stiffness, so that lengths alone decide how far they stretch
 _LARGEST_M = 1000.0  # the largest cable robot, which carries the receiver of the FAST telescope, spans 600 m
+# A desk's robot in millimetres spans hundreds of metres, too, and its platform weighs less than a thin rope of that
+# length. Cameras above stadiums weigh ten times the rope and more, what is built in a workshop spans less.
+_WIDE_M, _ROPE_KG_M = 50.0, 0.01
+_BROAD_M, _FRAME_KG_M = 5.0, 1.0  # a platform so broad is a frame, which weighs more than this for each metre
+_WHEEL_M = 5.0  # no winch or ropeway has a drum or pulley of a larger radius
 _OUTSIDE = 5.0  # times the platform's radius: a mass so far out hangs on a pole, not in a platform
 _STARTS = 8  # anywhere in the workspace, where the home pose leads to no pose that the lengths allow
 
@@ -117,20 +123,38 @@ def robot_notices(robot: Robot) -> list[Notice]:
     ----------
     robot : Robot
     """
-    found = [_exit_points(robot), _centre_of_mass(robot), _home(robot), *_lengths_of_legs(robot)]
+    found = [
+        _exit_points(robot), _platform_points(robot), _centre_of_mass(robot), _home(robot), *_lengths_of_legs(robot)
+    ]  # fmt: skip
     return [Notice("geometry", f"{text}; is the unit of the robot's file metres?") for text in found if text]
 
 
 def _exit_points(robot: Robot) -> str:
-    if robot.span_m <= _LARGEST_M:
+    key = f"leg.exit_point_m: the exit points span {number(robot.span_m)} m"
+    if robot.span_m > _LARGEST_M:
+        return f"{key}, and no cable robot spans {_LARGEST_M:g} m"
+    if robot.span_m > _WIDE_M and robot.mass_kg < _ROPE_KG_M * robot.span_m:
+        return f"{key}, and the platform, {number(robot.mass_kg)} kg, weighs less than a thin rope of that length"
+    return ""
+
+
+def _platform_points(robot: Robot) -> str:
+    arms = _arms(robot)
+    if not arms > _BROAD_M or robot.mass_kg > _FRAME_KG_M * arms:
         return ""
-    return f"leg.exit_point_m: the exit points span {number(robot.span_m)} m, and no cable robot spans {_LARGEST_M:g} m"
+    return (
+        f"leg.platform_point_m: the platform points lie within {number(arms)} m of their middle, and no platform as "
+        f"broad weighs {number(robot.mass_kg)} kg"
+    )
+
+
+def _arms(robot: Robot) -> float:
+    """The platform's radius, m."""
+    return float(np.linalg.norm(robot.platform_m - robot.platform_m.mean(0), axis=1).max())
 
 
 def _centre_of_mass(robot: Robot) -> str:
-    middle = robot.platform_m.mean(0)
-    arms = np.linalg.norm(robot.platform_m - middle, axis=1).max()
-    mass_at = float(np.linalg.norm(robot.centre_of_mass_m - middle))
+    arms, mass_at = _arms(robot), float(np.linalg.norm(robot.centre_of_mass_m - robot.platform_m.mean(0)))
     if not 0 < _OUTSIDE * arms < mass_at:
         return ""
     return (
@@ -140,29 +164,31 @@ def _centre_of_mass(robot: Robot) -> str:
 
 
 def _home(robot: Robot) -> str:
-    span, farthest = robot.span_m, float(_straight_at_home(robot).max())
+    span, farthest = robot.span_m, float(np.linalg.norm(robot.exit_m - robot.home_m, axis=1).max())
     if not 0 < _FAR * span < farthest:
         return ""
     return f"pose.position_m: the home position is {number(farthest)} m from an exit point, {_beyond(span, _FAR)}"
 
 
 def _lengths_of_legs(robot: Robot) -> list[str]:
-    """Of each key of a leg that is longer than the robot lets it be, the first leg."""
+    """Of each key of a leg that is longer than the robot, or any part of that kind, lets it be, the first leg."""
     size = max(robot.span_m, min(float(_straight_at_home(robot).max()), _FAR * robot.span_m))
     nothing = np.zeros(robot.legs)
     drum = nothing if robot.drums is None else robot.drums.radius_m
     pulley = nothing if robot.pulleys is None else robot.pulleys.radius_m
+    half = 0.5 * size  # a drum as wide as the robot
+    wheel = _beyond(size, 0.5) if half < _WHEEL_M else f"and none has a radius of more than {_WHEEL_M:g} m"
     limits = (
-        ("beyond_exit_m", robot.beyond_m, _FAR),
-        ("drum_radius_m", drum, 0.5),  # a drum as wide as the robot
-        ("pulley_radius_m", pulley, 0.5),
+        ("beyond_exit_m", robot.beyond_m, _FAR * size, _beyond(size, _FAR)),
+        ("drum_radius_m", drum, min(half, _WHEEL_M), wheel),
+        ("pulley_radius_m", pulley, min(half, _WHEEL_M), wheel),
     )
     out = []
-    for key, length, many in limits:
-        legs = np.flatnonzero(length > many * size)
+    for key, length, most, said in limits:
+        legs = np.flatnonzero(length > most)
         if legs.size:
             more = f" and {legs.size - 1} more" if legs.size > 1 else ""
-            out.append(f"leg.{key} of wire {legs[0] + 1}{more}: {number(length[legs[0]])} m, {_beyond(size, many)}")
+            out.append(f"leg.{key} of wire {legs[0] + 1}{more}: {number(length[legs[0]])} m, {said}")
     return out
 
 

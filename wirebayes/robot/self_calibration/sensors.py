@@ -51,7 +51,7 @@ class Suspects:
     @property
     def wires(self) -> list[int]:
         """Wires, from 0, one of whose sensors is at fault; none where nothing or no single sensor explains it."""
-        if self.p_none >= SIGNIFICANT:
+        if not self.p_none < SIGNIFICANT:  # nor where it is not known
             return []
         alone = self.p_alone >= SIGNIFICANT
         return [int(i) for i in np.flatnonzero(alone if alone.any() else self.explains >= MOST)]
@@ -139,7 +139,7 @@ def sensor_notices(found: Suspects | None) -> list[Notice]:
     ----------
     found : Suspects or None
     """
-    if found is None or found.p_none >= SIGNIFICANT:
+    if found is None or not found.p_none < SIGNIFICANT:
         return []
     if not found.wires:
         text = f"several tension sensors are off ({chance(found.p_none)} if none were): do not use these values"
