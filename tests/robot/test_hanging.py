@@ -1,6 +1,7 @@
 """Fewer wires than degrees of freedom: orientations in balance against an energy minimiser that shares no code."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -99,6 +100,25 @@ def test_a_robot_with_wires_enough_keeps_its_home_orientation():
     found = balanced_orientation(robot, robot.home_m, None)
     assert found.found is None
     np.testing.assert_array_equal(found.rotation, turning.matrix(robot.home_rotation_rad))
+
+
+@pytest.mark.parametrize("position_m", [(0.0, 0.0, 0.3), (0.03, 0.0, 0.3), (0.1, 0.05, 0.3), (0.1, 0.05, 0.8)])
+def test_of_two_wires_at_their_bounds_that_leave_no_balance_one_is_let_go(position_m):
+    """A Hangprinter whose mover may turn: a least-squares search from anywhere finds balances there."""
+    robot = schema.read_robot_file(Path(__file__).parent / "field" / "balanced-home" / "hang-free.toml")
+    x = np.array([position_m])
+    found = hanging.hang(robot, x, np.eye(3))
+    assert np.linalg.norm(turning.vector(found.rotation)[0]) < 0.1
+    np.testing.assert_allclose(inverse.tensions(robot, x, found.rotation), found.tension_N, rtol=1e-6)
+    assert found.tension_N.min() == pytest.approx(robot.rule.lowest_N)  # the smallest tensions, one at its bound
+
+
+def test_in_a_plane_only_turns_about_its_normal_are_orientations():
+    wall = schema.read_robot_file(Path(__file__).parent / "field" / "balanced-home" / "wall.toml")
+    found = hanging.hang(wall, wall.home_m[None], np.eye(3))
+    turns = np.vstack([turning.vector(found.rotation), *found.others])
+    np.testing.assert_allclose(turns[0], [0.0, -0.1181, 0.0], atol=1e-4)
+    np.testing.assert_allclose(turns[:, [0, 2]], 0.0, atol=1e-6)
 
 
 @pytest.mark.slow

@@ -80,6 +80,14 @@ def test_a_home_orientation_that_balance_replaces_is_said_with_both():
     assert home.home_notices(four_wires((0.1578, -0.2825, -0.0008322))) == []
 
 
+def test_a_home_orientation_that_the_file_leaves_to_balance_is_no_warning():
+    wall = robot_of(FIELD / "balanced-home" / "wall.toml")
+    assert wall.home_rotation_rad[1] == pytest.approx(-0.1181, abs=1e-4)
+    assert home.home_notices(wall) == []
+    assert balanced_orientation(wall, wall.home_m, None).turned_away == ()
+    assert home.home_notices(replace(wall, states_turn=True))
+
+
 def test_elsewhere_or_asked_for_the_orientation_of_fewer_wires_is_no_warning():
     robot = four_wires()
     assert balanced_orientation(robot, robot.home_m - [0.1, 0.0, 0.0], None).turned_away == ()

@@ -152,8 +152,10 @@ class Robot:
         Number of the winch that drives each leg, from 0 in the order of the legs; None where each has its own.
     joint_offset_m : (w,) array or None
         What a drum's zero-tension length is beyond the joint value; None where it is nothing.
+    states_turn : bool
+        Whether the robot's file states the home orientation; else it is level, or as balance leaves it.
     stated_turn_rad : (3,) array or None
-        The home orientation of the robot's file, where `home_rotation_rad` is another one that hangs in balance.
+        The home orientation that was stated, where `home_rotation_rad` is another one that hangs in balance.
 
     Examples
     --------
@@ -189,6 +191,7 @@ class Robot:
     plane: Plane | None = None
     winch: NDArray[np.intp] | None = None
     joint_offset_m: Floats | None = None
+    states_turn: bool = True
     stated_turn_rad: Floats | None = None
 
     @property

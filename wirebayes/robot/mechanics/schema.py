@@ -94,7 +94,7 @@ def _robot(top: Keys) -> Robot:
     freedom = cast(Freedom, top.string("freedom", default="pose", among=get_args(Freedom)))
     mass, centre = _platform(top.inside("platform"))
     tension = _tension(top.inside("tension"))
-    position, turn = _home(top.inside("pose"))
+    home = _home(top.inside("pose"))
     lower, upper = _workspace(top.inside("workspace"))
     bias = _bias(top.inside("sensors", {}))
     plane = _plane(top)
@@ -102,7 +102,7 @@ def _robot(top: Keys) -> Robot:
     legs, winch = _legs(top, declared)
     top.finish()
     if freedom == "orientation":
-        _check_ball_joint(top, plane, np.array([lower, upper]) - position, len(legs))
+        _check_ball_joint(top, plane, np.array([lower, upper]) - home["home_m"], len(legs))
 
     def stack(key: str) -> Any:
         return np.array([leg[key] for leg in legs])
@@ -124,8 +124,7 @@ def _robot(top: Keys) -> Robot:
         wire=tuple(leg["wire"] for leg in legs),
         given=given,
         rule=tension,
-        home_m=position,
-        home_rotation_rad=turn,
+        **home,
         lower_m=lower,
         upper_m=upper,
         pulleys=_pulleys(stack("pulley"), stack("axis")),
@@ -161,11 +160,15 @@ def _platform(keys: Keys) -> tuple[float, Floats]:
     return mass, centre
 
 
-def _home(keys: Keys) -> tuple[Floats, Floats]:
-    """Position and rotation vector of the home pose."""
-    position, turn = _triple(keys, "position_m"), _triple(keys, "rotation_vector_rad", [0.0, 0.0, 0.0])
+def _home(keys: Keys) -> dict[str, Any]:
+    """Position and rotation vector of the home pose, and whether the latter is stated, by the robot's own names."""
+    home = {
+        "home_m": _triple(keys, "position_m"),
+        "home_rotation_rad": _triple(keys, "rotation_vector_rad", [0.0, 0.0, 0.0]),
+        "states_turn": "rotation_vector_rad" in keys.table,
+    }
     keys.finish()
-    return position, turn
+    return home
 
 
 def _bias(keys: Keys) -> float:

@@ -12,6 +12,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.plane import off
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.motion.loose_balance import (
     equations,
@@ -79,7 +80,8 @@ def hang(robot: Robot, position_m: Floats, reference: Floats, asked_rad: Floats 
     begin = (turning.matrix(turns)[None] @ near[:, None]).reshape(-1, 3, 3)
     x, target = (np.repeat(v, len(turns), 0) for v in (position_m, near))
     found = nearest_balances(robot, x, begin, target, asked)
-    good = found.balanced & _stable(robot, found)
+    good = found.balanced & (off(robot, found.position_m, found.rotation) < _ALIKE * robot.span_m)
+    good &= _stable(robot, found)
     out = np.full((p, 3, 3), np.nan)
     tension, choice, others = np.full((p, robot.legs), np.nan), np.zeros(p, np.int64), []
     for k in range(p):

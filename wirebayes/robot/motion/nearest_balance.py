@@ -4,7 +4,7 @@ Unknown are rotation and tensions; known is the position, unless it may move. Ba
 vector that are asked for are equations. Every step is the smallest that solves the equations where they are linearised,
 by a singular value decomposition, so that robots whose equations depend on each other (all wires in one plane) need no
 case of their own. A wire whose tension leaves its bounds is held at the bound; where the search has come to rest and
-could come nearer without, it is let go, once.
+could come nearer without, it is let go, once. So is the one that is held longest where no step leads to a balance.
 """
 
 from dataclasses import dataclass
@@ -26,6 +26,7 @@ _FAR_FROM_BALANCE = 0.1  # of the unit of forces: balance comes first
 _SETTLED = 1e-10  # rad: a step so small changes nothing
 _PLACE = 30.0  # weight of a position, in spans, that may move: it is what shall stay, before angles and tensions
 _HINDERED = 1e-6  # of the goal's slope by a tension: what holds a search back by less does not hold it back
+_UNSOLVED = 100.0  # times the step, both in units of the equations: what is left is not what the step takes away
 _LESSER = 1e-3  # weight of what decides only where the first aim, tensions or angles, leaves a choice
 
 
@@ -74,6 +75,7 @@ def nearest_balances(
         newly = search.hold_at_bounds(rows, change < _NEARLY, robot, unit)
         rest = (imbalance < _BALANCED) & (change < _SETTLED) & ~newly
         search.done[rows] = rest & ~search.let_go(rows, rest, hindrance)
+        search.let_go_oldest(rows[(imbalance > _UNSOLVED * np.abs(step).max(1)) & ~rest & ~newly])
     return search.balances(robot, target, asked)
 
 
@@ -91,6 +93,8 @@ class _Search:
     x, R, tau : (n, 3), (n, 3, 3) and (n, w) arrays
     bound : (n, w) int array
         -1 and 1: held at the lowest and the highest tension.
+    since : (n, w) int array
+        How many wires were held before each.
     freed : (n, w) bool array
         Whether each wire was let go already: a second time would be a circle.
     done, dead : (n,) bool arrays
@@ -101,6 +105,7 @@ class _Search:
     R: Floats
     tau: Floats
     bound: NDArray[np.int64]
+    since: NDArray[np.int64]
     freed: NDArray[np.bool_]
     done: NDArray[np.bool_]
     dead: NDArray[np.bool_]
@@ -111,7 +116,7 @@ class _Search:
         x, R = np.array(position_m), np.array(rotation)
         bound = np.zeros((n, robot.legs), np.int64)
         none = np.zeros(n, bool)
-        return cls(x, R, _first_tensions(robot, x, R), bound, bound != 0, none, none.copy())
+        return cls(x, R, _first_tensions(robot, x, R), bound, bound.copy(), bound != 0, none, none.copy())
 
     def at(self, rows: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
         """Poses and tensions of some searches."""
@@ -131,6 +136,7 @@ class _Search:
         tau = self.tau[rows]
         newly = _newly_bound(tau, self.bound[rows], (low, high), unit) & nearly[:, None]
         self.bound[rows] += np.where(newly, np.where(tau < low, -1, 1), 0)
+        self.since[rows] = np.where(newly, self.since[rows].max(1, keepdims=True) + 1, self.since[rows])
         return np.asarray(newly.any(1))
 
     def let_go(self, rows: NDArray[np.intp], rest: NDArray[np.bool_], hindrance: Floats) -> NDArray[np.bool_]:
@@ -151,6 +157,14 @@ class _Search:
         self.bound[there] = np.where(wrongly, 0, self.bound[there])
         self.freed[there] |= wrongly
         return np.asarray(wrongly)
+
+    def let_go_oldest(self, rows: NDArray[np.intp]) -> None:
+        """Let go, in searches that no step brings to a balance, the wire that is held longest."""
+        held = (self.bound[rows] != 0) & ~self.freed[rows]
+        there = rows, np.where(held, self.since[rows], np.iinfo(np.int64).max).argmin(1)
+        some = held.any(1)
+        self.bound[there] = np.where(some, 0, self.bound[there])
+        self.freed[there] |= some
 
     def balances(self, robot: Robot, target: Floats, asked: Floats) -> Balances:
         """What has come to rest in balance, within the bounds of tensions, with what is asked for."""

@@ -5,10 +5,12 @@ import numpy as np
 from wirebayes.json_files.pose import OnPlane
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import plane, statics
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.pose.request import band_over_draws
+
+_ROUNDING = 1e-9  # of the weight: a force so small is none
 
 
 def lifted(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> str:
@@ -54,7 +56,10 @@ def on_plane(
     width, turn = plane.friction_half_width(robot, K, force)
     middle = 1e3 * np.median(width, axis=0)
     about = f" and turned by ±{np.degrees(np.median(turn)):.2g}°" if turn.any() else ""
-    said = f"The plane carries the platform with {force:.4g} N"
+    little = abs(force) < _ROUNDING * robot.mass_kg * GRAVITY
+    said = (
+        "The plane carries nothing of the platform" if little else f"The plane carries the platform with {force:.4g} N"
+    )
     if known.friction:
         along = ", ".join(f"±{v:.2g} mm along {axis}" for v, axis in zip(middle, "xyz", strict=True) if v > 1e-9)
         said += f"; its friction, {known.friction * abs(force):.3g} N at most, can hold the platform {along}{about}"
