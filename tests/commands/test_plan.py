@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from wirebayes.commands import plan_content
 from wirebayes.commands.wires import robot_of
 from wirebayes.effects import CATALOGUE
 from wirebayes.io.run_folder import write_json
+from wirebayes.model.spec import ModelSpec
 from wirebayes.robot.mechanics import schema
 
 FIELD = Path(__file__).parents[1] / "robot" / "field"
@@ -95,6 +97,18 @@ def test_what_speaks_against_a_robots_file_stands_in_the_plan_that_moves_it():
     far = replace(cube, beyond_m=np.full(4, 1e4))
     assert [one.kind for one in plan_content._of_robot(far)] == ["geometry", "unheld"]
     assert plan_content._of_robot(schema.read_robot_file("linear-7")) == []
+
+
+def test_a_robot_that_nothing_holds_at_home_has_no_drift():
+    """Nor does numpy complain of medians of nothing: warnings are errors here."""
+    robot = schema.read_robot_file("cogiro-desk")
+    high = replace(robot, home_m=robot.home_m + [0.0, 0.0, 1.0])
+    law = ModelSpec()
+    draws = {name: np.full(3, value) for name, value in {"k1": 5e3, "B": 0.1, "U": 0.6, "k2": 0.01, "N": 0.6}.items()}
+    judged = SimpleNamespace(test=SimpleNamespace(length_mm=1e3), expected=SimpleNamespace(draws=[draws, draws]))
+    guess = SimpleNamespace(draws=draws, length_mm=1e3)
+    assert plan_content._drift(judged, guess, high, law) is None
+    assert plan_content._drift(judged, guess, robot, law)["drift_mm"] > 0
 
 
 def test_a_plan_file_is_ranked_within_its_budget(plan_file, tmp_path, capsys):

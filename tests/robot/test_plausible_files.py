@@ -97,6 +97,15 @@ def test_a_workshops_robot_in_millimetres_is_suspected_by_key(name):
     assert ("leg.platform_point_m" in keys) == (name != "hangprinter-4")
 
 
+def test_a_leg_that_is_a_copy_of_another_is_named():
+    robot = six_wires()
+    copied = [0, 1, 2, 3, 1, 5]
+    beside = replace(robot, exit_m=robot.exit_m[copied])
+    (said,) = _warned(replace(beside, platform_m=robot.platform_m[copied]))
+    assert said.startswith("leg.exit_point_m and leg.platform_point_m of wires 2 and 5: the same points")
+    assert _warned(beside) == []
+
+
 def test_platform_points_in_millimetres_are_not_blamed_on_the_home_position():
     robot = six_wires()
     said = _warned(replace(robot, platform_m=1000.0 * robot.platform_m))
@@ -131,7 +140,7 @@ def test_a_mass_far_outside_its_platform_is_suspected(share):
 @pytest.mark.parametrize("share", [0.999, 1.001])
 def test_a_home_far_from_its_exit_points_is_suspected(share):
     robot = replace(six_wires(), platform_m=np.zeros((6, 3)))
-    exits = np.array([[-1.0, 0, 0], [1.0, 0, 0]] * 3)
+    exits = np.array([[-1.0, 0, 0], [1.0, 0, 0]] * 3) + 1e-9 * np.arange(6)[:, None]  # none is a copy
     said = _warned(replace(robot, exit_m=exits, home_m=np.array([0.0, 0.0, -np.sqrt((share * 20.0) ** 2 - 1.0)])))
     assert bool(said) == (share > 1)
     assert all(text.startswith("pose.position_m") for text in said)

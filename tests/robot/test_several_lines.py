@@ -94,7 +94,7 @@ def test_the_tested_ranges_are_each_lines_own():
     stiff = replace(_line(2), name=THICK, tension_range_N=(0.0, 1.0))
     line = replace(_line(2), others={THICK: stiff}, tension_range_N=(0.0, 9.0))
     message = draws.wire_warnings(robot, line, np.full((1, 6), 5.0), 60.0, np.ones((1, 6)))
-    assert message == [Notice("extrapolation", "wire thick: tensions 5 to 5 N leave the tested range 0 to 1 N")]
+    assert message == [Notice("extrapolation", "wire thick: tensions 5 N leave the tested range 0 to 1 N")]
 
 
 def test_only_lines_that_legs_hang_on_warn():

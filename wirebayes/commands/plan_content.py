@@ -132,8 +132,8 @@ def _of_robot(machine: Robot | None) -> list[Notice]:
     return [*out, Notice("left-out", text)]
 
 
-def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) -> RobotDrift:
-    """How well the drift of a robot within an hour would be known, and how well it is at the guess."""
+def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) -> RobotDrift | None:
+    """How well the drift of a robot within an hour would be known, and is at the guess; None where nothing holds it."""
 
     def sd(parameters: dict[str, Any], length_mm: float) -> tuple[float, float]:
         few = {n: parameters[n][:_ROBOT_DRAWS] for n in MATERIAL}
@@ -144,11 +144,14 @@ def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) 
         far = 1e3 * np.linalg.norm(course.position_m[:, -1] - machine.home_m, axis=1)[course.found]
         return (float(np.median(far)), float(far.std())) if len(far) > 1 else (np.nan, np.nan)
 
-    after = [sd(d, judged.test.length_mm) for d in judged.expected.draws]
+    after = np.array([sd(d, judged.test.length_mm) for d in judged.expected.draws])
+    if np.isnan(after).all():  # nothing holds the home pose
+        return None
+    drift_mm, drift_sd_mm = np.nanmedian(after, axis=0)
     return {
         "time_s": HOUR_S,
-        "drift_mm": float(np.nanmedian([m for m, _ in after])),
-        "drift_sd_mm": float(np.nanmedian([s for _, s in after])),
+        "drift_mm": float(drift_mm),
+        "drift_sd_mm": float(drift_sd_mm),
         "drift_sd_guess_mm": sd(guess.draws, guess.length_mm)[1],
     }
 

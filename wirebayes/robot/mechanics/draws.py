@@ -341,15 +341,19 @@ def wire_warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: floa
     return out
 
 
+def _span(values: Floats, form: str) -> str:
+    """The least and the largest of values, once where they look alike."""
+    least, largest = format(values.min(), form), format(values.max(), form)
+    return least if least == largest else f"{least} to {largest}"
+
+
 def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[Notice]:
     beyond, dropped = list[str](), list[str]()
     loads = tension_N[np.isfinite(tension_N) & (tension_N > 0)]
     if line.tension_range_N is not None and loads.size:
         low, high = line.tension_range_N
         if loads.min() < low or loads.max() > high:
-            beyond.append(
-                f"tensions {loads.min():.3g} to {loads.max():.3g} N leave the tested range {low:.3g} to {high:.3g} N"
-            )
+            beyond.append(f"tensions {_span(loads, '.3g')} N leave the tested range {low:.3g} to {high:.3g} N")
     if line.time_range_s is not None and time_s > line.time_range_s[1]:
         beyond.append(f"{time_s:.4g} s is longer than the longest tested hold, {line.time_range_s[1]:.4g} s")
     lengths = 1e3 * zero_m[np.isfinite(zero_m)]
@@ -357,9 +361,7 @@ def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -
         rule = "is taken to be a strain of the whole wire"
         if LENGTH_EXPONENT in line.parameters:
             rule = "grows with length by the exponent fitted to the tested lengths"
-        beyond.append(
-            f"wires of {lengths.min():.0f} to {lengths.max():.0f} mm, tested at {line.length_mm:.0f} mm: creep {rule}"
-        )
+        beyond.append(f"wires of {_span(lengths, '.0f')} mm, tested at {line.length_mm:.0f} mm: creep {rule}")
     kept = line.material()
     dropped.extend(
         f"the robot knows no temperature: the effect {e.name} sees none, as at the first reading of the test"

@@ -6,6 +6,7 @@ robots that were built shows it: how large, and how heavy for their size, robots
 """
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +127,22 @@ def robot_notices(robot: Robot) -> list[Notice]:
     found = [
         _exit_points(robot), _platform_points(robot), _centre_of_mass(robot), _home(robot), *_lengths_of_legs(robot)
     ]  # fmt: skip
-    return [Notice("geometry", f"{text}; is the unit of the robot's file metres?") for text in found if text]
+    out = [Notice("geometry", f"{text}; is the unit of the robot's file metres?") for text in found if text]
+    return out + _copies(robot)
+
+
+def _copies(robot: Robot) -> list[Notice]:
+    """A warning for each leg that runs where another one does."""
+    ends = np.hstack([robot.exit_m, robot.platform_m])
+    return [
+        Notice(
+            "geometry",
+            f"leg.exit_point_m and leg.platform_point_m of wires {i + 1} and {j + 1}: the same points; is one a copy "
+            "that was not changed? Parallel lines of one drum are one leg with lines = 2",
+        )
+        for i, j in combinations(range(robot.legs), 2)
+        if np.array_equal(ends[i], ends[j])
+    ]
 
 
 def _exit_points(robot: Robot) -> str:
