@@ -318,6 +318,14 @@ WORSE = DISCOVERY["held_out"] | {"final": {"rmse_N": 0.2, "elpd": 9.0, "elpd_dif
         ({"held_out": WORSE}, "On the unused holds 9 and 10 the rms error grows from 0.10 to 0.20 N"),
         ({}, "The wire becomes stiffer (or softer) the more it is strained. τ = k1 s (1 + c s)."),
         ({"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}}, "nothing is missing"),
+        (
+            {"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}, "p_global": 0.4},
+            "the test of all together finds no more than chance (p = 0.4).",
+        ),
+        (
+            {"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}, "where": []},
+            "No pattern stands out.",
+        ),
         ({"verdict": "unknown", "effects": [], "set": ["unknown"]}, "that no effect in the catalogue explains"),
         (
             {"verdict": "unknown", "effects": [], "probabilities": {"unknown": 0.2, "strain_stiffening": 0.8}},

@@ -105,17 +105,28 @@ def _curves(folder: Path, name: str) -> list[Block]:
 
 def _within_a_minute(v: ExperimentFindings, hidden: list[str]) -> Columns:
     """Where model and measurement disagree, what is known, and what is not."""
-    where = [w["sentence"] for w in v.get("where", []) if w["p"] <= _SPEAKS]
     beside = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
     known = [point for point in (*beside, _held_out(v), *_sizes(v)) if point]
     unknown = [f"Not identifiable here: {listed([spoken(what) for what in hidden])}."] if hidden else []
     return Columns(
         [
-            Points("Where model and measurement disagree", where or ["No pattern stands out."]),
+            Points("Where model and measurement disagree", _disagreements(v)),
             Points("What is known", known or ["Nothing had to be added to the plain model."]),
             Points("What is not known", unknown or ["Nothing to report."]),
         ]
     )
+
+
+def _disagreements(v: ExperimentFindings) -> list[str]:
+    """The residual patterns that chance alone would rarely make, and what they amount to where nothing is missing."""
+    patterns = [w["sentence"] for w in v.get("where", []) if w["p"] <= _SPEAKS]
+    if not patterns:
+        return ["No pattern stands out."]
+    if v["verdict"] == "nothing-missing":
+        patterns.append(
+            f"Several patterns were looked at; the test of all together finds no more than chance ({_p(v)})."
+        )
+    return patterns
 
 
 def _steps(v: ExperimentFindings) -> list[Block]:
