@@ -240,7 +240,7 @@ def of_calibration(found: CalibrateJson) -> list[str]:
     if np.any(np.array(points["sd"], float) > 0):
         lines.append("  exit points in mm, ± standard error:")
         for i, (mean, errors) in enumerate(zip(points["mean"], points["sd"], strict=True)):
-            place = ", ".join(f"{1e3 * m:.1f} ± {1e3 * sd:.2g}" for m, sd in zip(mean, errors, strict=True))
+            place = ", ".join(f"{1e3 * m:z.1f} ± {1e3 * sd:.2g}" for m, sd in zip(mean, errors, strict=True))
             lines.append(f"    wire {i + 1}: ({place})")
     open_ = found["identified"]["not_determined"]
     return lines + [f"  not determined: {text}" for text in open_[:_MOST_OPEN]]
