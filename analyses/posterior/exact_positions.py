@@ -1,6 +1,7 @@
 """Do fits converge, and intervals cover, where a bench sets positions exactly? Against another checkout, too.
 
     python -m analyses.posterior.exact_positions --tests 120 --against ../before
+    python -m analyses.posterior.exact_positions --tests 24 --seed 400 --effect toe --against ../before
 
 Wires of any scale, made here: 4 to 10 even steps of a strain of .5 to 3 %, 8 to 60 readings a hold, creep of .3 to 30 %
 of the stretch, a force sensor that is wrong by .01 to .3 % of the largest tension. Positions have no error, so that the
@@ -9,6 +10,7 @@ setting error is the narrow end of a funnel.
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,15 +43,19 @@ def made(seed: int) -> tuple[Any, dict[str, float]]:
     return test, {"k1": k1, "B": B, "U": U, "k2": k2, "N": N}
 
 
-def fitted(seeds: range) -> dict[str, Any]:
-    """Of each test whether its fit converged, evaluations, and which parameters the 90 % intervals hold."""
+def fitted(seeds: range, effects: Sequence[str]) -> dict[str, Any]:
+    """Of each test whether its fit converged, evaluations, and which parameters the 90 % intervals hold.
+
+    The wires have none of the effects that a fit may have.
+    """
+    from wirebayes.effects import effect_named
     from wirebayes.inference.fit import fit_problem
     from wirebayes.model.build import build
 
     out: dict[str, Any] = {"converged": [], "evaluations": [], "inside": []}
     for seed in seeds:
         test, truth = made(seed)
-        fit = fit_problem(build([test]), seed)
+        fit = fit_problem(build([test], [effect_named(name) for name in effects]), seed)
         low, high = np.quantile(fit.flat, [0.05, 0.95], axis=0)
         columns = [fit.problem.names.index(name) for name in PARAMETERS]
         inside = [bool(low[c] <= truth[n] <= high[c]) for n, c in zip(PARAMETERS, columns, strict=True)]
@@ -64,15 +70,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tests", type=int, default=120)
     parser.add_argument("--seed", type=int, default=200, help="of the first test; the others follow")
+    parser.add_argument("--effect", action="append", default=[], help="that the fits have; may be repeated")
     parser.add_argument("--against", type=Path, metavar="CHECKOUT", help="fit the same tests by its code, too")
     parser.add_argument("--here", action="store_true", help="in this process, and print JSON")
     options = parser.parse_args()
     if options.here:
-        print(json.dumps(fitted(range(options.seed, options.seed + options.tests))))
+        print(json.dumps(fitted(range(options.seed, options.seed + options.tests), options.effect)))
         return
     from analyses.speed.checkouts import answered  # another checkout need not have it
 
     given = ["--here", "--tests", str(options.tests), "--seed", str(options.seed)]
+    given += [word for name in options.effect for word in ("--effect", name)]
     trees = {"now": Path(__file__).parents[2]} | ({"before": options.against} if options.against else {})
     total = {}
     for name, tree in trees.items():

@@ -201,7 +201,9 @@ def _others(found: Investigation) -> list[tuple[int, JointModel]]:
 def _finals_that_are_plain(found: Investigation, output: Path) -> None:
     """Store the plain fit as the final one of every experiment that no effect was added to."""
     for model in final_models(found):
-        for e in () if model.effects else model.experiments:
+        if model.effects:
+            continue
+        for e in model.experiments:
             plain, final = (output / e.name / kind for kind in ("plain", "final"))
             final.mkdir(exist_ok=True)
             for name in (POSTERIOR, SUMMARY):

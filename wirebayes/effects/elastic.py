@@ -42,6 +42,7 @@ class Toe(Effect):
     pattern = "elastic curve"
     place = "strain"
     formula = "toe"
+    straightens = "toe.w"
     scope = "material"
     # a few steps of a test are enough to straighten ends and knots; as much as that is seen on short samples of rope
     amplitudes = (Amplitude("w", "mm", 0.0, HalfNormal(2.0)),)

@@ -160,6 +160,7 @@ class Effect:
     adds: ClassVar[bool] = False  # a sum to the reading, of each amplitude times a function of hold and time alone
     formula: ClassVar[str] = ""  # the name of its compiled twin in `wirebayes/wire/_kernel.pyx`, where it has one
     no_creep_below: ClassVar[str] = ""  # the parameter that is a tension below which nothing creeps, where it has one
+    straightens: ClassVar[str] = ""  # the parameter that is a length which pulls only once straight, where it has one
     in_series: ClassVar[bool] = False  # its amplitude is a compliance in series with the wire
     compares_lengths: ClassVar[bool] = False  # changes parameters by the sample's length over the common one
     nearly_linear: ClassVar[bool] = False  # of one sign, yet its signature has the same form at any size

@@ -35,6 +35,8 @@ PROBLEMS = {
     "shares, two lengths": draw(
         LINE, Truth(effects=(effect_named("fixture_compliance"), effect_named("steady_creep"))), seed=7
     ).problem,
+    "toe": draw([Bench()], Truth(effects=(effect_named("toe"),)), seed=9).problem,
+    "toes of one wire": draw([*LINE, Bench("c")], Truth(effects=(effect_named("toe"),)), seed=9).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
     "one hold": draw([Bench(displacements_mm=(1.0,))], Truth({"k1": 800.0}), seed=8).problem,
     "one hold, its preload known": with_readings(
@@ -67,6 +69,18 @@ def test_the_jacobian_is_the_determinant_of_the_map(name):
         matrix = (up - down) / (2 * step) / np.abs(natural)[:, None].T  # relative: the columns differ by many orders
         expected = np.linalg.slogdet(matrix)[1] + np.log(np.abs(natural)).sum()
         assert coordinates.log_jacobian(natural[None], row[None])[0] == pytest.approx(expected, abs=1e-5)
+
+
+def test_beside_a_toe_the_preload_is_what_is_left_of_it_once_the_toe_is_straight():
+    """A longer toe with as much more preload has the same coordinate; for a normal approximation none has."""
+    problem = PROBLEMS["toe"]
+    preload, toe = (problem.names.index(name) for name in ("preload", "toe.w"))
+    theta = np.repeat(problem.prior.rvs(1, np.random.default_rng(4)), 2, axis=0)
+    theta[:, preload], theta[:, toe] = [5.0, 5.7], [0.3, 1.0]
+    z = Transformation(problem).to_sampled(theta)
+    assert z[0, preload] == pytest.approx(z[1, preload], rel=1e-6)
+    z = Transformation(problem, for_draws=False).to_sampled(theta)
+    assert abs(z[1, preload] - z[0, preload]) > 1e-3
 
 
 def test_the_target_is_prior_likelihood_and_volume():

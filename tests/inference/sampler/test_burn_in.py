@@ -291,7 +291,7 @@ def test_a_mode_found_by_a_few_walkers_begins_the_run_anew(known: int, modes: in
         assert found.round == policy.rounds - 1 and found.learned.previous is None
 
 
-def with_a_far_hill(count: int) -> tuple[Sampling, SimpleNamespace]:
+def with_a_far_hill(count: int, steps: int = 32) -> tuple[Sampling, SimpleNamespace]:
     """Draws of a normal density; of 400 places that the search left, `count` are of a hill that holds a hundredth."""
     rng = np.random.default_rng(0)
     centre, far = np.full(D, 12.0), Mixture(np.ones(1), np.full((1, D), 12.0), 2.0 * np.eye(D)[None], 1e6)
@@ -299,8 +299,8 @@ def with_a_far_hill(count: int) -> tuple[Sampling, SimpleNamespace]:
     def density(z: np.ndarray) -> np.ndarray:
         return np.logaddexp(NORMAL.log_density(z), np.log(0.01) + far.log_density(z))
 
-    z = rng.normal(size=(32, 128, D))
-    kept = Kept((z,), (density(z.reshape(-1, D)).reshape(32, 128),), z[..., 0].size)
+    z = rng.normal(size=(steps, 128, D))
+    kept = Kept((z,), (density(z.reshape(-1, D)).reshape(steps, 128),), z[..., 0].size)
     left = rng.normal(size=(400, D))
     left[:count] = centre + 2.0 * left[:count]
     learned = Learned(NORMAL, NORMAL, 1, (left, density(left)))
@@ -309,12 +309,12 @@ def with_a_far_hill(count: int) -> tuple[Sampling, SimpleNamespace]:
     return Sampling(walkers, learned, rng, 0, kept), SimpleNamespace(coordinates=coordinates)
 
 
-@pytest.mark.parametrize("remembered", [True, False])
+@pytest.mark.parametrize(("remembered", "steps"), [(True, 32), (True, 512), (False, 32)])
 def test_what_the_search_left_gets_into_a_proposal_that_overlooks_it(
-    remembered: bool, monkeypatch: pytest.MonkeyPatch
+    remembered: bool, steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Then the proposal is no longer too low there, and the fit need not be given up for it."""
-    state, target = with_a_far_hill(40)
+    """Then the proposal is no longer too low there, however many draws are kept, and the fit is not given up for it."""
+    state, target = with_a_far_hill(40, steps)
     z, value = state.kept.flat
     assert overlooked_nats(state.learned, z, value)[1] > OUTWEIGHS
     if not remembered:

@@ -187,3 +187,27 @@ class Preload(Step):
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         return self.edge.log_slope(theta)
+
+
+@dataclass(frozen=True)
+class Straightened(Step):
+    """The preload becomes what is left of it once a toe is straight, which is all that a stretch far beyond it shows.
+
+    Attributes
+    ----------
+    preload, toe : int
+        Columns.
+    scale : float
+        Of the preload's coordinate, mm.
+    """
+
+    preload: int
+    toe: int
+    scale: float
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        z[:, self.preload] -= theta[:, self.toe] / self.scale
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        z[:, self.preload] += theta[:, self.toe] / self.scale  # for the steps before this one
+        theta[:, self.preload] = self.scale * z[:, self.preload]

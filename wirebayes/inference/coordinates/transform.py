@@ -24,7 +24,8 @@ measured in standard deviations of their prior. Then, one after the other (`wire
 - ``Power``: log U becomes its distance from the power of tension that suits the measured losses best at this hazard
   (`wirebayes.inference.coordinates.power_of_tension`);
 - ``Preload``: the preload becomes what is wide where the first hold hardly creeps
-  (`wirebayes.inference.coordinates.slack_edge`). Where a threshold of creep places it, it asks for k1 and comes first.
+  (`wirebayes.inference.coordinates.slack_edge`). Where a threshold of creep places it, it asks for k1 and comes first;
+- ``Straightened``: beside a toe, the preload becomes what is left of it once the toe is straight.
 
 The map is triangular: to natural parameters the steps go backwards, so that each finds the parameters that it asks for.
 Those but of the preload and of shares have unit Jacobian. Those of U, the preload and shares are for proposals to draw
@@ -50,6 +51,7 @@ from wirebayes.inference.coordinates.steps import (
     Preload,
     SoftenedStiffness,
     Step,
+    Straightened,
     WeightLevel,
 )
 from wirebayes.inference.coordinates.tension_level import tension_level
@@ -120,11 +122,12 @@ class Transformation:
                 levels = [Level(ridges[0], tension)]
             elif (weight := displacement_level(problem)) is not None:
                 levels = [WeightLevel(ridge, weight, self.scale[weight.preload])]
-        self.steps = _steps(ridges, levels, [Preload(edge, self.scale[edge.preload]) for edge in slack])
+        toes = _toes(problem, self.columns) if for_draws and not any(isinstance(s, WeightLevel) for s in levels) else []
+        self.steps = [*_steps(ridges, levels, [Preload(edge, self.scale[edge.preload]) for edge in slack]), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
-        preloads = [*(edge.preload for edge in slack), *(s.level.preload for s in levels if isinstance(s, WeightLevel))]
-        self._own_scale = [*self.shares, *preloads]
+        preloads = {edge.preload for edge in slack} | {s.level.preload for s in levels if isinstance(s, WeightLevel)}
+        self._own_scale = [*self.shares, *sorted(preloads | {toe.preload for toe in toes})]
 
     @property
     def kinds_of_creep(self) -> list[list[int]]:
@@ -203,6 +206,19 @@ def _slack_edges(problem: Problem, columns: ColumnMap) -> list[SlackEdge]:
     """Coordinates of the samples' preloads, where these have none of their own already."""
     found = [slack_edge(problem, sample) for sample in problem.samples]
     return [edge for edge in found if edge is not None and columns.is_linear(edge.preload)]
+
+
+def _toes(problem: Problem, columns: ColumnMap) -> list[Straightened]:
+    """The samples whose preload and whose toe are both open."""
+    out = []
+    for sample in problem.samples if problem.likelihood == "chain" else ():
+        preload = problem.column("preload", sample)
+        for own in (e.straightens for e in sample.model.effects if e.straightens):
+            toe = problem.column(own, sample)
+            if {preload, toe} <= set(problem.names) and columns.is_linear(problem.names.index(preload)):
+                at = problem.names.index(preload)
+                out.append(Straightened(at, problem.names.index(toe), float(columns.scale[at])))
+    return out
 
 
 def _is_usual(problem: Problem, columns: ColumnMap, ridges: Sequence[Ridge]) -> bool:

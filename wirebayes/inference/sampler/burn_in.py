@@ -164,14 +164,15 @@ def _with_excess(
     """
     drawn = WeightedPoints.weighted(np.column_stack([z, value]), log_weight)
     drawn = drawn.worth(effective_number(drawn.weight))
-    for others in (state.drawn, left):
-        drawn = drawn if others is None else others.joined(drawn)
-    drawn = WeightedPoints(drawn.z[-REMEMBERED:], drawn.weight[-REMEMBERED:])
+    if state.drawn is not None:
+        drawn = state.drawn.joined(drawn)
+        drawn = WeightedPoints(drawn.z[-REMEMBERED:], drawn.weight[-REMEMBERED:])
     state = replace(state, drawn=drawn)
     if not isinstance(state.learned.proposal, Proposal):
         return state
-    places = replace(drawn, z=drawn.z[:, :-1])
-    return state.knowing(proposal=proposal.with_excess(state.learned.proposal, places, drawn.z[:, -1], state.generator))
+    every = drawn if left is None else drawn.joined(left)
+    places = replace(every, z=every.z[:, :-1])
+    return state.knowing(proposal=proposal.with_excess(state.learned.proposal, places, every.z[:, -1], state.generator))
 
 
 def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
