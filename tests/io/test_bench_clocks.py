@@ -124,3 +124,26 @@ def test_a_clock_counts_to_59(tmp_path, cells):
 def test_a_cell_without_its_unit_among_cells_with_theirs_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"line 4, column 3 \(Time\): found '2', expected a time such as 1 h 30 min"):
         times_of(tmp_path, "Time", ["0", "1 h 30 min", "2"])
+
+
+@pytest.mark.parametrize(
+    "cells", [("0 min", "1h75"), ("0 min", "1 h 75 min"), ("0 min", "2'75''"), ("0 min 5 s", "1h5")]
+)
+def test_a_part_after_a_larger_one_counts_to_59_and_has_two_digits(tmp_path, cells):
+    with pytest.raises(InputError, match=rf"line 3, column 3 \(Time\): found \"?'?{cells[1]}"):
+        times_of(tmp_path, "Time", ["1 h 0 min", *cells[1:], "3 h 0 min"])
+
+
+@pytest.mark.parametrize("clock", ["{}h{:02}", "{} h {} min", "{}:{:02}"])
+def test_times_of_day_pass_midnight_however_they_are_written(tmp_path, clock):
+    moments = [(22, 30), (23, 30), (0, 30), (1, 30)]
+    path = tmp_path / "raw.csv"
+    rows = [f"{1 + i // 2};{1 + i // 2};{clock.format(*moment)};{9 - i}\n" for i, moment in enumerate(moments)]
+    path.write_text("Hold;Displacement [mm];Heure [hh:mm];Force [N]\n" + "".join(rows))
+    made = convert(path, ABOUT, Choices(time_since="test"))
+    assert [row[2] for row in made.rows] == [0.0, 3600.0, 7200.0, 0.0, 3600.0]  # the first hold lasts until the second
+
+
+@pytest.mark.parametrize("header", ["Time (in minutes)", "Time (IN MINUTES)", "Time (durations in minutes)"])
+def test_a_unit_in_brackets_may_begin_with_in(tmp_path, header):
+    assert times_of(tmp_path, header, ["0", "5"]) == [0.0, 300.0]

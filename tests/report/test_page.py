@@ -266,7 +266,8 @@ def test_the_table_of_creep_names_its_tension_and_what_it_includes(fitted, tmp_p
     (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"derived": derived}))
     words = read(write_page(copy)).words
     assert (
-        "A fresh sample under a constant 4.25 N, with which a hold began; with all fitted effects of the wire" in words
+        "A fresh sample held at 4.25 N, the tension at which one of the holds began. All fitted effects of the wire"
+        in words
     )
     assert "grows without end" in words and "stiffness there, N per unit strain" in words
 

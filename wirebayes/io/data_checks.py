@@ -248,7 +248,8 @@ def _jump(row: Floats, time_s: Floats, noise: float) -> int | None:
     for i in range(1, len(change) - 1):
         size, beside = abs(change[i]), [i - 1, i + 1]
         against = (change.sum() - change[i]) * np.sign(change[i]) <= FLAT * noise
-        out_of_course = against or speed[i] > FASTER * speed[beside].max()
+        # after a burst of readings a pause shows more change than they do, and is no faster
+        out_of_course = speed[i] > (1.0 if against else FASTER) * speed[beside].max()
         stays = ((row[i + 1 :] - row[i]) * np.sign(change[i]) > JUMP_STAYS * size).all()
         if size > max(ISOLATED * noise, JUMP * np.abs(change[beside]).max()) and out_of_course and stays:
             return i

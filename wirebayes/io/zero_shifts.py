@@ -13,12 +13,16 @@ from numpy.typing import NDArray
 from wirebayes.io.checked_test import CheckedTest
 from wirebayes.numeric.typing import Floats
 
-FEWEST = 6  # moves one way, which show what a move adds
-STANDS_OUT = 4.0  # times what nine in ten of the other moves are off by
-OF_A_MOVE = 0.25  # of what the usual move adds: smaller steps are the model check's affair
-TAKEN_BACK = 0.5  # of it, by the move before or after
-BESIDE = 0.5  # of it that the readings next to the first and the last show too, or one of these is wrong
-SLACK, NOISE = 0.02, 5.0  # of the largest reading, and noise levels: a wire with less may be slack
+FEWEST = 6  # with fewer moves one way nothing shows what a move usually adds
+STANDS_OUT = 4.0  # a step is off by so many times what nine in ten of the other moves are off by
+# a step is off by more than this share of what its own move should add and of what the usual move adds; the check of
+# the model finds smaller ones
+OF_A_MOVE = 0.25
+TAKEN_BACK = 0.5  # where a neighbouring move undoes more than this share, a single setting was wrong
+BESIDE = 0.5  # where the readings beside those two show less than this share of the step, one of the two is wrong
+# a wire with less than this share of the largest reading, or so many noise levels, may be slack
+SLACK, NOISE = 0.02, 5.0
+LATE = 0.5  # a hold first read later than usual, by this share of the time to its second reading, has crept until then
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ def zero_shift(readings: CheckedTest) -> str:
     before, after = readings.number[hold - 1], readings.number[hold]
     return (
         f"from hold {before} to hold {after} the {what} changes by {step:.3g} {readings.unit}, where the other moves "
-        f"make it {expected:.3g} {readings.unit}, and the difference stays: was the sensor zeroed there, did the wire "
+        f"suggest {expected:.3g} {readings.unit}, and the difference stays: was the sensor zeroed there, did the wire "
         "slip, or is time or a move not recorded? correct the readings from there on, or leave them out"
     )
 
@@ -74,6 +78,7 @@ def _moves(readings: CheckedTest, way: float) -> _Moves:
     this_way = np.sign(moved) == way
     used = this_way & np.concatenate([[True], this_way[:-1]])
     used &= np.diff(np.flatnonzero(readings.protocol.recorded)) == 1
+    used &= ~_late(readings)[1:]
     if readings.protocol.control == "displacement":
         taut = max(SLACK * float(begins.max()), NOISE * readings.noise)
         used &= np.minimum(begins[1:], ends[:-1]) > taut
@@ -83,19 +88,29 @@ def _moves(readings: CheckedTest, way: float) -> _Moves:
     return _Moves(at + 1, added[at], inner[at], moved[at], middle[at])
 
 
+def _late(readings: CheckedTest) -> NDArray[np.bool_]:
+    """Recorded holds that are first read later than usual."""
+    times = [np.asarray(t)[m] for t, m in zip(readings.protocol.time_s, readings.protocol.mask, strict=True) if m.any()]
+    first_s = np.array([t[0] for t in times])
+    until_second_s = np.median([t[1] - t[0] for t in times if len(t) > 1] or [0.0])
+    return np.asarray(first_s - np.median(first_s) > LATE * until_second_s)
+
+
 def _shift(moves: _Moves, noise: float) -> tuple[float, int, float, float] | None:
     """How far the step that stands out most does so, its hold, what it adds, and what was expected of it."""
     if len(moves.hold) < FEWEST:
         return None
     off, inner = moves.off(moves.added), moves.off(moves.inner)
-    own = max(float(np.median(np.abs(off))) / 0.6745, np.sqrt(2.0) * noise)
     usual = float(np.median(np.abs(moves.added)))
+    rounding = float(np.finfo(float).eps * np.abs(moves.added).max())
+    own = max(float(np.median(np.abs(off))) / 0.6745, np.sqrt(2.0) * noise, rounding)
+    expected = moves.added - off
     found = []
-    for i in np.flatnonzero(np.abs(off) > OF_A_MOVE * usual):
+    for i in np.flatnonzero(np.abs(off) > OF_A_MOVE * np.maximum(usual, np.abs(expected))):
         size, sign = abs(off[i]), np.sign(off[i])
         excess = float(size / max(np.quantile(np.abs(np.delete(off, i)), 0.9), own))
         taken_back = (-sign * off[np.abs(moves.hold - moves.hold[i]) == 1]).max(initial=0.0)
         stays = taken_back <= TAKEN_BACK * size and sign * inner[i] >= BESIDE * size
         if excess > STANDS_OUT and stays:
-            found.append((excess, int(moves.hold[i]), float(moves.added[i]), float(moves.added[i] - off[i])))
+            found.append((excess, int(moves.hold[i]), float(moves.added[i]), float(expected[i])))
     return max(found, default=None)

@@ -74,7 +74,8 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
         A cell is no clock; `Undecided` where ``a:b`` may be minutes or hours.
     """
     if any(map(is_spelt, table.column(column))):
-        return _spelt(table, column), False
+        values = _spelt(table, column)
+        return values + _DAY * np.cumsum(_days_begin(values, of_day=False)), False
     moments = _moments(table, column, unit)
     # what follows a date or stands before AM is of the day, and leaves no doubt
     of_clock = [m["date"] is None and m["half"] is None for m in moments]

@@ -16,7 +16,7 @@ _ANNOUNCED = re.compile(
 )
 _SPELT = re.compile(
     rf"(?:(?P<hours>\d+)\s*(?:{_HOURS})[\s,]*)?(?:(?P<minutes>\d+)\s*(?:{_MINUTES}|['′])[\s,]*)?"
-    rf"(?:(?P<seconds>\d+(?:[.,]\d+)?)\s*(?:{_SECONDS}|''|[\"″]))?(?P<rest>\d{{1,2}})?",
+    rf"(?:(?P<seconds>\d+(?:[.,]\d+)?)\s*(?:{_SECONDS}|''|[\"″]))?(?P<rest>\d\d)?",
     re.IGNORECASE,
 )
 
@@ -48,18 +48,25 @@ def announced(text: str) -> Announced | None:
 
 
 def spelt_s(cell: str) -> float | None:
-    """Seconds of a cell that names its units, as ``1 h 30 min``, ``1h30``, ``2'30''`` or ``30 s``; None of others."""
+    """Seconds of a cell that names its units, as ``1 h 30 min``, ``1h30``, ``2'30''`` or ``30 s``; None of others.
+
+    A part after a larger one counts to 59, and has two digits where it does not name its unit.
+    """
     found = _SPELT.fullmatch(cell)
     if found is None or not any(found.group("hours", "minutes", "seconds")):
         return None
     rest = found["rest"]
     if rest and found["seconds"]:
         return None
-    of_rest = 1.0 if found["minutes"] else 60.0  # the next smaller unit
     hours, minutes, seconds = (
         float((found[part] or "0").replace(",", ".")) for part in ("hours", "minutes", "seconds")
     )
-    return 3600.0 * hours + 60.0 * minutes + seconds + of_rest * float(rest or 0)
+    if rest and found["minutes"]:
+        seconds = float(rest)
+    elif rest:
+        minutes = float(rest)
+    too_many = found["hours"] and minutes >= 60.0 or (found["hours"] or found["minutes"]) and seconds >= 60.0
+    return None if too_many else 3600.0 * hours + 60.0 * minutes + seconds
 
 
 def is_spelt(cell: str) -> bool:

@@ -75,7 +75,7 @@ def _notes(readings: Readings, holds: int, kept: int, move_s: float) -> list[str
         f"a continuous recording of {count} readings: {counted(holds, 'hold')} where the {readings.role} stays within "
         f"{noise:.2g} {readings.unit} or so, {count - kept} readings of moves dropped",
         f"each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
-        f"{move_s:.3g} s (median), and readings as soon after one are left out",
+        f"{move_s:.3g} s (median), and readings as soon after one are left out, up to a tenth of the hold",
     ]
 
 

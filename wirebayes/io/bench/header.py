@@ -13,7 +13,8 @@ _UNIT_FIRST = re.compile(
     r"(seconds|minutes|hours|sekunden|minuten|stunden|secondes|heures|segundos|minutos)(?!\S)", re.I
 )
 _BEFORE_UNIT = re.compile(r"\s*/\s*|,\s*|\s+in\s+|[_\s]+")
-_IN = re.compile(r".*\s(?:in|en|em)\s+")  # what a unit in brackets may begin with: durations in minutes
+# what a unit in brackets may begin with: durations in minutes
+_IN = re.compile(r"(?:.*\s)?(?:in|en|em)\s+", re.IGNORECASE)
 
 
 def is_of_sample(table: RawTable, index: int, role: Role) -> bool:

@@ -288,8 +288,8 @@ def _derived(summary: SummaryJson) -> Table:
         for name, band, otherwise in rows
     ]
     caption = (
-        f"A fresh sample under a constant {derived['tension_N']:g} N, with which a hold began; with all fitted effects "
-        "of the wire and without those of the bench."
+        f"A fresh sample held at {derived['tension_N']:g} N, the tension at which one of the holds began. All fitted "
+        "effects of the wire are included, those of the bench are not."
     )
     caption = f"{caption} {summary['extrapolation']['warning']}".strip()
     return Table(["quantity", "median", "90 % interval"], lines, caption)
