@@ -1,6 +1,7 @@
 """Logs that fit no robot near the file's: the search is given up and says so; and how far a search has come."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -31,13 +32,13 @@ def _turned_log(holds):
     return log | {name: log[other] for name, other in zip(joints, joints[1:] + joints[:1], strict=True)}
 
 
-def _calibrated(holds=None, **options):
+def _calibrated(holds=None, errors=ROUGH, **options):
     robot = robot_of(FIELD / "hp4-rough.toml")
     table = columns_table(_turned_log(holds), Path("log"), session_file.may_be_empty)
     read = session_file.parse_session(table, robot, 5.0, 1e-3)
     with np.errstate(all="ignore"):  # as the command has it
         return calibration_report(
-            robot, LengthPrior(LINE, 0.05, 0.05), ROUGH, *read, requests=True, visits=1, **options
+            robot, LengthPrior(LINE, 0.05, 0.05), errors, *read, requests=True, visits=1, **options
         )
 
 
@@ -64,26 +65,39 @@ def _counted(function, count):
     return counted
 
 
-@pytest.mark.parametrize(("share", "rounds"), [(0.0999, 8), (0.1001, 5)])
-def test_a_search_is_given_up_where_loops_are_a_tenth_of_the_robot_open(monkeypatch, share, rounds):
+@pytest.mark.parametrize(
+    ("share", "stated", "rounds"),
+    [(0.0999, None, 8), (0.1001, None, 5), (0.1999, 0.2 / 3, 8), (0.2001, 0.2 / 3, 5)],
+)
+def test_a_search_is_given_up_where_loops_are_further_open_than_the_robot_or_its_errors_allow(
+    monkeypatch, share, stated, rounds
+):
+    """A tenth of the robot, or three times the stated error of the joint values."""
     monkeypatch.setattr(whole, "_ROUNDS", 8)
     monkeypatch.setattr(whole, "_STILL", 0.0)  # no round is the last by itself
     monkeypatch.setattr(whole, "length_rms_m", lambda found: share * found.unknowns.robot.span_m)
-    shares = []
-    _calibrated(6, progress=lambda name, done, total: shares.append(done) if name == "start 1" else None)
+    shares, robot = [], robot_of(FIELD / "hp4-rough.toml")
+    whole_wire = robot.span_m / np.sqrt(np.mean(1 / robot.lines**2))  # of each line no more than its part is open
+    errors = replace(ROUGH, joint_m=stated and stated * whole_wire)
+    _calibrated(6, errors, progress=lambda name, done, total: shares.append(done) if name == "start 1" else None)
     assert shares == [*(k / 8 for k in range(rounds)), 1.0]
 
 
-@pytest.mark.parametrize("share", [0.0099, 0.0101])
-def test_loops_that_stay_a_hundredth_of_the_robot_open_are_another_robots(share):
-    """Of four lines, each is a quarter of the loop."""
+@pytest.mark.parametrize(
+    ("share", "stated_m", "lost"),
+    [(0.0099, None, False), (0.0101, None, True), (0.0101, 0.08, False), (0.0239, 0.08, False), (0.0241, 0.08, True)],
+)
+def test_loops_that_stay_a_hundredth_of_the_robot_open_are_another_robots(share, stated_m, lost):
+    """Of four lines, each is a quarter of the loop; three times its stated error is no other robot."""
     equations = SimpleNamespace(residual=np.full((3, 2), 4 * share), rows={"loop": slice(0, 2)})
     robot = SimpleNamespace(lines=np.full(2, 4.0), span_m=2.5)
     found = SimpleNamespace(
-        equations=equations, noise=SimpleNamespace(joint_m=2.5), unknowns=SimpleNamespace(robot=robot)
+        equations=equations,
+        noise=SimpleNamespace(joint_m=2.5),
+        unknowns=SimpleNamespace(robot=robot, errors=SimpleNamespace(joint_m=stated_m)),
     )
     assert residuals.length_rms_m(found) == pytest.approx(2.5 * share)
-    assert residuals.lost(found) is (share > 0.01)
+    assert residuals.lost(found) is lost
     equations.residual[0, 0] = np.nan
     assert residuals.lost(found)
 

@@ -17,6 +17,7 @@ _BLIND, _BLIND_DEGREES = 1e-4, 10.0
 # Of the span: loops that stay so far open belong to another robot, in another unit or another order. Layers on a drum
 # and a printer's anchors that are off by a decimetre leave less.
 _LOST = 0.01
+_EXPLAINED = 3.0  # times the stated error of a joint value: loops that are no further open say nothing of the robot
 
 
 def trust(found: Whole) -> float:
@@ -58,7 +59,20 @@ def length_rms_m(found: Whole) -> float:
 
 def lost(found: Whole) -> bool:
     """Whether nothing near the robot, however it errs, has these joint values."""
-    return not length_rms_m(found) <= _LOST * found.unknowns.robot.span_m
+    return not length_rms_m(found) <= most_open_m(found, _LOST)
+
+
+def most_open_m(found: Whole, share: float) -> float:
+    """How far loops may stay open along one line: a share of the span, or what stated errors of joint values explain.
+
+    Parameters
+    ----------
+    found : Whole
+    share : float
+    """
+    robot, stated = found.unknowns.robot, found.unknowns.errors.joint_m
+    line = (stated or 0.0) * float(np.sqrt(np.mean(1.0 / robot.lines**2)))
+    return max(share * robot.span_m, _EXPLAINED * line)
 
 
 def usual_joint(robot: Robot, holds: Holds) -> tuple[float, float]:

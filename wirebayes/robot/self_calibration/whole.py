@@ -16,15 +16,16 @@ from wirebayes.robot.self_calibration.descent import descend
 from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds, Noise, State, linearised
 from wirebayes.robot.self_calibration.holds_creep import ROUGHLY, creep_of
 from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
-from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, noise_shown, usual_joint
+from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, most_open_m, noise_shown, usual_joint
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
 Progress = Callable[[str, float, float], None]  # of name, done and total
 
 _ROUNDS = 60  # of noise and creep: most end in ten
-# Rounds after which a search is given up whose loops are open by so much of the span: they close no more. Of sessions
-# that fit, however rough, they are open by a twentieth at most then; some go astray later and come back.
+# Rounds after which a search is given up whose loops are open by so much of the span, and by more than stated errors
+# explain: they close no more. Of sessions that fit, however rough, they are open by a twentieth at most then; some go
+# astray later and come back.
 _PATIENT, _HOPELESS = 5, 0.1
 _SOFT = 0.03  # of what is known best of tensions
 _WHOLE_ROUNDS = 3  # before creep goes half the way only
@@ -111,7 +112,7 @@ def _at_rest(
         level = np.abs(shown - rounds[-1][0]).max() < _SETTLED and abs(cost - found.cost) < _LEVEL_FIT
         if level and moved_on < _STILL:
             return found
-        if taken + 1 == _PATIENT and length_rms_m(found) > _HOPELESS * unknowns.robot.span_m:
+        if taken + 1 == _PATIENT and length_rms_m(found) > most_open_m(found, _HOPELESS):
             break
         cost = found.cost
         roughly = max(_FINEST, min(_STEADY * moved_on, ROUGHLY * _FINER ** len(rounds)))
