@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.robot.test_export import _line
 from wirebayes.answers import terminal
+from wirebayes.commands import export
 from wirebayes.commands.asked_pose import asked_place
 from wirebayes.commands.wires import folder_of, robot_of
 from wirebayes.errors import InputError
@@ -106,8 +108,15 @@ def test_a_home_position_without_balance_is_said_with_its_metres():
     (said,) = home.home_notices(robot)
     assert said.kind == "unheld" and "is 0.05 m away, (0.2, 0, -0.6) m" in said.text
     (nowhere,) = home.home_notices(replace(robot, home_m=np.array([0.2, 0.0, 0.4])))
-    assert nowhere.text.endswith("the home pose of the robot's file (pose)")
+    assert nowhere.text.endswith("the home pose of the robot's file (pose.position_m)")
     assert home.home_notices(two_wires()) == []
+
+
+@pytest.mark.parametrize("files", [{}, {"klipper.cfg": "", "robot.xml": ""}])
+def test_an_export_gives_the_metres_to_the_nearest_balance_with_and_without_simulators(files):
+    robot = replace(two_wires(), home_m=np.array([0.2, 0.05, -0.6]))
+    said = export._warnings(robot, _line("hooke", None, {}), files)
+    assert [notice for notice in said if "is 0.05 m away" in notice.text] == home.home_notices(robot)
 
 
 def test_a_wire_at_its_bound_is_let_go_where_that_leads_nearer():
@@ -133,7 +142,7 @@ def test_beside_the_plane_of_two_wires_the_nearest_position_within_it_is_named()
     robot = two_wires()
     there = balanced_orientation(robot, np.array([0.2, 0.1, -0.6]), None)
     np.testing.assert_allclose(there.nearest_m, [0.2, 0.0, -0.6], atol=1e-6)
-    assert "(0.2, 0, -0.6) m" in there.sentence
+    assert "is 0.1 m away, (0.2, 0, -0.6) m" in there.sentence
     assert balanced_orientation(robot, robot.home_m, None).sentence == ""
     nowhere = balanced_orientation(robot, np.array([0.2, 0.0, 0.4]), None)
     assert nowhere.nearest_m is None and "nearest" not in nowhere.sentence

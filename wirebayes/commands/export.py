@@ -104,13 +104,11 @@ def export(
 
 def _warnings(robot: Robot, line: WireDraws, contents: Mapping[str, str]) -> list[Notice]:
     """What speaks against the fits, and what could not be exported."""
-    out = [*doubts(robot, line), *robot_notices(robot)]
+    out = [*doubts(robot, line), *robot_notices(robot), *home_notices(robot)]
     if "klipper.cfg" not in contents:
         text = "no firmware settings: they exist for four or five drums with a position-only platform"
         out.append(Notice("left-out", text))
     if "robot.xml" not in contents:
         text = "no robot.xml, robot.urdf and robot.sdf: no tensions within the bounds hold the home pose"
         out.append(Notice("unheld", text))
-    else:
-        out += home_notices(robot)
     return out

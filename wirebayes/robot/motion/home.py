@@ -53,11 +53,19 @@ def home_notices(robot: Robot) -> list[Notice]:
         found = hanging.hang(robot, x[None], R)
         if found.held[0]:
             return turned_away(robot, found.rotation[0])
-    text = "no tensions within the bounds hold the home pose of the robot's file (pose)"
+    text = "no tensions within the bounds hold the home pose of the robot's file (pose.position_m)"
     near = hanging.nearest_position(robot, x, R) if robot.motions is None else None
     if near is not None:
-        far = float(np.linalg.norm(near - x))
-        text += (
-            f"; the nearest position that was found to have a balance is {far:.3g} m away, ({coordinates(near, 5)}) m"
-        )
+        text += f"; {nearest_balance(x, near)}"
     return [Notice("unheld", text)]
+
+
+def nearest_balance(position_m: Floats, near_m: Floats) -> str:
+    """Where the nearest position with a balance is, and how far away.
+
+    Parameters
+    ----------
+    position_m, near_m : (3,) array
+    """
+    far = float(np.linalg.norm(near_m - position_m))
+    return f"the nearest position that was found to have a balance is {far:.3g} m away, ({coordinates(near_m, 5)}) m"

@@ -11,7 +11,7 @@ from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
-from wirebayes.robot.motion.home import turned_away
+from wirebayes.robot.motion.home import nearest_balance, turned_away
 from wirebayes.sentences import coordinates, listed
 
 COMPONENTS = ("rx", "ry", "rz")
@@ -215,5 +215,4 @@ def _nowhere(robot: Robot, x: Floats, reference: Floats) -> Orientation:
     near = hanging.nearest_position(robot, x, reference)
     if near is None or np.abs(near - x).max() < _ROUNDING * robot.span_m:
         return Orientation(x, reference, None, f"{said}.")
-    said += f"; the nearest position that was found to have a balance is ({coordinates(near, 5)}) m."
-    return Orientation(x, reference, None, said, nearest_m=near)
+    return Orientation(x, reference, None, f"{said}; {nearest_balance(x, near)}.", nearest_m=near)
