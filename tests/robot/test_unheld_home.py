@@ -90,6 +90,28 @@ def test_a_home_orientation_that_the_file_leaves_to_balance_is_no_warning():
     assert home.home_notices(replace(wall, states_turn=True))
 
 
+@pytest.mark.parametrize(
+    ("normal", "turned_rad", "free"),
+    [
+        ((0.0, 1.0, 0.0), (0.0, -0.1181, 0.0), ["ry"]),
+        ((0.6, 0.8, 0.0), (0.0, 0.0, 0.0), ["rx", "ry"]),
+        ((0.0, 1.0, 0.0), (0.0, 0.0, 0.3), ["rx", "ry"]),
+    ],
+)
+def test_in_a_plane_balance_decides_what_turns_about_its_normal(normal, turned_rad, free):
+    wall = robot_of(FIELD / "balanced-home" / "wall.toml")
+    tilted = replace(wall, plane=replace(wall.plane, normal=np.array(normal)))
+    assert orientation.by_lines(tilted, turning.matrix(np.array(turned_rad)))["free_components"] == free
+
+
+@pytest.mark.parametrize("asked_rad", [None, np.array([0.0, np.nan, 0.0]), np.zeros(3)])
+def test_on_a_wall_balance_decides_one_component_and_none_is_commanded(asked_rad):
+    wall = robot_of(FIELD / "balanced-home" / "wall.toml")
+    found = balanced_orientation(wall, wall.home_m, asked_rad).found
+    assert (found["free_components"], found["commanded_components"]) == (["ry"], [])
+    assert "balance decides ry, the position" in found["sentence"]
+
+
 def test_elsewhere_or_asked_for_the_orientation_of_fewer_wires_is_no_warning():
     robot = four_wires()
     assert balanced_orientation(robot, robot.home_m - [0.1, 0.0, 0.0], None).turned_away == ()
@@ -155,18 +177,19 @@ def test_a_rotation_of_a_platform_that_cannot_turn_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("choice", "free", "said"),
+    ("left", "free", "said"),
     [
         (3, ["rx", "ry", "rz"], "nearest to the home orientation that was found to be held"),
         (1, ["rx", "ry", "rz"], "balance decides rx, ry and rz, but --rotation may ask for one of them"),
-        (2, ["rx", "ry"], "balance decides rx and ry, but --rotation may ask for one of them"),
-        (1, ["rx", "ry"], "balance decides rx and ry."),
-        (3, ["rx", "ry"], "balance decides rx and ry, but --rotation may ask for any of them"),
-        (0, [], "the orientation is as asked for"),
+        (1, ["rx", "ry"], "balance decides rx and ry, but --rotation may ask for one of them"),
+        (0, ["rx", "ry"], "balance decides rx and ry."),
+        (2, ["rx", "ry"], "balance decides rx and ry, but --rotation may ask for any of them"),
+        (1, ["ry"], "balance decides ry, but --rotation may ask for it."),
+        (-3, [], "the orientation is as asked for"),
     ],
 )
-def test_what_can_be_asked_for_is_said_where_balance_decides_it_now(choice, free, said):
-    assert said in orientation._summary(six_wires(), 6, 3, choice, free, 0)
+def test_what_can_be_asked_for_is_said_where_balance_decides_it_now(left, free, said):
+    assert said in orientation._summary(six_wires(), 6, 3, left, free, 0)
 
 
 def test_noise_in_coordinates_is_zero():

@@ -94,7 +94,7 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
         request = replace(request, rotation=R)
         content["pose"]["rotation_vector_rad"] = turning.vector(R[None])[0]
         if robot.joints < robot.freedoms:
-            content["orientation"] = by_lines(robot)
+            content["orientation"] = by_lines(robot, R)
     return _held_answer(_Held(robot, line, shared, request, commands, tau), other, turned, content)
 
 

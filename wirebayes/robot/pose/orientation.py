@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wirebayes.json_files.pose import OrientationFound
 from wirebayes.notice import Notice
@@ -12,11 +13,13 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
 from wirebayes.robot.motion.home import nearest_balance, turned_away
+from wirebayes.robot.motion.loose_balance import vector_by_turn
 from wirebayes.sentences import coordinates, listed
 
 COMPONENTS = ("rx", "ry", "rz")
 _COUNT = {1: "one", 2: "two"}  # in words, as sentences have it
 _ROUNDING = 1e-6  # of the robot's span: what a position written with six digits may be off
+_FIXED = 1e-6  # of a turn: a component that changes by no more in a plane only rounds
 _SAME = 5e-5  # rad: a component that balance decides and that was asked for to four decimals is as asked for
 
 
@@ -96,13 +99,14 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
     return replace(there, turned_away=tuple(turned_away(robot, there.rotation))) if meant else there
 
 
-def by_lines(robot: Robot) -> OrientationFound:
+def by_lines(robot: Robot, rotation: Floats) -> OrientationFound:
     """What winches command that drive several lines, which leave the orientation to their lengths and to balance.
 
     Parameters
     ----------
     robot : Robot
         With fewer winches than degrees of freedom.
+    rotation : (3, 3) array
     """
     places = min(robot.joints, 2 if robot.plane is not None else 3)
     return {
@@ -111,7 +115,7 @@ def by_lines(robot: Robot) -> OrientationFound:
         "position_directions": places,
         "rotation_choice": 0,
         "commanded_components": [],
-        "free_components": list(COMPONENTS),
+        "free_components": _names(_movable(robot, rotation)),
         "refused_components": [],
         "other_rotation_vectors_rad": np.empty((0, 3)),
         "sentence": f"{robot.joints} winches with {robot.legs} lines command {robot.joints} of {robot.freedoms} "
@@ -152,23 +156,26 @@ def _to_be_had(ways: Floats, asked: Floats) -> Floats:
     return out
 
 
-def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, had: Floats) -> Orientation:
+def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, had: NDArray[np.bool_]) -> Orientation:
     """The orientation that was found, with what was commanded."""
     R, tau = found.rotation[0], found.tension_N[0]
     vector = turning.vector(R[None])[0]
     places, degrees = hanging.commandable(robot, x, R, tau)
-    free = [name for name, given in zip(COMPONENTS, had, strict=True) if not given]
-    refused = [i for i in range(3) if np.isfinite(asked[i]) and not had[i]]
+    movable = _movable(robot, R)
+    had = had & movable
+    free = _names(movable & ~had)
+    left = int(found.choice[0]) - int(had.sum())
+    refused = [i for i in range(3) if np.isfinite(asked[i]) and movable[i] and not had[i]]
     content: OrientationFound = {
         "commanded_degrees": degrees,
         "of_degrees": robot.freedoms,
         "position_directions": len(places),
         "rotation_choice": int(found.choice[0]),
-        "commanded_components": [name for name in COMPONENTS if name not in free],
+        "commanded_components": _names(had),
         "free_components": free,
         "refused_components": [COMPONENTS[i] for i in refused],
         "other_rotation_vectors_rad": found.others[0],
-        "sentence": _summary(robot, degrees, len(places), int(found.choice[0]), free, len(found.others[0])),
+        "sentence": _summary(robot, degrees, len(places), left, free, len(found.others[0])),
     }
     missed = [
         f"{COMPONENTS[i]} = {asked[i]:g} (it is {vector[i]:.5g})" for i in refused if abs(asked[i] - vector[i]) > _SAME
@@ -177,17 +184,29 @@ def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, h
     return Orientation(x, R, content, "", words)
 
 
-def _summary(robot: Robot, degrees: int, places: int, choice: int, free: list[str], others: int) -> str:
-    """What is commanded, what is not, and which of several solutions this is."""
+def _movable(robot: Robot, rotation: Floats) -> NDArray[np.bool_]:
+    """(3,) which components of the rotation vector change where the platform turns: in a plane, about its normal."""
+    if robot.plane is None:
+        return np.ones(3, bool)
+    change = vector_by_turn(turning.vector(rotation[None]))[0] @ robot.plane.normal
+    return np.asarray(np.abs(change) > _FIXED)
+
+
+def _names(components: NDArray[np.bool_]) -> list[str]:
+    return [COMPONENTS[i] for i in np.flatnonzero(components)]
+
+
+def _summary(robot: Robot, degrees: int, places: int, left: int, free: list[str], others: int) -> str:
+    """What is commanded, what is not (`left` of it may be asked for), and which of several solutions this is."""
     said = f"{robot.legs} wires command {degrees} of {robot.freedoms} degrees of freedom; "
-    if choice == 3 and len(free) == 3:
+    if left == 3:
         said += "this is the rotation nearest to the home orientation that was found to be held"
         said += ", and --rotation may ask for another"
     else:
         said += f"balance decides {listed(free)}" if free else "the orientation is as asked for"
-        left = choice - (3 - len(free))
         if left > 0:
-            said += f", but --rotation may ask for {'any' if left == len(free) else _COUNT[left]} of them"
+            some = f"{'any' if left == len(free) else _COUNT[left]} of them"
+            said += f", but --rotation may ask for {some if len(free) > 1 else 'it'}"
     if places < 3:
         said += f", the position can be chosen in {places} directions only"
     if others:
