@@ -106,10 +106,18 @@ def test_a_leg_that_is_a_copy_of_another_is_named():
     assert _warned(beside) == []
 
 
+def test_legs_that_are_all_alike_are_one_warning():
+    robot, groups = six_wires(), [0, 1, 0, 1, 0, 0]
+    four, two = _warned(replace(robot, exit_m=robot.exit_m[groups], platform_m=robot.platform_m[groups]))
+    assert "of wires 1, 3, 5 and 6: the same points" in four and four.endswith("lines = 4")
+    assert "of wires 2 and 4: the same points" in two and two.endswith("lines = 2")
+
+
 def test_platform_points_in_millimetres_are_not_blamed_on_the_home_position():
     robot = six_wires()
     said = _warned(replace(robot, platform_m=1000.0 * robot.platform_m))
     assert [text.partition(":")[0] for text in said] == ["leg.platform_point_m"]
+    assert "and a platform that broad weighs more than 12" in said[0]
 
 
 @pytest.mark.parametrize("share", [0.999, 1.001])

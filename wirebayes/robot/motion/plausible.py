@@ -6,7 +6,6 @@ robots that were built shows it: how large, and how heavy for their size, robots
 """
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +20,14 @@ from wirebayes.robot.mechanics.joint_columns import column_of_leg, meant
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
-from wirebayes.sentences import number
+from wirebayes.sentences import listed, number
 from wirebayes.strict.table import CsvTable
 
 _FAR = 10.0  # times the robot's size: no wire is so long, and of millimetres those above a hundredth of it are noticed
 _TWICE = 2.0  # times its length: no wire stretches so far, but a wire of two lines looks so where one line was given
 _RIGID = 1e6  # times the weight: the wires' stiffness, so that lengths alone decide how far they stretch
 _LARGEST_M = 1000.0  # the largest cable robot, which carries the receiver of the FAST telescope, spans 600 m
-# A desk's robot in millimetres spans hundreds of metres, too, and its platform weighs less than a thin rope of that
+# A desktop robot in millimetres spans hundreds of metres, too, and its platform weighs less than a thin rope of that
 # length. Cameras above stadiums weigh ten times the rope and more, what is built in a workshop spans less.
 _WIDE_M, _ROPE_KG_M = 50.0, 0.01
 _BROAD_M, _FRAME_KG_M = 5.0, 1.0  # a platform so broad is a frame, which weighs more than this for each metre
@@ -132,16 +131,19 @@ def robot_notices(robot: Robot) -> list[Notice]:
 
 
 def _copies(robot: Robot) -> list[Notice]:
-    """A warning for each leg that runs where another one does."""
+    """A warning for each group of legs that run between the same points."""
     ends = np.hstack([robot.exit_m, robot.platform_m])
+    alike: dict[tuple[float, ...], list[str]] = {}
+    for leg, points in enumerate(ends.tolist(), 1):
+        alike.setdefault(tuple(points), []).append(str(leg))
     return [
         Notice(
             "geometry",
-            f"leg.exit_point_m and leg.platform_point_m of wires {i + 1} and {j + 1}: the same points; is one a copy "
-            "that was not changed? Parallel lines of one drum are one leg with lines = 2",
+            f"leg.exit_point_m and leg.platform_point_m of wires {listed(legs)}: the same points; is any a copy "
+            f"that was not changed? Parallel lines of one drum are one leg with lines = {len(legs)}",
         )
-        for i, j in combinations(range(robot.legs), 2)
-        if np.array_equal(ends[i], ends[j])
+        for legs in alike.values()
+        if len(legs) > 1
     ]
 
 
@@ -159,8 +161,8 @@ def _platform_points(robot: Robot) -> str:
     if not arms > _BROAD_M or robot.mass_kg > _FRAME_KG_M * arms:
         return ""
     return (
-        f"leg.platform_point_m: the platform points lie within {number(arms)} m of their middle, and no platform as "
-        f"broad weighs {number(robot.mass_kg)} kg"
+        f"leg.platform_point_m: the platform points lie within {number(arms)} m of their middle, and a platform that "
+        f"broad weighs more than {number(robot.mass_kg)} kg"
     )
 
 
