@@ -87,7 +87,7 @@ def test_a_home_orientation_that_the_file_leaves_to_balance_is_no_warning():
     assert wall.home_rotation_rad[1] == pytest.approx(-0.1181, abs=1e-4)
     assert home.home_notices(wall) == []
     assert balanced_orientation(wall, wall.home_m, None).turned_away == ()
-    assert home.home_notices(replace(wall, states_turn=True))
+    assert home.home_notices(replace(wall, home_rotation_is_stated=True))
 
 
 @pytest.mark.parametrize(

@@ -152,9 +152,9 @@ class Robot:
         Number of the winch that drives each leg, from 0 in the order of the legs; None where each has its own.
     joint_offset_m : (w,) array or None
         What a drum's zero-tension length is beyond the joint value; None where it is nothing.
-    states_turn : bool
+    home_rotation_is_stated : bool
         Whether the robot's file states the home orientation; else it is level, or as balance leaves it.
-    stated_turn_rad : (3,) array or None
+    rotation_of_file_rad : (3,) array or None
         The home orientation that was stated, where `home_rotation_rad` is another one that hangs in balance.
 
     Examples
@@ -191,8 +191,8 @@ class Robot:
     plane: Plane | None = None
     winch: NDArray[np.intp] | None = None
     joint_offset_m: Floats | None = None
-    states_turn: bool = True
-    stated_turn_rad: Floats | None = None
+    home_rotation_is_stated: bool = True
+    rotation_of_file_rad: Floats | None = None
 
     @property
     def legs(self) -> int:

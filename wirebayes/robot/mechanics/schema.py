@@ -5,7 +5,7 @@ import os
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +102,7 @@ def _robot(top: Keys) -> Robot:
     legs, winch = _legs(top, declared)
     top.finish()
     if freedom == "orientation":
-        _check_ball_joint(top, plane, np.array([lower, upper]) - home["home_m"], len(legs))
+        _check_ball_joint(top, plane, np.array([lower, upper]) - home.position_m, len(legs))
 
     def stack(key: str) -> Any:
         return np.array([leg[key] for leg in legs])
@@ -124,7 +124,8 @@ def _robot(top: Keys) -> Robot:
         wire=tuple(leg["wire"] for leg in legs),
         given=given,
         rule=tension,
-        **home,
+        home_m=home.position_m,
+        home_rotation_rad=home.rotation_rad,
         lower_m=lower,
         upper_m=upper,
         pulleys=_pulleys(stack("pulley"), stack("axis")),
@@ -134,6 +135,7 @@ def _robot(top: Keys) -> Robot:
         plane=plane,
         winch=winch,
         joint_offset_m=_or_none(stack("joint_offset")),
+        home_rotation_is_stated=home.rotation_is_stated,
     )
 
 
@@ -160,13 +162,20 @@ def _platform(keys: Keys) -> tuple[float, Floats]:
     return mass, centre
 
 
-def _home(keys: Keys) -> dict[str, Any]:
-    """Position and rotation vector of the home pose, and whether the latter is stated, by the robot's own names."""
-    home = {
-        "home_m": _triple(keys, "position_m"),
-        "home_rotation_rad": _triple(keys, "rotation_vector_rad", [0.0, 0.0, 0.0]),
-        "states_turn": "rotation_vector_rad" in keys.table,
-    }
+class _Home(NamedTuple):
+    """The home pose of a robot's file."""
+
+    position_m: Floats
+    rotation_rad: Floats
+    rotation_is_stated: bool
+
+
+def _home(keys: Keys) -> _Home:
+    home = _Home(
+        _triple(keys, "position_m"),
+        _triple(keys, "rotation_vector_rad", [0.0, 0.0, 0.0]),
+        "rotation_vector_rad" in keys.table,
+    )
     keys.finish()
     return home
 

@@ -124,7 +124,7 @@ def at_home(robot: Robot) -> Robot:
     if not found.held[0]:
         return robot
     balance = turning.vector(found.rotation)[0]
-    return replace(robot, home_rotation_rad=balance, stated_turn_rad=robot.home_rotation_rad)
+    return replace(robot, home_rotation_rad=balance, rotation_of_file_rad=robot.home_rotation_rad)
 
 
 def chosen(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> Floats:

@@ -21,9 +21,9 @@ def turned_away(robot: Robot, rotation: Floats) -> list[Notice]:
     rotation : (3, 3) array
         How the platform hangs at a position where the file's orientation was meant.
     """
-    if robot.is_underactuated and not robot.states_turn:
+    if robot.is_underactuated and not robot.home_rotation_is_stated:
         return []
-    stated = robot.home_rotation_rad if robot.stated_turn_rad is None else robot.stated_turn_rad
+    stated = robot.home_rotation_rad if robot.rotation_of_file_rad is None else robot.rotation_of_file_rad
     away = float(np.degrees(np.linalg.norm(turning.vector((rotation @ turning.matrix(stated).T)[None])[0])))
     if away < _TURNED_AWAY:
         return []

@@ -182,7 +182,7 @@ def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mo
     here = target.predicted(white)
     cost = target.cost(here, white)
     moved, damping = np.ones(m, bool), np.full(m, 1e-3)
-    converged, ended = ~moved, ~moved
+    converged, ended = np.zeros((2, m), bool)
     J = np.zeros((m, target.readings.shape[1], d))
     for taken in range(iterations):
         target.progress(taken / iterations)
