@@ -1,6 +1,5 @@
 """A small `reproduce`: the kite line alone, with chains too short to be believed but long enough to be looked at."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,14 +7,13 @@ import pytest
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
 from wirebayes.paper import run
+from wirebayes.progress import Progress, silent
 
 POLICY = Policy(walkers=32, ess=300.0, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
 
 
-def reproduce(
-    directory: Path, patch: pytest.MonkeyPatch, seed: int = 0, report: Callable[[str, float, float], None] | None = None
-) -> list[str]:
+def reproduce(directory: Path, patch: pytest.MonkeyPatch, seed: int = 0, report: Progress | None = None) -> list[str]:
     """Run it into a folder."""
     kite = [e for e in paper.experiments() if e.name == "kite-1.5m"]
     patch.setattr(run.paper, "experiments", lambda: kite)
-    return run.reproduce(directory, seed, report or (lambda name, done, total: None), POLICY)
+    return run.reproduce(directory, seed, report or silent, POLICY)

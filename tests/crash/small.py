@@ -8,6 +8,7 @@ import wirebayes as wb
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
 from wirebayes.paper import run
+from wirebayes.progress import silent
 
 # too short to be believed, long enough to be cut off in search, burn-in and sampling
 POLICY = Policy(walkers=32, ess=300.0, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
@@ -35,7 +36,7 @@ def batch(folder: Path) -> None:
 
 def reproduce(folder: Path) -> None:
     run.paper.experiments = lambda: KITE
-    run.reproduce(folder, 0, lambda name, done, total: None, POLICY)
+    run.reproduce(folder, 0, silent, POLICY)
 
 
 COMMANDS: dict[str, Callable[[Path], None]] = {

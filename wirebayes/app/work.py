@@ -2,7 +2,6 @@
 
 import shutil
 import traceback
-from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,7 @@ import wirebayes
 from wirebayes.app.folders import RAW, READ, ROBOTS, STEPS, Test
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import write_json
-
-Progress = Callable[[str, float, float], None]
+from wirebayes.progress import Progress
 
 
 def do_step(send: Connection, folder: Path, step: str, options: dict[str, Any]) -> None:

@@ -1,14 +1,14 @@
 """Progress bars on a terminal, silence in a pipe."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
-Report = Callable[[str, float, float], None]
+from wirebayes.progress import Progress, silent
 
 
 @contextmanager
-def progress() -> Iterator[Report]:
+def progress() -> Iterator[Progress]:
     """Show progress on stderr while the block runs.
 
     Yields
@@ -23,12 +23,13 @@ def progress() -> Iterator[Report]:
     ...         report("sampling", step + 1, 10)
     """
     if not sys.stderr.isatty():
-        yield _silent
+        yield silent  # somebody else reads stderr
         return
     from rich.console import Console  # rich is loaded only where there is someone to look at it
-    from rich.progress import Progress, TaskID, TimeElapsedColumn
+    from rich.progress import Progress as Bars
+    from rich.progress import TaskID, TimeElapsedColumn
 
-    bars = Progress(*Progress.get_default_columns(), TimeElapsedColumn(), console=Console(stderr=True))
+    bars = Bars(*Bars.get_default_columns(), TimeElapsedColumn(), console=Console(stderr=True))
     known: dict[str, TaskID] = {}
 
     def report(name: str, done: float, total: float) -> None:
@@ -43,7 +44,3 @@ def progress() -> Iterator[Report]:
     finally:
         if known:
             bars.stop()
-
-
-def _silent(name: str, done: float, total: float) -> None:
-    """Somebody else reads stderr."""

@@ -12,7 +12,7 @@ from typing import Any
 
 from wirebayes._version import __version__
 from wirebayes.commands.one_experiment import QUANTITIES, BatchTask, Done, do, first_columns, packed
-from wirebayes.commands.options import Progress, check_seed, check_train_holds, model_spec, names_given, path_of, silent
+from wirebayes.commands.options import check_seed, check_train_holds, model_spec, names_given, path_of
 from wirebayes.discovery.search import catalogue_without
 from wirebayes.discovery.settings import SIMULATIONS
 from wirebayes.effects import catalogue, source_of
@@ -26,6 +26,7 @@ from wirebayes.model.build import build
 from wirebayes.model.sample import MATERIAL, SAMPLE
 from wirebayes.notice import Notice, from_json, notices_by_part, to_json
 from wirebayes.processes.workers import as_finished, computing, executor
+from wirebayes.progress import Progress, silent
 from wirebayes.results.outliers import outliers
 from wirebayes.strict.files import PathLike
 from wirebayes.views.batch import Batch

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.commands.options import Progress, above_zero, check_seed, check_spread, from_zero, path_of, silent
+from wirebayes.commands.options import above_zero, check_seed, check_spread, from_zero, path_of
 from wirebayes.commands.wires import (
     RobotLike,
     Wires,
@@ -24,6 +24,7 @@ from wirebayes.io.run_folder import open_run, read_json, stored_results, write_j
 from wirebayes.json_files.calibrate import BelongsTo, CalibrateJson, UnknownsJson
 from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import computing
+from wirebayes.progress import Progress, silent
 from wirebayes.robot.exchange.points import with_points
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot

@@ -3,7 +3,7 @@
 import numpy as np
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import Progress, Source, check_seed, experiments_of, path_of, silent
+from wirebayes.commands.options import Source, check_seed, experiments_of, path_of
 from wirebayes.discovery.preview import preview
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.fit import seed_of
@@ -15,6 +15,7 @@ from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderst
 from wirebayes.json_files.read_units import in_unit
 from wirebayes.notice import notices_by_part, to_json
 from wirebayes.processes.workers import computing
+from wirebayes.progress import Progress, silent
 from wirebayes.strict.files import PathLike
 from wirebayes.views.check import CHECKED, Check
 from wirebayes.views.result import ResultFolder

@@ -7,7 +7,6 @@ from typing import Any
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
-    Progress,
     Source,
     check_seed,
     check_train_holds,
@@ -15,7 +14,6 @@ from wirebayes.commands.options import (
     model_spec,
     names_given,
     path_of,
-    silent,
 )
 from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates, problem_of
 from wirebayes.comparison.compare import POLICY, Task, judge_all, side_by_side
@@ -29,6 +27,7 @@ from wirebayes.json_files.comparison import ComparisonJson, ModelJson
 from wirebayes.model.sample import Likelihood
 from wirebayes.notice import Notice, notices_by_part
 from wirebayes.processes.workers import computing
+from wirebayes.progress import Progress, silent
 from wirebayes.sentences import counted
 from wirebayes.strict.files import PathLike
 from wirebayes.views.comparison import Comparison

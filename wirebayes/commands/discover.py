@@ -6,7 +6,6 @@ from pathlib import Path
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
-    Progress,
     Source,
     check_seed,
     check_train_holds,
@@ -14,7 +13,6 @@ from wirebayes.commands.options import (
     model_spec,
     names_given,
     path_of,
-    silent,
 )
 from wirebayes.discovery.investigation import Investigation, JointModel, alternative_models, final_models
 from wirebayes.discovery.search import catalogue_without, investigate
@@ -27,6 +25,7 @@ from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.model.spec import ModelSpec
 from wirebayes.notice import from_json, notices_by_part, to_json
 from wirebayes.processes.workers import computing, workers
+from wirebayes.progress import Progress, silent
 from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
 from wirebayes.results.read_back import load_posterior

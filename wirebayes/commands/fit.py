@@ -8,7 +8,6 @@ from typing import Any
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import (
-    Progress,
     Source,
     check_seed,
     check_train_holds,
@@ -16,7 +15,6 @@ from wirebayes.commands.options import (
     model_spec,
     names_given,
     path_of,
-    silent,
 )
 from wirebayes.discovery.model_check import checked_meanwhile, write_checks
 from wirebayes.effects import catalogue, effect_named, source_of
@@ -28,6 +26,7 @@ from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
 from wirebayes.numeric.distributions import Normal
 from wirebayes.processes.workers import computing
+from wirebayes.progress import Progress, silent
 from wirebayes.results.jobs import Job, run
 from wirebayes.strict.files import PathLike
 from wirebayes.views.posterior import Posterior, Posteriors

@@ -24,6 +24,7 @@ from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.spec import ModelSpec
 from wirebayes.processes.workers import one_thread_each
+from wirebayes.progress import silent
 from wirebayes.results.jobs import Job, fit_job, store
 from wirebayes.views.posterior import POSTERIOR, SUMMARY
 
@@ -141,7 +142,7 @@ def _fitted(experiment: Experiment, task: BatchTask, folder: Path) -> FitColumns
     job = Job(experiment.name, (experiment,), (), task.own_effects, task.spec, about)
     _fit_and_store(job, folder, task, draws=task.posteriors)
     if task.check:
-        write_checks([job], folder, task.seed, lambda name, done, total: None, map, task.simulations)
+        write_checks([job], folder, task.seed, silent, map, task.simulations)
     summary: SummaryJson = read_json(folder / experiment.name / SUMMARY)
     check = summary.get("model_check")
     return _columns(summary, check and check["p"], check and check["passed"])

@@ -1,7 +1,7 @@
 """The arguments of the public functions, checked and brought into one form."""
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -18,21 +18,9 @@ from wirebayes.strict.hint import hint
 from wirebayes.wire.laws import ElasticLaw, History
 
 Source = PathLike | Experiment | Sequence[Experiment]
-Progress = Callable[[str, float, float], None]
 Numbers = (
     str | float | Sequence[float] | Sequence[float | None]
 )  # text is what the command line was given: it stands in the configuration
-
-
-def silent(name: str, done: float, total: float) -> None:
-    """Nobody watches the progress.
-
-    Parameters
-    ----------
-    name : str
-    done, total : float
-        What a progress function is called with.
-    """
 
 
 def path_of(value: PathLike | None) -> Path | None:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import Progress, above_zero, check_seed, model_spec, path_of, silent
+from wirebayes.commands.options import above_zero, check_seed, model_spec, path_of
 from wirebayes.commands.plan_content import PlanRequest, plan_content, protocol_content
 from wirebayes.commands.predict import find_posterior
 from wirebayes.commands.wires import RobotLike, content_hash, hash_of, robot_of
@@ -33,6 +33,7 @@ from wirebayes.planning.ranking import Judged, ranked
 from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
 from wirebayes.planning.widths import at_centre, expected_widths, middle_tension
 from wirebayes.processes.workers import computing
+from wirebayes.progress import Progress, silent
 from wirebayes.results import read_back
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.simulation.synthetic import Bench

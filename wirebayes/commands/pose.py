@@ -11,14 +11,12 @@ import numpy as np
 from wirebayes.commands.asked_pose import AskedPose, asked_place, loaded, spelled
 from wirebayes.commands.options import (
     Numbers,
-    Progress,
     above_zero,
     check_seed,
     check_spread,
     numbers,
     path_of,
     rising_times,
-    silent,
     text_of,
 )
 from wirebayes.commands.pose_history import Begun, calibrated_errors, checked_errors, pose_along, pose_from_joints
@@ -37,6 +35,7 @@ from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.json_files.plain import plain
 from wirebayes.numeric.typing import Floats
 from wirebayes.processes.workers import computing
+from wirebayes.progress import Progress, silent
 from wirebayes.robot.history.unknowns import Uncertain
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, typical_spread

@@ -9,11 +9,12 @@ import numpy as np
 
 from wirebayes.commands.asked_pose import OFF_PLANE, AskedPose
 from wirebayes.commands.calibrate import calibrated_of
-from wirebayes.commands.options import Progress, above_zero
+from wirebayes.commands.options import above_zero
 from wirebayes.commands.wires import Wires, content_hash, hash_of
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json
 from wirebayes.processes.workers import computing
+from wirebayes.progress import Progress
 from wirebayes.robot.history import table
 from wirebayes.robot.history.answer import history_report
 from wirebayes.robot.history.history import History

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from wirebayes.commands.options import Progress, check_seed, silent
+from wirebayes.commands.options import check_seed
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.processes.workers import computing
+from wirebayes.progress import Progress, silent
 from wirebayes.strict.files import PathLike
 from wirebayes.views.reproduction import Reproduction
 from wirebayes.views.result import ResultFolder

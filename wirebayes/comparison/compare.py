@@ -1,7 +1,7 @@
 """Models side by side: each hold left out in turn, and the last holds predicted from the first."""
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -33,6 +33,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.held_out import HeldOutPrediction, Scores, held_out, two_thirds
 from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error
 from wirebayes.processes.workers import workers
+from wirebayes.progress import Progress, silent
 from wirebayes.wire.control import READ_UNIT
 
 # half the draws of a fit: dozens of models are sampled, and elpd differences count from 4, known to a tenth here
@@ -184,7 +185,7 @@ def judge_all(
     directory: Path,
     seed: int,
     policy: Policy = POLICY,
-    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+    report: Progress = silent,
 ) -> None:
     """Judge all models whose file is not there yet, on all cores; the results do not depend on how many there are.
 

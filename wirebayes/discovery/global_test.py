@@ -4,7 +4,7 @@ Its p-value comes from data sets simulated at the fit and refitted. `discover` a
 both use it, so they give the same answer for the same readings.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import repeat
 from typing import Any
@@ -24,9 +24,9 @@ from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.json_files.discovery import GrossError
 from wirebayes.processes.workers import ParallelMap
+from wirebayes.progress import Progress, silent
 from wirebayes.wire.effect import Effect
 
-Report = Callable[[str, float, float], None]
 CLOSE = 0.00135  # risk on either side that a p on the level itself gives so few, or so many, exceedances
 _AT_ONCE = 100  # simulations of one piece: a tenth of a second or two, beside which what is sent hardly counts
 MOST_TIMES = 4  # as many simulations at most, in units of the requested number
@@ -69,7 +69,7 @@ def examine(
     rng: np.random.Generator,
     *,
     alpha: float = ALPHA,
-    report: Report = lambda name, done, total: None,
+    report: Progress = silent,
     parallel_map: ParallelMap = map,
 ) -> Gate:
     """Test whether fitted blocks leave anything unexplained.

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.discovery.global_test import Report, examine
+from wirebayes.discovery.global_test import examine
 from wirebayes.discovery.screening import TWO
 from wirebayes.discovery.settings import ALPHA, SIMULATIONS
 from wirebayes.effects import catalogue, effect_named
@@ -27,6 +27,7 @@ from wirebayes.json_files.discovery import GrossError
 from wirebayes.json_files.summary import ModelCheckResult, SummaryJson
 from wirebayes.notice import Notice, from_json, to_json
 from wirebayes.processes.workers import ParallelMap, workers
+from wirebayes.progress import Progress
 from wirebayes.results.jobs import Job
 from wirebayes.sentences import spoken
 
@@ -186,7 +187,7 @@ def write_checks(
     jobs: Sequence[Job],
     directory: Path,
     seed: int,
-    report: Report,
+    report: Progress,
     parallel_map: ParallelMap | None = None,
     simulations: int | None = None,
 ) -> None:

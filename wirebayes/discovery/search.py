@@ -5,7 +5,7 @@ beside a flexible reference; further effects by leave-one-hold-out; the gap on h
 detected.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import repeat
@@ -42,6 +42,7 @@ from wirebayes.json_files.read_units import in_unit
 from wirebayes.model.scales import scales_of
 from wirebayes.notice import Notice, notices_by_part, to_json
 from wirebayes.processes.workers import ParallelMap
+from wirebayes.progress import Progress, silent
 from wirebayes.sentences import counted
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, EventEffect
@@ -65,7 +66,7 @@ def investigate(
     experiments: Sequence[Experiment],
     settings: Settings,
     seed: int = 0,
-    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+    report: Progress = silent,
     parallel_map: ParallelMap = map,
 ) -> Investigation:
     """Judge the experiments of one file together.

@@ -1,7 +1,7 @@
 """``wirebayes reproduce``, step by step: fits, tables, pictures, page."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from wirebayes.numeric.typing import Array
 from wirebayes.paper import claim_steps, identification, pictures, section_4, verdicts
 from wirebayes.paper.held_out import Forecast, forecast_held_out
 from wirebayes.processes.workers import workers
+from wirebayes.progress import Progress, silent
 from wirebayes.report.page import write_page
 from wirebayes.results.jobs import Job
 from wirebayes.results.jobs import run as run_jobs
@@ -34,7 +35,7 @@ _PRIOR_DRAWS = 20_000  # cheap, so many: a 5 % quantile is then one between 4.7 
 def reproduce(
     directory: Path,
     seed: int = 0,
-    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+    report: Progress = silent,
     policy: Policy = POLICY,
 ) -> list[str]:
     """Everything the paper shows, on its own tables, with posteriors.
@@ -112,7 +113,7 @@ def _tables_and_pictures(
     published: Mapping[str, Any],
     training: int,
     seed: int,
-    report: Callable[[str, float, float], None],
+    report: Progress,
 ) -> None:
     table_4 = published["table_4"]
     with workers(len(experiments)) as parallel_map:

@@ -13,6 +13,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.processes.workers import cores, workers
+from wirebayes.progress import Progress, silent
 from wirebayes.results.store import save_posterior, save_summary
 
 
@@ -58,7 +59,7 @@ def run(
     seed: int,
     *,
     policy: Policy = DEFAULT,
-    report: Callable[[str, float, float], None] = lambda name, done, total: None,
+    report: Progress = silent,
 ) -> None:
     """Do all fits that are not in the directory yet, on all cores.
 

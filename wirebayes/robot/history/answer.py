@@ -14,11 +14,12 @@ from wirebayes.notice import to_json
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import Progress, silent
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.doubts import history_warnings, unreached
-from wirebayes.robot.history.estimate import Estimate, Progress, estimate_poses
+from wirebayes.robot.history.estimate import Estimate, estimate_poses
 from wirebayes.robot.history.follow import RESTART, Track, follow_log
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.tables import correction_table, pose_table, rotation_vectors
@@ -71,7 +72,7 @@ def history_report(
     errors: Uncertain,
     start: tuple[Floats, Floats],
     seed: int,
-    progress: Progress = lambda name, done, total: None,
+    progress: Progress = silent,
 ) -> HistoryAnswer:
     """Poses over time from measured joint values, or the drift from commanded poses where there are none.
 

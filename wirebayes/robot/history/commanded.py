@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import Progress, silent
 from wirebayes.robot.history.balanced import balanced
-from wirebayes.robot.history.estimate import Estimate, Progress
+from wirebayes.robot.history.estimate import Estimate
 from wirebayes.robot.history.follow import RESTART, Track, clock_starts, follow_log
 from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
@@ -25,7 +26,7 @@ def drift_along(
     history: History,
     errors: Uncertain,
     rng: np.random.Generator,
-    progress: Progress = lambda name, done, total: None,
+    progress: Progress = silent,
     restart: float = RESTART,
 ) -> tuple[Estimate, Floats]:
     """Follow commanded poses: every draw's joint values would give them exactly if its wires did not creep.

@@ -1,6 +1,5 @@
 """Joint values, and tensions and tilts where they were read, to poses with their uncertainty at every row."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +7,7 @@ from numpy.typing import NDArray
 
 from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import Progress, silent
 from wirebayes.robot.history.conditioning import LogReadings, draw_posterior, find_mode, slack_wires
 from wirebayes.robot.history.follow import Track, clock_starts, follow_log, refined_joints
 from wirebayes.robot.history.history import History
@@ -18,7 +18,6 @@ from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState
 
-Progress = Callable[[str, float, float], None]
 _TOO_FEW = 20.0  # effective draws: of fewer, not one lies beyond a 5 % quantile
 _NONE = 1e-9  # of a wire's stiffness: it bears nothing, and the equations keep their form
 
@@ -66,7 +65,7 @@ def estimate_poses(
     start: tuple[Floats, Floats],
     errors: Uncertain,
     rng: np.random.Generator,
-    progress: Progress = lambda name, done, total: None,
+    progress: Progress = silent,
 ) -> Estimate:
     """Where the platform was at each row: forward kinematics of creeping wires, with what the sensors say of them.
 

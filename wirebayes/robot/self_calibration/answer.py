@@ -15,6 +15,7 @@ from wirebayes.json_files.calibrate import (
 )
 from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import Progress, silent
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
@@ -25,7 +26,7 @@ from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import GROSS, LengthPosterior, corrected_joints, length_posterior
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about
-from wirebayes.robot.self_calibration.whole import Progress, progress_of
+from wirebayes.robot.self_calibration.whole import progress_of
 from wirebayes.sentences import number
 
 CANDIDATES = 200  # in the workspace: the best of them come within a few percent of the best there are
@@ -41,7 +42,7 @@ def lengths_report(
     readings: Floats,
     seed: int = 0,
     visits: int = 5,
-    progress: Progress = lambda name, done, total: None,
+    progress: Progress = silent,
 ) -> tuple[CalibrateJson, Calibrated]:
     """Calibrate one robot and say how far the answer can be trusted.
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtr
 
+from wirebayes.progress import Progress
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.residuals import lost, trust
@@ -12,7 +13,7 @@ from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.sensors import Suspects, suspects
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.robot.self_calibration.whole import Progress, estimate, progress_of
+from wirebayes.robot.self_calibration.whole import estimate, progress_of
 
 _RATHER = 3.0  # times smaller errors of the loops, before stated poses are taken for requests
 _WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean

@@ -8,6 +8,7 @@ from scipy.optimize import nnls
 
 from wirebayes.numeric.linear_algebra import solve
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import Progress, silent
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -18,7 +19,7 @@ from wirebayes.robot.self_calibration.residuals import lost, trust
 from wirebayes.robot.self_calibration.strain import stretch
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-from wirebayes.robot.self_calibration.whole import Progress, estimate, progress_of, with_levels
+from wirebayes.robot.self_calibration.whole import estimate, progress_of, with_levels
 
 _TRIALS, _STEPS = 24, 25  # places a search begins from, and its steps: mirror images and far corners are among them
 _WEAK = 1e-2  # pull towards the workspace and the home orientation, beside lengths
@@ -154,7 +155,7 @@ def best(
     unknowns: Unknowns,
     holds: Holds,
     rng: np.random.Generator,
-    progress: Progress = lambda name, done, total: None,
+    progress: Progress = silent,
 ) -> Whole:
     """The posterior from the likeliest of several starts: about the file's geometry, and about others near it.
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import Progress
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.approach import onward
 from wirebayes.robot.self_calibration.descent import descend
@@ -19,8 +20,6 @@ from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
 from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, most_open_m, noise_shown, usual_joint
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
-
-Progress = Callable[[str, float, float], None]  # of name, done and total
 
 _ROUNDS = 60  # of noise and creep: most end in ten
 # Rounds after which a search is given up whose loops are open by so much of the span, and by more than stated errors

@@ -15,6 +15,7 @@ from wirebayes.json_files.calibrate import (
 )
 from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import Progress, silent
 from wirebayes.robot.mechanics import drums, rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
@@ -32,7 +33,7 @@ from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval_about, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
-from wirebayes.robot.self_calibration.whole import Progress, estimate, progress_of
+from wirebayes.robot.self_calibration.whole import estimate, progress_of
 
 _UNEVEN = 0.05  # of the weight: balance that fails by more shows that something else held the platform
 
@@ -75,7 +76,7 @@ def calibration_report(
     seed: int = 0,
     requests: bool = False,
     visits: int = 5,
-    progress: Progress = lambda name, done, total: None,
+    progress: Progress = silent,
 ) -> WholeAnswer:
     """Calibrate a whole robot and say how far the answer can be trusted.
 
