@@ -57,6 +57,16 @@ def test_a_log_that_fits_nothing_ends_early_and_says_how_far_off_it_is(monkeypat
     assert all(0.0 <= share <= 1.0 for _, share in said)
 
 
+def test_the_share_of_a_part_never_falls():
+    """Where exact joint values fit nothing, all starts come again with rough ones."""
+    said = {}
+    _calibrated(
+        6, replace(ROUGH, joint_m=0.0), progress=lambda name, done, total: said.setdefault(name, []).append(done)
+    )
+    assert {"start 1", "rough start 1"} <= said.keys()
+    assert all(shares == sorted(shares) and shares.count(1.0) == 1 for shares in said.values())
+
+
 def _counted(function, count):
     def counted(*arguments):
         count.append(1)

@@ -73,7 +73,8 @@ def searched(
         at_fault = suspects(found, holds, progress_of(progress, "sensors"))
     inexact = unknowns.errors.joint_m == 0 and not (found.converged and p >= SIGNIFICANT)
     if inexact:  # how far from exact the joint values are tells more than that there is no answer
-        found = best(replace(unknowns, errors=replace(unknowns.errors, joint_m=None)), holds, rng, progress)
+        rough = replace(unknowns, errors=replace(unknowns.errors, joint_m=None))
+        found = best(rough, holds, rng, progress, "rough start")
     return Searched(found, holds, p, at_fault, inexact, requested)
 
 

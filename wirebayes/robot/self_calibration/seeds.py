@@ -156,6 +156,7 @@ def best(
     holds: Holds,
     rng: np.random.Generator,
     progress: Progress = silent,
+    called: str = "start",
 ) -> Whole:
     """The posterior from the likeliest of several starts: about the file's geometry, and about others near it.
 
@@ -165,11 +166,13 @@ def best(
     holds : Holds
     rng : numpy Generator
     progress : function of name, done and total
+    called : str
+        What progress calls a start, before its number.
     """
     unknowns = with_levels(unknowns, holds)
 
     def from_start(white: Floats, number: int) -> Whole:
-        watched = progress_of(progress, f"start {number}")
+        watched = progress_of(progress, f"{called} {number}")
         return estimate(unknowns, holds, seed(unknowns, holds, white, rng), watched)
 
     found = from_start(np.zeros(unknowns.count), 1)
