@@ -144,6 +144,13 @@ def test_times_of_day_pass_midnight_however_they_are_written(tmp_path, clock):
     assert [row[2] for row in made.rows] == [0.0, 3600.0, 7200.0, 0.0, 3600.0]  # the first hold lasts until the second
 
 
+def test_durations_that_begin_anew_at_zero_pass_no_midnight(tmp_path):
+    assert times_of(tmp_path, "Time", ["0 h 0 min", "14 h 0 min"]) == [0.0, 50400.0]
+    path = bench_file(tmp_path, "Time", ["0 h 0 min", "14 h 0 min"])
+    second = [row for row in convert(path, ABOUT, Choices()).rows if row[0] == 2]
+    assert [row[2] for row in second] == [0.0, 50400.0]
+
+
 @pytest.mark.parametrize("header", ["Time (in minutes)", "Time (IN MINUTES)", "Time (durations in minutes)"])
 def test_a_unit_in_brackets_may_begin_with_in(tmp_path, header):
     assert times_of(tmp_path, header, ["0", "5"]) == [0.0, 300.0]

@@ -14,7 +14,7 @@ from wirebayes.io.bench.sheet import MONTHS, is_moment, is_number, is_value, mom
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
 
-_DAY = 86400.0
+_DAY, _HOUR = 86400.0, 3600.0
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
 _PUT_BACK = 3600.0  # clocks are put back by an hour in autumn
 _LATE = 3.0  # times the least time between readings: nobody who counts from zero begins so late
@@ -75,7 +75,9 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
     """
     if any(map(is_spelt, table.column(column))):
         values = _spelt(table, column)
-        return values + _DAY * np.cumsum(_days_begin(values, of_day=False)), False
+        # durations are counted from zero, and may be longer than a day
+        on_the_wall = values[0] >= _HOUR and values.max() < _DAY
+        return values + _DAY * np.cumsum(_days_begin(values, of_day=False) & on_the_wall), False
     moments = _moments(table, column, unit)
     # what follows a date or stands before AM is of the day, and leaves no doubt
     of_clock = [m["date"] is None and m["half"] is None for m in moments]
@@ -85,7 +87,7 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
         return (days - days[0]) + values, True
-    of_day = short is None and (not of_clock[0] or values[0] >= 3600.0)
+    of_day = short is None and (not of_clock[0] or values[0] >= _HOUR)
     return values + _DAY * np.cumsum(_days_begin(values, of_day)), of_day
 
 
