@@ -33,6 +33,12 @@ class CheckedTest:
         return [row[mask] for row, mask in zip(self.values, self.protocol.mask, strict=True) if mask.any()]
 
     @property
+    def times_s(self) -> list[Floats]:
+        """When the readings of each recorded hold were taken."""
+        p = self.protocol
+        return [times[mask] for times, mask in zip(p.time_s, p.mask, strict=True) if mask.any()]
+
+    @property
     def setting(self) -> Floats:
         """Of each recorded hold."""
         return self.protocol.setting[self.protocol.recorded]

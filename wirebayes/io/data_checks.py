@@ -187,7 +187,7 @@ def outlier(readings: CheckedTest) -> str:
     usual = max(float(np.quantile(np.delete(distance, worst), 0.9)), readings.noise)
     if distance[worst] <= max(ISOLATED * usual, GROSS * np.ptp(others)):
         return ""
-    time, unit = readings.protocol.time_s[readings.protocol.recorded][hold, at], readings.unit
+    time, unit = readings.times_s[hold][at], readings.unit
     return (
         f"the reading of {readings.each[hold][at]:.5g} {unit} in hold {readings.number[hold]} at {time:g} s is "
         f"{distance[worst]:.3g} {unit} from its neighbours: check it, correct a misprint or leave its row out"
@@ -219,9 +219,8 @@ def rising(readings: CheckedTest) -> str:
 def jump_within_a_hold(readings: CheckedTest) -> str:
     """A change from one reading to the next out of its hold's course, which stays: no wire does that by itself."""
     control = readings.protocol.control
-    for j, row in enumerate(readings.each):
-        time = readings.protocol.time_s[readings.protocol.recorded][j]
-        at = _jump(row, time[: len(row)], readings.noise)
+    for j, (row, time) in enumerate(zip(readings.each, readings.times_s, strict=True)):
+        at = _jump(row, time, readings.noise)
         if at is None:
             continue
         moved = (

@@ -90,9 +90,8 @@ def _moves(readings: CheckedTest, way: float) -> _Moves:
 
 def _late(readings: CheckedTest) -> NDArray[np.bool_]:
     """Recorded holds that are first read later than usual."""
-    times = [np.asarray(t)[m] for t, m in zip(readings.protocol.time_s, readings.protocol.mask, strict=True) if m.any()]
-    first_s = np.array([t[0] for t in times])
-    until_second_s = np.median([t[1] - t[0] for t in times if len(t) > 1] or [0.0])
+    first_s = np.array([times[0] for times in readings.times_s])
+    until_second_s = np.median([times[1] - times[0] for times in readings.times_s if len(times) > 1] or [0.0])
     return np.asarray(first_s - np.median(first_s) > LATE * until_second_s)
 
 
