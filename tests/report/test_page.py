@@ -321,7 +321,7 @@ WORSE = DISCOVERY["held_out"] | {"final": {"rmse_N": 0.2, "elpd": 9.0, "elpd_dif
         ({"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}}, "nothing is missing"),
         (
             {"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}, "p_global": 0.4},
-            "the test of all together finds no more than chance (p = 0.4).",
+            "One pattern of several may stand out by chance; the global test decides (p = 0.4).",
         ),
         (
             {"verdict": "nothing-missing", "effects": [], "amplitudes": {}, "probabilities": {}, "where": []},

@@ -123,9 +123,7 @@ def _disagreements(v: ExperimentFindings) -> list[str]:
     if not patterns:
         return ["No pattern stands out."]
     if v["verdict"] == "nothing-missing":
-        patterns.append(
-            f"Several patterns were looked at; the test of all together finds no more than chance ({_p(v)})."
-        )
+        patterns.append(f"One pattern of several may stand out by chance; the global test decides ({_p(v)}).")
     return patterns
 
 
