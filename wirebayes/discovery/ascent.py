@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery.ladders import FIRST, LAST, AmplitudePath
 from wirebayes.discovery.path_weights import Weighed, weigh, without_last
@@ -13,7 +12,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
 from wirebayes.numeric.distributions import Normal
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools, Ints
 
 _STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
 
@@ -165,7 +164,7 @@ class _Places:
         nothing = np.zeros(len(z)) if amplitude is None else amplitude
         return cls(z.copy(), np.full(len(z), _NEVER), nothing.copy(), np.zeros(len(z)))
 
-    def improve(self, rows: Array, other: "_Places") -> NDArray[np.bool_]:
+    def improve(self, rows: Array, other: "_Places") -> Bools:
         """Take over, in place, the others' places where they are better than these in some rows, and say where."""
         better = other.log_bayes > self.log_bayes[rows]
         for f in fields(self):
@@ -215,7 +214,7 @@ class _Ascent:
         """Whether all amplitudes have reached their ends."""
         return bool(np.isin(np.clip(self.neutral + amplitudes, self.low, self.high), (self.low, self.high)).all())
 
-    def look(self, z: Array, amplitude: Array, alive: NDArray[np.bool_], free: list[int], steps: int) -> _Places:
+    def look(self, z: Array, amplitude: Array, alive: Bools, free: list[int], steps: int) -> _Places:
         """The best places at one step of the path: the other parameters follow while the amplitude is held.
 
         A data set goes on for as long as it gains something from any of its starts.
@@ -261,7 +260,7 @@ class _Ascent:
             z[rows] = _follow(self.target, z[rows], self._seen(rows), both.of(go), here.of(go), free, self.degrees)
         return best
 
-    def _seen(self, rows: NDArray[np.int64]) -> list[Array] | None:
+    def _seen(self, rows: Ints) -> list[Array] | None:
         """The readings of the data sets of some climbs, a sample each; None for the measured ones."""
         return None if self.readings is None else [r[..., rows % self.data_sets] for r in self.readings]
 

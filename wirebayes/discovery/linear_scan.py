@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery import smooth_reference
 from wirebayes.discovery.noise_integral import (
@@ -21,7 +20,7 @@ from wirebayes.discovery.two_effects import log_bayes_of_two
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.log_sum import log_sum
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools, Ints
 
 
 def plain_reference(problem: Problem) -> list[list[Array]]:
@@ -90,7 +89,7 @@ def expand(
     )
 
 
-def _described(trials: Sequence[Probe], m: int) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+def _described(trials: Sequence[Probe], m: int) -> tuple[Bools, Ints]:
     """(m,) whether a signature is one-sided, and (m,) which effect it is of: -1 for those behind the probes'."""
     one_sided, kinds = np.zeros(m, bool), np.full(m, -1)
     one_sided[: len(trials)] = [trial.one_sided for trial in trials]

@@ -10,11 +10,10 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery.tangent import LARGEST_SLOPE, Tangent, damp, whitened
 from wirebayes.numeric.linear_algebra import cholesky
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools, Ints
 
 # of setting to sensor error, squared: from one that does not matter to one beside which the sensor's does not; steps of
 # half a decade, as the evidence is smooth in log ρ
@@ -43,7 +42,7 @@ class Expansion(Tangent):
 
     signatures: Array
     one_sided: Array
-    kinds: NDArray[np.int64]
+    kinds: Ints
     flexible: Array
     processes: tuple[int, ...]
 
@@ -147,7 +146,7 @@ class Functions(NamedTuple):
     taken: Array
     levels: Array
 
-    def of(self, columns: NDArray[np.int64]) -> "Functions":
+    def of(self, columns: Ints) -> "Functions":
         """Some of them, by a row of numbers (n, q) each."""
         plain, levels = (np.take_along_axis(v, columns[:, None], axis=2) for v in (self.plain, self.levels))
         return Functions(plain, np.take_along_axis(self.taken, columns[:, None, None], axis=3), levels)
@@ -221,7 +220,7 @@ def _taken_by(square: Array, along: Array) -> tuple[Array, Array]:
     return np.where(seen, log_volume, 0.0), np.where(seen, less, 0.0)
 
 
-def has_tangent(x: Expansion) -> NDArray[np.bool_]:
+def has_tangent(x: Expansion) -> Bools:
     """(n,) where the model neither overflows nor jumps."""
     parts = (x.parameters, x.signatures, x.flexible, x.residual[..., None])
     with np.errstate(invalid="ignore"):

@@ -3,12 +3,11 @@
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery.noise_integral import ABSORBED, RATIOS
 from wirebayes.discovery.tangent import Tangent, damp
 from wirebayes.numeric.linear_algebra import cholesky, solve
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools
 
 _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the readings jump
 
@@ -84,7 +83,7 @@ class _Free:
     """
 
     gram: Array
-    regular: NDArray[np.bool_]
+    regular: Bools
     log_volume: Array
     along: Array
     square: Array
@@ -122,7 +121,7 @@ def _weigh_few(x: Tangent, signature: Array, near: Array, far: Array, degrees: i
     )
 
 
-def _columns(x: Tangent, signature: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _columns(x: Tangent, signature: Array) -> tuple[Array, Bools]:
     """(n, N, p + 2) parameters, signature and residual, all zero in rows (n,) where the readings jump."""
     columns = np.concatenate([x.parameters, signature[..., None], x.residual[..., None]], axis=2)
     with np.errstate(invalid="ignore"):
@@ -177,7 +176,7 @@ def _summed(height: Array, peak: Array) -> Array:
     return np.where(np.isfinite(total), total, -np.inf)
 
 
-def _steps(gram: Array, regular: NDArray[np.bool_]) -> Array:
+def _steps(gram: Array, regular: Bools) -> Array:
     """(n, p) Gauss-Newton steps, of inner products (n, p + 2, p + 2); none where there is no such step."""
     step = solve(gram[:, :-2, :-2], gram[:, -1, :-2, None])[..., 0]
     return np.where((regular & np.isfinite(step).all(axis=1))[:, None], step, 0.0)

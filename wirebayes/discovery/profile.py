@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from wirebayes.inference.optimum import Optimum, together
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 
 _NEAR_TOP = 1.0  # nats below it that a parabola is fitted to; neighbours alone may differ in their last digits only
 _LEAST_INSIDE = 1e-3  # of a parabola; one farther outside the prior's ends is not the profile's
@@ -43,7 +42,7 @@ class Profile:
         ends = [together(pair).rows(order) for pair in zip(self.ends, other.ends, strict=True)]
         return Profile(amplitude, np.concatenate([self.value, other.value])[order], ends)
 
-    def with_rows(self, rows: NDArray[np.int64], other: "Profile") -> "Profile":
+    def with_rows(self, rows: Ints, other: "Profile") -> "Profile":
         """With some rows replaced by those of another profile."""
         number = np.arange(len(self.value))
         number[rows] = len(number) + np.arange(len(rows))

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import betaincinv
 
 from wirebayes.discovery.linear_scan import expand, plain_reference, scan
@@ -22,7 +21,7 @@ from wirebayes.inference.climb import climb
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.model.sample import LENGTH_EXPONENT
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.protocol import Protocol
 
@@ -143,13 +142,13 @@ def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array
     return value + occam(one_sided), mean, 1.0 / np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
 
 
-def best_probes(candidate: Candidate, scans: Sequence[Scan]) -> list[NDArray[np.int64]]:
+def best_probes(candidate: Candidate, scans: Sequence[Scan]) -> list[Ints]:
     """(n,) numbers of the probes that explain most in each of the candidate's blocks."""
     numbers = np.array([candidate.probe, *candidate.others])
     return [numbers[np.argmax(scans[b].effects[:, numbers], axis=1)] for b in candidate.blocks]
 
 
-def _each(values: Array, columns: NDArray[np.int64]) -> Array:
+def _each(values: Array, columns: Ints) -> Array:
     """(n,) of every row the value in its own column."""
     return np.asarray(np.take_along_axis(values, columns[:, None], axis=1)[:, 0])
 

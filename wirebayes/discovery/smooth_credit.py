@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery.noise_integral import ABSORBED, SIZES, Expansion, Projected, has_tangent, project
 from wirebayes.numeric.linear_algebra import eigh
 from wirebayes.numeric.log_sum import log_sum
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools
 
 
 def beside_smooth(x: Expansion) -> Array:
@@ -44,7 +43,7 @@ class _Products(NamedTuple):
     square: Array
 
 
-def _with_remainder(found: Projected, seen: NDArray[np.bool_]) -> _Products:
+def _with_remainder(found: Projected, seen: Bools) -> _Products:
     """The first row's inner products at some ratios, free of what a remainder of one process takes, too."""
     (functions,), (with_residual,), (smooth,) = found.smooth_square, found.smooth_along, found.smooth
     crossed = smooth.products(found.form, found.shrink)

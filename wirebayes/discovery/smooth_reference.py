@@ -4,11 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery.settings import HOLD_LENGTHS, TIME_LENGTHS
 from wirebayes.numeric.evenly import evenly
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 from wirebayes.wire.protocol import Protocol
 
 FUNCTIONS = 16  # they hold 99 % of the process's variance on the paper's protocols
@@ -21,7 +20,7 @@ _LEAST = 1e-6  # of the largest function's size: smaller ones are rounding error
 class _Readings:
     """(N,) of every reading: number of its hold, displacement above the least, logarithm of its time in the hold."""
 
-    hold: NDArray[np.int64]
+    hold: Ints
     place: Array
     time: Array
 
@@ -34,7 +33,7 @@ class _Readings:
         place = protocol.setting[j] - protocol.setting.min()
         return _Readings(j, place, np.log1p(protocol.time_s[j, r] / (0.2 * typical)))
 
-    def rows(self, which: NDArray[np.int64]) -> "_Readings":
+    def rows(self, which: Ints) -> "_Readings":
         """Some of them."""
         return _Readings(self.hold[which], self.place[which], self.time[which])
 
@@ -94,5 +93,5 @@ def _functions(protocol: Protocol, covariance: _Covariance, most: int) -> Array:
     return out
 
 
-def _smooth(one: Array | NDArray[np.int64], other: Array | NDArray[np.int64], length: float) -> Array:
+def _smooth(one: Array | Ints, other: Array | Ints, length: float) -> Array:
     return np.asarray(np.exp(-0.5 * (np.subtract.outer(one, other) / length) ** 2))

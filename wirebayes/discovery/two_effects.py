@@ -5,11 +5,10 @@ there; a setting error takes the place of a slip only until the elastic curve ha
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.discovery.noise_integral import Expansion, Projected, has_tangent, project, with_each_signature
 from wirebayes.numeric.log_sum import log_sum
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 
 # effects that are tried beside every other one; those of a pair that shows are hardly ever all farther down
 FIRST = 6
@@ -60,12 +59,12 @@ def log_bayes_of_each_pair(x: Expansion) -> Array:
     return pairs - nothing[0]
 
 
-def _forms_of_each(x: Expansion) -> list[NDArray[np.int64]]:
+def _forms_of_each(x: Expansion) -> list[Ints]:
     """The numbers of the signatures of each effect."""
     return [np.flatnonzero(x.kinds == kind) for kind in np.unique(x.kinds[x.kinds >= 0])]
 
 
-def _log_evidence(x: Expansion, found: Projected, first: NDArray[np.int64], groups: list[NDArray[np.int64]]) -> Array:
+def _log_evidence(x: Expansion, found: Projected, first: Ints, groups: list[Ints]) -> Array:
     """(n, j, m) of some signatures (n, j) with each one of another effect; forms share the weight of their effect."""
     left = np.maximum(found.rss[:, :, None, None] - _explained(x, found, first), x.least[:, None, None, None])
     evidence = log_sum(found.shared[:, :, None, None] - 0.5 * x.degrees * np.log(left), axis=1)
@@ -74,7 +73,7 @@ def _log_evidence(x: Expansion, found: Projected, first: NDArray[np.int64], grou
     return np.where(different, evidence + prior[first][:, :, None] + prior, -np.inf)
 
 
-def _log_shares(x: Expansion, groups: list[NDArray[np.int64]]) -> Array:
+def _log_shares(x: Expansion, groups: list[Ints]) -> Array:
     """(m,) log prior of each signature among those of its effect; twice as dense where it has one sign."""
     prior = np.full(len(x.kinds), -np.inf)
     for group in groups:
@@ -82,19 +81,19 @@ def _log_shares(x: Expansion, groups: list[NDArray[np.int64]]) -> Array:
     return prior
 
 
-def _best_forms(single: Array, groups: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+def _best_forms(single: Array, groups: list[Ints]) -> Ints:
     """(n, e) the signature of each effect that explains most."""
     return np.stack([group[np.argmax(single[:, group], axis=1)] for group in groups], axis=1)
 
 
-def _leading(single: Array, groups: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+def _leading(single: Array, groups: list[Ints]) -> Ints:
     """(n, j) the best signatures of the effects that explain most."""
     best = _best_forms(single, groups)
     order = np.argsort(-np.take_along_axis(single, best, axis=1), axis=1, kind="stable")
     return np.take_along_axis(best, order[:, :FIRST], axis=1)
 
 
-def _explained(x: Expansion, found: Projected, first: NDArray[np.int64]) -> Array:
+def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
     """(n, k, j, m) of the sum of squares by some signatures with each one; -inf where an amplitude has no meaning."""
     own = first[:, None, :]
     b, c = found.along[:, :, None, :], found.square[:, :, None, :]

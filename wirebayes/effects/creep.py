@@ -1,17 +1,16 @@
 """Effects on the creep within and between holds."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric.distributions import HalfNormal, LogNormal, Normal, Uniform
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.laws import creep_fraction
 from wirebayes.wire.protocol import Protocol
 
-Own = dict[str, NDArray[Any]]
+Own = dict[str, Array]
 
 
 class PermanentCreep(Effect):
@@ -33,7 +32,7 @@ class PermanentCreep(Effect):
     )
     shows = "between holds, unloading"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["psi"] * hold.carried
 
 
@@ -56,7 +55,7 @@ class Superposition(Effect):
     sentence = "The creep of earlier holds continues on its own time scale after the next hold has begun."
     shows = "grows with hold number, slow inside holds"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         exponent, superposed = hold.theta["N"], 0.0 * hold.grown
         before = np.zeros((1, 1))
         for start_s, goal, k2 in hold.past:
@@ -81,7 +80,7 @@ class SecondRelaxation(Effect):
     sentence = "The wire creeps in two modes, one with a time constant of its own."
     shows = "shape within the hold"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + (own["A"] * hold.initial_tension - value) * -np.expm1(-hold.time_s / own["T2"])
 
 
@@ -97,7 +96,7 @@ class SteadyCreep(Effect):
     sentence = "The wire also flows steadily under tension and never settles."
     shows = "tail of the hold"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["a"] * hold.initial_tension * hold.time_s
 
     @classmethod
@@ -121,7 +120,7 @@ class SteadyCreepCarried(Effect):
     def key(self) -> str:
         return f"{self.name}@carried"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["a"] * hold.initial_tension * hold.time_s
 
 
@@ -137,7 +136,7 @@ class TensionDependentRate(Effect):
     sentence = "The creep runs faster or slower at higher tension."
     shows = "hold shape changes with tension"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         ratio = hold.initial_tension / hold.tension_ref_N
         return value * np.power(np.where(ratio.real > 0.01, ratio, 0.01), own["m"])
 
@@ -154,7 +153,7 @@ class Ageing(Effect):
     sentence = "Each hold relaxes less than the one before, whatever its tension."
     shows = "relaxation amplitude by order, not displacement"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value * (1.0 + hold.index) ** -own["a"]
 
 
@@ -171,7 +170,7 @@ class CreepThreshold(Effect):
     sentence = "Below a threshold tension the wire does not creep."
     shows = "no relaxation in the first holds"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return np.where((value - own["tau_c"]).real > 0, value - own["tau_c"], 0.0)
 
 
@@ -192,7 +191,7 @@ class PriorCreep(Effect):
     sentence = "The wire had been under its preload for some time before the first hold."
     shows = "first holds relax less"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["T_0"]
 
     @classmethod

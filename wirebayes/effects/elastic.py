@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric.distributions import HalfNormal, Normal, TruncatedNormal
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Protocol
 
-Own = dict[str, NDArray[Any]]
+Own = dict[str, Array]
 _DEPENDENT = ("k1", "B", "U", "N")  # parameters that may depend on the length; compiled code counts them in this order
 
 
@@ -27,7 +27,7 @@ class StrainStiffening(Effect):
     sentence = "The wire becomes stiffer (or softer) the more it is strained."
     shows = "curved in displacement, constant within a hold"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value * (1.0 + own["c"] * value)
 
 
@@ -49,7 +49,7 @@ class Toe(Effect):
     sentence = "At low tension the ends are still straightening out and the line pulls less than its stiffness implies."
     shows = "deficit at low tension only"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         strained = hold.zero_mm if hold.law == "hooke" else hold.zero_mm / (1.0 - value)
         return value - own["w"] * _straightened(value * strained, own["w"]) / strained
 
@@ -77,11 +77,11 @@ class ToeOfStrain(Effect):
     def key(self) -> str:
         return f"{self.name}@strain"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value - own["w"] * _straightened(value * hold.length_mm, own["w"]) / hold.length_mm
 
 
-def _straightened(stretch_mm: NDArray[Any], width_mm: NDArray[Any]) -> NDArray[Any]:
+def _straightened(stretch_mm: Array, width_mm: Array) -> Array:
     """Share of its width that a toe has straightened by at a stretch."""
     bent = (width_mm.real > 0) & (stretch_mm.real > 0)
     ratio = np.where(bent, stretch_mm, 0.0) / np.where(bent, width_mm, 1.0)
@@ -104,7 +104,7 @@ class PowerStrain(Effect):
     sentence = "The tension follows a power of the strain."
     shows = "curved in displacement, most at low tension; constant within a hold"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         stretched = value.real > 0
         typical = hold.tension_ref_N / hold.theta["k1"]
         return value * np.power(np.where(stretched, value / typical, 1.0), own["p"])
@@ -123,7 +123,7 @@ class FixtureCompliance(Effect):
     sentence = "The test bench itself deforms under the tension."
     shows = "k1 differs by length; needs two lengths of one line"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         # A spring of compliance c in series with the wire, solved for the tension.
         return value / (1.0 + own["c"] * hold.theta["k1"] / hold.length_mm)
 
@@ -144,7 +144,7 @@ class ThermalExpansion(Effect):
     sentence = "The wire grows or shrinks with the logged temperature."
     shows = "follows the logged temperature"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value * (1.0 + own["alpha"] * hold.warming_K)
 
     @classmethod

@@ -1,14 +1,12 @@
 """Effects that happened once, at one hold of one test."""
 
 from dataclasses import dataclass
-from typing import Any
-
-from numpy.typing import NDArray
 
 from wirebayes.numeric.distributions import HalfNormal, Normal
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, EventEffect, HoldContext
 
-Own = dict[str, NDArray[Any]]
+Own = dict[str, Array]
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class GripSlip(EventEffect):
     sentence = "The wire slipped in its grip once."
     shows = "one step in level; names the hold"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["w"] if hold.order >= self.hold else value
 
 
@@ -39,5 +37,5 @@ class UnrecordedHold(EventEffect):
     sentence = "Time passed at a displacement before its first reading."
     shows = "step in level; names the hold"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["T"] if hold.order == self.hold else value + 0.0 * own["T"]

@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric.distributions import HalfNormal, LogNormal, LogUniform, Normal, Uniform
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Protocol
 
-Own = dict[str, NDArray[Any]]
+Own = dict[str, Array]
 
 
 class ReadingDelay(Effect):
@@ -26,7 +25,7 @@ class ReadingDelay(Effect):
     sentence = "The first reading of each hold was taken later than recorded."
     shows = "first reading low, most where creep is fastest"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         first = np.zeros((len(hold.time_s), 1))
         first[0] = hold.recorded
         return value + own["t_d"] * first
@@ -45,7 +44,7 @@ class LateClock(Effect):
     sentence = "The clock of each hold was started some time after the move."
     shows = "first readings of all holds low"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["t_d"]
 
 
@@ -61,7 +60,7 @@ class SensorDrift(Effect):
     sentence = "The force sensor drifts with time."
     shows = "grows with elapsed time, also within holds"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["a"] * (hold.start_s + hold.time_s)
 
 
@@ -77,7 +76,7 @@ class SensorNonlinearity(Effect):
     sentence = "The force sensor is nonlinear at higher tension."
     shows = "like stiffening; distinguishable with several wires"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value * (1.0 + own["a"] * value)
 
 
@@ -96,7 +95,7 @@ class ClampTransient(Effect):
     sentence = "After each move the clamp or sensor settles, in proportion to the tension."
     shows = "decays inside the hold, scales with tension"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value * (1.0 + own["a"] * np.exp(-hold.time_s / own["T"]))
 
 
@@ -153,7 +152,7 @@ class ScrewError(Effect):
             phase = replace(phase, prior=Uniform(-np.pi, 2.0 * np.pi))
         object.__setattr__(self, "amplitudes", (size, period, phase))
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value + own["a"] * np.cos(2.0 * np.pi / own["P"] * hold.displacement_mm + own["phi"])
 
     def on(self, protocols: Sequence[Protocol]) -> Effect:
@@ -203,7 +202,7 @@ class LostMotion(_NeedsReversal):
     sentence = "The screw has play: after a reversal the true position lags behind."
     shows = "unloading branch"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value - own["w"] * hold.direction if hold.direction != hold.first_direction else value
 
 
@@ -219,5 +218,5 @@ class GuideFriction(_NeedsReversal):
     sentence = "Friction in the guide raises the reading while loading and lowers it while unloading."
     shows = "unloading branch"
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return value * (1.0 + own["mu"] * hold.direction)

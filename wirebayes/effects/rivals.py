@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric.distributions import LogNormal, Uniform
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 
-Own = dict[str, NDArray[Any]]
+Own = dict[str, Array]
 LONG = 720.0  # typical holds: a day, where they last two minutes
 
 
@@ -43,7 +43,7 @@ class AtOnce(Effect):
     amplitudes = ()
     sentence = "All creep of eq (2) happens before the first reading."
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         stretched = value.real > 0
         whole = np.where(stretched, value, 1.0)
         exponent = hold.theta["U"]
@@ -56,7 +56,7 @@ class AtOnce(Effect):
         return np.where(stretched, np.exp(log_s), value)
 
 
-def _nearer(log_s: NDArray[Any], log_creep: NDArray[Any], exponent: Any, whole: NDArray[Any]) -> NDArray[Any]:
+def _nearer(log_s: Array, log_creep: Array, exponent: Any, whole: Array) -> Array:
     """One of Newton's steps towards the elastic part of a whole strain, in its logarithm."""
     elastic, crept = np.exp(log_s), np.exp(log_creep + exponent * log_s)
     return np.asarray(log_s - (elastic + crept - whole) / (elastic + exponent * crept))
@@ -75,7 +75,7 @@ class NotInTime(Effect):
     amplitudes = ()
     sentence = "Nothing changes while a position is held."
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return 0.0 * value
 
 
@@ -89,7 +89,7 @@ class Logarithmic(_WithoutPlateau):
     amplitudes = (Amplitude("t0", "s", np.nan, LogNormal(1.5, 0.08), is_shape=True),)
     sentence = "Creep grows with the logarithm of time."
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         share = np.log1p(hold.time_s / own["t0"]) / np.log1p(self.long_s / own["t0"])
         return np.asarray(share + 0.0 * value)
 
@@ -104,7 +104,7 @@ class PowerLaw(_WithoutPlateau):
     amplitudes = (Amplitude("n", "-", np.nan, LogNormal(0.7, 0.25), is_shape=True),)
     sentence = "Creep grows with a power of time."
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         return np.asarray((hold.time_s / self.long_s) ** own["n"] + 0.0 * value)
 
 
@@ -121,7 +121,7 @@ class TwoModes(Effect):
     )
     sentence = "The creep has two exponential modes."
 
-    def apply(self, value: NDArray[Any], own: Own, hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
         rate = hold.theta["k2"] * hold.time_s
         share = (1.0 - own["slow_share"]) * -np.expm1(-rate) + own["slow_share"] * -np.expm1(-rate / own["slower"])
         return np.asarray(share + 0.0 * value)

@@ -5,13 +5,12 @@ between a few knots. Beyond the training holds the walks continue, so the bands 
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.numeric.distributions import Normal
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 
 KNOTS = 3  # in the training holds, and as many behind them
@@ -55,7 +54,7 @@ class Discrepancy(Effect):
         """The same walks, their size in another unit of tension and the hold in another one of time."""
         return replace(self, size_N=self.size_N * tension, hold_s=self.hold_s * time)
 
-    def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
         place = hold.index / max(self.holds - 1, 1) * KNOTS
         course = np.log1p(10.0 * hold.time_s / self.hold_s) / np.log(11.0) - 0.5
         for k in range(2 * KNOTS):

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.log_posterior import Density, Residuals
 from wirebayes.inference.optimum import Ends, Optimum, nowhere
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools, Ints
 
 _ENOUGH = 0.25  # of what a step promises to gain: with less, damped ones are tried
 _LONGEST = 2.0  # step of a coordinate; they are of order one under the prior
@@ -32,7 +31,7 @@ class _Local:
     gradient: Array
     curvature: Array
 
-    def rows(self, which: NDArray[np.bool_]) -> "_Local":
+    def rows(self, which: Bools) -> "_Local":
         """Some of the places."""
         return _Local(self.value[which], self.gradient[which], self.curvature[which])
 
@@ -63,10 +62,10 @@ class _Climbs:
     vectors: Array
     ahead: Array
     promised: Array
-    arrived: NDArray[np.bool_]
+    arrived: Bools
     damping: Array
-    done: NDArray[np.bool_]
-    converged: NDArray[np.bool_]
+    done: Bools
+    converged: Bools
 
     @classmethod
     def beginning(cls, start: Array) -> "_Climbs":
@@ -86,12 +85,12 @@ class _Climbs:
             converged=np.zeros(n, bool),
         )
 
-    def gain_enough(self, rows: NDArray[np.int64], ahead: Array) -> NDArray[np.bool_]:
+    def gain_enough(self, rows: Ints, ahead: Array) -> Bools:
         """Whether rows gain what makes a step good, given their densities ahead; at its start any density will do."""
         least = np.where(self.arrived[rows], -np.inf, self.value[rows] + _ENOUGH * self.promised[rows])
         return np.asarray(np.isfinite(ahead) & (ahead > least))
 
-    def lead_damped(self, density: Density, rows: NDArray[np.int64]) -> None:
+    def lead_damped(self, density: Density, rows: Ints) -> None:
         """Lead rows whose step was not good to where the best damped one leads; those that none leads up are done."""
         if not len(rows):
             return
@@ -105,7 +104,7 @@ class _Climbs:
         self.damping[moved] = by[better]
         self.arrived[moved] = True
 
-    def take_step(self, rows: NDArray[np.int64], local: _Local, tolerance: float) -> None:
+    def take_step(self, rows: Ints, local: _Local, tolerance: float) -> None:
         """Lead rows to what they looked at, and plan their next steps from what is known there."""
         self.z[rows], self.value[rows] = self.ahead[rows], local.value
         eigen, vectors = _positive(local.curvature)
@@ -120,14 +119,14 @@ class _Climbs:
         self.ahead[rows] = self.z[rows] + _step(slope, eigen, vectors, damping[:, None])[:, 0]
         self.arrived[rows] = False
 
-    def most_promised(self, rows: NDArray[np.int64]) -> Array:
+    def most_promised(self, rows: Ints) -> Array:
         """(n,) densities that rows hardly rise beyond."""
         return np.asarray(self.value[rows] + _PATIENCE * self.promised[rows])
 
-    def give_up(self, rows: NDArray[np.int64]) -> None:
+    def give_up(self, rows: Ints) -> None:
         self.done[rows], self.value[rows] = True, -np.inf
 
-    def optimum(self, rows: NDArray[np.int64]) -> Optimum:
+    def optimum(self, rows: Ints) -> Optimum:
         """Where rows stand."""
         curvature = _composed(self.eigen[rows], self.vectors[rows])
         return Optimum(self.z[rows], self.value[rows], curvature, self.converged[rows])
@@ -140,7 +139,7 @@ def climb(
     *,
     iterations: int = 60,
     tolerance: float = 1e-5,
-    of: NDArray[np.int64] | None = None,
+    of: Ints | None = None,
     known: Sequence[Optimum] = (),
     reach: float = np.inf,
     curvature_at_end: bool = True,
@@ -199,14 +198,14 @@ def climb(
     return curved(density, found) if curvature_at_end else found
 
 
-def _best(value: Array, group: NDArray[np.int64]) -> Array:
+def _best(value: Array, group: Ints) -> Array:
     """(n,) the greatest of the values (n,) in each one's group (n,)."""
     best = np.full(group.max(initial=0) + 1, -np.inf)
     np.maximum.at(best, group, value)
     return best[group]
 
 
-def curved(density: Density, found: Optimum, which: NDArray[np.int64] | None = None) -> Optimum:
+def curved(density: Density, found: Optimum, which: Ints | None = None) -> Optimum:
     """The same places with the curvature of the density itself, where that is finite.
 
     Parameters
@@ -229,7 +228,7 @@ def curved(density: Density, found: Optimum, which: NDArray[np.int64] | None = N
 
 
 def _damped(
-    density: Density, z: Array, rows: NDArray[np.int64], slope: Array, eigen: Array, vectors: Array
+    density: Density, z: Array, rows: Ints, slope: Array, eigen: Array, vectors: Array
 ) -> tuple[Array, Array, Array]:
     """Places (n, d) to which the best of several damped steps leads, the density there, and the dampings (n,)."""
     trial = z[:, None] + _step(slope, eigen, vectors, _DAMPINGS)
@@ -258,7 +257,7 @@ def _positive(matrices: Array) -> tuple[Array, Array]:
     return np.maximum(np.abs(eigen), 1e-9 * scale), vectors
 
 
-def _by_residuals(residuals: Residuals, z: Array, rows: NDArray[np.int64], *_: Array) -> _Local:
+def _by_residuals(residuals: Residuals, z: Array, rows: Ints, *_: Array) -> _Local:
     """Curvature as the expected information, and the gradient, from one more evaluation a coordinate."""
     n, d = z.shape
     points = z[:, None] + np.concatenate([np.zeros((1, d)), _NEAR * np.eye(d)])
@@ -273,7 +272,7 @@ def _by_residuals(residuals: Residuals, z: Array, rows: NDArray[np.int64], *_: A
     return _Local(values[:, 0], np.where(np.isfinite(gradient), gradient, 0.0), curvature)
 
 
-def _by_differences(density: Density, z: Array, rows: NDArray[np.int64], eigen: Array, vectors: Array) -> _Local:
+def _by_differences(density: Density, z: Array, rows: Ints, eigen: Array, vectors: Array) -> _Local:
     """Curvature and gradient from differences of values alone, as far apart as the last curvature's diagonal suggests.
 
     Of that, `eigen` (n, d) are the eigenvalues, `vectors` (n, d, d) the vectors.

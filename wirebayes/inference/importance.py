@@ -16,7 +16,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.inference.chain_statistics import pareto_smoothed
@@ -30,7 +29,7 @@ from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.resampling import truncated_rows
 from wirebayes.numeric.spread_rows import spread_rows
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools, Ints
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class Weighted:
     z: Array
     log_density: Array
     log_proposal: Array
-    settled: NDArray[np.bool_]
+    settled: Bools
     log_integral: Array
     log_ratio: Array
     proposal: Mixture | Proposal
@@ -103,7 +102,7 @@ class _Past:
             (*self.counts, len(new.z)),
         )
 
-    def points(self, wanted: NDArray[np.bool_], ess: float) -> tuple[WeightedPoints, WeightedPoints]:
+    def points(self, wanted: Bools, ess: float) -> tuple[WeightedPoints, WeightedPoints]:
         """Points of the sum of the wanted densities to a power, and of the sum itself.
 
         Parameters
@@ -127,7 +126,7 @@ def importance_sample(
     densities: Callable[[Array], Array],
     start: Mixture,
     draws: Array,
-    order: NDArray[np.int64],
+    order: Ints,
     rng: np.random.Generator,
     ess: float,
 ) -> Weighted:
@@ -191,7 +190,7 @@ def _remembering(points: WeightedPoints, witness: Array) -> WeightedPoints:
 def from_draws(
     densities: Callable[[Array], Array],
     draws: Array,
-    order: NDArray[np.int64],
+    order: Ints,
     rng: np.random.Generator,
     ess: float,
 ) -> Weighted:
@@ -229,7 +228,7 @@ def _weighted(
     n: int,
     ess: float,
     rng: np.random.Generator,
-    settled: NDArray[np.bool_],
+    settled: Bools,
 ) -> Weighted:
     """Weighted draws of a proposal.
 
@@ -292,7 +291,7 @@ def _learned(
     hot: WeightedPoints,
     cold: WeightedPoints,
     start: Mixture,
-    order: NDArray[np.int64],
+    order: Ints,
     rng: np.random.Generator,
     before: Mixture | Proposal,
 ) -> Mixture | Proposal:

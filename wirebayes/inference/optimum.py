@@ -5,9 +5,8 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools, Ints
 
 LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
 _ONE_MODE = 4.0  # squared standard deviations
@@ -31,7 +30,7 @@ class Optimum:
     z: Array
     log_density: Array
     curvature: Array
-    converged: NDArray[np.bool_]
+    converged: Bools
 
     def rows(self, which: Any) -> "Optimum":
         """Some of them, by number or mask."""
@@ -61,7 +60,7 @@ class Optimum:
 class Ends:
     """Where climbs of several densities have ended, and which density (k,) each place is of."""
 
-    which: NDArray[np.int64]
+    which: Ints
     places: Optimum
 
     @classmethod
@@ -69,7 +68,7 @@ class Ends:
         """Modes of each density that are known."""
         return cls(np.repeat(np.arange(len(known)), [len(found.z) for found in known]), together(known))
 
-    def joined(self, which: NDArray[np.int64], ended: Optimum) -> "Ends":
+    def joined(self, which: Ints, ended: Optimum) -> "Ends":
         """With further places, highest first, but for those that are near one.
 
         Parameters
@@ -84,7 +83,7 @@ class Ends:
                 out = Ends(np.append(out.which, which[i]), together([out.places, here]))
         return out
 
-    def near(self, which: NDArray[np.int64], z: Array, value: Array) -> NDArray[np.bool_]:
+    def near(self, which: Ints, z: Array, value: Array) -> Bools:
         """(n,) whether places would count as one of these modes of their density; never where they are higher.
 
         Parameters

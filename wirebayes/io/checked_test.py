@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol
 
@@ -44,7 +43,7 @@ class CheckedTest:
         return self.protocol.setting[self.protocol.recorded]
 
     @property
-    def number(self) -> NDArray[np.int64]:
+    def number(self) -> Ints:
         """Of each recorded hold."""
         return self.protocol.number[self.protocol.recorded]
 

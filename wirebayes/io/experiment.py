@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.readings import Hold
 from wirebayes.numeric.frozen import frozen
+from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import counted
 from wirebayes.wire.protocol import Control, Protocol
 
@@ -84,12 +84,12 @@ class Experiment:
         first = next((hold.temperature_C[0] for hold in self.holds if hold.temperature_C is not None), None)
         return protocol_of(self.holds, self.length_mm, first)
 
-    def readings(self) -> NDArray[np.float64]:
+    def readings(self) -> Floats:
         """What was read, (H, R), padded with 0 as `protocol` is: tensions in N, or displacements in mm."""
         read = _padded([hold.readings for hold in self.holds])
         return np.pad(read, [(0, 0), (0, self.protocol().mask.shape[1] - read.shape[1])])
 
-    def tension(self) -> NDArray[np.float64]:
+    def tension(self) -> Floats:
         """Tensions, (H, R) in N, padded with 0 as `protocol` is: as read, or as set."""
         if self.control == "displacement":
             return self.readings()
@@ -217,7 +217,7 @@ def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | 
     )
 
 
-def _padded(rows: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _padded(rows: list[Floats]) -> Floats:
     array = np.zeros((len(rows), max((row.size for row in rows), default=0)))
     for target, row in zip(array, rows, strict=True):
         target[: row.size] = row

@@ -9,12 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold
 from wirebayes.numeric.frozen import frozen
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.sentences import counted, listed
 from wirebayes.wire.protocol import Protocol
 
@@ -45,7 +44,7 @@ class Event:
 
     kind: str
     text: str
-    readings: NDArray[np.int64]
+    readings: Ints
 
 
 @dataclass(frozen=True)
@@ -63,8 +62,8 @@ class _Test:
         What is read.
     """
 
-    hold: NDArray[np.int64]
-    number: NDArray[np.int64]
+    hold: Ints
+    number: Ints
     setting: Floats
     time_s: Floats
     read: Floats
@@ -76,7 +75,7 @@ class _Test:
         """Where a reading stands."""
         return f"hold {self.number[i]} from {self.time_s[i]:g} s on"
 
-    def holds(self, readings: NDArray[np.int64]) -> str:
+    def holds(self, readings: Ints) -> str:
         """The holds of some readings, in words."""
         numbers = np.unique(self.number[readings])
         if len(numbers) > 2 and np.isin(self.number[readings[0] : readings[-1] + 1], numbers).all():
@@ -289,7 +288,7 @@ def _limits(test: _Test, resolution: float) -> list[Event]:
     return events
 
 
-def _slope_beside(test: _Test, at: NDArray[np.int64]) -> float:
+def _slope_beside(test: _Test, at: Ints) -> float:
     """How far readings change with the setting between neighbouring holds without readings at a limit; the median."""
     free = np.setdiff1d(test.hold, test.hold[at])
     settings = np.array([test.setting[test.hold == h][0] for h in free])

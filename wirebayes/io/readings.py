@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.numeric.frozen import frozen
+from wirebayes.numeric.typing import Floats
 from wirebayes.strict.table import CsvTable, read_table
 from wirebayes.wire.protocol import Control
 
@@ -53,9 +53,9 @@ class Hold:
     number: int | None
     setting: float
     duration_s: float
-    time_s: NDArray[np.float64]
-    readings: NDArray[np.float64]
-    temperature_C: NDArray[np.float64] | None = None
+    time_s: Floats
+    readings: Floats
+    temperature_C: Floats | None = None
     start_s: float = 0.0
     control: Control = "displacement"
 
@@ -306,7 +306,7 @@ STRETCH = 8.0  # the most elastic thread breaks at seven times its length
 RUN_ON_CERTAIN = 1e-4  # three holds of four readings; two holds of five may still be an odd protocol (0.004)
 
 
-def times_run_on(times_s: Sequence[NDArray[np.float64]]) -> float:
+def times_run_on(times_s: Sequence[Floats]) -> float:
     """How likely the reading times would run on from hold to hold over the whole test, had they nothing to do with it.
 
     Parameters

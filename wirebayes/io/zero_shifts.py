@@ -8,10 +8,9 @@ back is an error of a single setting.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.io.checked_test import CheckedTest
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Ints
 
 FEWEST = 6  # with fewer moves one way nothing shows what a move usually adds
 STANDS_OUT = 4.0  # a step is off by so many times what nine in ten of the other moves are off by
@@ -39,7 +38,7 @@ class _Moves:
         By how much the setting changes, and its middle.
     """
 
-    hold: NDArray[np.int64]
+    hold: Ints
     added: Floats
     inner: Floats
     moved: Floats
@@ -88,7 +87,7 @@ def _moves(readings: CheckedTest, way: float) -> _Moves:
     return _Moves(at + 1, added[at], inner[at], moved[at], middle[at])
 
 
-def _late(readings: CheckedTest) -> NDArray[np.bool_]:
+def _late(readings: CheckedTest) -> Bools:
     """Recorded holds that are first read later than usual."""
     first_s = np.array([times[0] for times in readings.times_s])
     until_second_s = np.median([times[1] - times[0] for times in readings.times_s if len(times) > 1] or [0.0])

@@ -2,14 +2,11 @@
 
 from typing import Any, Literal, TypedDict
 
-import numpy as np
-from numpy.typing import NDArray
-
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Ints
 
 # an array where it is computed, a list where it is read
 Numbers = Floats | list[float]
-Integers = NDArray[np.int64] | list[int]
+Integers = Ints | list[int]
 
 # of the plain model's parameters; errors of what is set and read have the unit of either
 UNITS = {"k1": "N", "B": "mm N^-U", "U": "1", "k2": "s^-N", "N": "1", "preload": "mm"}

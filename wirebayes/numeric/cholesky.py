@@ -1,12 +1,11 @@
 """Many small symmetric systems at once: Cholesky written over the batch, which numpy does fast."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 
 
-def solve_symmetric(H: Floats, right: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def solve_symmetric(H: Floats, right: Floats) -> tuple[Floats, Bools]:
     """Solve ``H x = right`` for symmetric matrices.
 
     Parameters

@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+
+from wirebayes.numeric.typing import Floats
 
 
-def frozen(values: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
+def frozen(values: Sequence[float] | Floats) -> Floats:
     """A read-only array, so that what was measured stays what was measured."""
     array = np.array(values, dtype=float)
     array.flags.writeable = False

@@ -8,9 +8,8 @@ have none.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools
 
 
 def solve(matrices: Array, right: Array) -> Array:
@@ -53,7 +52,7 @@ def _each(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: 
     return tuple(np.where(usable.reshape(*usable.shape, *[1] * (a.ndim - usable.ndim)), a, np.nan) for a in out)
 
 
-def _computable(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> NDArray[np.bool_]:
+def _computable(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> Bools:
     """Which matrices of a stack a function takes, ``(...)``, by trying ever smaller parts of the stack."""
     stack = matrices.shape[:-2]
     flat = matrices.reshape(-1, *matrices.shape[-2:])

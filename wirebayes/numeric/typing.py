@@ -7,3 +7,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]  # of numbers; sums of several kinds have no narrower type
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+Indices = NDArray[np.intp]  # what numpy returns when it is asked where

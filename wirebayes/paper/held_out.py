@@ -3,11 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.single_holds import hold_courses
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 from wirebayes.prediction.predictive import PredictionRequest, draw_predictive
 from wirebayes.results.read_back import Stored
 from wirebayes.wire.model import Model
@@ -29,7 +28,7 @@ class Forecast:
         Predictive draws: parameter, setting, sensor and rounding error.
     """
 
-    hold: NDArray[np.int64]
+    hold: Ints
     time_s: Array
     measured_N: Array
     drawn_N: Array

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from wirebayes.io.experiment import Experiment
@@ -18,7 +17,7 @@ from wirebayes.model.sample import MATERIAL
 from wirebayes.model.scales import scales_of
 from wirebayes.model.single_holds import hold_courses
 from wirebayes.model.spec import ModelSpec
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
 
@@ -141,7 +140,7 @@ class _Search:
     variant: ModelSpec
     known: Mapping[str, float]
     names: Sequence[str]
-    logarithmic: NDArray[np.bool_]
+    logarithmic: Bools
 
     def natural(self, z: Array) -> dict[str, Array]:
         """(n, d) search coordinates as parameters, each (n,)."""
@@ -156,7 +155,7 @@ class _Search:
         return np.where(np.isfinite(values), values, self.experiment.tension()[predicted][:, None])
 
 
-def _predicted(experiment: Experiment, variant: ModelSpec) -> NDArray[np.bool_]:
+def _predicted(experiment: Experiment, variant: ModelSpec) -> Bools:
     """Which readings (H, R) are predicted: hold by hold all but the first of each."""
     predicted = experiment.protocol().mask.copy()
     if variant.likelihood == "hold":
@@ -179,7 +178,7 @@ def leading(experiment: Experiment, holds: int) -> int:
     return len(experiment.train(holds).holds)
 
 
-def _logged(values: Array, logarithmic: NDArray[np.bool_]) -> Array:
+def _logged(values: Array, logarithmic: Bools) -> Array:
     return np.where(logarithmic, np.log(np.where(logarithmic, values, 1.0)), values)
 
 

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.run_folder import write_json
+from wirebayes.numeric.typing import Floats
 from wirebayes.paper.figures import drifts
 from wirebayes.paper.pictures import Gallery
 from wirebayes.report.blocks import number
@@ -103,7 +103,7 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
     """
     robot = schema.read_robot_file(MAPPED)
     x, R = robot.home_m, matrix(robot.home_rotation_rad)
-    moved: dict[str, NDArray[np.float64]] = {}
+    moved: dict[str, Floats] = {}
     budget: dict[str, dict[str, float]] = {}
     for wire, stored in chains.items():
         line = as_line(stored)

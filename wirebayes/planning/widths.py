@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import Density, LogPosterior
@@ -23,7 +22,7 @@ from wirebayes.model.replicate import readings
 from wirebayes.model.sample import MATERIAL
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.numeric.frozen import frozen
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Indices
 from wirebayes.results.parameters import unit_of
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.staircase import simulate
@@ -181,7 +180,7 @@ def _expected(widths: list[dict[str, Array]], before: dict[str, Array], test: Ex
 
 
 def _posteriors(
-    target: LogPosterior, found: Optimum, good: NDArray[np.intp], y: Array, rng: np.random.Generator
+    target: LogPosterior, found: Optimum, good: Indices, y: Array, rng: np.random.Generator
 ) -> Iterator[_Posteriors]:
     """Weighted draws around the best parameters of each test, some tests at once."""
     covariance = found.covariance
@@ -195,7 +194,7 @@ def _rows(values: Mapping[str, Array]) -> list[dict[str, Array]]:
     return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
 
 
-def _climbed(target: LogPosterior, truth: Array, y: Array) -> tuple[Optimum, NDArray[np.intp]]:
+def _climbed(target: LogPosterior, truth: Array, y: Array) -> tuple[Optimum, Indices]:
     """The best parameters of each simulated test, and of which tests there is a posterior around them."""
     density, residuals = target.rowwise([y])
     start = target.coordinates.to_sampled(truth)

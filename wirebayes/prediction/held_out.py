@@ -7,13 +7,12 @@ were made. The same code serves a single hold left out in the middle and the las
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods, single_holds
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools, Ints
 from wirebayes.prediction.leave_one_hold_out import evenly_thinned
 from wirebayes.prediction.predictive import PredictionRequest, draw_predictive, given_first
 from wirebayes.wire.staircase import linearise
@@ -44,7 +43,7 @@ class Scores:
         Share of joint draws whose `pit` strays at least as far from that band's middle.
     """
 
-    hold: NDArray[np.int64]
+    hold: Ints
     time_s: Array
     observed_N: Array
     mean_N: Array
@@ -140,7 +139,7 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
 
 
 def _scores(
-    drawn: Array, rows: NDArray[np.bool_], number: Array, time_s: Array, tension: Array, elpd: Array, together: float
+    drawn: Array, rows: Bools, number: Array, time_s: Array, tension: Array, elpd: Array, together: float
 ) -> Scores:
     draws, observed = drawn[rows], tension[rows]
     band, p = pit_band(draws, observed)
@@ -193,7 +192,7 @@ def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[
 
 
 def _chain_scores(
-    fitted: Posterior, experiment: Experiment, sample: int, requested: NDArray[np.bool_]
+    fitted: Posterior, experiment: Experiment, sample: int, requested: Bools
 ) -> tuple[Array, Array, float]:
     """log p(readings | training) and log p(later readings | first, training) of each held-out hold; all together."""
     here = fitted.problem.samples[sample]
@@ -218,7 +217,7 @@ def _chain_scores(
     return whole_hold, whole_hold - first_reading, float(_log_mean(np.concatenate(together, axis=-1)))
 
 
-def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, requested: NDArray[np.bool_]) -> Array:
+def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, requested: Bools) -> Array:
     problem, here = fitted.problem, fitted.problem.samples[sample]
     own = problem.parameters(evenly_thinned(fitted.flat), here)
     own = own | {"preload": 0.0 * own["B"]}

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import expit, logsumexp
 
@@ -21,7 +20,7 @@ from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.model.problem import Problem
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.prediction.left_out_density import log_densities, without_hold
 
 # Above 0.7 importance sampling cannot be trusted (Vehtari et al., Pareto smoothed importance sampling). Stricter here:
@@ -54,10 +53,10 @@ class LeftOutHolds:
     """
 
     sample: tuple[str, ...]
-    hold: NDArray[np.int64]
+    hold: Ints
     elpd: Floats
     pareto_k: Floats
-    refitted: NDArray[np.bool_]
+    refitted: Bools
     converged: bool = True
 
     @property
@@ -138,7 +137,7 @@ def _smoothed(conditional: Sequence[Floats]) -> tuple[Floats, Floats]:
     return elpd, k
 
 
-def _holds_named(problem: Problem, where: Sequence[tuple[int, int]]) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+def _holds_named(problem: Problem, where: Sequence[tuple[int, int]]) -> tuple[tuple[str, ...], Ints]:
     """Sample and number of each hold."""
     names = tuple(problem.samples[s].name for s, _ in where)
     return names, np.array([problem.samples[s].protocol.number[j] for s, j in where])

@@ -11,7 +11,6 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference import importance
 from wirebayes.inference.fit import seed_of
@@ -19,14 +18,12 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import searches
 from wirebayes.inference.weighted_posterior import overlooked_share, weighted_posterior
 from wirebayes.model.problem import Problem
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools
 
 Holds = list[tuple[int, int]]
 
 
-def log_densities(
-    problem: Problem, holds: Holds, draws: Array, seed: int, doubtful: NDArray[np.bool_]
-) -> tuple[Array, NDArray[np.bool_]]:
+def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int, doubtful: Bools) -> tuple[Array, Bools]:
     """Log density of the readings of some holds, each given those of all other holds.
 
     Parameters
@@ -69,8 +66,8 @@ def _bear_witness(
     target: LogPosterior,
     holds: Holds,
     pool: importance.Weighted,
-    settled: NDArray[np.bool_],
-    doubtful: NDArray[np.bool_],
+    settled: Bools,
+    doubtful: Bools,
     rng: np.random.Generator,
 ) -> None:
     """Of the doubtful holds that seem settled, those stay so of which a search of its own finds nothing overlooked."""

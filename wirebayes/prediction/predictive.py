@@ -11,13 +11,12 @@ each draw is shifted by the regression of all readings on the given ones, which 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.linear_algebra import eigh, solve
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Theta, Walk, linearise
@@ -43,7 +42,7 @@ class PredictionRequest:
 
     protocol: Protocol
     trained: int
-    requested: NDArray[np.bool_]
+    requested: Bools
     first: Floats
 
 

@@ -2,15 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError, shown
 from wirebayes.io.experiment import protocol_of
 from wirebayes.io.readings import READ, SET, Hold, protocol_holds
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Array, Floats
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.read_back import Stored
 from wirebayes.sentences import counted
@@ -225,7 +223,7 @@ def _joined(before: Protocol, after: Protocol) -> Protocol:
     """One protocol after another, padded to the same width."""
     width = max(before.time_s.shape[1], after.time_s.shape[1])
 
-    def padded(array: NDArray[Any]) -> Floats:
+    def padded(array: Array) -> Floats:
         return np.pad(array.astype(float), [(0, 0), (0, width - array.shape[1])])
 
     warming = None

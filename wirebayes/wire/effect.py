@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Array
 from wirebayes.wire.laws import ElasticLaw
 from wirebayes.wire.protocol import Control, Protocol
 
@@ -75,7 +75,7 @@ class Amplitude:
     of_each_test: bool = False
 
 
-Clock = tuple[Any, NDArray[Any], NDArray[Any]]  # when it began, the creep that it heads for, its rate
+Clock = tuple[Any, Array, Array]  # when it began, the creep that it heads for, its rate
 
 
 @dataclass
@@ -124,20 +124,20 @@ class HoldContext:
     first_direction: int
     start_s: float
     duration_s: float
-    time_s: NDArray[Any]
-    warming_K: NDArray[Any]
+    time_s: Array
+    warming_K: Array
     length_mm: float
     length_ref_mm: float
     tension_ref_N: float
-    theta: dict[str, NDArray[Any]]
-    initial_tension: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
-    carried: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
-    zero_mm: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
-    grown: NDArray[Any] = field(default_factory=lambda: np.zeros((1, 1)))
+    theta: dict[str, Array]
+    initial_tension: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    carried: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    zero_mm: Array = field(default_factory=lambda: np.zeros((1, 1)))
+    grown: Array = field(default_factory=lambda: np.zeros((1, 1)))
     past: list[Clock] = field(default_factory=list)
     law: ElasticLaw = "hooke"
 
-    def carrying(self, carried: NDArray[Any]) -> "HoldContext":
+    def carrying(self, carried: Array) -> "HoldContext":
         """The same hold with other creep carried into it, (1, n)."""
         # coordinates need one for every hold of a batch, and `replace` takes three times as long
         return HoldContext(**vars(self) | {"carried": carried})
@@ -167,7 +167,7 @@ class Effect:
     needs_saturation: ClassVar[bool] = False  # has no meaning where creep is added anew in every hold
     control: Control | None = None  # of the tests that it acts on, where it does not act on all: see `under`
 
-    def apply(self, value: NDArray[Any], own: dict[str, NDArray[Any]], hold: HoldContext) -> NDArray[Any]:
+    def apply(self, value: Array, own: dict[str, Array], hold: HoldContext) -> Array:
         """The quantity at the effect's place, changed by the effect.
 
         Parameters
@@ -284,7 +284,7 @@ class Placed:
     own : dict of effect key to its amplitudes by their short names
     """
 
-    def __init__(self, effects: Sequence[Effect], theta: Mapping[str, NDArray[Any]]) -> None:
+    def __init__(self, effects: Sequence[Effect], theta: Mapping[str, Array]) -> None:
         self.at: dict[str, list[Effect]] = {}
         for effect in effects:
             self.at.setdefault(effect.place, []).append(effect)
@@ -309,7 +309,7 @@ class Placed:
 
 
 def steady_hold(
-    theta: Mapping[str, NDArray[Any]],
+    theta: Mapping[str, Array],
     length_mm: Any,
     tension_ref_N: float,
     *,
@@ -317,8 +317,8 @@ def steady_hold(
     length_ref_mm: Any = None,
     index: int = 0,
     start_s: float = 0.0,
-    tension_N: NDArray[Any] | None = None,
-    carried_mm: NDArray[Any] | None = None,
+    tension_N: Array | None = None,
+    carried_mm: Array | None = None,
 ) -> HoldContext:
     """A hold away from the bench: no displacement, no temperature, no earlier holds unless `index` says so.
 

@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric.means import geometric_mean
+from wirebayes.numeric.typing import Array
 from wirebayes.wire import laws
 from wirebayes.wire.effect import Effect
 
@@ -43,7 +42,7 @@ class Model:
 PLAIN = Model()
 
 
-def tension_reference(tensions: Sequence[float] | NDArray[Any]) -> float:
+def tension_reference(tensions: Sequence[float] | Array) -> float:
     """Geometric mean of the positive tensions, N; the constant that some effects and coordinates refer to."""
     values = np.asarray(tensions, float)
     values = values[values > 0]

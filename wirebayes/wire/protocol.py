@@ -5,9 +5,8 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Ints
 
 Control = Literal["displacement", "force"]  # what is set in a hold; the other is read
 
@@ -45,9 +44,9 @@ class Protocol:
     length_mm: float
     setting: Floats
     time_s: Floats
-    mask: NDArray[np.bool_]
+    mask: Bools
     duration_s: Floats
-    number: NDArray[np.int64]
+    number: Ints
     warming_K: Floats | None = None
     reference_C: float | None = None
     control: Control = "displacement"
@@ -73,13 +72,13 @@ class Protocol:
             object.__setattr__(self, name, array)
 
     @property
-    def _longer(self) -> NDArray[np.bool_]:
+    def _longer(self) -> Bools:
         """(H,) True where a hold went on after its last reading."""
         last_s = np.max(self.time_s * self.mask, axis=1, initial=0.0)
         return np.asarray(self.recorded & (self.duration_s > last_s))
 
     @property
-    def recorded(self) -> NDArray[np.bool_]:
+    def recorded(self) -> Bools:
         """(H,) True for holds with readings."""
         return np.asarray(self.mask.any(axis=1))
 
@@ -89,7 +88,7 @@ class Protocol:
         return np.concatenate([[0.0], np.cumsum(self.duration_s)[:-1]])
 
     @cached_property
-    def distinct_times(self) -> tuple[Floats, tuple[slice | NDArray[np.int64], ...]]:
+    def distinct_times(self) -> tuple[Floats, tuple[slice | Ints, ...]]:
         """Times of readings (T,), of an unrecorded hold its end, each once, and for every hold where its own stand."""
         time = np.where(self.recorded[:, None], self.time_s, self.duration_s[:, None])
         times, where = np.unique(time, return_inverse=True)
@@ -101,12 +100,12 @@ class Protocol:
         )
 
     @cached_property
-    def last_reading(self) -> NDArray[np.int64]:
+    def last_reading(self) -> Ints:
         """(H,) column of each hold's last reading."""
         return np.asarray(np.maximum(self.mask.sum(axis=1) - 1, 0))
 
     @cached_property
-    def end(self) -> NDArray[np.int64]:
+    def end(self) -> Ints:
         """(H,) column in which each hold ends: that of its last reading, or the one behind it."""
         return self.last_reading + self._longer
 

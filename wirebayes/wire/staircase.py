@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Array
 from wirebayes.wire import compiled, laws
 from wirebayes.wire.control import SETTINGS
 from wirebayes.wire.creep import Creep
@@ -22,8 +22,8 @@ from wirebayes.wire.protocol import Protocol
 if TYPE_CHECKING:
     from wirebayes.wire._kernel import Staircases
 
-Theta = Mapping[str, NDArray[Any]]
-_NONE: NDArray[Any] = np.zeros((1, 1))  # stands in for what the hold has not computed yet
+Theta = Mapping[str, Array]
+_NONE: Array = np.zeros((1, 1))  # stands in for what the hold has not computed yet
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
 
 
@@ -43,17 +43,15 @@ class Linearised:
         Creep elongation carried into each hold, and out of the last.
     """
 
-    reading: NDArray[Any]
-    by_setting: NDArray[Any]
-    by_creep: NDArray[Any]
-    carry_by_setting: NDArray[Any]
-    carry_by_creep: NDArray[Any]
-    creep: NDArray[Any]
+    reading: Array
+    by_setting: Array
+    by_creep: Array
+    carry_by_setting: Array
+    carry_by_creep: Array
+    creep: Array
 
 
-def simulate(
-    protocol: Protocol, theta: Theta, model: Model = PLAIN, setting_error: NDArray[Any] | None = None
-) -> NDArray[Any]:
+def simulate(protocol: Protocol, theta: Theta, model: Model = PLAIN, setting_error: Array | None = None) -> Array:
     """Noise-free readings, the setting errors entering exactly.
 
     Parameters
@@ -82,7 +80,7 @@ def simulate(
     return np.array(readings)
 
 
-def simulate_alone(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> list[NDArray[Any]]:
+def simulate_alone(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> list[Array]:
     """Noise-free readings (R, n) of each hold as if there had been none before it.
 
     Parameters
@@ -182,7 +180,7 @@ class Walk:
         self.late: Any = 0.0
         self.effects = Placed(model.effects, theta)
         self.at, self.change = self.effects.at, self.effects.change
-        self.theta: dict[str, NDArray[Any]] = dict(theta)
+        self.theta: dict[str, Array] = dict(theta)
         if "sample" in self.at:
             self.theta = self.change("sample", self.theta, self._context(0))
         self.late = self.change("time", np.zeros((1, 1)), self._context(0)) if "time" in self.at else 0.0
@@ -199,8 +197,8 @@ class Walk:
         self.fraction = laws.creep_fraction(times[:, None] + self.late, self.k2, self.N)
 
     def hold(
-        self, j: int, setting: NDArray[Any], creep: NDArray[Any], beside: dict[str, NDArray[Any]]
-    ) -> tuple[NDArray[Any], NDArray[Any], dict[str, NDArray[Any]]]:
+        self, j: int, setting: Array, creep: Array, beside: dict[str, Array]
+    ) -> tuple[Array, Array, dict[str, Array]]:
         """One hold, effects included; real or complex.
 
         Parameters
@@ -238,7 +236,7 @@ class Walk:
         end = self.protocol.end[j]
         return readings, hold.grown[end], {key: course[end][None] for key, course in courses.items()}
 
-    def begin(self, n: int) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
+    def begin(self, n: int) -> tuple[Array, dict[str, Array]]:
         """What the wire brings into the first hold: its creep (n,), and elongations beside it by effect key."""
         if "before" not in self.at:
             return np.zeros(n), {}
@@ -249,9 +247,7 @@ class Walk:
         beside = self._wait(held, self.change("before", np.zeros((1, 1)), hold), {}, hold)
         return np.array(np.broadcast_to(hold.carried[0], (n,))), beside
 
-    def _wait(
-        self, held: NDArray[Any], wait_s: NDArray[Any], beside: dict[str, NDArray[Any]], hold: HoldContext
-    ) -> dict[str, NDArray[Any]]:
+    def _wait(self, held: Array, wait_s: Array, beside: dict[str, Array], hold: HoldContext) -> dict[str, Array]:
         """Let time pass before a hold begins, as in a hold that nobody reads; what is then beside the creep."""
         if not np.any(wait_s):
             return beside
@@ -266,7 +262,7 @@ class Walk:
         hold.initial_tension = self._first(held, sum(beside.values(), hold.carried), hold)
         return beside
 
-    def fresh(self, j: int, setting: NDArray[Any], rows: slice = slice(None)) -> tuple[NDArray[Any], NDArray[Any]]:
+    def fresh(self, j: int, setting: Array, rows: slice = slice(None)) -> tuple[Array, Array]:
         """Some readings of a hold without a past, and their derivatives by what is set.
 
         Parameters
@@ -290,9 +286,7 @@ class Walk:
         moved = self.hold(j, setting + 1j * _STEP, uncrept, {})[0][rows]
         return moved.real, moved.imag / _STEP
 
-    def closed_form(
-        self, j: int, stretched: NDArray[Any], creep: NDArray[Any], rows: slice = slice(None)
-    ) -> tuple[NDArray[Any], ...]:
+    def closed_form(self, j: int, stretched: Array, creep: Array, rows: slice = slice(None)) -> tuple[Array, ...]:
         """A hold without effects, eqs (4)-(6) differentiated by hand.
 
         Parameters
@@ -331,13 +325,13 @@ class Walk:
         carried = creep + amount * end, amount_by_setting * end, 1.0 + amount_by_creep * end
         return np.maximum(tension, 0.0), by_setting, by_creep, *carried
 
-    def _tension(self, stretched: NDArray[Any], zero: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+    def _tension(self, stretched: Array, zero: Array) -> tuple[Array, ...]:
         """Tension, N, and the slopes of strain by stretched and zero-tension length, 1/mm; (n,) or (r, n) arrays."""
         law = laws.LAWS[self.model.law]
         slopes = law.by_stretched(stretched, zero), law.by_zero(stretched, zero)
         return self.k1 * law.strain(stretched, zero), *slopes
 
-    def _first(self, held: NDArray[Any], elongation: NDArray[Any], hold: HoldContext) -> NDArray[Any]:
+    def _first(self, held: Array, elongation: Array, hold: HoldContext) -> Array:
         """Tension (1, n) when the hold begins: effects see its first time only."""
         times, warming = hold.time_s, hold.warming_K
         hold.time_s, hold.warming_K = times[:1], warming[:1]

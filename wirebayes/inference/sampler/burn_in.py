@@ -15,7 +15,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
@@ -53,7 +52,7 @@ from wirebayes.inference.sampler.settings import (
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers, advance, move_of
 from wirebayes.numeric.resampling import effective_number, next_power, truncated_rows
 from wirebayes.numeric.spread_rows import spread_rows
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 
 
 def init(
@@ -337,7 +336,7 @@ def _weighted_twice(z: Array, value: Array, base: Array) -> tuple[WeightedPoints
     return hot, cold
 
 
-def _placed(policy: Policy, log_weight: Array, rng: np.random.Generator) -> NDArray[np.int64]:
+def _placed(policy: Policy, log_weight: Array, rng: np.random.Generator) -> Ints:
     """Rows by weight where walkers begin: every ensemble has a share of the places of its own."""
     chosen = []
     for i in range(policy.ensembles):

@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.sampler import net
 from wirebayes.inference.sampler.emcee_core import EmceeState, Move, RedBlueMove
 from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.proposal import Proposal, components
 from wirebayes.inference.sampler.transport_map import Straight
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools
 
 
 class PoolMove(Move):  # type: ignore[misc]
@@ -51,9 +50,9 @@ class PoolMove(Move):  # type: ignore[misc]
     def __init__(self, proposal: Mixture | Proposal, between: Move, steps: int, most: int) -> None:
         self.proposal, self.between, self.steps, self.most = proposal, between, steps, most
         self.components = components(proposal)
-        self.coming: list[tuple[Array, Array, NDArray[np.bool_]]] = []
+        self.coming: list[tuple[Array, Array, Bools]] = []
 
-    def propose(self, model: Any, state: EmceeState) -> tuple[EmceeState, NDArray[np.bool_]]:
+    def propose(self, model: Any, state: EmceeState) -> tuple[EmceeState, Bools]:
         """The next place of every walker, and which ones are new."""
         if self.coming:
             x, value, new = self.coming.pop()
@@ -65,7 +64,7 @@ class PoolMove(Move):  # type: ignore[misc]
             self.coming = self._pooled(model, state, size - 1)[::-1]
         return state, accepted
 
-    def _pooled(self, model: Any, state: EmceeState, k: int) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
+    def _pooled(self, model: Any, state: EmceeState, k: int) -> list[tuple[Array, Array, Bools]]:
         """The next k places of all walkers: (n, d), their log densities (n,), and whether they changed (n,)."""
         (n, d), random = state.coords.shape, model.random
         points = net.around(self.components.to_cube(state.coords, random), k + 1, random)
@@ -142,7 +141,7 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
         return self.straight.forward(x) if self.straight else (x, np.zeros(len(x)))
 
 
-def _within(y: Array, x: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _within(y: Array, x: Array) -> tuple[Array, Bools]:
     """Places (n, d), those of x where one lies beyond all numbers, as where the map overflows; which (n,) these are."""
-    beyond: NDArray[np.bool_] = np.any(~np.isfinite(y), axis=1)
+    beyond: Bools = np.any(~np.isfinite(y), axis=1)
     return np.where(beyond[:, None], x, y), beyond

@@ -1,12 +1,11 @@
 """What a proposal overlooks: places of kept draws, or of the search before them, that it makes far too little of."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.settings import NEXT_TO_NOTHING, OUTWEIGHS, WIDEST
 from wirebayes.inference.sampler.state import Learned
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools
 
 
 def overlooked_nats(learned: Learned, z: Array, value: Array) -> tuple[float, float]:
@@ -67,7 +66,7 @@ def _nats_of_search(learned: Learned, middle: float) -> float:
     return float(np.quantile(left, 0.99) - middle)
 
 
-def _matters(z: Array, value: Array, middle: float) -> NDArray[np.bool_]:
+def _matters(z: Array, value: Array, middle: float) -> Bools:
     """Where a hill as wide as the prior would hold more than next to nothing.
 
     Parameters

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.sampler import mixture, transport_map
 from wirebayes.inference.sampler.components import Components
@@ -31,7 +30,7 @@ from wirebayes.inference.sampler.settings import (
 from wirebayes.inference.sampler.transport_map import Straight
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.resampling import effective_number
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 
 Shares = tuple[float, float, float, float, float]
 
@@ -118,7 +117,7 @@ def fit_proposal(
     hot: WeightedPoints,
     cold: WeightedPoints,
     start: Mixture,
-    order: NDArray[np.int64],
+    order: Ints,
     rng: np.random.Generator,
     shares: Shares,
     *,

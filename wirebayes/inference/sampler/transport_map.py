@@ -17,7 +17,6 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from wirebayes.inference.sampler.points import WeightedPoints
@@ -33,7 +32,7 @@ from wirebayes.inference.sampler.settings import (
     SETTLED,
     SKEWNESSES,
 )
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class Straight:
         Location, scale and skewness of what is left.
     """
 
-    order: NDArray[np.int64]
+    order: Ints
     centre: Array
     scale: Array
     low: Array
@@ -113,7 +112,7 @@ class Straight:
         return x
 
 
-def fit_map(points: WeightedPoints, order: NDArray[np.int64]) -> Straight:
+def fit_map(points: WeightedPoints, order: Ints) -> Straight:
     """The map that straightens points: weighted regressions, coordinate by coordinate.
 
     Parameters
@@ -182,8 +181,8 @@ class _Straightened:
         Log scales, and deviations from the mean in units of the scale.
     """
 
-    one: NDArray[np.int64]
-    other: NDArray[np.int64]
+    one: Ints
+    other: Ints
     of_mean: Array
     of_scale: Array
     spread: Array
@@ -211,8 +210,8 @@ def _straighten(v: Array, j: int, weight: Array, clear: float, every: bool) -> _
 
 
 def _seen_at_once(
-    v: Array, lines: Array, one: NDArray[np.int64], other: NDArray[np.int64], y: Array, weight: Array, clear: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    v: Array, lines: Array, one: Ints, other: Ints, y: Array, weight: Array, clear: float
+) -> tuple[Ints, Ints]:
     """The pairs whose product, alone, clearly explains what straight lines leave of y; the clearest few.
 
     In many dimensions there are too many pairs to fit all together.

@@ -11,10 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.exchange.imported import ImportedRobot
 from wirebayes.strict.files import read_text
 
@@ -173,7 +172,7 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
     )  # fmt: skip
 
 
-def _on_spools(path: Path, found: _Settings, count: Floats) -> NDArray[np.intp]:
+def _on_spools(path: Path, found: _Settings, count: Floats) -> Indices:
     """How many lines each spool winds."""
     if not ((count >= 1) & (count <= _MOST_ON_SPOOL) & (count == np.round(count))).all():
         given = ":".join(f"{value:g}" for value in found.values["on spool"])

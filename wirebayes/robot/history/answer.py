@@ -6,14 +6,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.json_files.pose_history import ClockJson, DriftOverTime, HistoryReadings, PoseHistoryJson
 from wirebayes.json_files.values import Band, Statistic
 from wirebayes.notice import to_json
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.means import mean_of_finite
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.progress import Progress, silent
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.balanced import balanced
@@ -60,7 +59,7 @@ class HistoryAnswer:
 
     content: PoseHistoryJson
     tables: dict[str, tuple[list[str], list[list[Any]]]]
-    rows: NDArray[np.intp]
+    rows: Indices
     found: Estimate | None = None
     to: Target | None = None
 
@@ -231,7 +230,7 @@ def _requested(robot: Robot, line: WireDraws, history: History, errors: Uncertai
     return out
 
 
-def _course(history: History, found: Estimate, rows: NDArray[np.intp]) -> Course:
+def _course(history: History, found: Estimate, rows: Indices) -> Course:
     """The rows that are shown, as drift from one command is."""
     track = found.track
     status = np.where(track.held[:, rows], 0, 4)
@@ -245,7 +244,7 @@ def _course(history: History, found: Estimate, rows: NDArray[np.intp]) -> Course
     )
 
 
-def _moved(course: Course, to: Target, rows: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+def _moved(course: Course, to: Target, rows: Indices) -> tuple[Floats, Floats, Floats]:
     """Displacement ``(n, r, 3)`` m, rotation and tilt ``(n, r)`` rad, each row from its own target."""
     shift = course.position_m - to.position_m[rows]
     angle, tilt = np.empty(shift.shape[:2]), np.empty(shift.shape[:2])
@@ -256,7 +255,7 @@ def _moved(course: Course, to: Target, rows: NDArray[np.intp]) -> tuple[Floats, 
     return shift, angle, tilt
 
 
-def _drift(course: Course, to: Target, rows: NDArray[np.intp], spread: float) -> DriftOverTime:
+def _drift(course: Course, to: Target, rows: Indices, spread: float) -> DriftOverTime:
     shift, angle, tilt = _moved(course, to, rows)
     return {
         "specimen_spread": spread,

@@ -3,10 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.progress import Progress, silent
 from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.estimate import Estimate
@@ -106,7 +105,7 @@ def wanted_tensions(robot: Robot, history: History) -> Floats:
     return out
 
 
-def refined_poses(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
+def refined_poses(robot: Robot, history: History) -> tuple[History, Indices]:
     """The history with rows between distant poses, and where its own rows are among them."""
     x, R = history.position_m, history.rotation
     assert x is not None and R is not None

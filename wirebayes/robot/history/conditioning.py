@@ -14,16 +14,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric.resampling import systematic_rows
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.history.follow import Track
 from wirebayes.robot.history.history import roll_and_pitch
 from wirebayes.robot.history.readings import Information, Sensors
 from wirebayes.robot.history.unknowns import LogUnknowns, slopes
 
-Way = Callable[[Floats, str, NDArray[np.bool_]], Track]  # of white unknowns (n, d), a name for the progress, no wires
+Way = Callable[[Floats, str, Bools], Track]  # of white unknowns (n, d), a name for the progress, no wires
 _MOST = 12  # passes to the mode; four or five are usual
 _PASSES = 5  # to move the draws; two or three are usual
 _NEAR = 0.2  # posterior sd, in whatever direction it is largest: less than a band of 200 draws can show
@@ -110,14 +109,14 @@ def predicted_readings(track: Track) -> Floats:
     return np.concatenate([track.tension_N, roll_and_pitch(track.rotation)], -1)
 
 
-def slack_wires(read: LogReadings, legs: int) -> NDArray[np.bool_]:
+def slack_wires(read: LogReadings, legs: int) -> Bools:
     """Wires ``(w,)`` that all readings say are slack, as far as a sensor can tell."""
     tension = read.values[:, :legs]
     loose = ~(tension > _SLACK * read.of.sd[:legs]) & np.isfinite(tension).any(0)
     return np.asarray(loose.all(0))
 
 
-def find_mode(known: LogUnknowns, read: LogReadings, way: Way, without: NDArray[np.bool_]) -> Mode | None:
+def find_mode(known: LogUnknowns, read: LogReadings, way: Way, without: Bools) -> Mode | None:
     """The mode by Gauss-Newton; None where mean wires do not hold the platform.
 
     Parameters

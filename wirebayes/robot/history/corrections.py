@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.history.estimate import Estimate
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
@@ -77,9 +76,7 @@ def wanted(robot: Robot, history: History, found: Estimate, to: Target) -> Float
     return out
 
 
-def error_left(
-    robot: Robot, history: History, found: Estimate, to: Target, joint_m: Floats, rows: NDArray[np.intp]
-) -> Floats:
+def error_left(robot: Robot, history: History, found: Estimate, to: Target, joint_m: Floats, rows: Indices) -> Floats:
     """Distance from the target that corrected joint values leave.
 
     Parameters

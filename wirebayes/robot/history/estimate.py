@@ -3,10 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric.means import mean_of_finite
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.progress import Progress, silent
 from wirebayes.robot.history.conditioning import LogReadings, draw_posterior, find_mode, slack_wires
 from wirebayes.robot.history.follow import Track, clock_starts, follow_log, refined_joints
@@ -206,7 +205,7 @@ class _Way:
             carried,
         )
 
-    def white(self, white: Floats, name: str, without: NDArray[np.bool_]) -> Track:
+    def white(self, white: Floats, name: str, without: Bools) -> Track:
         """White unknowns followed, some wires without stiffness.
 
         Parameters

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
@@ -38,14 +37,14 @@ class Track:
     rotation: Floats
     tension_N: Floats
     strain: Floats
-    hold: NDArray[np.int64]
+    hold: Ints
 
     @property
-    def held(self) -> NDArray[np.bool_]:
+    def held(self) -> Bools:
         """(n, t) True where the platform hangs in an equilibrium."""
         return np.asarray(np.isfinite(self.position_m).all(-1))
 
-    def part(self, index: NDArray[np.intp]) -> "Track":
+    def part(self, index: Indices) -> "Track":
         """Some of the columns."""
         return replace(
             self,
@@ -55,12 +54,12 @@ class Track:
             strain=self.strain[index],
         )
 
-    def at_rows(self, rows: NDArray[np.intp]) -> "Track":
+    def at_rows(self, rows: Indices) -> "Track":
         """Some of the rows."""
         position, rotation = self.position_m[:, rows], self.rotation[:, rows]
         return Track(position, rotation, self.tension_N[:, rows], self.strain[:, rows], self.hold[rows])
 
-    def with_columns(self, at: NDArray[np.bool_], other: "Track") -> "Track":
+    def with_columns(self, at: Bools, other: "Track") -> "Track":
         """The columns of another in the places of some of its own."""
         out = self.part(np.arange(len(at)))
         for own, new in zip(
@@ -134,7 +133,7 @@ def follow_log(
     return track
 
 
-def _empty(columns: int, legs: int, hold: NDArray[np.int64]) -> Track:
+def _empty(columns: int, legs: int, hold: Ints) -> Track:
     """A track of which no row is known yet."""
     shapes = ((3,), (3, 3), (legs,), (legs,))
     position, rotation, tension, strain = (np.full((columns, len(hold), *shape), np.nan) for shape in shapes)
@@ -181,7 +180,7 @@ def clock_starts(history: History, tension_N: Floats, share: float = RESTART) ->
     return np.array(out)
 
 
-def refined_joints(robot: Robot, history: History) -> tuple[History, NDArray[np.intp]]:
+def refined_joints(robot: Robot, history: History) -> tuple[History, Indices]:
     """A history of joint values with rows between distant ones, and where its own rows are among them."""
     assert history.joint_m is not None
     wire = np.where(robot.is_linear, robot.ratio, 1.0) / robot.lines  # paid out in each line, by the joint value

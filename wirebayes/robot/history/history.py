@@ -3,10 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices, Ints
 from wirebayes.robot.mechanics.description import Robot
 
 
@@ -40,7 +39,7 @@ class History:
     rotation: Floats | None
     payload_kg: Floats
     payload_m: Floats
-    hold: NDArray[np.int64] | None = None
+    hold: Ints | None = None
     tension_N: Floats | None = None
     tilt_rad: Floats | None = None
 
@@ -54,7 +53,7 @@ class History:
         return with_payload(robot, float(self.payload_kg[row]), self.payload_m[row])
 
 
-def divided(history: History, pieces: NDArray[np.intp]) -> tuple[History, NDArray[np.intp]]:
+def divided(history: History, pieces: Indices) -> tuple[History, Indices]:
     """The history with rows between its own, without readings.
 
     Parameters

@@ -9,10 +9,10 @@ unknown, and the draws are moved by what the readings so far say (`readings`): t
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wirebayes.errors import InputError
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.history.beside import beside, beside_fresh
 from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
@@ -323,7 +323,7 @@ class LiveEstimator:
         self._tension = balance.tensions_at(robot, wires, self._x, self._R, zero, offset)
         self._lengths = zero, offset
 
-    def _carefully(self, rows: NDArray[np.intp], zero: Floats, offset: Floats) -> None:
+    def _carefully(self, rows: Indices, zero: Floats, offset: Floats) -> None:
         """Columns whose way is long or unstable: followed in parts; lost where the platform falls."""
         new, old = ((a[rows], b[rows]) for a, b in ((zero, offset), self._lengths))
         there = path.follow(self.robot, self._wires.part(rows), (self._x[rows], self._R[rows]), old, new).here

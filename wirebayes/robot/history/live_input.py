@@ -1,10 +1,10 @@
 """Numbers that a live estimator is given, checked: what is wrong is refused, with what was expected."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from wirebayes.errors import InputError
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 
 
 def checked_number(name: str, value: float) -> float:
@@ -50,7 +50,7 @@ def checked_reading(name: str, values: ArrayLike | None, count: int) -> Floats:
     return given
 
 
-def refuse_bad(name: str, given: Floats, good: NDArray[np.bool_], expected: str) -> None:
+def refuse_bad(name: str, given: Floats, good: Bools, expected: str) -> None:
     """Refuse the first number that is not good.
 
     Parameters

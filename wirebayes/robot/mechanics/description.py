@@ -5,9 +5,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices
 
 Actuator = Literal["drum", "linear"]
 Freedom = Literal["pose", "position", "orientation"]
@@ -189,7 +188,7 @@ class Robot:
     tension_bias_N: float = 0.0
     mass_kg_m: Floats | None = None
     plane: Plane | None = None
-    winch: NDArray[np.intp] | None = None
+    winch: Indices | None = None
     joint_offset_m: Floats | None = None
     home_rotation_is_stated: bool = True
     rotation_of_file_rad: Floats | None = None
@@ -250,7 +249,7 @@ class Robot:
         return all(name in self.given for name in self.wire)
 
     @property
-    def is_linear(self) -> NDArray[np.bool_]:
+    def is_linear(self) -> Bools:
         """(w,) True where a linear actuator drives the leg."""
         return np.array([a == "linear" for a in self.actuator])
 

@@ -8,12 +8,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.json_files.pose import Specimens, WiresUsed
 from wirebayes.notice import Notice
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.statics import geometry
@@ -80,7 +79,7 @@ class WireDraws:
         """The effects that the robot's wires show too."""
         return material(self.effects)
 
-    def part(self, index: NDArray[np.intp] | slice) -> "WireDraws":
+    def part(self, index: Indices | slice) -> "WireDraws":
         """Some of the draws, each with all its parameters."""
         others = {name: line.part(index) for name, line in self.others.items()}
         parts = ({k: v[index] for k, v in values.items()} for values in (self.parameters, self.spread))
@@ -260,7 +259,7 @@ def nominal_length(robot: Robot) -> Floats:
     return np.where(robot.is_linear, robot.wire_m, free)
 
 
-def _is_given(robot: Robot) -> NDArray[np.bool_]:
+def _is_given(robot: Robot) -> Bools:
     return np.array([[name in robot.given] for name in robot.wire])
 
 

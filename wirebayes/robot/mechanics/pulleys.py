@@ -11,9 +11,8 @@ Its straight part is ``L = sqrt(h^2 + z^2 - rho^2)`` and its arc follows from ``
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Pulleys
 from wirebayes.robot.mechanics.vectors import cross, dot, norm
 
@@ -49,7 +48,7 @@ class WireRun:
     across: Floats
     swing_1_m: Floats
     wrap_rad: Floats
-    clear: NDArray[np.bool_]
+    clear: Bools
 
 
 def wire_run(pulleys: Pulleys, line_m: Floats) -> WireRun:
@@ -84,7 +83,7 @@ class _Tangent:
     sine: Floats
     cosine: Floats
     wrap_rad: Floats
-    clear: NDArray[np.bool_]
+    clear: Bools
 
 
 def _tangent(h: Floats, along: Floats, rho: Floats, tiny: Floats) -> _Tangent:

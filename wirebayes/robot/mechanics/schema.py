@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError, shown
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics.description import Drums, Freedom, GivenWire, Plane, Pulleys, Robot, TensionRule
 from wirebayes.robot.mechanics.shipped import shipped as shipped
 from wirebayes.robot.mechanics.tensions import CHOICES
@@ -252,7 +251,7 @@ def _or_none(values: Floats) -> Floats | None:
     return values if values.any() else None
 
 
-def _legs(top: Keys, declared: set[str]) -> tuple[list[dict[str, Any]], NDArray[np.intp] | None]:
+def _legs(top: Keys, declared: set[str]) -> tuple[list[dict[str, Any]], Indices | None]:
     """All legs, and the number of each one's winch."""
     tables = [replace(leg, name=str(number)) for number, leg in enumerate(top.tables("leg", least=2), 1)]
     legs = [_leg(leg, declared) for leg in tables]
@@ -293,7 +292,7 @@ def _leg(leg: Keys, declared: set[str]) -> dict[str, Any]:
     return row
 
 
-def _winches(tables: list[Keys], legs: list[dict[str, Any]]) -> NDArray[np.intp] | None:
+def _winches(tables: list[Keys], legs: list[dict[str, Any]]) -> Indices | None:
     """Number of each leg's winch in the order of the legs; None where each has its own.
 
     Legs of one winch turn together: what their joint value means must be the same.

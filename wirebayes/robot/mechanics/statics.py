@@ -7,9 +7,8 @@ Batch-last throughout: positions ``(3, n)``, rotations ``(3, 3, n)``, legs ``(w,
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.pulleys import WireRun, wire_run
 from wirebayes.robot.mechanics.vectors import cross, norm
@@ -45,7 +44,7 @@ class Geometry:
         return self.distance_m if self.over is None else self.over.straight_m
 
     @property
-    def clear(self) -> NDArray[np.bool_]:
+    def clear(self) -> Bools:
         """(n,) False where a platform point lies on an exit point, inside a pulley or on its swivel axis."""
         return np.asarray((self.distance_m > 0 if self.over is None else self.over.clear).all(0))
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics.description import Robot
 
 _T = TypeVar("_T", bound=np.generic)
@@ -52,7 +52,7 @@ def mean_of_each_winch(robot: Robot, value: Floats) -> Floats:
     return np.asarray(value @ (share / share.sum(0)))
 
 
-def first_legs(robot: Robot) -> NDArray[np.intp]:
+def first_legs(robot: Robot) -> Indices:
     """(j,) The first leg of every winch."""
     return np.arange(robot.legs) if robot.winch is None else np.unique(robot.winch, return_index=True)[1]
 

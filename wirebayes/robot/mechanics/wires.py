@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.wire import laws
 from wirebayes.wire.bent_strain import bent, strain_of
 from wirebayes.wire.effect import Effect, HoldContext, Placed, steady_hold
@@ -67,7 +66,7 @@ class Wires:
         model = Model(self.law, self.history, self.effects, float(references[min(leg, len(references) - 1)]))
         return FreshSample(theta, model, float(self.length_mm[min(leg, len(self.length_mm) - 1), 0]))
 
-    def part(self, index: slice | NDArray[np.intp]) -> "Wires":
+    def part(self, index: slice | Indices) -> "Wires":
         """The same wires for some of the draws."""
         theta = {k: v if v.shape[-1] == 1 else v[:, index] for k, v in self.theta.items()}
         return replace(self, theta=theta)

@@ -3,10 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.json_files.pose import ClaimNumbers
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
@@ -56,7 +55,7 @@ class WorkspaceDrift:
         """(p,) probability, at every point, that both limits are kept."""
         return np.asarray(((self.distance_m < distance_m) & (self.tilt_rad < tilt_rad)).mean(1))
 
-    def part(self, rows: NDArray[np.bool_], feasible: float) -> "WorkspaceDrift":
+    def part(self, rows: Bools, feasible: float) -> "WorkspaceDrift":
         """Some of the positions ``(p,)``, and the share of the requested ones that tensions hold."""
         found = float(np.isfinite(self.distance_m[rows]).all(1).mean()) if rows.any() else 0.0
         return WorkspaceDrift(

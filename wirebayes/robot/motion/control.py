@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, inverse
@@ -90,7 +89,7 @@ class PoseError:
     times_s: Floats
     distance_m: Floats
     angle_rad: Floats
-    found: NDArray[np.bool_]
+    found: Bools
 
     def probability(self, tolerance_m: float, tolerance_rad: float = np.inf) -> Floats:
         """(t,) share of draws within both tolerances; a draw without equilibrium is never within."""

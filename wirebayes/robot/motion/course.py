@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.robot.motion import outcome
 from wirebayes.robot.motion.creep import CreepState
 
@@ -31,12 +30,12 @@ class Course:
     position_m: Floats
     rotation: Floats
     tension_N: Floats
-    status: NDArray[np.int64]
+    status: Ints
     end: CreepState
     falls: "Falls | None" = None
 
     @property
-    def found(self) -> NDArray[np.bool_]:
+    def found(self) -> Bools:
         """(n,) True where every time has a stable equilibrium."""
         return np.asarray((self.status == outcome.FOUND).all(1))
 
@@ -62,13 +61,13 @@ class Falls:
     """
 
     time_s: Floats
-    wire: NDArray[np.int64]
+    wire: Ints
     drop_m: Floats
     slack_s: Floats
     tension_share: Floats
     stiffness_share: Floats
 
     @property
-    def fell(self) -> NDArray[np.bool_]:
+    def fell(self) -> Bools:
         """(n,) True where the platform falls."""
         return np.isfinite(self.time_s)

@@ -3,10 +3,9 @@
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric import cholesky
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
@@ -36,8 +35,8 @@ class Solved:
     x: Floats
     R: Floats
     tau: Floats
-    status: NDArray[np.int64]
-    count: NDArray[np.int64]
+    status: Ints
+    count: Ints
     left: Floats
 
     @classmethod
@@ -59,7 +58,7 @@ class Solved:
         self.x[:, cases.number], self.R[..., cases.number] = cases.x, cases.R
         self.tau[:, cases.number], self.left[cases.number] = cases.at.tau, cases.at.size
 
-    def go_on(self, rows: NDArray[np.intp], later: "Solved") -> None:
+    def go_on(self, rows: Indices, later: "Solved") -> None:
         """Put what became of some cases, which had gone on, in their place."""
         for name in ("x", "R", "tau", "status", "left"):
             getattr(self, name)[..., rows] = getattr(later, name)
@@ -132,7 +131,7 @@ class _Cases:
         Size of the robot with its wires, m.
     """
 
-    number: NDArray[np.intp]
+    number: Indices
     wires: Wires
     zero: Floats
     offset: Floats
@@ -144,7 +143,7 @@ class _Cases:
     floor: Floats
     span: Floats
 
-    def part(self, keep: NDArray[np.intp]) -> "_Cases":
+    def part(self, keep: Indices) -> "_Cases":
         return _Cases(
             number=self.number[keep],
             wires=self.wires.part(keep),
@@ -159,7 +158,7 @@ class _Cases:
             span=self.span[keep],
         )
 
-    def moved(self, accept: NDArray[np.bool_], x: Floats, R: Floats, new: "_Point") -> "_Cases":
+    def moved(self, accept: Bools, x: Floats, R: Floats, new: "_Point") -> "_Cases":
         """The cases at new places where these are accepted."""
         x, R = np.where(accept, x, self.x), np.where(accept, R, self.R)
         return replace(self, x=x, R=R, at=self.at.where(accept, new))
@@ -201,7 +200,7 @@ def _begin(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, 
     return _Cases(np.arange(n), wires, zero, offset, x, R, at, np.zeros(n), level, floor, robot.span_m + zero.max(0))
 
 
-def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, NDArray[np.int64]]:
+def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, Ints]:
     """A damped Newton step of every case, taken where it leads down, and how it ended (`_GOING_ON` if it did not)."""
     step = _newton_step(robot, cases)
     move = step.move * scale
@@ -241,7 +240,7 @@ class _Step:
 
     move: Floats
     length: Floats
-    positive: NDArray[np.bool_]
+    positive: Bools
     downhill: Floats
 
 
@@ -311,12 +310,12 @@ class _Point:
     tau: Floats
     size: Floats
 
-    def where(self, accept: NDArray[np.bool_], other: "_Point") -> "_Point":
+    def where(self, accept: Bools, other: "_Point") -> "_Point":
         if accept.all():
             return other
         return _Point(*(np.where(accept, getattr(other, f.name), getattr(self, f.name)) for f in fields(_Point)))
 
-    def part(self, keep: NDArray[np.intp]) -> "_Point":
+    def part(self, keep: Indices) -> "_Point":
         return _Point(*(getattr(self, f.name)[..., keep] for f in fields(_Point)))
 
 

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, one_sided, outcome, path
@@ -221,7 +220,7 @@ class CreepingHold:
         """The creep at a time by the amounts that belong to the tensions there."""
         return self.creep.toward(time, np.zeros(1), self.creep.amount_at(there.tension_N.T))
 
-    def _worst(self, off: Floats, last: HoldCreep, alive: NDArray[np.bool_]) -> float:
+    def _worst(self, off: Floats, last: HoldCreep, alive: Bools) -> float:
         """The error of a step, relative to what creeps in it: that of nearly all draws, a tenth of the largest."""
         least = _RESOLVED * np.abs(self.creep.carried.creep_mm + self.creep.amount)
         size = self._of_worst_wire(np.maximum(np.abs(last.grown), least))
@@ -249,9 +248,7 @@ class CreepingHold:
         zero = np.where(near.found[:, None], zero, np.nan)
         return path.settle(self.robot, self.wires, (near.position_m, near.rotation), (zero, offset))
 
-    def _note(
-        self, fell: NDArray[np.bool_], there: path.Followed, here: forward.Equilibria, span_s: tuple[float, float]
-    ) -> None:
+    def _note(self, fell: Bools, there: path.Followed, here: forward.Equilibria, span_s: tuple[float, float]) -> None:
         """Write down falls and slack wires of a step."""
         a, b = (t**self.power for t in span_s)
         share = np.where(there.share < 1, there.share, 1.0)
@@ -315,9 +312,7 @@ def from_command(
     return course
 
 
-def stably(
-    robot: Robot, wires: Wires, commands: inverse.Commands, position_m: Floats, rotation: Floats
-) -> NDArray[np.bool_]:
+def stably(robot: Robot, wires: Wires, commands: inverse.Commands, position_m: Floats, rotation: Floats) -> Bools:
     """Whether commands hold their own poses stably: not every balance is stable.
 
     Parameters

@@ -1,9 +1,8 @@
 """Every stable equilibrium of one set of lengths, as far as many starts find them."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics import plane, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
@@ -64,7 +63,7 @@ def equilibria(
     )
 
 
-def _distinct(robot: Robot, found: Equilibria, order: NDArray[np.intp]) -> NDArray[np.intp]:
+def _distinct(robot: Robot, found: Equilibria, order: Indices) -> Indices:
     """Of poses in an order those that no earlier one is near to, rotations being compared at the platform's edge."""
     near_m = 1e-6 * robot.span_m
     kept: list[int] = []

@@ -7,9 +7,8 @@ that energy, damped where the Hessian is not positive definite or the energy wou
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
@@ -37,12 +36,12 @@ class Equilibria:
     position_m: Floats
     rotation: Floats
     tension_N: Floats
-    status: NDArray[np.int64]
-    iterations: NDArray[np.int64]
+    status: Ints
+    iterations: Ints
     residual_N: Floats
 
     @property
-    def found(self) -> NDArray[np.bool_]:
+    def found(self) -> Bools:
         """(n,) True where a stable equilibrium was found."""
         return np.asarray(self.status == outcome.FOUND)
 
@@ -106,7 +105,7 @@ def _look_again(robot: Robot, wires: Wires, zero: Floats, offset: Floats, solved
         solved.status[loose[held]] = outcome.FOUND
 
 
-def put_back(found: Equilibria | None, rows: NDArray[np.intp], n: int, legs: int = 0) -> Equilibria:
+def put_back(found: Equilibria | None, rows: Indices, n: int, legs: int = 0) -> Equilibria:
     """Solutions put back among rows that could not be tried.
 
     Parameters

@@ -6,9 +6,8 @@ Of the balances nearest to a reference (`wirebayes.robot.motion.nearest_balance`
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -47,10 +46,10 @@ class Hanging:
     rotation: Floats
     tension_N: Floats
     others: tuple[Floats, ...]
-    choice: NDArray[np.int64]
+    choice: Ints
 
     @property
-    def held(self) -> NDArray[np.bool_]:
+    def held(self) -> Bools:
         """(p,) True where the platform hangs."""
         return np.asarray(np.isfinite(self.tension_N).all(1))
 
@@ -196,7 +195,7 @@ def nearest_position(robot: Robot, position_m: Floats, reference: Floats) -> Flo
     return found.position_m[0] if found.balanced[0] and _stable(robot, found)[0] else None
 
 
-def _stable(robot: Robot, found: Balances) -> NDArray[np.bool_]:
+def _stable(robot: Robot, found: Balances) -> Bools:
     """(n,) Whether every motion that stretches no wire raises the energy."""
     out = np.zeros(len(found.rotation), bool)
     scale = scale_of(robot)
@@ -217,7 +216,7 @@ def _basis(rows: Floats) -> Floats:
     return np.asarray(right[: int((sizes > _ALIKE).sum())])
 
 
-def _distinct(rotation: Floats, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+def _distinct(rotation: Floats, rows: Indices) -> Indices:
     """Rows whose rotations differ, the first of each kind kept."""
     kept: list[int] = []
     for row in rows:

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.tensions import CHOICES, Choice
@@ -38,7 +37,7 @@ class Commands:
     joint_m: Floats
     offset_m: Floats
     tension_N: Floats
-    feasible: NDArray[np.bool_]
+    feasible: Bools
     rotation: Floats
 
 

@@ -9,10 +9,9 @@ displacement, whose minimum Newton's method finds in as many steps as sets of ta
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric import cholesky
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -87,7 +86,7 @@ class _Quadratic:
     pull: Floats
     slope: Floats
 
-    def part(self, rows: NDArray[np.intp]) -> "_Quadratic":
+    def part(self, rows: Indices) -> "_Quadratic":
         return _Quadratic(*(getattr(self, f.name)[..., rows] for f in fields(_Quadratic)))
 
     def tensions(self, move: Floats) -> Floats:
@@ -99,14 +98,14 @@ class _Quadratic:
         pulled = (self.J * np.maximum(self.tensions(move), 0.0)).sum(1)
         return np.asarray(self.load + (self.K * move).sum(1) + pulled)
 
-    def least_with(self, taut: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.bool_]]:
+    def least_with(self, taut: Bools) -> tuple[Floats, Bools]:
         """Where the energy would be least if just these wires were taut, and whether it would."""
         stiff, at_rest = np.where(taut, self.slope, 0.0), np.where(taut, self.pull, 0.0)
         H = self.K + np.einsum("iwn,jwn->ijn", self.J * stiff, self.J)
         return cholesky.solve_symmetric(H, -(self.load + (self.J * at_rest).sum(1)))
 
 
-def _lowest(energy: _Quadratic, taut: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+def _lowest(energy: _Quadratic, taut: Bools) -> tuple[Floats, Floats]:
     """Displacements ``(n, d)`` of least energy, and the tensions ``(n, w)`` there.
 
     Parameters

@@ -10,9 +10,8 @@ could come nearer without, it is let go, once. So is the one that is held longes
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
@@ -38,7 +37,7 @@ class Balances:
     rotation: Floats
     tension_N: Floats
     distance_rad: Floats
-    balanced: NDArray[np.bool_]
+    balanced: Bools
 
 
 def nearest_balances(
@@ -104,11 +103,11 @@ class _Search:
     x: Floats
     R: Floats
     tau: Floats
-    bound: NDArray[np.int64]
-    since: NDArray[np.int64]
-    freed: NDArray[np.bool_]
-    done: NDArray[np.bool_]
-    dead: NDArray[np.bool_]
+    bound: Ints
+    since: Ints
+    freed: Bools
+    done: Bools
+    dead: Bools
 
     @classmethod
     def beginning(cls, robot: Robot, position_m: Floats, rotation: Floats) -> "_Search":
@@ -118,19 +117,17 @@ class _Search:
         none = np.zeros(n, bool)
         return cls(x, R, _first_tensions(robot, x, R), bound, bound.copy(), bound != 0, none, none.copy())
 
-    def at(self, rows: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
+    def at(self, rows: Indices) -> tuple[Floats, Floats, Floats]:
         """Poses and tensions of some searches."""
         return self.x[rows], self.R[rows], self.tau[rows]
 
-    def move(self, rows: NDArray[np.intp], step: Floats, unit: float) -> None:
+    def move(self, rows: Indices, step: Floats, unit: float) -> None:
         """Take the steps (k, 6 + w) of some searches."""
         self.x[rows] += step[:, :3]
         self.R[rows] = turning.compose(step[:, 3:6].T, self.R[rows].transpose(1, 2, 0)).transpose(2, 0, 1)
         self.tau[rows] += unit * step[:, 6:]
 
-    def hold_at_bounds(
-        self, rows: NDArray[np.intp], nearly: NDArray[np.bool_], robot: Robot, unit: float
-    ) -> NDArray[np.bool_]:
+    def hold_at_bounds(self, rows: Indices, nearly: Bools, robot: Robot, unit: float) -> Bools:
         """Hold what has left its bounds where a search is `nearly` there, and say which searches hold more now."""
         low, high = robot.rule.lowest_N, robot.rule.highest_N
         tau = self.tau[rows]
@@ -139,7 +136,7 @@ class _Search:
         self.since[rows] = np.where(newly, self.since[rows].max(1, keepdims=True) + 1, self.since[rows])
         return np.asarray(newly.any(1))
 
-    def let_go(self, rows: NDArray[np.intp], rest: NDArray[np.bool_], hindrance: Floats) -> NDArray[np.bool_]:
+    def let_go(self, rows: Indices, rest: Bools, hindrance: Floats) -> Bools:
         """Let go the wire whose bound keeps a search most from its goal, and say which searches have one.
 
         Parameters
@@ -158,7 +155,7 @@ class _Search:
         self.freed[there] |= wrongly
         return np.asarray(wrongly)
 
-    def let_go_oldest(self, rows: NDArray[np.intp]) -> None:
+    def let_go_oldest(self, rows: Indices) -> None:
         """Let go, in searches that no step brings to a balance, the wire that is held longest."""
         held = (self.bound[rows] != 0) & ~self.freed[rows]
         there = rows, np.where(held, self.since[rows], np.iinfo(np.int64).max).argmin(1)
@@ -183,7 +180,7 @@ def _step(
     at: tuple[Floats, Floats, Floats],
     goal: tuple[Floats, Floats],
     asked: Floats,
-    bound: NDArray[np.int64],
+    bound: Ints,
     unit: float,
     movable: bool,
 ) -> tuple[Floats, Floats, Floats]:
@@ -215,7 +212,7 @@ def _linearised(
     robot: Robot,
     at: tuple[Floats, Floats, Floats],
     asked: Floats,
-    bound: NDArray[np.int64],
+    bound: Ints,
     unit: float,
     movable: bool,
 ) -> tuple[Floats, Floats]:
@@ -243,7 +240,7 @@ def _wish(
 
 
 def _side_conditions(
-    robot: Robot, R: Floats, tau: Floats, asked: Floats, bound: NDArray[np.int64], unit: float
+    robot: Robot, R: Floats, tau: Floats, asked: Floats, bound: Ints, unit: float
 ) -> tuple[Floats, Floats]:
     """Rows of the equations that say what is asked for, and which tensions are held at a bound."""
     n, legs = tau.shape
@@ -258,7 +255,7 @@ def _side_conditions(
     return rows, values
 
 
-def _newly_bound(tau: Floats, bound: NDArray[np.int64], limits: tuple[float, float], unit: float) -> NDArray[np.bool_]:
+def _newly_bound(tau: Floats, bound: Ints, limits: tuple[float, float], unit: float) -> Bools:
     """(n, w) Of each row the wire that is farthest beyond its bounds, where there is one."""
     beyond = np.where(bound == 0, np.maximum(limits[0] - tau, tau - limits[1]), -np.inf)
     worst = beyond.argmax(1)

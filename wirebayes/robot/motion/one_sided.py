@@ -9,9 +9,8 @@ minimum on the unit sphere is an eigenvector of the form that adds all wires of 
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires, tension
@@ -43,7 +42,7 @@ def lowest_stiffness(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], le
     return _bounds(robot, wires, pose, lengths)[1]
 
 
-def held(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> NDArray[np.bool_]:
+def held(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Bools:
     """Whether wires that are just not slack make balances stable that the taut ones alone leave loose, ``(n,)``.
 
     Parameters
@@ -57,7 +56,7 @@ def held(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple
 
 def _bounds(
     robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]
-) -> tuple[NDArray[np.bool_], Floats, Floats]:
+) -> tuple[Bools, Floats, Floats]:
     """Where any wire is just not slack, and least and largest stiffness, ``(n,)`` each; NaN where there is no pose."""
     known = np.asarray(np.isfinite(pose[0]).all(1))
     turn, zero = np.moveaxis(pose[1], 0, -1), lengths[0].T

@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric import cholesky
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, mixed, outcome
@@ -46,14 +45,14 @@ class Followed:
     share: Floats
     drop_m: Floats
 
-    def _go_on(self, rows: NDArray[np.intp], there: forward.Equilibria, held: NDArray[np.bool_], share: Floats) -> None:
+    def _go_on(self, rows: Indices, there: forward.Equilibria, held: Bools, share: Floats) -> None:
         """Take over the poses that held, in their rows, and how far along they are."""
         for name in ("position_m", "rotation", "tension_N", "status", "residual_N"):
             getattr(self.here, name)[rows] = getattr(there, name)[held]
         self.share[rows] = share[held]
 
     def _fall(
-        self, robot: Robot, wires: Wires, rows: NDArray[np.intp], lengths: Sequence[Floats], pose: Sequence[Floats]
+        self, robot: Robot, wires: Wires, rows: Indices, lengths: Sequence[Floats], pose: Sequence[Floats]
     ) -> None:
         """Note where some platforms come to rest downhill from the poses in which they hung."""
         caught = forward.solve_equilibrium(robot, wires, lengths[0], lengths[1], pose[0], pose[1])
@@ -111,7 +110,7 @@ def follow(
 
 def _undivided(
     robot: Robot, wires: Wires, start: tuple[Floats, Floats], old: tuple[Floats, Floats], new: tuple[Floats, Floats]
-) -> tuple[Followed, NDArray[np.bool_]]:
+) -> tuple[Followed, Bools]:
     """All at once, as most need no division; the others are where they were, and (n,) says which are not."""
     x, R = (np.array(v) for v in start)
     tau = tensions_at(robot, wires, x, R, *old)
@@ -134,9 +133,9 @@ class _Divided:
     """
 
     step: Floats
-    hesitant: NDArray[np.bool_]
+    hesitant: Bools
 
-    def adapt(self, live: NDArray[np.intp], held: NDArray[np.bool_]) -> None:
+    def adapt(self, live: Indices, held: Bools) -> None:
         """Longer steps where one held, half as long where it did not.
 
         After a division one step of the same length: what was hard a moment ago is still near.
@@ -149,7 +148,7 @@ class _Divided:
 
 def _step(
     robot: Robot, wires: Wires, start: tuple[Floats, Floats], tension_N: Floats, lengths: tuple[Floats, Floats]
-) -> tuple[forward.Equilibria, NDArray[np.bool_]]:
+) -> tuple[forward.Equilibria, Bools]:
     """Solutions from starts, and whether each is where one Newton step says that it is.
 
     Where the step leads further than is believed, nothing is solved: no solution would be taken.
@@ -173,7 +172,7 @@ def _step(
 
 
 def _let_go(
-    robot: Robot, wires: Wires, there: forward.Equilibria, loose: NDArray[np.intp], lengths: tuple[Floats, Floats]
+    robot: Robot, wires: Wires, there: forward.Equilibria, loose: Indices, lengths: tuple[Floats, Floats]
 ) -> None:
     """Put in place of unstable balances the equilibria next to them, to which the least disturbance leads.
 

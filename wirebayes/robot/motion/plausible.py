@@ -8,11 +8,10 @@ robots that were built shows it: how large, and how heavy for their size, robots
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import shown
 from wirebayes.notice import Notice
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, lines_of
@@ -251,12 +250,12 @@ def strain_notices(robot: Robot, line: WireDraws, tension_N: Floats) -> list[Not
     ]
 
 
-def _first(bad: NDArray[np.bool_]) -> tuple[int, int]:
+def _first(bad: Bools) -> tuple[int, int]:
     row, leg = np.argwhere(bad)[0].tolist()
     return row, leg
 
 
-def overstretched(robot: Robot, joint_m: Floats) -> NDArray[np.bool_]:
+def overstretched(robot: Robot, joint_m: Floats) -> Bools:
     """Wires that joint values leave stretched by more than 100 % wherever the platform is.
 
     Parameters

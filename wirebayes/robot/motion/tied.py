@@ -9,9 +9,8 @@ linear and takes these aims in this order, each in what those before it leave fr
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
@@ -44,7 +43,7 @@ class Tied:
     rotation: Floats
     joint_m: Floats
     tension_N: Floats
-    held: NDArray[np.bool_]
+    held: Bools
 
 
 @dataclass
@@ -54,7 +53,7 @@ class _Cases:
     x: Floats
     R: Floats
     joint: Floats
-    bound: NDArray[np.int64]  # -1 and 1: lines held at the lowest and the highest tension
+    bound: Ints  # -1 and 1: lines held at the lowest and the highest tension
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ def tied(
     return out
 
 
-def _settled(robot: Robot, here: _Here, cases: _Cases, step: Floats) -> NDArray[np.bool_]:
+def _settled(robot: Robot, here: _Here, cases: _Cases, step: Floats) -> Bools:
     """(n,) Which cases are in balance and at rest; a line outside its bounds then is bound, and its case goes on."""
     size, unit = np.abs(step).max(1), robot.mass_kg * GRAVITY + np.abs(here.tension_N).max(1)
     still = (size < _SETTLED * robot.span_m) & (np.abs(here.force).max(1) < _BALANCED * unit)
@@ -187,7 +186,7 @@ def _inverse(A: Floats, least: Floats) -> Floats:
     return np.where(finite[:, None, None], out, np.nan)
 
 
-def _move(robot: Robot, cases: _Cases, go: NDArray[np.bool_], step: Floats, scale: Floats) -> None:
+def _move(robot: Robot, cases: _Cases, go: Bools, step: Floats, scale: Floats) -> None:
     """Cases that go on, moved; long steps are cut, the direction kept."""
     moved = np.linalg.norm(step[:, :3], axis=1) / (_LONGEST * robot.span_m)
     turned = step[:, 3 : robot.degrees] * scale[3:]
@@ -200,13 +199,13 @@ def _move(robot: Robot, cases: _Cases, go: NDArray[np.bool_], step: Floats, scal
     cases.joint, cases.bound = cases.joint[go] + share * step[:, robot.degrees :], cases.bound[go]
 
 
-def _outside(robot: Robot, tension_N: Floats) -> NDArray[np.bool_]:
+def _outside(robot: Robot, tension_N: Floats) -> Bools:
     """(n, w) Whether tensions are outside their bounds, by more than rounding."""
     rule, margin = robot.rule, _INSIDE * np.abs(tension_N).max(1, keepdims=True)
     return (tension_N < rule.lowest_N - margin) | (tension_N > rule.highest_N + margin)
 
 
-def _newly_bound(robot: Robot, tension_N: Floats, bound: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _newly_bound(robot: Robot, tension_N: Floats, bound: Ints) -> Bools:
     """(n, w) The line farthest outside its bounds, where lines are left to move it by.
 
     As many lines can be held at bounds as there are winches beyond those that command position and orientation.

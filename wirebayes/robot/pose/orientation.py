@@ -3,11 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.json_files.pose import OrientationFound
 from wirebayes.notice import Notice
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -156,7 +155,7 @@ def _to_be_had(ways: Floats, asked: Floats) -> Floats:
     return out
 
 
-def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, had: NDArray[np.bool_]) -> Orientation:
+def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, had: Bools) -> Orientation:
     """The orientation that was found, with what was commanded."""
     R, tau = found.rotation[0], found.tension_N[0]
     vector = turning.vector(R[None])[0]
@@ -184,7 +183,7 @@ def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, h
     return Orientation(x, R, content, "", words)
 
 
-def _movable(robot: Robot, rotation: Floats) -> NDArray[np.bool_]:
+def _movable(robot: Robot, rotation: Floats) -> Bools:
     """(3,) which components of the rotation vector change where the platform turns: in a plane, about its normal."""
     if robot.plane is None:
         return np.ones(3, bool)
@@ -192,7 +191,7 @@ def _movable(robot: Robot, rotation: Floats) -> NDArray[np.bool_]:
     return np.asarray(np.abs(change) > _FIXED)
 
 
-def _names(components: NDArray[np.bool_]) -> list[str]:
+def _names(components: Bools) -> list[str]:
     return [COMPONENTS[i] for i in np.flatnonzero(components)]
 
 

@@ -1,11 +1,10 @@
 """Reports of falls: how probable, when, by which wire, and how close a platform that holds comes to one."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.json_files.pose import FallsReport, Times
 from wirebayes.notice import Notice
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.robot.motion.course import Course, Falls
 from wirebayes.robot.pose.request import band_over_draws
 
@@ -47,11 +46,11 @@ def _spread(values: Floats) -> Times | None:
     return {"first": float(values.min()), "median": float(np.median(values)), "last": float(values.max())}
 
 
-def _by_wire(wires: NDArray[np.int64], legs: int, draws: int) -> Floats:
+def _by_wire(wires: Ints, legs: int, draws: int) -> Floats:
     return np.bincount(wires, minlength=legs) / draws
 
 
-def _nearest(falls: Falls, began: NDArray[np.bool_]) -> int:
+def _nearest(falls: Falls, began: Bools) -> int:
     """The wire that comes nearest to slackness in most draws."""
     share = np.where(np.isfinite(falls.tension_share), falls.tension_share, np.inf)[began]
     return int(np.bincount(share.argmin(1), minlength=share.shape[1]).argmax())

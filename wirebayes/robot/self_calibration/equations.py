@@ -8,9 +8,8 @@ pulls at nothing, and its gap follows Hooke's law.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
@@ -43,12 +42,12 @@ class Holds:
     tilt: Floats | None = None
 
     @property
-    def placed(self) -> NDArray[np.bool_]:
+    def placed(self) -> Bools:
         """(p,) Whether the hold's position is stated."""
         return np.asarray(np.isfinite(self.session.position_m).all(1))
 
     @property
-    def oriented(self) -> NDArray[np.bool_]:
+    def oriented(self) -> Bools:
         """(p,) Whether the hold's orientation is stated."""
         return np.asarray(np.isfinite(self.session.rotation).all((1, 2)))
 
@@ -108,7 +107,7 @@ class Equations:
     by_robot: Floats
     by_hold: Floats
     rows: dict[str, slice]
-    known: NDArray[np.bool_]
+    known: Bools
 
 
 def scale(robot: Robot) -> Floats:
@@ -319,7 +318,7 @@ def _tensions(
     residual: Floats,
     by_robot: Floats,
     by_hold: Floats,
-    known: NDArray[np.bool_],
+    known: Bools,
 ) -> None:
     """Tensions that were read, and what is usual where none was."""
     robot, session = unknowns.robot, holds.session
@@ -351,7 +350,7 @@ def _poses(
     state: State,
     residual: Floats,
     by_hold: Floats,
-    known: NDArray[np.bool_],
+    known: Bools,
 ) -> None:
     """Poses that were stated."""
     robot, session = unknowns.robot, holds.session
@@ -374,7 +373,7 @@ def _tilts(
     state: State,
     residual: Floats,
     by_hold: Floats,
-    known: NDArray[np.bool_],
+    known: Bools,
 ) -> None:
     """Components of the platform's normal that an inclinometer read."""
     sd = holds.session.tilt_sd_rad

@@ -6,14 +6,12 @@ creep model makes readings at different times speak of the same unknowns.
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from wirebayes.numeric.linear_algebra import inv, solve
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Array, Bools, Floats, Indices
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
@@ -68,7 +66,7 @@ class LengthPosterior:
     ended_sd: Floats
     misfit: Floats
     p_joint: Floats
-    converged: NDArray[np.bool_]
+    converged: Bools
 
     def interval(self, probability: float = 0.9) -> tuple[Floats, Floats]:
         """Central intervals of the lengths, two ``(m, w)`` arrays."""
@@ -161,7 +159,7 @@ class _Target:
         value = ((self.readings - at.readings) ** 2).sum(1) + (white**2).sum(1)
         return np.where(at.solved, value, np.inf)
 
-    def contradicted(self, foreseen: Floats) -> NDArray[np.bool_]:
+    def contradicted(self, foreseen: Floats) -> Bools:
         """(m,) Whether the readings contradict a robot grossly where slopes foresee no lower cost."""
         return np.asarray(foreseen > GROSS * self.readings.shape[1])
 
@@ -173,7 +171,7 @@ class _Mode:
     white: Floats
     here: PredictedSession
     cost: Floats
-    converged: NDArray[np.bool_]
+    converged: Bools
 
 
 def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mode:
@@ -290,13 +288,13 @@ def derivatives(
     return difference(p.readings), difference(p.length_m), difference(poses)
 
 
-def _pick(first: NDArray[np.bool_], a: PredictedSession, b: PredictedSession) -> PredictedSession:
-    def choose(u: NDArray[Any], v: NDArray[Any]) -> NDArray[Any]:
+def _pick(first: Bools, a: PredictedSession, b: PredictedSession) -> PredictedSession:
+    def choose(u: Array, v: Array) -> Array:
         return np.where(first.reshape(-1, *[1] * (u.ndim - 1)), u, v)
 
     both = {f.name: choose(getattr(a, f.name), getattr(b, f.name)) for f in fields(PredictedSession)}
     return PredictedSession(**both)
 
 
-def _part(p: PredictedSession, rows: NDArray[np.intp]) -> PredictedSession:
+def _part(p: PredictedSession, rows: Indices) -> PredictedSession:
     return PredictedSession(**{f.name: getattr(p, f.name)[rows] for f in fields(PredictedSession)})

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.winches import lengths
@@ -54,9 +53,7 @@ def refuse_mistaken(robot: Robot, session: Session, tension_N: Floats, table: Cs
         _refuse_tensions(robot, session, tension_N, read, table)
 
 
-def _refuse_lengths(
-    robot: Robot, session: Session, rows: NDArray[np.bool_], table: CsvTable, joints: Sequence[str]
-) -> None:
+def _refuse_lengths(robot: Robot, session: Session, rows: Bools, table: CsvTable, joints: Sequence[str]) -> None:
     """Two columns of joint values that are the lengths of each other's wires."""
     shape = statics.geometry(robot, session.position_m[rows].T, np.moveaxis(session.rotation[rows], 0, -1))
 
@@ -72,9 +69,7 @@ def _refuse_lengths(
             raise _mixed_up(table, (joints[i], joints[j]), found, f"{number(there)} m")
 
 
-def _refuse_tensions(
-    robot: Robot, session: Session, tension_N: Floats, rows: NDArray[np.bool_], table: CsvTable
-) -> None:
+def _refuse_tensions(robot: Robot, session: Session, tension_N: Floats, rows: Bools, table: CsvTable) -> None:
     """Tensions in another unit, and two columns that are the tensions of each other's wires."""
     turn = np.moveaxis(session.rotation[rows], 0, -1)
     shape = statics.geometry(robot, session.position_m[rows].T, turn)

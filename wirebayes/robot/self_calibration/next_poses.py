@@ -8,10 +8,9 @@ workspace.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.numeric.linear_algebra import inv, solve
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.equations import Equations, Holds, State, linearised, moved
@@ -137,6 +136,6 @@ def _information(e: Equations) -> Floats:
 
 def _follows(e: Equations, degrees: int) -> Floats:
     """(n, d, m) how a commanded pose follows the robot's unknowns: loops closed, platform in balance."""
-    part: NDArray[np.intp] = np.r_[e.rows["loop"], e.rows["balance"]]
+    part: Indices = np.r_[e.rows["loop"], e.rows["balance"]]
     z, g = e.by_hold[:, part], e.by_robot[:, part]
     return np.asarray(-solve(z, g)[:, :degrees], np.float64)

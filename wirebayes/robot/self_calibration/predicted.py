@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.motion import forward
 from wirebayes.robot.motion.creep import CreepState
@@ -47,7 +46,7 @@ class PredictedSession:
     ended_m: Floats
     ended_rotation: Floats
     read_length_m: Floats
-    solved: NDArray[np.bool_]
+    solved: Bools
 
 
 def predict_session(

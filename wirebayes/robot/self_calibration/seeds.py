@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from wirebayes.numeric.linear_algebra import solve
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.progress import Progress, silent
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
@@ -73,7 +72,7 @@ def _located(
     holds: Holds,
     white: Floats,
     ratio: Floats,
-    lost: NDArray[np.intp],
+    lost: Indices,
     position: Floats,
     turn: Floats,
     rng: np.random.Generator,

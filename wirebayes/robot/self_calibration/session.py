@@ -7,9 +7,8 @@ a prior allows it, the bias of each tension sensor: its zero, or friction of gui
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import (
     CORE,
@@ -52,7 +51,7 @@ class Session:
     rotation: Floats
     joint_m: Floats
     duration_s: Floats
-    read: NDArray[np.bool_]
+    read: Bools
     tension_sd_N: float
     tilt_sd_rad: float | None = None
     motion: Floats | None = None
