@@ -25,8 +25,6 @@ STORED = ROOT / "tests" / "data" / "results"
 SESSION = ROOT / "docs" / "example" / "linear-7-session.csv"
 ROBOTS = ROOT / "data" / "robots"
 HASTY = Policy(walkers=64, rounds=2, round_draws=1024, most_rounds=2, block=2, most_steps=2)
-# the destructor of h5netcdf's File, which the command line silences
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 
 
 @pytest.fixture(scope="module")

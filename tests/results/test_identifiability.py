@@ -16,7 +16,7 @@ from wirebayes.results.identifiability import (
     SENSITIVE,
     Extrapolation,
     _weighted_quantiles,
-    distance_per_doubling,
+    distances_per_doubling,
     extrapolation,
     identifiability,
     log_priors,
@@ -66,10 +66,15 @@ def test_a_sum_alone_is_a_ridge() -> None:
 
 def test_sensitivity_is_zero_for_a_flat_component_and_grows_with_its_part() -> None:
     values = np.random.default_rng(1).normal(size=4000)
-    assert distance_per_doubling(values, np.zeros(4000)) == 0.0
-    assert distance_per_doubling(values, 1e-7 * values) == 0.0  # readings of a sensor too coarse to say anything
-    assert 0.0 < distance_per_doubling(values, 1e-6 * values) < 1e-5
-    small, large = (distance_per_doubling(values, -0.5 * part * values**2) for part in (0.01, 0.5))
+
+    def moved(component: np.ndarray) -> float:
+        (distance,) = distances_per_doubling(values[:, None], component)
+        return distance
+
+    assert moved(np.zeros(4000)) == 0.0
+    assert moved(1e-7 * values) == 0.0  # readings of a sensor too coarse to say anything
+    assert 0.0 < moved(1e-6 * values) < 1e-5
+    small, large = (moved(-0.5 * part * values**2) for part in (0.01, 0.5))
     assert small < 0.02 < large
 
 
@@ -213,14 +218,15 @@ def test_sensitivity_is_the_distance_over_powers_a_tenth_apart(monkeypatch: pyte
         return power * component
 
     def distance(values: np.ndarray, low: np.ndarray, high: np.ndarray, powers: tuple[float, float]) -> float:
-        assert values.tolist() == [1.0, 2.0, 4.0] and list(powers) == asked
+        assert list(powers) == asked
         assert low == pytest.approx(np.exp(component / 1.1)) and high == pytest.approx(np.exp(component * 1.1))
-        return 0.25
+        return float(values[-1])
 
     component = np.array([0.1, -0.2, 0.3])
     monkeypatch.setattr(module, "power_scaled", weights)
     monkeypatch.setattr(module, "power_sensitivity", distance)
-    assert distance_per_doubling(np.array([1.0, 2.0, 4.0]), component) == 0.25
+    values = np.array([[1.0, 0.0], [2.0, 0.0], [4.0, 3.0]])
+    assert distances_per_doubling(values, component) == [4.0, 3.0]  # of each column, with weights found once
     assert asked == pytest.approx([1.0 / 1.1, 1.1])
 
 

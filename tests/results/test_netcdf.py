@@ -1,5 +1,6 @@
 """Files of named arrays: what xarray finds in them, and what is read back."""
 
+import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -49,6 +50,15 @@ def test_xarray_finds_dimensions_labels_units_and_missing_values(group, tmp_path
         "seeds": None,
     }
     assert found.attrs["words"] == "für ArviZ" and list(found.attrs["range"]) == [0.5, 2.0]
+
+
+def test_dimensions_are_numbered_through_the_file(group, tmp_path):
+    path = tmp_path / "some.nc"
+    path.write_bytes(content({"first": group, "second": group}, {}))
+    with h5py.File(path) as file:
+        scales = [d for name in ("first", "second") for d in file[name].values() if d.is_scale]
+        assert [d.name.rpartition("/")[2] for d in scales] == ["hold", "time", "draw"] * 2
+        assert sorted(int(d.attrs["_Netcdf4Dimid"]) for d in scales) == list(range(6))
 
 
 @pytest.mark.parametrize("writer", ["content", "xarray"])

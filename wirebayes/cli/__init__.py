@@ -144,8 +144,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         gc.set_threshold(100_000, 50, 100)
         # The end of the process frees all at once; Python would free each object before it, for half a second.
         atexit.register(gc.freeze)
-        # Of a damaged file, h5netcdf complains a second time, in a traceback from a destructor that stops nothing.
-        sys.unraisablehook = lambda unraisable: None
     arguments = list(arguments)
     called = next((word for word in _typed(arguments) if not word.startswith("-")), None)
     if called is None and arguments in (["-h"], ["--help"]):

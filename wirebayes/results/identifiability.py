@@ -49,6 +49,7 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
     correlation = np.atleast_2d(np.corrcoef(z.T))
     out: dict[str, Identifiability] = {}
     drawn = prior.rvs(20000, np.random.default_rng(0))
+    by_likelihood = distances_per_doubling(z, likelihood)
     for i, name in enumerate(names):
         sample = drawn[:, i]
         before = np.quantile(sample, [0.05, 0.95])
@@ -61,8 +62,8 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
             "prior_range_90": float(before[1] / before[0] if positive[i] else before[1] - before[0]),
             "posterior_range_90": float(after[1] / after[0] if positive[i] else after[1] - after[0]),
             "range_is_factor": bool(positive[i]),
-            "prior_sensitivity": distance_per_doubling(z[:, i], own_prior[:, i]),
-            "likelihood_sensitivity": distance_per_doubling(z[:, i], likelihood),
+            "prior_sensitivity": distances_per_doubling(z[:, [i]], own_prior[:, i])[0],
+            "likelihood_sensitivity": by_likelihood[i],
             "ridges": {names[j]: float(correlation[i, j]) for j in along},
         }
         out[name] = {**figures, "sentence": parameter_in_words(name, figures)}
@@ -91,12 +92,12 @@ def parameter_in_words(name: str, figures: IdentifiabilityFigures) -> str:
     return f"{name}: {verdict}; {ranges}{along}."
 
 
-def distance_per_doubling(values: Array, log_component: Array) -> float:
-    """Distance the distribution of (n,) `values` moves for each doubling of a component's power."""
+def distances_per_doubling(values: Array, log_component: Array) -> list[float]:
+    """How far the distribution of each column of (n, d) `values` moves for each doubling of a component's power."""
     if np.ptp(log_component) < _NOTHING:
-        return 0.0
+        return [0.0] * values.shape[1]
     below, above = (np.exp(power_scaled(log_component, power)) for power in _POWERS)
-    return power_sensitivity(values, below, above, _POWERS)
+    return [power_sensitivity(column, below, above, _POWERS) for column in values.T]
 
 
 def log_priors(fitted: Fit, theta: Array) -> Array:

@@ -1,18 +1,24 @@
 """Named arrays in groups, to and from netCDF files that xarray and ArviZ open.
 
-Both would do the same, but take a second to load, and most commands need neither.
+Both would do the same, but take a second to load, and most commands need neither. h5netcdf, which they open files with,
+takes six times as long to write one as HDF5 itself, because it looks up each dimension again for each variable.
+
+A netCDF file is one of HDF5 in which every dimension is a dataset, a "scale" that the axes of others are attached to:
+the coordinate that labels it, or else an empty one whose name says that it is no variable.
 """
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import h5netcdf
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+_NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."  # words of the format
 
 
 class Variable(NamedTuple):
@@ -67,11 +73,11 @@ def content(groups: Mapping[str, Group], attributes: Mapping[str, Any]) -> bytes
     attributes : mapping
         Of the file as a whole.
     """
-    stream = io.BytesIO()
-    with h5netcdf.File(stream, "w") as file:
-        file.attrs.update(attributes)
+    stream, numbers = io.BytesIO(), count()
+    with h5py.File(stream, "w", track_order=True) as file:
+        _describe(file, attributes)
         for name, group in groups.items():
-            _write(file.create_group(name), group)
+            _write(file.create_group(name, track_order=True), group, numbers)
     return stream.getvalue()
 
 
@@ -83,51 +89,82 @@ def read_groups(path: Path, names: Sequence[str]) -> dict[str, Group]:
     names : sequence of str
         Of the groups.
     """
-    with h5netcdf.File(path, "r") as file:
-        return {name: _read(file.groups[name]) for name in names}
+    with h5py.File(path, "r") as file:
+        return {name: _read(file[name]) for name in names}
 
 
-def _write(node: Any, group: Group) -> None:
-    node.attrs.update(group.attributes)
+def _write(node: Any, group: Group, numbers: Iterator[int]) -> None:
+    """Fill a group of HDF5; each dimension takes the next of the file's numbers."""
+    _describe(node, group.attributes)
     both = group.coordinates | group.variables
-    for variable in both.values():
-        sizes = zip(variable.dims, variable.values.shape, strict=True)
-        node.dimensions.update({dim: size for dim, size in sizes if dim not in node.dimensions})
-    auxiliary = [name for name in group.coordinates if name not in node.dimensions]
+    sizes = {dim: size for v in both.values() for dim, size in zip(v.dims, v.values.shape, strict=True)}
+    written = {name: _dataset(node, name, variable.values) for name, variable in both.items()}
+    for dim, size in sizes.items():
+        scale = written[dim] if dim in written else node.create_dataset(dim, (size,), ">f4", track_order=True)
+        scale.make_scale(dim if dim in written else f"{_NO_VARIABLE}{size:10}")
+        scale.attrs["_Netcdf4Dimid"] = np.int32(next(numbers))
+    auxiliary = [name for name in group.coordinates if name not in sizes]
     for name, variable in both.items():
-        written = _write_variable(node, name, variable)
+        if name not in sizes:
+            for axis, dim in zip(written[name].dims, variable.dims, strict=True):
+                axis.attach_scale(node[dim])
         if name in group.units:
-            written.attrs["units"] = group.units[name]
+            written[name].attrs["units"] = group.units[name]
         labelling = [other for other in auxiliary if set(group.coordinates[other].dims) <= set(variable.dims)]
         if labelling and name in group.variables:  # as the conventions for climate and forecast (CF) have it
-            written.attrs["coordinates"] = " ".join(labelling)
+            written[name].attrs["coordinates"] = " ".join(labelling)
 
 
-def _write_variable(node: Any, name: str, variable: Variable) -> Any:
-    values = variable.values
-    is_text = values.dtype.kind in "UO"
-    dtype = h5py.string_dtype() if is_text else values.dtype
-    missing = np.nan if values.dtype.kind == "f" else None
-    written = node.create_variable(name, variable.dims, dtype, fillvalue=missing)
-    written[...] = values.astype(object) if is_text else values
-    return written
+def _dataset(node: Any, name: str, values: NDArray[Any]) -> Any:
+    if values.dtype.kind in "UO":
+        return node.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype(), track_order=True)
+    if values.dtype.kind != "f":
+        return node.create_dataset(name, data=values, track_order=True)
+    dataset = node.create_dataset(name, data=values, fillvalue=np.nan, track_order=True)
+    dataset.attrs["_FillValue"] = np.array([np.nan], values.dtype)
+    return dataset
+
+
+def _describe(node: Any, attributes: Mapping[str, Any]) -> None:
+    """Attributes of a file or group; netCDF has lists of numbers only, with one entry or more."""
+    for name, value in attributes.items():
+        node.attrs[name] = value if isinstance(value, str) else np.atleast_1d(value)
 
 
 def _read(node: Any) -> Group:
-    both = {name: Variable(tuple(v.dimensions), _values(v)) for name, v in node.variables.items()}
-    labels = {word for v in node.variables.values() for word in str(v.attrs.get("coordinates", "")).split()}
-    labels |= set(node.dimensions)
+    stored = {name: dataset for name, dataset in node.items() if not _is_bare(dataset)}
+    both = {name: Variable(_dims(dataset), _values(dataset)) for name, dataset in stored.items()}
+    units = {name: _entry(d.attrs["units"]) for name, d in stored.items() if "units" in d.attrs}
+    auxiliary = [_entry(d.attrs["coordinates"]) for d in stored.values() if "coordinates" in d.attrs]
+    labels = {dim for v in both.values() for dim in v.dims} | {name for names in auxiliary for name in names.split()}
     return Group(
         {name: v for name, v in both.items() if name not in labels},
         {name: v for name, v in both.items() if name in labels},
-        {name: v.attrs["units"] for name, v in node.variables.items() if "units" in v.attrs},
-        dict(node.attrs),
+        units,
+        {name: _entry(value) for name, value in node.attrs.items()},
     )
 
 
-def _values(variable: Any) -> NDArray[Any]:
+def _is_bare(dataset: Any) -> bool:
+    """Whether a dataset stands for a dimension without labels."""
+    return dataset.is_scale and h5py.h5ds.get_scale_name(dataset.id).startswith(_NO_VARIABLE.encode())
+
+
+def _dims(dataset: Any) -> tuple[str, ...]:
+    """Names of the axes: of the scales that are attached; a scale is attached to none, and labels its own."""
+    scales = [dataset] if dataset.is_scale else [axis[0] for axis in dataset.dims]
+    return tuple(scale.name.rpartition("/")[2] for scale in scales)
+
+
+def _entry(value: Any) -> Any:
+    """An attribute as it was given to `content`: a list of one entry is that entry."""
+    entry = value[0] if np.size(value) == 1 and np.ndim(value) else value
+    return entry.decode() if isinstance(entry, bytes) else entry
+
+
+def _values(dataset: Any) -> NDArray[Any]:
     """The values in this machine's order of bytes; text as Python's own."""
-    values = np.asarray(variable[...])
+    values = np.asarray(dataset[...])
     if values.dtype.kind in "OSU":
         return np.array([t.decode() if isinstance(t, bytes) else t for t in values.ravel()]).reshape(values.shape)
     return values
