@@ -19,7 +19,7 @@ from wirebayes.commands.options import (
     rising_times,
     text_of,
 )
-from wirebayes.commands.pose_history import Begun, calibrated_errors, checked_errors, pose_along, pose_from_joints
+from wirebayes.commands.pose_history import Begun, calibrated_errors, checked_errors, pose_over_time
 from wirebayes.commands.wires import (
     RobotLike,
     Wires,
@@ -191,10 +191,10 @@ def pose(
 def _along(asked: AskedPose, joints: Any, trajectory: Any, errors: Uncertain, begun: Begun) -> Pose:
     """Poses over time, of measured joint values or of commands."""
     if joints is None:
-        return pose_along(asked, trajectory, errors, begun)
+        return pose_over_time(asked, "--trajectory", trajectory, errors, begun)
     if trajectory is not None:
         raise InputError("--joints and --trajectory: found both, expected one (a file of --joints may hold poses too)")
-    return pose_from_joints(asked, joints, errors, begun)
+    return pose_over_time(asked, "--joints", joints, errors, begun)
 
 
 def _options_of(slices: Slices) -> dict[str, Any]:

@@ -118,48 +118,27 @@ class Begun:
     progress: Progress
 
 
-def pose_from_joints(asked: AskedPose, joints: Any, errors: Uncertain, begun: Begun) -> Pose:
-    """Poses over time from measured joint values: ``pose.json``, two tables and pictures.
-
-    Parameters
-    ----------
-    asked : AskedPose
-        The pose near which the first row's is sought.
-    joints : path of a CSV, DataFrame, or mapping of name to (t,) array
-    errors : Uncertain
-    begun : Begun
-
-    Raises
-    ------
-    InputError
-        The table is wrong (line and column).
-    """
-    return _followed(asked, "--joints", joints, errors, begun)
-
-
-def pose_along(asked: AskedPose, trajectory: Any, errors: Uncertain, begun: Begun) -> Pose:
-    """Poses over time for commanded ones: ``pose.json``, two tables and pictures.
-
-    Parameters
-    ----------
-    asked : AskedPose
-        The pose near which the first row's is sought.
-    trajectory : path of a CSV, DataFrame, or mapping of name to (t,) array
-    errors : Uncertain
-    begun : Begun
-
-    Raises
-    ------
-    InputError
-        The table is wrong (line and column).
-    """
-    return _followed(asked, "--trajectory", trajectory, errors, begun)
-
-
 _COLUMNS = {"--joints": table.measured_columns, "--trajectory": table.commanded_columns}
 
 
-def _followed(asked: AskedPose, option: str, given: Any, errors: Uncertain, begun: Begun) -> Pose:
+def pose_over_time(asked: AskedPose, option: str, given: Any, errors: Uncertain, begun: Begun) -> Pose:
+    """Poses over time from measured joint values or for commanded poses: ``pose.json``, two tables and pictures.
+
+    Parameters
+    ----------
+    asked : AskedPose
+        The pose near which the first row's is sought.
+    option : {"--joints", "--trajectory"}
+        What is given.
+    given : path of a CSV, DataFrame, or mapping of name to (t,) array
+    errors : Uncertain
+    begun : Begun
+
+    Raises
+    ------
+    InputError
+        The table is wrong (line and column).
+    """
     robot, columns = asked.robot, _COLUMNS[option]
     if isinstance(given, str | os.PathLike):
         history = table.read_log(Path(given), robot, columns)

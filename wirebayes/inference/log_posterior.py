@@ -34,10 +34,7 @@ class LogPosterior:
         self.evaluations += len(z)
         if len(z) <= self._rows:
             return self._values(z, readings)
-        pieces = [slice(i, i + self._rows) for i in range(0, len(z), self._rows)]
-        return np.concatenate(
-            [self._values(z[p], None if readings is None else [y[..., p] for y in readings]) for p in pieces]
-        )
+        return np.concatenate([self._values(z[p], _of_rows(readings, p)) for p in self._pieces(len(z))])
 
     def standardised(self, z: Array, readings: Any = None) -> tuple[Array, Array]:
         """(n,) log density, and (m, n) residuals whose derivatives J give its curvature nearly, as JᵀJ.
@@ -47,8 +44,7 @@ class LogPosterior:
         self.evaluations += len(z)
         if len(z) <= self._rows:
             return self._standardised(z, readings)
-        pieces = [slice(i, i + self._rows) for i in range(0, len(z), self._rows)]
-        parts = [self._standardised(z[p], None if readings is None else [y[..., p] for y in readings]) for p in pieces]
+        parts = [self._standardised(z[p], _of_rows(readings, p)) for p in self._pieces(len(z))]
         values, residuals = zip(*parts, strict=True)
         return np.concatenate(values), np.concatenate(residuals, axis=1)
 
@@ -60,14 +56,13 @@ class LogPosterior:
         readings : sequence of (H, R, n) arrays, optional
             In place of the measured ones, a sample each: row r sees the r-th of n.
         """
-
-        def seen(rows: Array) -> list[Array] | None:
-            return None if readings is None else [y[..., rows] for y in readings]
-
         return (
-            lambda points, rows: self(points, seen(rows)),
-            lambda points, rows: self.standardised(points, seen(rows)),
+            lambda points, rows: self(points, _of_rows(readings, rows)),
+            lambda points, rows: self.standardised(points, _of_rows(readings, rows)),
         )
+
+    def _pieces(self, count: int) -> list[slice]:
+        return [slice(i, i + self._rows) for i in range(0, count, self._rows)]
 
     def _standardised(self, z: Array, readings: Any) -> tuple[Array, Array]:
         theta = self.coordinates.to_natural(z)
@@ -86,7 +81,11 @@ class LogPosterior:
             return np.full(len(z), -np.inf)
         if inside.all():
             return value + self.problem.log_likelihood(theta, readings)
-        picked = None if readings is None else [y[..., inside] for y in readings]
         value = np.where(inside, value, -np.inf)
-        value[inside] += self.problem.log_likelihood(theta[inside], picked)
+        value[inside] += self.problem.log_likelihood(theta[inside], _of_rows(readings, inside))
         return value
+
+
+def _of_rows(readings: Sequence[Array] | None, rows: Any) -> list[Array] | None:
+    """What some of the rows see in place of the measured readings."""
+    return None if readings is None else [y[..., rows] for y in readings]

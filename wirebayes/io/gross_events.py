@@ -12,7 +12,6 @@ import numpy as np
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold
-from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.sentences import counted, listed
 from wirebayes.wire.protocol import Protocol
@@ -164,20 +163,7 @@ def without_gross_events(experiment: Experiment, events: Sequence[Event]) -> Exp
     for hold in experiment.holds:
         own = np.arange(begin, begin + hold.time_s.size)
         begin += hold.time_s.size
-        keep = ~np.isin(own, dropped)
-        if keep.all():
-            holds.append(hold)
-            continue
-        temperature = None if hold.temperature_C is None else frozen(hold.temperature_C[keep])
-        holds.append(
-            replace(
-                hold,
-                number=hold.number if keep.any() else None,
-                time_s=frozen(hold.time_s[keep]),
-                readings=frozen(hold.readings[keep]),
-                temperature_C=temperature if keep.any() else None,
-            )
-        )
+        holds.append(hold.of_readings(~np.isin(own, dropped)))
     while holds and not holds[-1].recorded:
         holds.pop()
     if holds and begin - 1 in dropped:  # how long the last one was as it should be, its last reading says

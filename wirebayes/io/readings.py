@@ -15,7 +15,7 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.numeric.frozen import frozen
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.strict.table import CsvTable, read_table
 from wirebayes.wire.protocol import Control
 
@@ -74,6 +74,19 @@ class Hold:
         """The (r,) tensions that were read, or the one that was set."""
         return self.readings if self.control == "displacement" else self.setting
 
+    def of_readings(self, kept: Bools) -> "Hold":
+        """The hold with some of its readings; without any it is unrecorded."""
+        if kept.all():
+            return self
+        temperature = None if self.temperature_C is None else frozen(self.temperature_C[kept])
+        return replace(
+            self,
+            number=self.number if kept.any() else None,
+            time_s=frozen(self.time_s[kept]),
+            readings=frozen(self.readings[kept]),
+            temperature_C=temperature if kept.any() else None,
+        )
+
 
 def readings_table(path: Path) -> CsvTable:
     """A readings' CSV split into fields, not checked any further."""
@@ -104,25 +117,11 @@ def checked_readings(table: CsvTable, length_mm: float, control: Control = "disp
     values = [table.number(row, column) if table.cell(row, column) else np.nan for row in range(len(table.rows))]
     if not np.isfinite(values).any():
         raise table.complain(0, column, "no reading", "at least one")
-    holds = tuple(_without_empty(hold) for hold in _holds(table, length_mm, control, values))
+    read = _holds(table, length_mm, control, values)
+    holds = tuple(hold.of_readings(np.isfinite(hold.readings)) for hold in read)  # without rows of no reading
     if control == "displacement":
         _check_sign(table, [hold for hold in holds if hold.recorded])
     return holds
-
-
-def _without_empty(hold: Hold) -> Hold:
-    """A hold without its rows of no reading; one without any reading is unrecorded."""
-    read = np.isfinite(hold.readings)
-    if read.all():
-        return hold
-    temperature = None if hold.temperature_C is None else frozen(hold.temperature_C[read])
-    return replace(
-        hold,
-        number=hold.number if read.any() else None,
-        time_s=frozen(hold.time_s[read]),
-        readings=frozen(hold.readings[read]),
-        temperature_C=temperature if read.any() else None,
-    )
 
 
 def protocol_columns(control: Control) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -12,7 +12,7 @@ from wirebayes.robot.motion.creep import CreepState
 def beside(first: Wires, other: Wires) -> Wires:
     """Columns of wires of one model side by side."""
     theta = {}
-    counts = [max(v.shape[-1] for v in wires.theta.values()) for wires in (first, other)]
+    counts = (first.count, other.count)
     for name, value in first.theta.items():
         rows = max(len(value), len(other.theta[name]))
         both = [np.broadcast_to(v, (rows, n)) for v, n in zip((value, other.theta[name]), counts, strict=True)]

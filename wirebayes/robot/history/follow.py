@@ -106,7 +106,7 @@ def follow_log(
     -------
     Track
     """
-    n = max(v.shape[-1] for v in wires.theta.values())
+    n = wires.count
     times, legs = history.times_s, robot.legs
     hold = np.searchsorted(starts_s, times, "right") - 1
     track = _empty(n, legs, np.maximum(hold, 0))

@@ -22,7 +22,7 @@ from wirebayes.robot.history.unknowns import Uncertain, slopes, unknowns
 from wirebayes.robot.mechanics import firmware
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts
-from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.rotation import antisymmetric, matrix
 from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch
 from wirebayes.robot.motion import balance, forward, inverse, mixed, path, plausible
 from wirebayes.robot.motion.creep import HoldCreep
@@ -372,12 +372,11 @@ class LiveEstimator:
 
     def _own_draws(self, centre: Floats) -> Floats:
         """Position, rotation from `centre`, joint values and tensions of the draws that count; NaN if none does."""
-        turned = self._R @ centre.T
-        xyz = [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]]
+        turned = antisymmetric(self._R @ centre.T)
         target = self._x[-1:], self._R[-1:], self._tension[-1:]
         strain = self._state.strain(self._wires)
         wanted = inverse.commands(self.robot, self._wires, *target, strain, self._error.T).joint_m
-        values = np.concatenate([self._x, 0.5 * np.stack(xyz, 1), wanted, self._tension], 1)
+        values = np.concatenate([self._x, turned, wanted, self._tension], 1)
         own = values[: self._n]
         if self._reads:
             own = own + self._moves @ slopes(values[self._n : -1])

@@ -39,6 +39,12 @@ def cross_matrix(v: Floats) -> Floats:
     return out
 
 
+def antisymmetric(rotation: Floats) -> Floats:
+    """``(..., 3)``: the sine of the angle along the axis, of ``(..., 3, 3)`` matrices."""
+    R = rotation
+    return 0.5 * np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1)
+
+
 def tilt(rotation: Floats, commanded: Floats | None = None) -> Floats:
     """Angle between the platform's normal (its third axis) and another, rad; `(...)` of `(..., 3, 3)`.
 

@@ -46,6 +46,11 @@ class Wires:
     tension_ref_N: float = 1.0
 
     @property
+    def count(self) -> int:
+        """How many draws there are."""
+        return max(v.shape[-1] for v in self.theta.values())
+
+    @property
     def elastic(self) -> laws.Hooke:
         """The elastic law of the wires without effects."""
         return laws.LAWS[self.law]

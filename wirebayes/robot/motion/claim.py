@@ -111,7 +111,7 @@ def over_workspace(
         empty = np.empty((0, 1))
         return WorkspaceDrift(np.empty((0, 3)), empty, empty, np.empty((0, robot.legs)), 0.0, 0.0)
     x, tau = position_m[good], tau[good]
-    n, p = max(v.shape[-1] for v in wires.theta.values()), len(x)
+    n, p = wires.count, len(x)
     many = _at_each(wires, n, p)
     where, pull = np.repeat(x, n, 0), np.repeat(tau, n, 0)
     R = np.repeat(turn[good], n, 0)

@@ -38,8 +38,7 @@ def hooke_only(robot: Robot, model: Wires, position_m: Floats, rotation: Floats)
     callable
         Of a time, s, to the joint values (1, w): here the same at all times.
     """
-    tau = inverse.tensions(robot, position_m[None], rotation[None])
-    joint = inverse.commands(robot, known(model), position_m[None], rotation[None], tau).joint_m
+    joint = inverse.commands_at(robot, known(model), position_m, rotation).joint_m
     return lambda time_s: joint
 
 
@@ -63,8 +62,7 @@ def creep_aware(robot: Robot, model: Wires, position_m: Floats, rotation: Floats
         Of a time, s, to the joint values (1, w).
     """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
-    draws = max(v.shape[-1] for v in model.theta.values())
-    ahead = HoldCreep(model, fresh(robot.legs, draws), np.repeat(tau.T, draws, 1), "start")
+    ahead = HoldCreep(model, fresh(robot.legs, model.count), np.repeat(tau.T, model.count, 1), "start")
     plain = known(model)
 
     def joint(time_s: float) -> Floats:
@@ -98,7 +96,13 @@ class PoseError:
 
 
 def error(
-    robot: Robot, wires: Wires, schedule: Schedule, position_m: Floats, rotation: Floats, times_s: Floats
+    robot: Robot,
+    wires: Wires,
+    schedule: Schedule,
+    position_m: Floats,
+    rotation: Floats,
+    times_s: Floats,
+    carried: CreepState | None = None,
 ) -> PoseError:
     """Pose error over time of uncertain wires under one controller's commands.
 
@@ -112,8 +116,10 @@ def error(
     position_m, rotation : (3,), (3, 3) arrays
         The requested pose.
     times_s : (t,) array
+    carried : CreepState, optional
+        Creep that the wires bring along; default: they were never loaded.
     """
-    course = drift.hold(robot, wires, schedule, times_s, position_m, rotation)
+    course = drift.hold(robot, wires, schedule, times_s, position_m, rotation, carried)
     shift, angle = drift.distance_moved(course, position_m, rotation)
     return PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.found)
 
@@ -168,8 +174,7 @@ def after_calibration(
         `foreseen`: the controller compensates for the mean creep of the draws, given the same history.
     """
     tau = inverse.tensions(robot, position_m[None], rotation[None])
-    draws = max(v.shape[-1] for v in wires.theta.values())
-    load = np.repeat(tau.T, draws, 1)
+    load = np.repeat(tau.T, wires.count, 1)
     before = carried.strain(wires)
     joint = inverse.commands(robot, wires, position_m[None], rotation[None], tau, before).joint_m
     ahead = HoldCreep(wires, carried, load, "start")
@@ -179,9 +184,5 @@ def after_calibration(
         growth = (ahead.advance(time_s, load).strain(wires) - before).mean(1, keepdims=True)
         return inverse.commands(robot, wires, position_m[None], rotation[None], tau, before + growth).joint_m
 
-    out = []
-    for schedule in (lambda time_s: joint, expected):
-        course = drift.hold(robot, wires, schedule, times_s, position_m, rotation, carried)
-        shift, angle = drift.distance_moved(course, position_m, rotation)
-        out.append(PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.found))
-    return out[0], out[1]
+    still = error(robot, wires, lambda time_s: joint, position_m, rotation, times_s, carried)
+    return still, error(robot, wires, expected, position_m, rotation, times_s, carried)

@@ -7,6 +7,7 @@ import numpy as np
 
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.rotation import antisymmetric
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, one_sided, outcome, path
 from wirebayes.robot.motion.course import Course, Falls
@@ -116,7 +117,7 @@ class CreepingHold:
     ) -> None:
         self.robot, self.wires, self.joint, self.tolerance = robot, wires, joint_m, tolerance
         self.error_m = error_m
-        self.n = max(v.shape[-1] for v in wires.theta.values())
+        self.n = wires.count
         state = carried or fresh(robot.legs, self.n)
         self.lengths = self._lengths(0.0, state)
         self.here = forward.solve_equilibrium(robot, wires, *self.lengths, *start)
@@ -303,8 +304,7 @@ def from_command(
     Course
         NaN poses when no tensions hold the pose, or not stably (status `outcome.NOT_HELD`).
     """
-    tau = inverse.tensions(robot, position_m[None], rotation[None])
-    commands = inverse.commands(robot, wires, position_m[None], rotation[None], tau)
+    commands = inverse.commands_at(robot, wires, position_m, rotation)
     stable = stably(robot, wires, commands, position_m, commands.rotation)
     joint = np.where(stable[:, None], commands.joint_m, np.nan)
     course = hold(robot, wires, joint, times_s, position_m, commands.rotation, follow=follow)
@@ -356,11 +356,9 @@ def distance_moved(course: Course, origin_m: Floats, origin_rotation: Floats) ->
     R0 = np.broadcast_to(origin_rotation, (len(course.position_m), 3, 3))[:, None]
     turn = course.rotation @ np.swapaxes(R0, -1, -2)
     # The antisymmetric part keeps small angles exact where the trace would lose half the digits.
-    axis = 0.5 * np.stack(
-        [turn[..., 2, 1] - turn[..., 1, 2], turn[..., 0, 2] - turn[..., 2, 0], turn[..., 1, 0] - turn[..., 0, 1]], -1
-    )
+    sine = np.linalg.norm(antisymmetric(turn), axis=-1)
     cosine = 0.5 * (np.trace(turn, axis1=-2, axis2=-1) - 1.0)
-    return course.position_m - x0, np.arctan2(np.linalg.norm(axis, axis=-1), cosine)
+    return course.position_m - x0, np.arctan2(sine, cosine)
 
 
 def without_creep(wires: Wires) -> Wires:

@@ -112,6 +112,19 @@ def commands(
     return Commands(zero.T, joint, offset, pull, found.held, found.rotation)
 
 
+def commands_at(robot: Robot, wires: Wires, position_m: Floats, rotation: Floats) -> Commands:
+    """`commands` of one pose, under the tensions that the robot's file chooses for it.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+    position_m, rotation : (3,), (3, 3) arrays
+    """
+    x, R = position_m[None], rotation[None]
+    return commands(robot, wires, x, R, tensions(robot, x, R))
+
+
 def _of_each_line(
     robot: Robot,
     wires: Wires,
@@ -127,24 +140,15 @@ def _of_each_line(
     linear = robot.is_linear[:, None]
     tau = tension_N.T
     free = statics.stretched(robot, shape, robot.beyond_m[:, None])
-    drum = zero_tension_length(wires, free, tau)
-    beyond_joint = robot.beyond_joint_m[:, None] + error_m
-    if not linear.any():
-        return _of_drums(robot, drum, drum / grown - beyond_joint, tau, rotation)
-    fixed = (robot.wire_m[:, None] + error_m) * grown
-    moved = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
-    zero = np.where(linear, fixed, drum)
-    joint = np.where(linear, moved / np.where(linear, robot.ratio[:, None], 1.0), drum / grown - beyond_joint)
-    offset = robot.beyond_m[:, None] + np.where(linear, moved, 0.0)
+    zero, offset = zero_tension_length(wires, free, tau), robot.beyond_m[:, None]
+    joint = zero / grown - (robot.beyond_joint_m[:, None] + error_m)
+    if linear.any():
+        fixed = (robot.wire_m[:, None] + error_m) * grown
+        moved = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
+        zero = np.where(linear, fixed, zero)
+        joint = np.where(linear, moved / np.where(linear, robot.ratio[:, None], 1.0), joint)
+        offset = offset + np.where(linear, moved, 0.0)
     feasible = np.isfinite(zero).all(0) & np.isfinite(tau).all(0)
     zero, joint, offset, tau = np.broadcast_arrays(zero, joint, offset, tau)
     turn = np.broadcast_to(rotation, (zero.shape[1], 3, 3))
     return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, zero.shape[1:]), turn)
-
-
-def _of_drums(robot: Robot, zero: Floats, joint: Floats, tau: Floats, rotation: Floats) -> Commands:
-    """Commands of a robot without linear actuators, whose lengths beyond the exit points stay."""
-    feasible = np.isfinite(zero).all(0) & np.isfinite(tau).all(0)
-    zero, offset, tau = (np.broadcast_to(v, joint.shape) for v in (zero, robot.beyond_m[:, None], tau))
-    turn = np.broadcast_to(rotation, (joint.shape[1], 3, 3))
-    return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, joint.shape[1:]), turn)

@@ -242,7 +242,7 @@ def _times(matrix: Any, vector: Floats, arb: Any) -> list[Any]:
 
 def _square(v: list[Any]) -> Any:
     # not v**2: the power of a ball that holds zero is taken by logarithms and lost
-    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+    return _dot(v, v)
 
 
 def _dot(a: list[Any], b: list[Any]) -> Any:

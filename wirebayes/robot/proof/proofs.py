@@ -41,8 +41,7 @@ def only_equilibrium(robot: Robot, wires: Wires, position_m: Floats, rotation: F
         return {"proved": None, "sentence": "Proofs know laws (1), (3) and (6) without further effects."}
     mean = control.known(wires)
     k1 = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)
-    tau = inverse.tensions(robot, position_m[None], rotation[None])
-    here = inverse.commands(robot, mean, position_m[None], rotation[None], tau)
+    here = inverse.commands_at(robot, mean, position_m, rotation)
     lengths = here.zero_m[0], here.zero_m[0]
     try:
         proof = certify(robot, wires.law, (k1, k1), lengths, here.offset_m[0], position_m, here.rotation[0])
@@ -83,8 +82,7 @@ def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rot
     if not course.found.any() or (course.falls is not None and course.falls.fell.any()):
         return nothing
     mean = control.known(wires)
-    tau = inverse.tensions(robot, position_m[None], rotation[None])
-    commands = inverse.commands(robot, mean, position_m[None], rotation[None], tau)
+    commands = inverse.commands_at(robot, mean, position_m, rotation)
     bare, offset = inverse.lengths(robot, commands.joint_m[0])
     strain = np.broadcast_to(course.end.strain(wires), (robot.legs, len(course.found)))[:, course.found]
     k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, len(course.found)))[:, course.found]

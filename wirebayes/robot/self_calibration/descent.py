@@ -1,10 +1,12 @@
 """Levenberg-Marquardt over robot and holds together, the holds eliminated one by one."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from wirebayes.numeric.linear_algebra import inv, solve
+from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics.description import Robot
@@ -177,11 +179,7 @@ def _corrected(
     hold = -solve(A, zt @ e.residual[..., None])[..., 0]
     there = _stepped(unknowns.robot, state, np.zeros_like(state.white), np.nan_to_num(hold))
     ahead = linearised(unknowns, holds, noise, there, creep, since)
-    better = (ahead.residual**2).sum(1) < (e.residual**2).sum(1)
-
-    def chosen(new: Floats, old: Floats) -> Floats:
-        return np.where(better.reshape(-1, *[1] * (new.ndim - 1)), new, old)
-
+    chosen = partial(chosen_rows, (ahead.residual**2).sum(1) < (e.residual**2).sum(1))
     state = State(
         state.white,
         chosen(there.position_m, state.position_m),

@@ -17,7 +17,7 @@ from wirebayes.robot.mechanics.winches import turned_by
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.strain import Grown, stretch
-from wirebayes.robot.self_calibration.unknowns import Parts, Unknowns
+from wirebayes.robot.self_calibration.unknowns import Parts, Unknowns, one_after_another
 
 EXACT = 1e-8  # of the robot's span: what is exact is known this well, far below anything that matters
 FRICTIONLESS = 1e-5  # of the weight: balance holds this well
@@ -265,8 +265,7 @@ def _rows(robot: Robot, holds: Holds) -> dict[str, slice]:
     counts = {"loop": robot.legs, "balance": robot.degrees, "tension": robot.legs, "pose": robot.degrees}
     if holds.tilt is not None:
         counts["tilt"] = 2
-    ends = np.cumsum(list(counts.values()))
-    return {name: slice(int(end) - count, int(end)) for (name, count), end in zip(counts.items(), ends, strict=True)}
+    return one_after_another(counts)
 
 
 def _points(out: Floats, unknowns: Unknowns, by_exit: Floats, by_platform: Floats) -> None:

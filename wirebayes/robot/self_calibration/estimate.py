@@ -11,7 +11,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from wirebayes.numeric.linear_algebra import inv, solve
-from wirebayes.numeric.typing import Array, Bools, Floats, Indices
+from wirebayes.numeric.rows import chosen_rows
+from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
@@ -289,10 +290,7 @@ def derivatives(
 
 
 def _pick(first: Bools, a: PredictedSession, b: PredictedSession) -> PredictedSession:
-    def choose(u: Array, v: Array) -> Array:
-        return np.where(first.reshape(-1, *[1] * (u.ndim - 1)), u, v)
-
-    both = {f.name: choose(getattr(a, f.name), getattr(b, f.name)) for f in fields(PredictedSession)}
+    both = {f.name: chosen_rows(first, getattr(a, f.name), getattr(b, f.name)) for f in fields(PredictedSession)}
     return PredictedSession(**both)
 
 

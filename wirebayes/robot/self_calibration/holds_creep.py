@@ -6,8 +6,8 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.self_calibration import observability
-from wirebayes.robot.self_calibration.equations import EXACT, Holds, State, moved
-from wirebayes.robot.self_calibration.residuals import usual_joint
+from wirebayes.robot.self_calibration.equations import Holds, State, moved
+from wirebayes.robot.self_calibration.residuals import joint_error
 from wirebayes.robot.self_calibration.strain import Grown, grown, stretch
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 from wirebayes.robot.self_calibration.within_holds import Loaded
@@ -42,8 +42,7 @@ def creep_of(unknowns: Unknowns, holds: Holds, state: State, known: Grown | None
 
 def _resolution(unknowns: Unknowns, holds: Holds, here: "_Here") -> float:
     """What the session resolves of a tension, N: a reading's error, or what the joint values' makes of it."""
-    stated, robot = unknowns.errors.joint_m, unknowns.robot
-    joint_m = usual_joint(robot, holds)[0] if stated is None else max(stated, EXACT * robot.span_m)
+    joint_m = joint_error(unknowns, holds)
     by_joint = float(np.median(here.wires.theta["k1"]) * joint_m / np.median(here.zero))
     read = bool(np.isfinite(holds.tension_N).any())
     return max(by_joint, holds.session.tension_sd_N) if read else by_joint

@@ -64,7 +64,7 @@ def next_poses(found: Whole, holds: Holds, count: int, rng: np.random.Generator)
     commands = inverse.commands(robot, wires, x, R, tau)
     told = replace(told, session=replace(told.session, joint_m=commands.joint_m))
     equations = _at(found, told, x, R, tau)
-    blind = replace(told, tension_N=np.full_like(tau, np.nan), session=_without_poses(told.session), tilt=None)
+    blind = replace(told, tension_N=np.full_like(tau, np.nan), session=told.session.without_poses(), tilt=None)
     motion = _follows(_at(found, blind, x, R, tau), robot.degrees)
     information = _information(equations)
     root = np.moveaxis(motion[:, :3], 0, 1).reshape(-1, motion.shape[2])  # what counts: the position
@@ -105,14 +105,6 @@ def _as_read(holds: Holds, x: Floats, R: Floats, tau: Floats) -> Holds:
     )
     tilt = None if holds.tilt is None else np.where(np.isfinite(holds.tilt).any(), R[:, :2, 2], np.nan)
     return Holds(there, tau if read else np.full_like(tau, np.nan), tilt)
-
-
-def _without_poses(session: Session) -> Session:
-    return replace(
-        session,
-        position_m=np.full_like(session.position_m, np.nan),
-        rotation=np.full(session.rotation.shape, np.nan),
-    )
 
 
 def _at(found: Whole, holds: Holds, x: Floats, R: Floats, tau: Floats) -> Equations:

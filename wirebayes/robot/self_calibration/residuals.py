@@ -5,9 +5,10 @@ from scipy.special import chdtrc, fdtrc
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.self_calibration.equations import FRICTIONLESS, Holds
+from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.trust import joint_test
+from wirebayes.robot.self_calibration.unknowns import Unknowns
 
 _FLOOR = 1e-6  # of the span: no encoder with drum and wire does better
 _LEAST_DEGREES = 1.0  # weight of `_FLOOR` beside the readings, in degrees of freedom
@@ -80,6 +81,12 @@ def usual_joint(robot: Robot, holds: Holds) -> tuple[float, float]:
     if np.isfinite(holds.tension_N).any():
         return _FLOOR * robot.span_m, _LEAST_DEGREES
     return _BLIND * robot.span_m, _BLIND_DEGREES
+
+
+def joint_error(unknowns: Unknowns, holds: Holds) -> float:
+    """Error of a joint value before anything was read, m: as stated, or usual."""
+    stated, robot = unknowns.errors.joint_m, unknowns.robot
+    return usual_joint(robot, holds)[0] if stated is None else max(stated, EXACT * robot.span_m)
 
 
 def noise_shown(found: Whole, usual_m: float, worth: float) -> tuple[Floats, float]:

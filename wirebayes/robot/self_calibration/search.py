@@ -83,13 +83,7 @@ def _rather_requests(found: Whole, holds: Holds, allowed: bool, progress: Progre
     too_good = _too_good(found)
     if not holds.placed.any() or not (too_good or (allowed and found.unknowns.errors.pose_m == 0)):
         return found, holds, False
-    session = holds.session
-    nowhere = replace(
-        session,
-        position_m=np.full_like(session.position_m, np.nan),
-        rotation=np.full(session.rotation.shape, np.nan),
-    )
-    blind = replace(holds, session=nowhere)
+    blind = replace(holds, session=holds.session.without_poses())
     state = replace(found.state, white=np.zeros_like(found.state.white))
     other = estimate(found.unknowns, blind, state, progress_of(progress, "poses as requests"))
     clearer = other.noise.joint_m * _RATHER < found.noise.joint_m and trust(other) >= SIGNIFICANT

@@ -63,6 +63,11 @@ class Session:
         tilts = 0 if self.tilt_sd_rad is None else 2
         return int(self.read.sum()) * (self.joint_m.shape[1] + tilts)
 
+    def without_poses(self) -> "Session":
+        """The same where nothing is known of the poses."""
+        position, turn = np.full_like(self.position_m, np.nan), np.full(self.rotation.shape, np.nan)
+        return replace(self, position_m=position, rotation=turn)
+
     @property
     def bias_sign(self) -> Floats:
         """(q, w) How the bias enters the tensions that were read."""

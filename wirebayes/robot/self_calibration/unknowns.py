@@ -14,6 +14,12 @@ from wirebayes.robot.mechanics.winches import of_each_leg
 from wirebayes.robot.self_calibration.session import LengthPrior
 
 
+def one_after_another(counts: dict[str, int]) -> dict[str, slice]:
+    """The place of each in a vector that holds so many numbers of them, in this order."""
+    ends = np.cumsum(list(counts.values()))
+    return {name: slice(int(end) - count, int(end)) for (name, count), end in zip(counts.items(), ends, strict=True)}
+
+
 @dataclass(frozen=True)
 class StatedErrors:
     """Standard deviations of what a robot's file and a session state; 0 is exact.
@@ -104,10 +110,7 @@ class Unknowns:
             "wires": len(self.moments[0]),
             "level": legs if self.errors.level_N > 0 else 0,
         }
-        ends = np.cumsum(list(counts.values()))
-        return {
-            name: slice(int(end) - count, int(end)) for (name, count), end in zip(counts.items(), ends, strict=True)
-        }
+        return one_after_another(counts)
 
     @property
     def count(self) -> int:

@@ -14,10 +14,17 @@ from wirebayes.progress import Progress
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.approach import onward
 from wirebayes.robot.self_calibration.descent import descend
-from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds, Noise, State, linearised
+from wirebayes.robot.self_calibration.equations import FRICTIONLESS, Holds, Noise, State, linearised
 from wirebayes.robot.self_calibration.holds_creep import ROUGHLY, creep_of
 from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
-from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, most_open_m, noise_shown, usual_joint
+from wirebayes.robot.self_calibration.residuals import (
+    joint_error,
+    length_rms_m,
+    lost,
+    most_open_m,
+    noise_shown,
+    usual_joint,
+)
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
@@ -122,12 +129,11 @@ def _at_rest(
 
 def _before_reading(unknowns: Unknowns, holds: Holds) -> Noise:
     """What is stated of every noise, or usual."""
-    robot, stated = unknowns.robot, unknowns.errors.joint_m
-    joint = usual_joint(robot, holds)[0] if stated is None else max(stated, EXACT * robot.span_m)
+    robot = unknowns.robot
     low, high = robot.rule.lowest_N, robot.rule.highest_N
     usual = 0.5 * (low + high) if robot.rule.choice == "middle" else low
     finest = min(holds.session.tension_sd_N, low) if np.isfinite(holds.tension_N).any() else low
-    return Noise(joint, FRICTIONLESS, _UNREAD * (high - low), usual, _SOFT * finest)
+    return Noise(joint_error(unknowns, holds), FRICTIONLESS, _UNREAD * (high - low), usual, _SOFT * finest)
 
 
 def _next_noise(noise: Noise, rounds: list[tuple[Floats, Floats]]) -> Noise:
