@@ -18,7 +18,7 @@ from wirebayes.numeric.typing import Array
 
 @dataclass(frozen=True)
 class DisplacementLevel:
-    """The only hold of a test under weights.
+    """A test under weights whose readings are all of one weight.
 
     Attributes
     ----------
@@ -26,6 +26,8 @@ class DisplacementLevel:
         Columns.
     weight, length, last : float
         The weight, N; length of the wire, and the last displacement that was read, mm.
+    holds : int
+        Of the test until that reading; those that were not read, as rests between, may be of another weight.
     modified : bool
         Whether strain is relative to the stretched length (`wirebayes.wire.laws.Modified`).
     """
@@ -35,13 +37,14 @@ class DisplacementLevel:
     weight: float
     length: float
     last: float
+    holds: int
     modified: bool
 
     def log_beyond(self, theta: Array, U: Array | float) -> Array:
         """(n,) log of what the readings show of a creep over the creep, which is stretched itself."""
         return np.log1p(self._strain(theta))
 
-    def score(self, theta: Array, U: Array | float, log_lost: Array) -> Array:
+    def score(self, theta: Array, U: Array | float, log_total: Array) -> Array:
         """(n,) error of the weight, as a share of it, by which the last reading is what it is.
 
         Parameters
@@ -50,24 +53,24 @@ class DisplacementLevel:
             Natural parameters.
         U : (n,) array or float
             Exponent of the tension.
-        log_lost : (n,) array
-            Log of what the weight as stated gains by creep, mm.
+        log_total : (n,) array
+            Log of what the weight as stated has gained by creep until then, mm.
         """
-        left = theta[:, self.preload] + self.last - self._stretch(theta) - np.exp(log_lost)
-        return np.asarray(left / self.slope(theta, U, log_lost))
+        left = theta[:, self.preload] + self.last - self._stretch(theta) - np.exp(log_total)
+        return np.asarray(left / self.slope(theta, U, log_total))
 
-    def value(self, score: Array, theta: Array, U: Array | float, log_lost: Array) -> Array:
+    def value(self, score: Array, theta: Array, U: Array | float, log_total: Array) -> Array:
         """(n,) preloads, mm.
 
         Parameters
         ----------
         score : (n,) array
             Errors of the weight, as shares of it.
-        theta, U, log_lost
+        theta, U, log_total
             See `score`; the preload in `theta` is not looked at.
         """
-        known = self._stretch(theta) + np.exp(log_lost) - self.last
-        return np.asarray(known + self.slope(theta, U, log_lost) * score)
+        known = self._stretch(theta) + np.exp(log_total) - self.last
+        return np.asarray(known + self.slope(theta, U, log_total) * score)
 
     def log_gain(self, theta: Array, U: Array | float, score: Array) -> Array:
         """(n,) log of the creep that is read under the true weight over that under the stated one.
@@ -79,16 +82,16 @@ class DisplacementLevel:
         """
         return np.log(np.maximum(1.0 + self._power(theta, U) * score, _LEAST_GAIN))
 
-    def slope(self, theta: Array, U: Array | float, log_lost: Array) -> Array:
+    def slope(self, theta: Array, U: Array | float, log_total: Array) -> Array:
         """(n,) derivative of the preload by its score, mm.
 
         Parameters
         ----------
-        theta, U, log_lost
+        theta, U, log_total
             See `score`; the preload in `theta` is not looked at.
         """
         elastic = self._stretch(theta) * self._steepness(theta)
-        return np.asarray(elastic + self._power(theta, U) * np.exp(log_lost))
+        return np.asarray(elastic + self._power(theta, U) * np.exp(log_total))
 
     def _stretch(self, theta: Array) -> Array:
         return np.asarray(self.length * self._strain(theta))
@@ -123,15 +126,17 @@ def displacement_level(problem: Problem) -> DisplacementLevel | None:
     """
     (sample,) = problem.samples
     protocol = sample.protocol
-    if protocol.control != "force" or len(protocol.setting) != 1:
+    weights = protocol.setting[protocol.recorded]
+    if protocol.control != "force" or (weights != weights[0]).any():
         return None
     k1, preload = (problem.column(name, sample) for name in ("k1", "preload"))
     if preload not in problem.names:
         return None
     last = float(sample.readings[..., 0][protocol.mask][-1])
+    holds = 1 + int(np.flatnonzero(protocol.recorded)[-1])
     modified = sample.model.law == "modified"
-    weight, (k1_at, preload_at) = float(protocol.setting[0]), map(problem.names.index, (k1, preload))
-    return DisplacementLevel(k1_at, preload_at, weight, protocol.length_mm, last, modified)
+    k1_at, preload_at = map(problem.names.index, (k1, preload))
+    return DisplacementLevel(k1_at, preload_at, float(weights[0]), protocol.length_mm, last, holds, modified)
 
 
 _LEAST = 1e-3  # of the stretched length that is left without strain: below, the law has no wire

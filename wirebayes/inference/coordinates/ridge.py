@@ -98,13 +98,25 @@ class Ridge:
             )
             square = compiled.kernel.square_gained(every, share, self.which_time, self.kept)
         else:
-            square = self._square_gained(drive, reached, theta)
+            square = (self._gained(drive, reached, theta) ** 2).sum(axis=0)
         # the floor keeps the logarithm finite
         return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
 
-    def _square_gained(self, drive: Array, reached: Array, theta: Array) -> Array:
-        """What `compiled.kernel.square_gained` computes, by numpy; effects on the amount of creep included."""
-        carried, square = 0.0 * reached[0], 0.0 * drive[0]
+    def log_total(self, theta: Array, holds: int) -> Array:
+        """(n,) log of the elongation gained in the first holds together over the root mean square of all holds."""
+        U, k2, N = (self.get(theta, name) for name in ("U", "k2", "N"))
+        reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
+        gained = self._gained(np.exp(U * self._tensions[1]), reached, theta)
+        total = gained[:holds].sum(axis=0)
+        square = (gained**2).mean(axis=0)
+        return np.asarray(np.log(np.maximum(total, 1e-150)) - 0.5 * np.log(np.maximum(square, 1e-300)))
+
+    def _gained(self, drive: Array, reached: Array, theta: Array) -> Array:
+        """(H, n) elongation gained in each hold, whose squares `compiled.kernel.square_gained` sums.
+
+        Effects on the amount of creep are included here.
+        """
+        carried, out = 0.0 * reached[0], []
         effects = Placed(self.effects, {c: self.get(theta, c) for e in self.effects for c in e.columns()})
         for j, time in enumerate(self.which_time):
             amount = drive[j] - self.kept * carried
@@ -112,8 +124,8 @@ class Ridge:
                 amount = effects.change("amount", amount[None], self.holds[j].carrying(carried[None]))[0]
             gained = amount * reached[time]
             carried = carried + gained
-            square = square + gained * gained
-        return square
+            out.append(gained)
+        return np.array(np.broadcast_arrays(*out))
 
 
 def ridges_of(problem: Problem, columns: ColumnMap, for_draws: bool) -> list[Ridge]:

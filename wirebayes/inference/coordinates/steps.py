@@ -155,7 +155,7 @@ class WeightLevel(Step):
 
     def to_sampled(self, z: Array, theta: Array) -> None:
         B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
-        error = self.level.score(theta, U, z[:, B])
+        error = self.level.score(theta, U, self._log_total(theta, z[:, B]))
         z[:, self.level.preload] = error
         z[:, B] += self.level.log_gain(theta, U, error)
 
@@ -163,12 +163,17 @@ class WeightLevel(Step):
         column, B, U = self.level.preload, self.ridge.where["B"], self.ridge.get(theta, "U")
         error = z[:, column]
         z[:, B] -= self.level.log_gain(theta, U, error)  # for the steps before this one
-        theta[:, column] = self.level.value(error, theta, U, z[:, B])
+        theta[:, column] = self.level.value(error, theta, U, self._log_total(theta, z[:, B]))
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
         log_lost = z[:, B] - self.level.log_gain(theta, U, z[:, self.level.preload])
-        return np.asarray(np.log(self.level.slope(theta, U, log_lost)) - np.log(self.scale))
+        slope = self.level.slope(theta, U, self._log_total(theta, log_lost))
+        return np.asarray(np.log(slope) - np.log(self.scale))
+
+    def _log_total(self, theta: Array, log_lost: Array) -> Array:
+        """(n,) log of what was gained until the last reading, by that of what is gained in a hold, mm."""
+        return log_lost + self.ridge.log_total(theta, self.level.holds)
 
 
 @dataclass(frozen=True)
