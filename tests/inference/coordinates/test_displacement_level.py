@@ -12,8 +12,8 @@ WIRE = {"k1": 800.0, "B": 0.2, "U": 0.5, "k2": 0.03, "N": 0.8, "preload": 0.0}
 NAMES = ("k1", "B", "U", "k2", "N", "preload")
 
 
-def one_weight(law="hooke", weights=(WEIGHT_N,), count=1):
-    benches = [Bench(f"w{i}", weights_N=weights) for i in range(count)]
+def one_weight(law="hooke", weights=(WEIGHT_N,), count=1, unrecorded=()):
+    benches = [Bench(f"w{i}", weights_N=weights, unrecorded=frozenset(unrecorded)) for i in range(count)]
     return draw(benches, Truth(WIRE, law=law), seed=3).problem
 
 
@@ -43,9 +43,27 @@ def test_an_error_of_the_weight_moves_one_coordinate_alone(law):
     assert np.ptp(np.log(theta[:, column["B"]])) > 1.0
 
 
+def test_the_last_of_several_holds_is_read_after_the_creep_of_all():
+    """Preloads with which the wire ends where it was read lie at a zero error, whatever the other parameters are."""
+    weights = (WEIGHT_N, 0.1 * WEIGHT_N, WEIGHT_N)
+    problem = one_weight(weights=weights, unrecorded=(2,))
+    theta = problem.prior.rvs(200, np.random.default_rng(0))
+    column = {name: problem.names.index(name) for name in NAMES}
+    k1, B, U, k2, N = (theta[:, column[name]] for name in NAMES[:5])
+    reached = -np.expm1(-k2 * HOLD_S**N)
+    creep = np.zeros(200)
+    for weight in weights:
+        creep += (B * weight**U - creep) * reached
+    stretch = LENGTH_MM * WEIGHT_N / k1
+    theta[:, column["preload"]] = stretch + creep * (1.0 + WEIGHT_N / k1) - problem.samples[0].readings[2, -1, 0]
+    z = Transformation(problem).to_sampled(theta)
+    assert z[:, column["preload"]] == pytest.approx(np.zeros(200), abs=1e-9)
+
+
+@pytest.mark.parametrize("weights", [(WEIGHT_N,), (WEIGHT_N, 0.1 * WEIGHT_N, WEIGHT_N)], ids=["one hold", "a rest"])
 @pytest.mark.parametrize("law", ["hooke", "modified"])
-def test_the_map_goes_back_and_its_jacobian_is_that_of_differences(law):
-    problem = one_weight(law)
+def test_the_map_goes_back_and_its_jacobian_is_that_of_differences(law, weights):
+    problem = one_weight(law, weights, unrecorded=(2,))
     coordinates = Transformation(problem)
     theta = problem.prior.rvs(50, np.random.default_rng(1))
     theta = theta[theta[:, problem.names.index("k1")] > 2.0 * WEIGHT_N]
@@ -60,11 +78,14 @@ def test_the_map_goes_back_and_its_jacobian_is_that_of_differences(law):
     ("problem", "has_one"),
     [
         (one_weight(), True),
-        (one_weight(weights=(10.0, 20.0)), False),
+        (one_weight(weights=(20.0, 18.1, 20.0)), True),
+        (one_weight(weights=(20.0, 17.9, 20.0)), False),
+        (one_weight(weights=(20.0, 2.0, 20.0), unrecorded=(2,)), True),
+        (one_weight(weights=(20.0, 2.0, 20.0)), False),
         (one_weight(count=2), False),
         (draw([Bench(displacements_mm=(3.0,))], seed=1).problem, False),
     ],
-    ids=["one weight", "two weights", "two tests", "one displacement"],
+    ids=["one weight", "alike", "two weights", "rest between", "rest that was read", "two tests", "one displacement"],
 )
 def test_only_a_test_of_one_weight_has_this_coordinate(problem, has_one):
     def has_it(for_draws):

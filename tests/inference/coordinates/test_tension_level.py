@@ -67,18 +67,47 @@ def test_a_setting_error_moves_one_coordinate_alone():
     assert np.ptp(z[:, column["B"]]) < 0.01
 
 
+def test_several_holds_begin_at_the_tension_of_the_first():
+    """Wires of one first reading lie at one coordinate, though what they lose is said of all holds."""
+    problem = draw([Bench(displacements_mm=(AT_MM,) * 3, times_s=(60.0, 120.0))], WIRE, seed=8).problem
+    first = float(problem.samples[0].readings[0, 0, 0])
+    theta, column = wires(problem, np.random.default_rng(0))
+    for row in theta:
+        own = {name: row[column[name]] for name in NAMES if name != "k1"}
+        row[column["k1"]] = brentq(lambda k1, own=own: reading(60.0, 0.0, k1, **own) - first, 1.0, 5e3)
+    z = Transformation(problem).to_sampled(theta)
+    assert np.log(theta[:, column["k1"]]).std() > 0.3
+    assert z[:, column["k1"]].std() < 0.001
+
+
 @pytest.mark.parametrize(
     ("problem", "has_one"),
     [
         (ONE_HOLD, True),
         (KNOWN, True),
-        (draw([Bench(displacements_mm=(1.0, 2.0))], Truth(), seed=1).problem, False),
+        (draw([Bench(displacements_mm=(3.0, 2.71, 3.0))], WIRE, seed=1).problem, True),
+        (draw([Bench(displacements_mm=(3.0, 2.69, 3.0))], WIRE, seed=1).problem, False),
+        (draw([Bench(displacements_mm=(3.0, 0.0, 3.0))], WIRE, seed=1).problem, True),
+        (draw([Bench(displacements_mm=(3.0, 0.1, 3.0))], WIRE, seed=1).problem, False),
+        (draw([Bench(displacements_mm=(0.0, 3.0))], WIRE, seed=1).problem, False),
+        (draw([Bench(displacements_mm=(3.0, 3.0), unrecorded=frozenset({1}))], WIRE, seed=1).problem, False),
         (draw([Bench(name, displacements_mm=(1.0,)) for name in "ab"], seed=1).problem, False),
         (build([Bench(displacements_mm=(1.0,)).experiment()]), False),  # every reading zero
     ],
-    ids=["one hold", "one hold of a known preload", "two holds", "two tests", "slack"],
+    ids=[
+        "one hold",
+        "one hold of a known preload",
+        "alike",
+        "two displacements",
+        "slack between",
+        "nearly slack between",
+        "slack before",
+        "first not read",
+        "two tests",
+        "slack",
+    ],
 )
-def test_only_a_test_of_one_hold_has_this_coordinate(problem, has_one):
+def test_only_a_test_of_one_displacement_has_this_coordinate(problem, has_one):
     def has_it(for_draws):
         return any(isinstance(step, Level) for step in Transformation(problem, for_draws).steps)
 

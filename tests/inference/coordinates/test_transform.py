@@ -39,6 +39,7 @@ PROBLEMS = {
     "toes of one wire": draw([*LINE, Bench("c")], Truth(effects=(effect_named("toe"),)), seed=9).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
     "one hold": draw([Bench(displacements_mm=(1.0,))], Truth({"k1": 800.0}), seed=8).problem,
+    "one displacement": draw([Bench(displacements_mm=(3.0, 0.0, 3.0))], Truth({"k1": 800.0}), seed=8).problem,
     "one hold, its preload known": with_readings(
         build([replace(Bench(displacements_mm=(1.0,)).experiment(), priors={"preload": {"fixed": 0.3}})]),
         [draw([Bench(displacements_mm=(1.0,))], Truth({"k1": 800.0}), seed=8).problem.samples[0].readings],

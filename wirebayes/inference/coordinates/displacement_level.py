@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.inference.coordinates.one_setting import is_one_setting
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.typing import Array
 
@@ -25,7 +26,7 @@ class DisplacementLevel:
     k1, preload : int
         Columns.
     weight, length, last : float
-        The weight, N; length of the wire, and the last displacement that was read, mm.
+        The weight under which the last displacement was read, N; length of the wire, and that displacement, mm.
     holds : int
         Of the test until that reading; those that were not read, as rests between, may be of another weight.
     modified : bool
@@ -122,12 +123,12 @@ def displacement_level(problem: Problem) -> DisplacementLevel | None:
     Returns
     -------
     DisplacementLevel or None
-        None unless the test is of one weight, and its preload open.
+        None unless all that was read is of one weight, and the preload open.
     """
     (sample,) = problem.samples
     protocol = sample.protocol
     weights = protocol.setting[protocol.recorded]
-    if protocol.control != "force" or (weights != weights[0]).any():
+    if protocol.control != "force" or not is_one_setting(weights):
         return None
     k1, preload = (problem.column(name, sample) for name in ("k1", "preload"))
     if preload not in problem.names:
@@ -136,7 +137,7 @@ def displacement_level(problem: Problem) -> DisplacementLevel | None:
     holds = 1 + int(np.flatnonzero(protocol.recorded)[-1])
     modified = sample.model.law == "modified"
     k1_at, preload_at = map(problem.names.index, (k1, preload))
-    return DisplacementLevel(k1_at, preload_at, float(weights[0]), protocol.length_mm, last, holds, modified)
+    return DisplacementLevel(k1_at, preload_at, float(weights[-1]), protocol.length_mm, last, holds, modified)
 
 
 _LEAST = 1e-3  # of the stretched length that is left without strain: below, the law has no wire

@@ -69,7 +69,7 @@ class Loss(Step):
     level: TensionLevel | DisplacementLevel | None
 
     def _beyond(self, theta: Array) -> Any:
-        """(n,) log of what the only hold of a test shows over what the ridge says."""
+        """(n,) log of what a test of one setting shows over what the ridge says."""
         return 0.0 if self.level is None else self.level.log_beyond(theta, self.ridge.get(theta, "U"))
 
     def to_sampled(self, z: Array, theta: Array) -> None:
@@ -125,7 +125,7 @@ class SoftenedStiffness(Step):
 
 @dataclass(frozen=True)
 class Level(Step):
-    """In a test of one hold, log k1 becomes that beside preload and loss, and the loss is that of the true stretch."""
+    """At one displacement, log k1 becomes that beside preload and loss, and the loss is that of the true stretch."""
 
     ridge: Ridge
     level: TensionLevel
@@ -142,12 +142,13 @@ class Level(Step):
         z[:, k1] = tension - self.level.log_tension(theta, np.zeros(len(theta)))  # for the steps before this one
 
     def _log_expected(self, theta: Array, log_lost: Array) -> Any:
-        return self.level.log_expected(log_lost, self.ridge.get(theta, "k2"), self.ridge.get(theta, "N"))
+        in_first_hold = log_lost + self.ridge.log_total(theta, holds=1)
+        return self.level.log_expected(in_first_hold, self.ridge.get(theta, "k2"), self.ridge.get(theta, "N"))
 
 
 @dataclass(frozen=True)
 class WeightLevel(Step):
-    """In a test of one weight, the preload becomes an error of the weight, and log B is that under the true weight."""
+    """Under one weight, the preload becomes an error of the weight, and log B is that under the true weight."""
 
     ridge: Ridge
     level: DisplacementLevel

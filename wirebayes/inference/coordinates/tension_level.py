@@ -1,9 +1,9 @@
-"""Coordinates of k1 and B for a test of one hold, which determines tensions and neither the stiffness nor the preload.
+"""Coordinates of k1 and B for holds at one displacement, which determine tensions, not the stiffness nor the preload.
 
-A hold at displacement x begins at the tension ``k1 (x + preload) / L0`` and has lost some of it at its first reading,
-which is known: where creep follows a power of the time, much of it is over by then. So k1 lies on a curved surface over
-the preload and that loss, as narrow as the setting error is small: a bent funnel, which walkers enter and do not leave.
-A setting error changes the creep, too, by the power U of the tension.
+The first hold, at displacement x, begins at the tension ``k1 (x + preload) / L0`` and has lost some of it at its first
+reading, which is known: where creep follows a power of the time, much of it is over by then. So k1 lies on a curved
+surface over the preload and that loss, as narrow as the setting error is small: a bent funnel, which walkers enter and
+do not leave. A setting error changes the creep, too, by the power U of the tension.
 
 Beside preload and loss, the logarithm of ``k1 (x + preload) / (L0 (first reading + loss until then))`` is straight: the
 setting error with which the wire would be read as it was, as a share of its stretch. So is the log of the tension lost
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.inference.coordinates.one_setting import is_one_setting
 from wirebayes.inference.coordinates.slack_edge import SlackEdge
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.typing import Array
@@ -21,7 +22,7 @@ from wirebayes.numeric.typing import Array
 
 @dataclass(frozen=True)
 class TensionLevel:
-    """The only hold of a test.
+    """The holds of a test, all at one displacement.
 
     Attributes
     ----------
@@ -30,9 +31,9 @@ class TensionLevel:
     preload : int or float
         Its column, or the number at which it is fixed, mm.
     at, length : float
-        Displacement of the hold, and length of the wire, mm.
+        Displacement of the first hold, and length of the wire, mm.
     first, begin_s, end_s : float
-        The first tension that was read, N; when it was, and how long the hold lasted, s.
+        The first tension that was read, N; when it was, and how long the first hold lasted, s.
     """
 
     k1: int
@@ -69,7 +70,7 @@ class TensionLevel:
         Parameters
         ----------
         log_lost : (n,) array
-            Log of the tension lost in the hold.
+            Log of the tension lost in the first hold.
         k2, N : (n,) arrays or floats
             Rate of the creep and exponent of time.
         """
@@ -92,15 +93,18 @@ def tension_level(problem: Problem, slack_edges: list[SlackEdge]) -> TensionLeve
     Returns
     -------
     TensionLevel or None
-        None unless the test is of one hold, which ends taut.
+        None unless all holds are at one displacement, but for rests at zero or below, and taut.
     """
     if any(edge.threshold != 0.0 for edge in slack_edges):
         return None
     (sample,) = problem.samples
     protocol = sample.protocol
-    if protocol.control == "force" or len(protocol.setting) != 1 or protocol.setting[0] <= 0.0:
+    pulled = protocol.setting > 0.0
+    if protocol.control == "force" or not (pulled[0] and protocol.recorded[0]):
         return None
-    read = sample.readings[..., 0][protocol.mask]
+    if not is_one_setting(protocol.setting[pulled]):
+        return None
+    read = sample.readings[..., 0][protocol.mask & pulled[:, None]]
     if read[0] <= 0.0 or read[-1] <= 0.0:
         return None
     k1, column = (problem.column(name, sample) for name in ("k1", "preload"))

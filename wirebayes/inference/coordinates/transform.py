@@ -16,7 +16,7 @@ measured in standard deviations of their prior. Then, one after the other (`wire
   creep is over before a first reading, the readings see this stiffness alone; where there is little, it is k1. Under
   weights it stays log k1. Where a fixture's compliance is sampled, k1 is in all this the stiffness of the wire with its
   fixture, and the compliance becomes its share;
-- ``Level``: in a test of one hold, k1 and B become what its tensions say beside the preload
+- ``Level``: in a test of one displacement, k1 and B become what its tensions say beside the preload
   (`wirebayes.inference.coordinates.tension_level`);
 - ``WeightLevel``: in a test of one weight, the preload and B become what its displacements say beside k1
   (`wirebayes.inference.coordinates.displacement_level`);
