@@ -154,3 +154,15 @@ def test_durations_that_begin_anew_at_zero_pass_no_midnight(tmp_path):
 @pytest.mark.parametrize("header", ["Time (in minutes)", "Time (IN MINUTES)", "Time (durations in minutes)"])
 def test_a_unit_in_brackets_may_begin_with_in(tmp_path, header):
     assert times_of(tmp_path, header, ["0", "5"]) == [0.0, 300.0]
+
+
+@pytest.mark.parametrize(
+    ("header", "cells"),
+    [("Time [hh,mm]", ["0,00", "0,30", "1,00"]), ("Date;Time [s]", ["14,06;0", "14,06;30", "14,06;60"])],
+)
+def test_clocks_and_columns_that_are_not_read_do_not_decide_the_decimal_sign(tmp_path, header, cells):
+    path = tmp_path / "raw.csv"
+    path.write_text(f"Displacement [mm];{header};Force [N]\n" + "".join(f"2;{cell};1.234\n" for cell in cells))
+    with pytest.raises(Undecided, match="found '1.234', which is 1.234 or 1234, expected --decimal point"):
+        convert(path, ABOUT, Choices())
+    assert convert(path, ABOUT, Choices(decimal="point")).rows[0][3] == 1.234

@@ -1,7 +1,8 @@
-"""Which sign is the decimal one, inferred from all numbers of a file.
+"""Which sign is the decimal one, inferred from all numbers that are read of a file.
 
-A comma followed by three digits may be either; so may a point where semicolons separate. Any other number in the file
-that can be read in only one way decides for all of them.
+A comma followed by three digits may be either; so may a point where semicolons separate. Any other number that can be
+read in only one way decides for all of them. Clocks and columns that are not read decide nothing: ``1,30`` may be an
+hour and a half, and ``14.06`` a day.
 """
 
 import re

@@ -116,12 +116,11 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     not_read = next((row.line for row in table.rows if not row.cell(columns["displacement"].index)), None)
     table, notes = complete_rows(table, columns)
     not_read = not_read if not_read in {row.line for row in table.rows} else None  # below the readings
-    decimal = decimal_sign(table, range(len(table.header)), choices.decimal)
+    numbers = {role: column for role, column in columns.items() if not _is_of_clocks(table, column)}
+    decimal = decimal_sign(table, [column.index for column in numbers.values()], choices.decimal)
     notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes]
     texts: dict[Role, list[str]] = {
-        role: _numbers(table, column, decimal)
-        for role, column in columns.items()
-        if role != "hold" and not (role == "time" and clock.is_clock(table, column.index, column.unit))
+        role: _numbers(table, column, decimal) for role, column in numbers.items() if role != "hold"
     }
     values: dict[Role, Floats] = {role: _converted(columns[role], text) for role, text in texts.items()}
     values["time"], of_day = _times(table, columns["time"], values.get("time"), notes)
@@ -146,6 +145,10 @@ def _of_sample(table: RawTable, columns: dict[Role, Column], about: About) -> di
             raise table.complain(table.header_line, column.index, found, expected)
         out[role] = replace(column, unit=replace(column.unit, factor=column.unit.factor * times))
     return out
+
+
+def _is_of_clocks(table: RawTable, column: Column) -> bool:
+    return column.role == "time" and clock.is_clock(table, column.index, column.unit)
 
 
 def _whose(table: RawTable, columns: dict[Role, Column]) -> list[str]:
