@@ -49,6 +49,7 @@ def test_what_clocks_were_taken_for_is_said(tmp_path):
         ("Time [hh.mm]", ["0.00", "0.30", "1.05"]),
         ("Time [hh.mm]", ["0,00", "0,30", "1,05"]),
         ("Time [h-min]", ["0-00", "0-30", "1-05"]),
+        ("Time [h-min]", ["0-0", "0-30", "1-5"]),
     ],
 )
 def test_points_and_dashes_divide_clocks_where_the_header_has_them(tmp_path, header, cells):
@@ -142,6 +143,7 @@ def test_times_of_day_pass_midnight_however_they_are_written(tmp_path, clock):
     path.write_text("Hold;Displacement [mm];Heure [hh:mm];Force [N]\n" + "".join(rows))
     made = convert(path, ABOUT, Choices(time_since="test"))
     assert [row[2] for row in made.rows] == [0.0, 3600.0, 7200.0, 0.0, 3600.0]  # the first hold lasts until the second
+    assert "the clock passes midnight 1 time" in made.notes
 
 
 def test_durations_that_begin_anew_at_zero_pass_no_midnight(tmp_path):
@@ -166,3 +168,31 @@ def test_clocks_and_columns_that_are_not_read_do_not_decide_the_decimal_sign(tmp
     with pytest.raises(Undecided, match="found '1.234', which is 1.234 or 1234, expected --decimal point"):
         convert(path, ABOUT, Choices())
     assert convert(path, ABOUT, Choices(decimal="point")).rows[0][3] == 1.234
+
+
+@pytest.mark.parametrize(
+    ("header", "clock", "beside", "read"),
+    [
+        ("Time [hh:mm]", ("8:00", "8:01", "8:05"), ("50", "110", "348"), "seconds"),  # 8:00:50
+        (
+            "Time",
+            ("14.06.2026 8:00:50", "14.06.2026 8:01:50", "14.06.2026 8:05:48"),
+            ("0.2", "60.4", "297.9"),
+            "seconds",
+        ),
+        ("Time", ("8:00:50.25", "8:01:50.50", "8:05:48.00"), ("0", "60", "298"), "Time"),
+    ],
+)
+def test_of_a_clock_and_a_stopwatch_the_finer_is_read(tmp_path, header, clock, beside, read):
+    path = tmp_path / "raw.csv"
+    rows = [f"{time};{seconds};2;{5 - i}.25\n" for i, (time, seconds) in enumerate(zip(clock, beside, strict=True))]
+    path.write_text(f"{header};seconds (s);Displacement [mm];Force [N]\n" + "".join(rows))
+    notes = convert(path, ABOUT, Choices()).notes
+    assert f"time from '{read}" in notes[0]
+
+
+def test_a_clock_that_runs_a_minute_apart_from_a_stopwatch_is_asked_about(tmp_path):
+    path = tmp_path / "raw.csv"
+    path.write_text("Time [hh:mm];seconds (s);x [mm];Force [N]\n8:00;0;2;5.1\n8:01;60;2;5.0\n8:05;362;2;4.9\n")
+    with pytest.raises(Undecided, match="which tell different times from line 4 on"):
+        convert(path, ABOUT, Choices())

@@ -48,13 +48,7 @@ def is_clock(table: RawTable, column: int, unit: Unit | None) -> bool:
     return (unit is not None and unit.clock is not None) or has_moments(table, column)
 
 
-def has_dates(table: RawTable, column: int) -> bool:
-    """Whether the moments of a column say the day, too."""
-    first = moment(table.rows[0].cell(column))  # either all have a date, or none
-    return first is not None and first["date"] is not None
-
-
-def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np.float64], bool]:
+def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np.float64], bool, int]:
     """Times of a column of clocks or dates.
 
     Parameters
@@ -67,6 +61,8 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
     time_s : (r,) array
     of_day : bool
         Whether they are moments of a calendar or a clock on the wall, so that nothing restarts.
+    midnights : int
+        How often a clock without dates has passed midnight.
 
     Raises
     ------
@@ -77,7 +73,8 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
         values = _spelt(table, column)
         # durations are counted from zero, and may be longer than a day
         on_the_wall = values[0] >= _HOUR and values.max() < _DAY
-        return values + _DAY * np.cumsum(_days_begin(values, of_day=False) & on_the_wall), False
+        midnights = np.cumsum(_days_begin(values, of_day=False) & on_the_wall)
+        return values + _DAY * midnights, False, int(midnights[-1])
     moments = _moments(table, column, unit)
     # what follows a date or stands before AM is of the day, and leaves no doubt
     of_clock = [m["date"] is None and m["half"] is None for m in moments]
@@ -86,9 +83,10 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
     values = np.array([_value(m, leading if bare else 3600.0) for m, bare in zip(moments, of_clock, strict=True)])
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
-        return (days - days[0]) + values, True
+        return (days - days[0]) + values, True, 0
     of_day = short is None and (not of_clock[0] or values[0] >= _HOUR)
-    return values + _DAY * np.cumsum(_days_begin(values, of_day)), of_day
+    midnights = np.cumsum(_days_begin(values, of_day))
+    return values + _DAY * midnights, of_day, int(midnights[-1])
 
 
 def _days_begin(values: NDArray[np.float64], of_day: bool) -> NDArray[np.bool_]:
@@ -102,11 +100,6 @@ def _days_begin(values: NDArray[np.float64], of_day: bool) -> NDArray[np.bool_]:
     closest = steps[rises].min(initial=np.inf)
     goes_on = of_day and rises.sum() > falls.sum()
     return (steps < -_MIDNIGHT) | (falls & goes_on & (values > _LATE * closest))
-
-
-def midnights(time_s: NDArray[np.float64]) -> int:
-    """How often a clock without dates has passed midnight, of its times (r,) in seconds since the first day began."""
-    return int(time_s.max() // _DAY)
 
 
 def _spelt(table: RawTable, column: int) -> NDArray[np.float64]:
@@ -146,7 +139,8 @@ def _moments(table: RawTable, column: int, unit: Unit | None) -> list[re.Match[s
 def _with_colons(cell: str, joint: str) -> str:
     """A clock with colons between its parts, in place of points, commas or dashes where the header has such a sign."""
     signs = {".": ".,", ",": ".,", "-": "-\u2013", "\u2013": "-\u2013"}.get(joint)
-    if signs is None or not re.fullmatch(rf"\d+([{signs}]\d\d){{1,2}}", cell):
+    digits = r"\d{1,2}" if joint in "-\u2013" else r"\d\d"  # 1-5 is no fraction, and 1.5 may be
+    if signs is None or not re.fullmatch(rf"\d+([{signs}]{digits}){{1,2}}", cell):
         return cell
     return re.sub(rf"[{signs}]", ":", cell)
 

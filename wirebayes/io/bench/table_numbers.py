@@ -199,10 +199,12 @@ def _converted(column: Column, texts: list[str]) -> Floats:
 
 def _times(table: RawTable, column: Column, numbers: Floats | None, notes: list[str]) -> tuple[Floats, bool]:
     """Times in s, of numbers or of clocks, and whether they are moments of a day; what was done joins the notes."""
-    time, of_day = (numbers, False) if numbers is not None else clock.seconds(table, column.index, column.unit)
-    days = clock.midnights(time) if of_day and not clock.has_dates(table, column.index) else 0
-    if days:
-        notes.append(f"the clock passes midnight {counted(days, 'time')}")
+    if numbers is None:
+        time, of_day, midnights = clock.seconds(table, column.index, column.unit)
+    else:
+        time, of_day, midnights = numbers, False, 0
+    if midnights:
+        notes.append(f"the clock passes midnight {counted(midnights, 'time')}")
     if is_coarse(table, column.index):
         time, spreading = spread(time)
         notes += spreading

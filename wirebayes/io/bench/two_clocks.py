@@ -11,6 +11,8 @@ from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.numeric.typing import Floats
 
+TICKS_S = (60.0, 1.0, 0.1, 0.01, 0.001)  # what clocks are written to
+ROUNDING_S = 1e-6  # of times over a month
 SAME_RATE = 1e-3  # of the time that has passed: a quartz is a hundred times better
 
 
@@ -43,15 +45,21 @@ def clock_of(table: RawTable, column: int, unit: Unit | None) -> Clock | None:
         None for clocks and dates.
     """
     cells = [cell.replace(",", ".") for cell in table.column(column)]
-    places = max(len(cell.partition(".")[2]) for cell in cells)
     try:
         if is_clock(table, column, unit):
-            return Clock(seconds(table, column, unit)[0], 10.0**-places)
+            time_s, _, _ = seconds(table, column, unit)
+            return Clock(time_s, _tick_s(time_s))
         values = np.array([float(cell) for cell in cells])
     except (InputError, ValueError):
         return None
+    places = max(len(cell.partition(".")[2]) for cell in cells)
     factor = 1.0 if unit is None else unit.factor
     return Clock(values * factor, abs(factor) * 10.0**-places)
+
+
+def _tick_s(time_s: Floats) -> float:
+    """The largest step of which all times of a clock are multiples: a minute, a second or a fraction of one."""
+    return next((tick for tick in TICKS_S if np.abs(time_s - tick * np.round(time_s / tick)).max() < ROUNDING_S), 0.0)
 
 
 def parting(first: Clock, second: Clock) -> int | None:
