@@ -43,11 +43,12 @@ def test_a_step_is_evident_from_enough_readings_with_few_digits_and_fine_enough(
     [
         (49.0, [0.0, 20.0, 40.0, 60.0, 80.0, 100.0], False),  # half of the time that was read
         (51.0, [0.0, 20.0, 40.0, 60.0, 80.0, 100.0], True),
-        (119.0, [0.0, 40.0, 100.0], False),  # twice the longest pause
-        (121.0, [0.0, 40.0, 100.0], True),
+        (89.0, [0.0, 40.0, 100.0], False),  # one and a half times the longest pause
+        (91.0, [0.0, 40.0, 100.0], True),
+        (300.0, [0.0, 5.0, 10.0, 20.0, 40.0, 80.0, 150.0, 300.0], True),  # a rest as long as the hold
     ],
 )
-def test_a_hold_goes_on_unread_beyond_half_of_what_was_read_and_two_of_its_pauses(after_s, times_s, said):
+def test_a_hold_goes_on_unread_beyond_half_of_what_was_read_and_one_and_a_half_of_its_pauses(after_s, times_s, said):
     times = [np.array(times_s), np.array([0.0, 20.0])]
     assert bool(holds._unread_ends(times, [times_s[-1] + after_s, None], "displacement")) == said
 

@@ -35,7 +35,7 @@ from wirebayes.sentences import counted, lasting, listed
 
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
-UNREAD, LONGER = 0.5, 2.0  # of the time that was read, and times its longest pause: beyond, it may be a rest
+UNREAD, LONGER = 0.5, 1.5  # of the time that was read, and times its longest pause: beyond, it may be a rest
 BACKWARDS = 0.5  # of the steps in time: holds of two readings or more whose times start again fall at fewer
 
 
