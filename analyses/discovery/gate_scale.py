@@ -37,7 +37,7 @@ def values(case: str, seed: int) -> tuple[dict[str, Array], dict[str, Array]]:
     """Each name's log Bayes factor in the readings (1,) of a file, and in the simulations (n,)."""
     blocks, rng = plain_fits(experiments_of(case), seed)
     trials, candidates = screening.candidate_probes(blocks, CATALOGUE)
-    data = [scan(expand(b.target, b.modes.z[:1], trials)) for b in blocks]
+    data = [scan(expand(b.target, b.z, trials)) for b in blocks]
     null = [screening.replicated(b, trials, ALL, rng).scan for b in blocks]
     return screening.by_name(candidates, data), screening.by_name(candidates, null)
 

@@ -41,7 +41,7 @@ def block_of(folder: Path, truth: dict[str, float], effects: list[Effect], seed:
 
 def scanned(block: LaplaceFit, kinds: dict[str, type[Effect]]) -> tuple[list, list, Scan]:
     trials, candidates = screening.candidate_probes([block], kinds)
-    return trials, candidates, scan(expand(block.target, block.modes.z[:1], trials))
+    return trials, candidates, scan(expand(block.target, block.z, trials))
 
 
 @pytest.mark.parametrize(("widest", "rungs"), [(2.0, 2), (2.01, 3), (64.0, 7), (64.1, 8), (1e4, 8)])
@@ -64,7 +64,7 @@ def test_a_ladder_finds_what_refits_of_the_whole_density_find(tmp_path: Path, na
     block = block_of(tmp_path, {effect.columns()[0]: size}, [effect], 1)
     trials, candidates, data = scanned(block, {name: CATALOGUE[name]})
     ways = ladders([block], trials, candidates, [data])
-    found = strengths(ways, [{0: lead(block, way, start(block, block.modes.z[:1]))} for way in ways])
+    found = strengths(ways, [{0: lead(block, way, start(block, block.z))} for way in ways])
     best = max(range(len(trials)), key=lambda k: data.effects[0, k])
     per_delta = 1.0 / float(data.norm[0, best])
     truth = refit.refit([block], (0,), trials[best].effect, per_delta, float(data.amplitude[0, best]))
@@ -78,14 +78,14 @@ def test_a_wire_that_goes_slack_in_every_hold_is_climbed_past() -> None:
     block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
     trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
     (way,) = ladders([block], trials, candidates, [data])
-    found = lead(block, way, start(block, block.modes.z[:1]))
+    found = lead(block, way, start(block, block.z))
     assert np.isfinite([found.log_bayes, found.amplitude, found.norm]).all() and found.log_bayes.max() > -2.0
 
 
 def test_a_data_set_without_a_tangent_says_nothing_and_changes_no_other(tmp_path: Path) -> None:
     block = block_of(tmp_path, {}, [], 3)
     trials, _ = screening.candidate_probes([block], {"toe": CATALOGUE["toe"]})
-    x = expand(block.target, np.repeat(block.modes.z[:1], 3, axis=0), trials)
+    x = expand(block.target, np.repeat(block.z, 3, axis=0), trials)
     for name in ("parameters", "residual", "flexible", "signatures"):
         for wild in (np.nan, np.inf, 1e200):
             part = getattr(x, name).copy()
@@ -175,7 +175,7 @@ def test_no_step_is_tried_that_promises_too_little(
 
     monkeypatch.setattr(ascent, "weigh", promising)
     monkeypatch.setattr(ascent, "_follow", followed)
-    begin = start(block, block.modes.z[:1])
+    begin = start(block, block.z)
     assert bool(tried) == goes_on
     tried.clear()
     lead(block, way, begin)
@@ -316,7 +316,7 @@ def test_a_ladder_broken_off_keeps_the_places_of_its_rungs(tmp_path: Path) -> No
     block = block_of(tmp_path, {}, [], 3)
     trials, candidates, data = scanned(block, {"permanent_creep": CATALOGUE["permanent_creep"]})
     way = ladders([block], trials, candidates, [data])[0]
-    found = lead(block, way, start(block, block.modes.z[:1]))
+    found = lead(block, way, start(block, block.z))
     rungs, starts = way.amplitudes.shape
     assert found.log_bayes.shape == found.amplitude.shape == found.norm.shape == ((rungs + 1) * starts, 1)
     assert (found.log_bayes < -1e200).any()  # it was broken off: no more than all creep can be permanent
@@ -325,8 +325,8 @@ def test_a_ladder_broken_off_keeps_the_places_of_its_rungs(tmp_path: Path) -> No
 def test_the_noise_ratio_of_a_fit_is_that_of_its_setting_and_sensor_errors(tmp_path: Path) -> None:
     """Sensor variance times I + ρKKᵀ is the covariance that steps of each hold's setting error give."""
     block = block_of(tmp_path, {}, [], 3)
-    x, sample = expand(block.target, block.modes.z[:1], []), block.target.problem.samples[0]
-    own = block.target.problem.parameters(block.target.coordinates.to_natural(block.modes.z[:1]), sample)
+    x, sample = expand(block.target, block.z, []), block.target.problem.samples[0]
+    own = block.target.problem.parameters(block.theta, sample)
     mask, holds, step = sample.protocol.mask, len(sample.readings), 1e-5
     each = {name: np.repeat(value, holds) for name, value in own.items()}
     up, down = (simulate(sample.protocol, each, sample.model, s * np.eye(holds))[mask] for s in (step, -step))
@@ -359,7 +359,7 @@ def test_an_effect_gets_no_credit_for_what_the_plain_fit_gains_nearby(tmp_path: 
     block = block_of(tmp_path, {}, [], 3)
     trials, candidates, data = scanned(block, {"toe": CATALOGUE["toe"]})
     way = ladders([block], trials, candidates, [data])[0]
-    best, beside = start(block, block.modes.z[:1]), block.modes.z[:1].copy()
+    best, beside = start(block, block.z), block.z.copy()
     free = moving_columns(block.target.problem)
     beside[:, free] += 0.3 / np.sqrt(np.diag(block.modes.curvature[0]))[free]
     moved = start(block, beside)

@@ -238,7 +238,7 @@ class Fits:
                 experiments=f"e{b}",
                 effects=(f"old{b}",),
                 target=b,
-                modes=SimpleNamespace(z=np.ones((2, 1))),
+                z=np.ones((1, 1)),
                 scales="scales",
             )
             for b in range(2)
@@ -262,7 +262,7 @@ class Fits:
         def fitted(experiments: str, effects: Any, spec: str, rng: Any, near: Any, scales: Any) -> Any:
             assert scales == "scales"
             self.did.append(("fitted", experiments, effects, spec, near.tolist()))
-            return SimpleNamespace(target=experiments, modes=SimpleNamespace(z=np.ones((2, 1))))
+            return SimpleNamespace(target=experiments, z=np.ones((1, 1)))
 
         def informed(blocks: Any, effects: Any, rng: Any) -> Any:
             self.did.append(("informed", effects))

@@ -84,7 +84,7 @@ def test_a_bent_line_and_a_bent_sensor_are_one_family_and_a_delay_is_another() -
     plain = [fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))]
     kinds = {name: CATALOGUE[name] for name in ("strain_stiffening", "sensor_nonlinearity", "reading_delay")}
     trials, candidates = screening.candidate_probes(plain, kinds)
-    data = [scan(expand(plain[0].target, plain[0].modes.z[:1], trials))]
+    data = [scan(expand(plain[0].target, plain[0].z, trials))]
     found = weigh_names(plain, trials, candidates, data)
     order = [n for n in ("strain_stiffening", "sensor_nonlinearity", "reading_delay") if n in found.winners]
     probed = {n: {0: refitted_probe(plain[0], found.winners[n][0], 0)} for n in order}

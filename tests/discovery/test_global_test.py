@@ -56,7 +56,7 @@ def examined(
     monkeypatch.setattr(global_test, "Continuation", Larger)
     for name in ("expand", "scan"):
         monkeypatch.setattr(global_test, name, lambda *given, **known: None)
-    block: Any = SimpleNamespace(target=SimpleNamespace(problem=None), modes=SimpleNamespace(z=np.zeros((1, 1))))
+    block: Any = SimpleNamespace(target=SimpleNamespace(problem=None), z=np.zeros((1, 1)))
     return examine([block], {}, simulations, np.random.default_rng(0), alpha=alpha), sum(made)
 
 
@@ -115,9 +115,7 @@ def test_readings_are_struck_out_one_by_one_of_their_own_experiment(
     def fitted(members: Any, *given: Any, **known: Any) -> Any:
         return SimpleNamespace(**(vars(block) | {"experiments": tuple(members)}))
 
-    block: Any = SimpleNamespace(
-        experiments=pair, target=None, modes=SimpleNamespace(z=np.zeros((1, 1))), effects=(), spec=None, scales=None
-    )
+    block: Any = SimpleNamespace(experiments=pair, target=None, z=np.zeros((1, 1)), effects=(), spec=None, scales=None)
     # the best effect of this block explains 7, one of another block 50, a smooth curve 4
     effects = SimpleNamespace(effects=np.array([[7.0, 50.0]]), flexible=np.array([4.0]))
     monkeypatch.setattr(gross_errors, "suspect", suspect)
@@ -182,7 +180,7 @@ def test_of_few_readings_one_may_be_struck_out(monkeypatch: pytest.MonkeyPatch) 
     block: Any = SimpleNamespace(
         experiments=(one,),
         target=None,
-        modes=SimpleNamespace(z=np.zeros((1, 1))),
+        z=np.zeros((1, 1)),
         effects=(),
         spec=PLAIN_SPEC,
         scales=None,
@@ -211,7 +209,7 @@ def test_where_no_effect_acts_a_gross_error_is_held_against_the_smooth_curve(mon
     found = SimpleNamespace(effects=np.array([[9.0]]), flexible=np.array([0.25]))
     monkeypatch.setattr(global_test, "scan", lambda x: found)
     one = experiments()[2].train(3)
-    block: Any = SimpleNamespace(experiments=(one,), target=None, modes=SimpleNamespace(z=np.zeros((1, 1))))
+    block: Any = SimpleNamespace(experiments=(one,), target=None, z=np.zeros((1, 1)))
     for flexible, rival in ((0.25, 0.25), (-3.0, 0.0)):
         found.flexible[0] = flexible
         same, gone = global_test._strike_gross_errors(block, [], [Candidate(0, "a", (1,), True)], 0, None)  # type: ignore[arg-type]

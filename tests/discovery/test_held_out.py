@@ -162,17 +162,12 @@ def test_training_begins_at_the_block_s_own_fit_where_it_has_the_same_effects(
 
     monkeypatch.setattr(held_out, "fitted", fitted)
     monkeypatch.setattr(held_out, "_draws", draws)
-    target = SimpleNamespace(coordinates=SimpleNamespace(to_natural=lambda z: z))
-    block = SimpleNamespace(
-        effects=effects if same else (),
-        spec=ModelSpec(law="modified"),
-        target=target,
-        scales=SCALES,
-        modes=SimpleNamespace(z=np.array([[1.0, 2.0], [3.0, 4.0]])),
-    )
+    theta = np.array([[1.0, 2.0]])
+    spec = ModelSpec(law="modified")
+    block = SimpleNamespace(effects=effects if same else (), spec=spec, target=None, scales=SCALES, theta=theta)
     found = held_out.predicted(pair, [7, 3], effects, block, np.random.default_rng(0))  # type: ignore[arg-type]
-    ((counts, extra, spec, _, start),) = given
-    assert (counts, extra, spec) == ([7, 3], effects, ModelSpec(law="modified"))
+    ((counts, extra, asked, _, start),) = given
+    assert (counts, extra, asked) == ([7, 3], effects, spec)
     assert start is None if near is None else start.tolist() == near  # type: ignore[attr-defined]
     assert [one.holds for one in found] == [[8, 9, 10, 11, 12], [4]]
 

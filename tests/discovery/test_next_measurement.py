@@ -133,7 +133,7 @@ def test_what_a_second_effect_takes_up_does_not_distinguish_the_first(monkeypatc
     monkeypatch.setattr(module, "expand", lambda target, z, trials: SimpleNamespace(ratio=[2.0], trials=trials))
     sizes = np.array([[4.0, 10.0], [3.0, 0.0]])
     monkeypatch.setattr(module, "projected", lambda x, ratio: sizes[:, : len(x.trials)] if ratio == 2.0 else None)
-    fit: Any = SimpleNamespace(modes=SimpleNamespace(z=np.zeros((1, 1))))
+    fit: Any = SimpleNamespace(z=np.zeros((1, 1)))
     assert module._separation(None, fit, ["a", "b"]) == pytest.approx(3.0)  # type: ignore[arg-type, list-item]
     assert module._separation(None, fit, ["a"]) == pytest.approx(5.0)  # type: ignore[arg-type, list-item]
     sizes[:, 1] = [1e-3, 0.0]

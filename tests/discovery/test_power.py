@@ -142,7 +142,7 @@ def test_what_the_plain_model_takes_up_and_what_a_protocol_cannot_show_is_said(m
     block: Any = SimpleNamespace(
         experiments=[SimpleNamespace(control="displacement")],
         target="target",
-        modes=SimpleNamespace(z=np.array([[1.0], [2.0]])),
+        z=np.array([[1.0]]),
     )
     kinds: Any = [SimpleNamespace(name=n, shows=f"shows {n}") for n in ("superposition", "toe")]
     found = power.not_identifiable(block, kinds, ["superposition"])

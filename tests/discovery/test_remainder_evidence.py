@@ -37,7 +37,7 @@ def integral(fit: LaplaceFit, centre: np.ndarray, reference: Reference | None) -
     measured in the errors of the fit. Where draws come from does not matter to what they say, only to how many count.
     """
     columns = moving_columns(fit.target.problem)
-    middle = fit.modes.z[:1].copy()
+    middle = fit.z.copy()
     middle[:, columns] = centre[:, columns]
     x = expand(fit.target, middle, [], reference=reference)
     k, jac, shared = x.left[0] * x.singular[0], x.parameters[0], x.prior_precision[0]
@@ -78,10 +78,10 @@ def integral(fit: LaplaceFit, centre: np.ndarray, reference: Reference | None) -
 def weighed(fit: LaplaceFit) -> tuple[float, float, float]:
     """Log Bayes factor of a remainder: by the fit without it, refitted, and by the integral."""
     reference = reference_of(fit)
-    plain = expand(fit.target, fit.modes.z[:1], [], reference=reference)
+    plain = expand(fit.target, fit.z, [], reference=reference)
     which = _most_probable(evidences(plain)[1])
-    beside, _ = _refitted(fit.target, fit.modes.z[:1], plain, which, reference)
-    exact = integral(fit, beside, reference) - integral(fit, fit.modes.z[:1], None)
+    beside, _ = _refitted(fit.target, fit.z, plain, which, reference)
+    exact = integral(fit, beside, reference) - integral(fit, fit.z, None)
     return float(scan(plain).flexible[0]), remainder_evidence(fit, reference), exact
 
 
@@ -108,10 +108,10 @@ def test_a_mode_at_the_edge_of_a_prior_lends_a_remainder_nothing() -> None:
     """There the prior falls without a bend; as a parabola it would have its top anywhere, and any height."""
     experiments = simulated_tests([Bench(displacements_mm=(*range(1, 8), *range(6, 0, -1)))], Truth(WIRE), seed=3)
     block = fitted(experiments, (effect_named("superposition"),), PLAIN_SPEC, np.random.default_rng(0))
-    edge = block.modes.z[:1].copy()
+    edge = block.z.copy()
     edge[0, block.target.problem.names.index("superposition.omega")] = 6.0
     assert float(expand(block.target, edge, []).prior_square[0]) < 20.0
-    both = replace(block, modes=replace(block.modes, z=np.concatenate([block.modes.z[:1], edge])))
+    both = replace(block, modes=replace(block.modes, z=np.concatenate([block.z, edge])))
     reference = reference_of(block)
     assert remainder_evidence(both, reference) == pytest.approx(remainder_evidence(block, reference), abs=3.0)
 
@@ -119,6 +119,6 @@ def test_a_mode_at_the_edge_of_a_prior_lends_a_remainder_nothing() -> None:
 def test_what_has_no_tangent_has_no_evidence() -> None:
     experiments = simulated_tests([Bench()], Truth(WIRE), seed=3)
     block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
-    x = expand(block.target, block.modes.z[:1], [], reference=reference_of(block))
+    x = expand(block.target, block.z, [], reference=reference_of(block))
     plain, beside = evidences(replace(x, residual=np.full_like(x.residual, np.nan)))
     assert (plain == -np.inf).all() and (beside == -np.inf).all()

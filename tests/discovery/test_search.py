@@ -70,7 +70,7 @@ def test_false_alarms_are_as_rare_as_said(tmp_path: Path) -> None:
         rng = np.random.default_rng(seed)
         block = fitted(made(folder, [Bench(resolution_N=0.01)], {}, [], seed), (), PLAIN_SPEC, rng)
         trials, candidates = screening.candidate_probes([block], CATALOGUE)
-        data = linear_scan.scan(linear_scan.expand(block.target, block.modes.z[:1], trials))
+        data = linear_scan.scan(linear_scan.expand(block.target, block.z, trials))
         values.append(screening.global_test(candidates, [data], [screening.replicated(block, trials, 99, rng).scan]).p)
     assert sum(p <= 0.08 for p in values) <= 5
     assert 0.3 < np.mean(values) < 0.7  # the mean of 24 uniforms has a standard deviation of 0.06
@@ -267,7 +267,7 @@ def test_the_linear_scan_sees_what_a_regression_on_the_dense_covariance_sees(tmp
         made(tmp_path, [Bench()], {"toe.w": 1.0}, [effect_named("toe")]), (), PLAIN_SPEC, np.random.default_rng(0)
     )
     trials = probes(effect_named("strain_stiffening"))
-    x = linear_scan.expand(block.target, block.modes.z[:1], trials)
+    x = linear_scan.expand(block.target, block.z, trials)
     whitened = noise_integral.projected(x, float(x.ratio[0]))[:, 0]
     k = np.sqrt(float(x.ratio[0])) * x.left[0] * x.singular[0]
     inverse = np.linalg.inv(np.eye(len(k)) + k @ k.T)

@@ -84,7 +84,7 @@ def weighed_by_both(folder: Path, periods: tuple[float, float]) -> tuple[float, 
     scales = scales_of(experiments)
     plain = [fitted([e], [], PLAIN_SPEC, np.random.default_rng(0), scales=scales) for e in experiments]
     trials, candidates = candidate_probes(plain, {"screw_error": ScrewError})
-    scans = [scan(expand(block.target, block.modes.z[:1], trials)) for block in plain]
+    scans = [scan(expand(block.target, block.z, trials)) for block in plain]
     found = weigh_names(plain, trials, candidates, scans).winners["screw_error"][0]
     both = fitted(experiments, [found.effect], PLAIN_SPEC, np.random.default_rng(0), scales=scales)
     by_both = both.log_evidence - sum(block.log_evidence for block in plain)

@@ -209,9 +209,8 @@ def test_a_discrepancy_is_as_large_as_what_the_effects_leave_over(monkeypatch: p
     }
     problem = build([one, other])
     best = np.array([values[name.split("[")[0]] for name in problem.names])
-    target = SimpleNamespace(problem=problem, coordinates=SimpleNamespace(to_natural=lambda z: z))
-    modes = SimpleNamespace(z=np.stack([best, 2.0 * best]))
-    block: Any = SimpleNamespace(target=target, modes=modes, names=[s.name for s in problem.samples])
+    names = [s.name for s in problem.samples]
+    block: Any = SimpleNamespace(target=SimpleNamespace(problem=problem), theta=best[None], names=names)
     theta = {name: np.array([value]) for name, value in values.items()}
     for e in (one, other):
         mask = e.protocol().mask

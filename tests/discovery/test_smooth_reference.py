@@ -78,7 +78,7 @@ def test_of_many_readings_the_covariance_of_some_gives_nearly_the_best_functions
 
 def test_the_evidence_of_several_processes_is_the_mean_of_theirs() -> None:
     block = fitted([WIRE], (), PLAIN_SPEC, np.random.default_rng(0))
-    z, family = block.modes.z[:1], smooth_reference.family(WIRE.protocol())
+    z, family = block.z, smooth_reference.family(WIRE.protocol())
     each = [scan(expand(block.target, z, [], reference=[[f]])).flexible[0] for f in family]
     together = scan(expand(block.target, z, [], reference=[family])).flexible[0]
     assert np.ptp(each) > 1.0
@@ -99,7 +99,7 @@ def disturbed(folder: Path, size_N: float) -> LaplaceFit:
 
 def test_a_local_deviation_is_a_remainder_that_one_global_process_does_not_see(tmp_path: Path) -> None:
     block = disturbed(tmp_path / "off", 0.12)
-    alone = scan(expand(block.target, block.modes.z[:1], [])).flexible[0]
+    alone = scan(expand(block.target, block.z, [])).flexible[0]
     assert alone < 1.0 < 8.0 < remainder_evidence(block, reference_of(block))
     clean = disturbed(tmp_path / "clean", 0.0)
     assert remainder_evidence(clean, reference_of(clean)) < 0.0

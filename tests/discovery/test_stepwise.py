@@ -37,7 +37,7 @@ def test_two_effects_have_one_evidence_in_either_order(truth: dict[str, float], 
     plain = plain_fit(bench, truth, (first, second))
     settings = Settings(kinds={n: CATALOGUE[n] for n in (first, second)})
     trials, candidates = screening.candidate_probes(plain, settings.kinds)
-    data = [scan(expand(plain[0].target, plain[0].modes.z[:1], trials))]
+    data = [scan(expand(plain[0].target, plain[0].z, trials))]
     found = weigh_names(plain, trials, candidates, data, reach=reaches(plain, trials, candidates))
     references = [reference_of(block) for block in plain]
     root = stepwise.FittedSet(EffectSet((), 0.0, {}, None), plain, (), found, ([], []))
@@ -45,7 +45,7 @@ def test_two_effects_have_one_evidence_in_either_order(truth: dict[str, float], 
     for one, other in ((first, second), (second, first)):
         added = stepwise._fit(root, one, (), references, settings, np.random.default_rng(1))
         blocks, (probes, further) = added.blocks, added.probed
-        scans = [scan(expand(b.target, b.modes.z[:1], probes)) for b in blocks]
+        scans = [scan(expand(b.target, b.z, probes)) for b in blocks]
         beside = weigh_names(blocks, probes, further, scans, reach=found.reach)
         values.append(found.log_bayes[one] + beside.log_bayes[other])
     assert values[0] == pytest.approx(values[1], abs=SAME_EVIDENCE)
@@ -57,7 +57,7 @@ def test_the_credit_beside_a_smooth_remainder_is_a_ratio_of_two_regressions() ->
 
     block = plain_fit(Bench(), {"toe.w": 1.0}, ("toe",))[0]
     trials, _ = screening.candidate_probes([block], {"toe": CATALOGUE["toe"]})
-    x = expand(block.target, block.modes.z[:1], trials)
+    x = expand(block.target, block.z, trials)
     ratio, size = 10.0, 8.0
     found = {}
     with pytest.MonkeyPatch.context() as patch:

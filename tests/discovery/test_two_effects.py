@@ -29,7 +29,7 @@ def block() -> LaplaceFit:
 @pytest.fixture(scope="module")
 def expansion(block: LaplaceFit) -> Expansion:
     trials, _ = screening.candidate_probes([block], {name: CATALOGUE[name] for name in NAMES})
-    return expand(block.target, block.modes.z[:1], trials)
+    return expand(block.target, block.z, trials)
 
 
 def left_by(columns: Array, x: Expansion, ratio: float) -> tuple[float, Array]:

@@ -365,9 +365,7 @@ def test_an_effect_that_gains_exactly_four_does_not_predict(monkeypatch: pytest.
 def retested(monkeypatch: pytest.MonkeyPatch, p: float) -> tuple[Any, list[Any], Any]:
     """The second test of a set on two blocks, where p is as given, its blocks, and what was simulated."""
     blocks: Any = [
-        SimpleNamespace(
-            target=SimpleNamespace(problem=f"p{b}"), modes=SimpleNamespace(z=np.array([[b], [9]])), names=[f"n{b}", "m"]
-        )
+        SimpleNamespace(target=SimpleNamespace(problem=f"p{b}"), z=np.array([[b]]), names=[f"n{b}", "m"])
         for b in range(2)
     ]
     asked: list[Any] = []

@@ -102,7 +102,7 @@ def test_a_search_looks_for_the_fault_of_each_instrument_apart(pair):
     trials, candidates = candidate_probes([block], kinds)
     assert all(c.blocks == (0,) and c.shared for c in candidates)
     of_key = {trial.effect.key: k for k, trial in enumerate(trials)}
-    seen = forms(block.target, block.modes.z[:1], trials)
+    seen = forms(block.target, block.z, trials)
     assert {key: [bool(np.any(shape[..., k])) for shape in seen] for key, k in of_key.items()} == {
         "toe": [True, True],
         "sensor_drift@displacement": [True, False],

@@ -12,6 +12,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
 from wirebayes.numeric.distributions import Normal
+from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Bools, Ints
 
 _STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
@@ -342,5 +343,5 @@ def _follow(
     with np.errstate(invalid="ignore"):
         prior = np.concatenate([x.prior[None], prior.reshape(many, -1)])
         value = prior - 0.5 * degrees * np.log(np.maximum(square, x.least))
-    best = np.argmax(np.where(np.isfinite(value), value, -np.inf), axis=0)
+    best = np.argmax(or_impossible(value), axis=0)
     return np.asarray(trial[best, np.arange(len(z))])

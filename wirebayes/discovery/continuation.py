@@ -82,7 +82,7 @@ class Continuation:
     ) -> None:
         self._blocks, self._each = blocks, parallel_map
         self._ways = ladders(blocks, trials, candidates, data)
-        found = self._strengths(self._ways, [(b.modes.z[:1], None) for b in blocks])
+        found = self._strengths(self._ways, [(b.z, None) for b in blocks])
         self.log_bayes = {c: float(v[0]) for c, v in found.items()}  # of every candidate that has a ladder
         linear = by_name(candidates, data)
         self._values = {c.name: float(linear[c.name][0]) for c in found}

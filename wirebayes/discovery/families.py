@@ -57,7 +57,7 @@ def families_of(
     parts = []
     for b, (block, ratio) in enumerate(zip(plain, ratios, strict=True)):
         here = [i for i, name in enumerate(names) if b in found[name]]
-        seen = projected(expand(block.target, block.modes.z[:1], [found[names[i]][b] for i in here]), ratio)
+        seen = projected(expand(block.target, block.z, [found[names[i]][b] for i in here]), ratio)
         part = np.zeros((seen.shape[0], len(names)))
         part[:, here] = seen
         parts.append(part)
@@ -97,7 +97,7 @@ def refitted_probe(block: LaplaceFit, found: Refit, b: int) -> Probe:
 def block_ratio(block: LaplaceFit) -> float:
     """Size of the setting errors against the sensor's, ρ, in a fitted block."""
     target = block.target
-    return float(tangent(target, block.modes.z[:1], None, moving_columns(target.problem)).ratio[0])
+    return float(tangent(target, block.z, None, moving_columns(target.problem)).ratio[0])
 
 
 def noise_ratio(block: LaplaceFit, found: Refit, b: int) -> float:

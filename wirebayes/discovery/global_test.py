@@ -106,7 +106,7 @@ def examine(
     data, patterns, expansions = [], [], []
     for block in blocks:
         listed, columns = residual_patterns.patterns(block.target.problem)
-        expansions.append(expand(block.target, block.modes.z[:1], trials, columns=columns))
+        expansions.append(expand(block.target, block.z, trials, columns=columns))
         data.append(scan(expansions[-1]))
         patterns.append(listed)
     simulated: list[Replicates] = []
@@ -252,7 +252,7 @@ def _strike_gross_errors(
     most = max(1, int(gross_errors.MOST * gross_errors.readings_of(block.experiments)))
     while len(struck) < most:
         own = [c for c in candidates if i in c.blocks]
-        here = scan(expand(block.target, block.modes.z[:1], trials))
+        here = scan(expand(block.target, block.z, trials))
         rival = max((float(here.effects[0, c.probe]) for c in own), default=0.0)
         found = gross_errors.suspect(block, max(rival, float(here.flexible[0])))
         if found is None:

@@ -32,7 +32,7 @@ def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | No
                 out[j, r, :, i] = 1.0
         return out
 
-    found: Scan = scan(expand(block.target, block.modes.z[:1], [], columns=columns))
+    found: Scan = scan(expand(block.target, block.z, [], columns=columns))
     best = int(np.argmax(found.effects[0]))
     value = float(found.effects[0, best]) + occam(False) - np.log(len(cells))
     if value < max(3.0, rival + 2.0):

@@ -15,6 +15,7 @@ from wirebayes.model.build import build
 from wirebayes.model.linear_amplitudes import completed
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
+from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array
 from wirebayes.processes.workers import ParallelMap
 from wirebayes.wire.effect import Effect
@@ -89,7 +90,7 @@ def predicted(
     rng : numpy Generator
     """
     first = [e.train(k) for e, k in zip(experiments, train, strict=True)]
-    near = block.target.coordinates.to_natural(block.modes.z[:1])[0] if block.effects == tuple(effects) else None
+    near = block.theta[0] if block.effects == tuple(effects) else None
     trained = fitted(first, effects, block.spec, rng, near, scales=block.scales)
     problem, theta = _draws(trained, rng, 500)
     whole = build(experiments, effects, block.spec, scales=block.scales)
@@ -111,7 +112,7 @@ def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng
     mask[last] = False
     carried = likelihoods.chain(line, sample.readings, mask, *noise)
     log_p = likelihoods.held_out_density(line, carried, sample.readings, sample.protocol.mask & ~mask, *noise)
-    elpd = logsumexp(np.where(np.isfinite(log_p), log_p, -np.inf), axis=1) - np.log(log_p.shape[1])
+    elpd = logsumexp(or_impossible(log_p), axis=1) - np.log(log_p.shape[1])
     holds = [_scored_hold(sample, line, carried, int(j), noise, rng) for j in last]
     error = np.concatenate([hold.error for hold in holds])
     floor = np.concatenate([hold.floor for hold in holds])

@@ -128,8 +128,8 @@ def _rungs(starts: Sequence[_LadderEnds]) -> Array:
 
 def _raw(block: LaplaceFit, probe: Probe) -> float:
     """Squared length of a unit of the effect in the readings, in standard deviations of one."""
-    shapes = forms(block.target, block.modes.z[:1], [probe])
-    theta, total = block.target.coordinates.to_natural(block.modes.z[:1]), 0.0
+    shapes = forms(block.target, block.z, [probe])
+    theta, total = block.theta, 0.0
     for sample, shape in zip(block.target.problem.samples, shapes, strict=True):
         own = block.target.problem.parameters(theta, sample)
         variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)

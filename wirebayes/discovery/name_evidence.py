@@ -185,7 +185,7 @@ def reaches(
     """
     lengths = []
     for block in blocks:
-        x = expand(block.target, block.modes.z[:1], trials)
+        x = expand(block.target, block.z, trials)
         lengths.append((projected(x, float(x.ratio[0])) ** 2).sum(axis=0))
     out: dict[_Place, float] = {}
     for c in candidates:

@@ -196,7 +196,7 @@ def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tup
 
 def _remainder_seen(target: LogPosterior, block: LaplaceFit) -> float:
     """Typical length, in standard deviations of a reading, of a smooth remainder of one unit after projection."""
-    x = expand(target, block.modes.z[:1], [])
+    x = expand(target, block.z, [])
     count = x.flexible.shape[2]
     smooth = replace(x, signatures=x.flexible, one_sided=np.zeros(count, bool), kinds=np.full(count, -1))
     return float(np.sqrt((projected(smooth, float(x.ratio[0])) ** 2).sum()))
@@ -211,7 +211,7 @@ def replace_problem(target: LogPosterior, problem: Any) -> LogPosterior:
 
 def _separation(target: LogPosterior, block: LaplaceFit, trials: Sequence[Probe]) -> float:
     """Length of the first signature left when parameters, and the second where there is one, have taken their part."""
-    x = expand(target, block.modes.z[:1], trials)
+    x = expand(target, block.z, trials)
     p = projected(x, float(x.ratio[0]))
     first = p[:, 0]
     if p.shape[1] > 1 and (p[:, 1] ** 2).sum() > 0:

@@ -7,6 +7,7 @@ import numpy as np
 from wirebayes.discovery.noise_integral import ABSORBED, RATIOS
 from wirebayes.discovery.tangent import Tangent, damp
 from wirebayes.numeric.linear_algebra import cholesky, solve
+from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Bools
 
 _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the readings jump
@@ -173,7 +174,7 @@ def _summed(height: Array, peak: Array) -> Array:
     """(n,) log densities summed over ratios (n, k), whose largest is `peak`; -inf where that is not a number."""
     with np.errstate(invalid="ignore"):
         total = peak + np.log(np.exp(height - peak[:, None]).sum(axis=1))
-    return np.where(np.isfinite(total), total, -np.inf)
+    return or_impossible(total)
 
 
 def _steps(gram: Array, regular: Bools) -> Array:

@@ -215,7 +215,7 @@ def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible:
         absorbable = [kind() for kind in _ABSORBABLE if kind not in known]
         of_this_bench = [effect.under(control) for effect in absorbable]
         trials = [Probe(effect, {effect.columns()[0]: 1e-3}, 1e-3, False) for effect in of_this_bench]
-        x = expand(block.target, block.modes.z[:1], trials)
+        x = expand(block.target, block.z, trials)
         wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
         left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
         of_which = f" ({WORD[control]})" if len(controls) > 1 else ""

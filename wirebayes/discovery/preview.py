@@ -98,7 +98,7 @@ def _effects(block: LaplaceFit, kinds: Mapping[str, type[Effect]], rng: np.rando
     """Each effect at the size at which it would be seen, in the form and at the hold where it is seen best."""
     trials, candidates = screening.candidate_probes([block], kinds)
     control = block.experiments[0].control
-    if expand(block.target, block.modes.z[:1], []).degrees < 1:
+    if expand(block.target, block.z, []).degrees < 1:
         return {name: _hidden(kind, "fewer readings than parameters", control) for name, kind in kinds.items()}
     if not candidates:
         return {name: _hidden(kind, kind.shows, control) for name, kind in kinds.items()}

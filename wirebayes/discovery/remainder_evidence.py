@@ -17,7 +17,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
 from wirebayes.numeric.linear_algebra import solve
-from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.log_sum import log_sum, or_impossible
 from wirebayes.numeric.typing import Array
 
 _MODES = 2  # of the fit without a remainder, from which the parameters move: as many as names begin from
@@ -48,7 +48,7 @@ def remainder_evidence(block: LaplaceFit, reference: Reference) -> float:
     float
         The mean over processes and over their sizes.
     """
-    target, best = block.target, block.modes.z[:1]
+    target, best = block.target, block.z
     fit = expand(target, best, [], reference=reference)
     plain, beside = evidences(fit)
     without = float(log_sum(plain, axis=1)[0])
@@ -203,7 +203,7 @@ class _Remainder:
         white = whitened(x, residual.T, self.ratio)
         with np.errstate(invalid="ignore"):
             value = prior - 0.5 * (white * self._left(white)).sum(axis=0)
-        return np.where(np.isfinite(value), value, -np.inf)
+        return or_impossible(value)
 
     def _left(self, columns: Array) -> Array:
         """What the remainder leaves of columns (N, c)."""

@@ -105,7 +105,7 @@ def retested(best: FittedSet, rng: np.random.Generator, parallel_map: ParallelMa
         return Retest(None, [[] for _ in best.blocks])
     patterns = [residual_patterns.patterns(block.target.problem) for block in best.blocks]
     data = [
-        scan(expand(block.target, block.modes.z[:1], trials, columns=columns))
+        scan(expand(block.target, block.z, trials, columns=columns))
         for block, (_, columns) in zip(best.blocks, patterns, strict=True)
     ]
     simulated: list[Replicates] = []

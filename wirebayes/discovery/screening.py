@@ -21,6 +21,7 @@ from wirebayes.inference.climb import climb
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.model.sample import LENGTH_EXPONENT
+from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Ints
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.protocol import Protocol
@@ -176,7 +177,7 @@ def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
         total = np.maximum(weight.sum(axis=0), 1e-300)
         mean = (weight * a).sum(axis=0) / total
         value = (lr - 0.5 * weight * (a - mean) ** 2).sum(axis=0)
-    return np.where(np.isfinite(value), value, -np.inf), mean
+    return or_impossible(value), mean
 
 
 def _alone_and_together(log_bayes: Sequence[Array]) -> Array:
@@ -212,13 +213,13 @@ def replicated(
     -------
     Replicates
     """
-    z = np.repeat(block.modes.z[:1], n, axis=0)
+    z = np.repeat(block.z, n, axis=0)
     theta = block.target.coordinates.to_natural(z)
     problem = block.target.problem
     y = [replicate(problem, theta, s, rng) for s in problem.samples]
     density, residuals = block.target.rowwise(y)
     found = climb(density, z, residuals, iterations=25, tolerance=1e-2, curvature_at_end=False)
-    shapes, smooth = forms(block.target, block.modes.z[:1], trials), plain_reference(problem)
+    shapes, smooth = forms(block.target, block.z, trials), plain_reference(problem)
     at_once = int(np.clip(_NUMBERS / max(sum(shape.size for shape in shapes), 1), 1, _ROWS))
     parts = []
     for begin in range(0, n, at_once):

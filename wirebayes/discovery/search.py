@@ -29,7 +29,7 @@ from wirebayes.effects import CATALOGUE
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
-from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment import Experiment, by_material
 from wirebayes.json_files.discovery import (
     AmplitudeEstimate,
     Disagreement,
@@ -125,9 +125,7 @@ def _plain_fits(
     experiments: Sequence[Experiment], settings: Settings, rng: np.random.Generator, parallel_map: ParallelMap
 ) -> list[LaplaceFit]:
     """The experiments of each material, fitted jointly, all on one scale: they may share an instrument's amplitude."""
-    materials: dict[str, list[Experiment]] = {}
-    for e in experiments:
-        materials.setdefault(e.material, []).append(e)
+    materials = by_material(experiments)
     one_scale = partial(fitted, scales=scales_of(experiments))
     spec = repeat(settings.spec)
     return list(parallel_map(one_scale, materials.values(), repeat(()), spec, rng.spawn(len(materials))))

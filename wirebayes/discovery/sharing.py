@@ -35,7 +35,7 @@ def informed(blocks: Sequence[LaplaceFit], effects: Mapping[int, Effect], rng: n
         priors = {column: table for column, table in tables.items() if table is not None}
         if priors:
             with_prior = [replace(e, priors=e.priors | priors) for e in blocks[b].experiments]
-            near = blocks[b].target.coordinates.to_natural(blocks[b].modes.z[:1])[0]
+            near = blocks[b].theta[0]
             block = blocks[b]
             out[b] = fitted(with_prior, block.effects, block.spec, rng, near, scales=block.scales)
     return out

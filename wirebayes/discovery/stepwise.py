@@ -182,7 +182,7 @@ def _further(
     """Evidence of one more effect beside some names; None where none has a chance."""
     assert parent.further is not None
     trials, candidates = probed
-    scans = [scan(expand(block.target, block.modes.z[:1], trials)) for block in blocks]
+    scans = [scan(expand(block.target, block.z, trials)) for block in blocks]
     explained = {other for own in names for other in family_of(own, families)}  # what they were, they are no more
     before = {n: -np.inf if n in explained else value for n, value in parent.further.tried.items()}
     by_scan = [float(screening.log_bayes(c, scans)[0][0]) for c in candidates]

@@ -52,16 +52,26 @@ class LaplaceFit:
         return tuple(e.name for e in self.experiments)
 
     @property
+    def z(self) -> Array:
+        """(1, d): the best mode, as it is sampled."""
+        return self.modes.z[:1]
+
+    @property
+    def theta(self) -> Array:
+        """(1, d): the best parameters, in units of the tests' scales."""
+        return self.target.coordinates.to_natural(self.z)
+
+    @property
     def best(self) -> dict[str, float]:
         """The best parameters, all of them, in mm, N and s."""
-        theta = self.target.coordinates.to_natural(self.modes.z[:1])
+        theta = self.theta
         natural = self.target.problem.theta_in(NATURAL, theta)[0]
         return dict(zip(self.target.problem.names, natural.tolist(), strict=True))
 
     def parameters(self, name: str) -> dict[str, float]:
         """The best parameters in mm, N and s, by the names they have where one of the experiments is fitted alone."""
         problem = self.target.problem.in_units(NATURAL)
-        theta = self.target.coordinates.to_natural(self.modes.z[:1])
+        theta = self.theta
         natural = self.target.problem.theta_in(NATURAL, theta)
         own = problem.parameters(natural, problem.samples[self.names.index(name)])
         return {key: float(value[0]) for key, value in own.items()}
@@ -82,7 +92,7 @@ class LaplaceFit:
         """
         name = effect.columns()[amplitude]
         column = _column(self.target.problem, name)
-        z = np.repeat(self.modes.z[:1], len(deviations), axis=0)
+        z = np.repeat(self.z, len(deviations), axis=0)
         z[:, column] += np.asarray(deviations) * np.sqrt(self.modes.covariance[0, column, column])
         amplitudes = self.target.coordinates.to_natural(z)[:, column]
         return amplitudes * self.target.problem.units.of(self._unit(effect, name))

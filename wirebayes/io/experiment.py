@@ -175,6 +175,14 @@ LEAST_READINGS = 3  # level, slope and curvature of one relaxation
 ENOUGH = f"at least one recorded hold and {LEAST_READINGS} readings in all"
 
 
+def by_material(experiments: Sequence[Experiment]) -> dict[str, list[Experiment]]:
+    """The experiments of each material, in the order given."""
+    materials: dict[str, list[Experiment]] = {}
+    for experiment in experiments:
+        materials.setdefault(experiment.material, []).append(experiment)
+    return materials
+
+
 def enough(holds: Sequence[Hold]) -> bool:
     """True where there are readings enough for a fit."""
     return sum(hold.time_s.size for hold in holds) >= LEAST_READINGS

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment import Experiment, by_material
 from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.prior import PowerScaled, Prior, from_table, possible, wire_defaults
 from wirebayes.model.problem import Problem
@@ -50,9 +50,7 @@ def build(
     InputError
         If a prior in the file names no parameter, or is malformed.
     """
-    materials: dict[str, list[Experiment]] = {}
-    for experiment in experiments:
-        materials.setdefault(experiment.material, []).append(experiment)
+    materials = by_material(experiments)
     scales = scales or scales_of(experiments)
     several = len(experiments) > 1
     effects = [

@@ -16,6 +16,7 @@ from wirebayes.model.prior import PowerScaled, Prior
 from wirebayes.model.sample import LENGTH_EXPONENT, Likelihood, Sample, at_length
 from wirebayes.model.scales import NATURAL, Scales, Units
 from wirebayes.numeric.distributions import scaled
+from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol
@@ -101,7 +102,7 @@ class Problem:
         """(n,) log-likelihood; -inf where the model cannot be computed."""
         with np.errstate(all="ignore"):
             total: Array = sum(holds.sum(axis=0) for holds in self.hold_log_likelihood(theta, readings))
-        return np.where(np.isfinite(total), total, -np.inf)
+        return or_impossible(total)
 
     def standardised(self, theta: Array, readings: Sequence[Array] | None = None) -> tuple[Array, Array]:
         """(n,) log-likelihood, and (m, n) residuals whose derivatives J give its curvature nearly, as JᵀJ.
@@ -122,7 +123,7 @@ class Problem:
                 values.append(found[0])
                 residuals.append(found[1])
             total: Any = sum(values)
-        return np.where(np.isfinite(total), total, -np.inf), np.concatenate(residuals)
+        return or_impossible(total), np.concatenate(residuals)
 
     def without_each_hold(self, theta: Array) -> tuple[Array, list[Array]]:
         """(n,) log-likelihood, and per sample the (H, n) of the readings of all holds, of all samples, but one."""
@@ -151,7 +152,7 @@ class Problem:
         for sample, rest in zip(self.samples, without, strict=True):
             with np.errstate(all="ignore"):
                 value = np.where(sample.protocol.recorded[:, None], whole - rest, 0.0)
-            out.append(np.where(np.isfinite(value), value, -np.inf))
+            out.append(or_impossible(value))
         return out
 
     def read_unit(self, sample: Sample) -> float:

@@ -5,6 +5,11 @@ import numpy as np
 from wirebayes.numeric.typing import Array
 
 
+def or_impossible(logs: Array) -> Array:
+    """Log probabilities, -inf where they are no numbers."""
+    return np.where(np.isfinite(logs), logs, -np.inf)
+
+
 def log_sum(logs: Array, axis: int = 0) -> Array:
     """Log of the sum of exponentials along an axis, -inf where all are.
 

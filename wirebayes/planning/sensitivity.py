@@ -79,7 +79,7 @@ def sensitivity(
         return Sensitivity(hidden=tuple(hidden))
     null = screening.replicated(block, trials, simulations, rng).scan
     level = screening.chance_level(candidates, [null])
-    x = expand(block.target, block.modes.z[:1], trials)
+    x = expand(block.target, block.z, trials)
     alike = power.similarity([x], trials, [float(x.ratio[0])])
     strength = np.median(null.norm, axis=0)
     effects: dict[str, EffectPower] = {}

@@ -12,6 +12,7 @@ from scipy.special import logsumexp
 from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods, single_holds
+from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Bools, Ints
 from wirebayes.prediction.leave_one_hold_out import evenly_thinned
 from wirebayes.prediction.predictive import PredictionRequest, draw_predictive, given_first
@@ -230,7 +231,7 @@ def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, request
 
 def _log_mean(log_p: Array) -> Array:
     """(...) logarithm of the mean density over draws (..., n)."""
-    finite = np.where(np.isfinite(log_p), log_p, -np.inf)
+    finite = or_impossible(log_p)
     return np.asarray(logsumexp(finite, axis=-1) - np.log(finite.shape[-1]))
 
 

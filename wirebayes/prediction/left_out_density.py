@@ -18,6 +18,7 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import searches
 from wirebayes.inference.weighted_posterior import overlooked_share, weighted_posterior
 from wirebayes.model.problem import Problem
+from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Bools
 
 Holds = list[tuple[int, int]]
@@ -142,7 +143,7 @@ def joined_densities(target: LogPosterior, holds: Holds) -> Callable[[Array], Ar
         with np.errstate(all="ignore"):
             prior = target.log_prior(theta) + target.coordinates.log_jacobian(theta, z)
             value = prior[:, None] + np.column_stack([whole, *(without[s][j] for s, j in holds)])
-        return np.where(np.isfinite(value), value, -np.inf)
+        return or_impossible(value)
 
     return lambda z: np.concatenate([densities(z[i : i + _ROWS]) for i in range(0, len(z), _ROWS)])
 

@@ -71,7 +71,7 @@ def normal_force(robot: Robot, position_m: Floats, rotation: Floats, tension_N: 
     tension_N : (w,) array
     """
     assert robot.plane is not None
-    shape = statics.geometry(robot, position_m[:, None], rotation[..., None])
+    shape = statics.geometry_at(robot, position_m, rotation)
     pull = shape.direction[..., 0] @ (robot.lines * tension_N)
     return float(robot.plane.normal @ (pull + np.array([0.0, 0.0, robot.mass_kg * GRAVITY])))
 

@@ -78,6 +78,17 @@ def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
     return Geometry(distance, line / np.maximum(distance, _NOWHERE), arm)
 
 
+def geometry_at(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
+    """`geometry` at one pose.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m, rotation : (3,), (3, 3) arrays
+    """
+    return geometry(robot, position_m[:, None], rotation[..., None])
+
+
 def jacobian(robot: Robot, shape: Geometry) -> Floats:
     """Change of the distances with a small motion, ``(6 or 3, w, n)``: rows ``u`` and ``r × u``."""
     J = _with_moments(robot, shape.direction, shape.arm_m)

@@ -166,7 +166,7 @@ def commandable(robot: Robot, position_m: Floats, rotation: Floats, tension_N: F
     degrees : int
         Of freedom that are commanded, in all.
     """
-    shape = statics.geometry(robot, position_m[:, None], rotation[..., None])
+    shape = statics.geometry_at(robot, position_m, rotation)
     tau = tension_N[:, None]
     scale = scale_of(robot)
     K = stiffness_at_tension(robot, shape, rotation[..., None], tau)[0] * scale * scale[:, None]

@@ -291,7 +291,7 @@ def overstretched(robot: Robot, joint_m: Floats) -> Bools:
 def _stretch_at(robot: Robot, joint_m: Floats, position_m: Floats, rotation: Floats) -> Floats:
     """Stretched by zero-tension length ``(t, w)`` at one pose."""
     zero, offset = inverse.lengths(robot, joint_m)
-    shape = statics.geometry(robot, position_m[:, None], rotation[..., None])
+    shape = statics.geometry_at(robot, position_m, rotation)
     return np.asarray(statics.stretched(robot, shape, offset.T).T / zero)
 
 

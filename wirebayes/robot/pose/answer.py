@@ -183,7 +183,7 @@ def _why_not(robot: Robot, x: Floats, turned: Orientation) -> tuple[str, str]:
 
 def _pulled_up(robot: Robot, x: Floats, R: Floats) -> bool:
     """Whether some wire pulls the platform upwards, by more than rounding."""
-    direction = statics.geometry(robot, x[:, None], R[..., None]).direction[..., 0]
+    direction = statics.geometry_at(robot, x, R).direction[..., 0]
     return bool((-direction[2]).max() > _LEVEL)
 
 

@@ -124,7 +124,7 @@ def by_lines(robot: Robot, rotation: Floats) -> OrientationFound:
 
 def _clear(robot: Robot, x: Floats, R: Floats) -> bool:
     """Whether every wire runs somewhere: no platform point lies on an exit point or inside a pulley."""
-    return bool(statics.geometry(robot, x[:, None], R[..., None]).clear[0])
+    return bool(statics.geometry_at(robot, x, R).clear[0])
 
 
 def _cleared(robot: Robot, x: Floats, reference: Floats) -> Floats:

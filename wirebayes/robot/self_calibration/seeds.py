@@ -58,7 +58,7 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: np.random.Generat
 
 def _carrying(robot: Robot, position_m: Floats, turn: Floats) -> Floats:
     """(w,) tensions above the lowest that carry the platform at a pose as nearly as they can, small ones rather."""
-    shape = statics.geometry(robot, position_m[:, None], turn[..., None])
+    shape = statics.geometry_at(robot, position_m, turn)
     unit = scale(robot)
     structure = -statics.jacobian(robot, shape)[..., 0] * robot.lines * unit[:, None]
     load = -statics.weight(robot, turn[..., None])[:, 0] * unit
