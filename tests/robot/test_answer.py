@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from tests.robot.lines import STRONGER, line_about
 from wirebayes.json_files.plain import plain
 from wirebayes.report.pictures import robot as pictures
 from wirebayes.robot.mechanics import draws, schema
@@ -11,9 +12,7 @@ TIMES = np.array([0.0, 60.0])
 
 
 def _line(n, k1, law="hooke"):
-    rng = np.random.default_rng(0)
-    means = {"k1": k1, "B": 0.3, "U": 0.9, "k2": 0.03, "N": 0.64}
-    return draws.WireDraws({k: v * np.exp(0.02 * rng.standard_normal(n)) for k, v in means.items()}, 1000.0, law)
+    return line_about(STRONGER | {"k1": k1}, 0.02, n, law=law)
 
 
 def test_wires_too_weak_for_the_robot_are_an_answer_not_a_crash(tmp_path):

@@ -3,17 +3,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.robot.lines import STRONGER, line_about
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.motion import claim, control, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.robot.pose.variance_shares import shares
 
-CORE = {"k1": 800.0, "B": 0.3, "U": 0.9, "k2": 0.03, "N": 0.64}
-
 
 def _line(n=50, sd=0.05, seed=0):
-    rng = np.random.default_rng(seed)
-    return draws.WireDraws({k: v * np.exp(sd * rng.standard_normal(n)) for k, v in CORE.items()}, 1000.0)
+    return line_about(STRONGER, sd, n, seed)
 
 
 @pytest.mark.parametrize("name", ["cogiro-desk", "linear-7", "hangprinter-4"])

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.robot.lines import CORE, line_about
 from tests.wire.test_fresh import Shrinking, Waking
 from wirebayes.effects import effect_named
 from wirebayes.effects.rivals import Logarithmic, PowerLaw, TwoModes
@@ -15,13 +16,10 @@ from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import simulate
 
-CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
-
 
 def _line(n=1, law="hooke", history="saturating", effects=(), sd=0.0, seed=0, **more):
-    rng = np.random.default_rng(seed)
-    values = {k: v * np.exp(sd * rng.standard_normal(n)) for k, v in {**CORE, **more}.items()}
-    return draws.WireDraws(values, 1000.0, law, history, tuple(effects), tension_ref_N=3.0)
+    line = line_about(CORE | more, sd, n, seed, law)
+    return replace(line, history=history, effects=tuple(effects), tension_ref_N=3.0)
 
 
 def _bench_with_the_robots_wire(line, displacement_mm, duration_s, follow):

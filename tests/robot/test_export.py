@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.robot import cases
+from tests.robot.lines import CORE
 from wirebayes.effects import effect_named
 from wirebayes.errors import InputError
 from wirebayes.robot.export import files
@@ -17,7 +18,6 @@ from wirebayes.robot.mechanics.description import GivenWire
 from wirebayes.robot.mechanics.wires import tension
 from wirebayes.robot.motion import inverse
 
-CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
 BENT = [
     ("hooke", "strain_stiffening", {"strain_stiffening.c": 15.0}),
     ("hooke", "toe", {"toe.w": 4.0}),

@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tests.robot.independent import Rig
+from tests.robot.lines import CORE, line_about
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.errors import InputError
@@ -26,12 +27,9 @@ from wirebayes.robot.mechanics.description import Drums
 from wirebayes.robot.motion import inverse
 from wirebayes.strict.table import csv_table
 
-CORE = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
-
 
 def _line(n, sd=0.05, seed=0):
-    rng = np.random.default_rng(seed)
-    return draws.WireDraws({k: v * np.exp(sd * rng.standard_normal(n)) for k, v in CORE.items()}, 1000.0)
+    return line_about(CORE, sd, n, seed)
 
 
 def _joint_values_for(robot, times, position, holds=None, payload=None):

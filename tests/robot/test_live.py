@@ -20,11 +20,19 @@ from wirebayes.robot.mechanics import schema
 from wirebayes.robot.motion import path
 
 TIMES = np.array([0, 60, 70, 400, 420, 900, 930, 2000, 2030, 3600.0])
+EXACT = Uncertain()
 
 
 def _history(robot):
     a, _, b, _, c, _ = _places(robot)
     return _joint_values_for(robot, TIMES, [a, a, b, b, c, c, b, b, a, a])
+
+
+def _standing(name="hangprinter-4", draws=4, errors=EXACT, reads=False, **more):
+    """An estimator of a robot at its home pose, and the joint values there."""
+    robot = schema.read_robot_file(name)
+    live = LiveEstimator(robot, _line(draws), errors, (robot.home_m, np.eye(3)), reads=reads, **more)
+    return live, _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
 
 
 def _run(live, history, **more):
@@ -78,15 +86,12 @@ def test_with_readings_it_agrees_with_the_batch_in_the_end():
 
 
 def test_joint_values_that_are_sent_back_bring_the_platform_back():
-    robot = schema.read_robot_file("linear-7")
-    line = _line(24)
-    live = LiveEstimator(robot, line, Uncertain(), (robot.home_m, np.eye(3)), reads=False)
-    nominal = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    live, nominal = _standing("linear-7", 24)
     joint = nominal
     for time in np.arange(0, 600.0, 5.0):
         now = live.step(time, joint, nominal_m=nominal)
         joint = nominal + now.correction_m
-    still = LiveEstimator(robot, line, Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+    still, _ = _standing("linear-7", 24)
     for time in (0.0, 595.0):
         drifted = still.step(time, nominal)
     meant = still._x[-1]
@@ -96,35 +101,30 @@ def test_joint_values_that_are_sent_back_bring_the_platform_back():
 
 
 def test_a_long_step_is_as_good_as_short_ones():
-    robot = schema.read_robot_file("cogiro-desk")
     ends = []
-    joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     for times in ([0.0, 600.0], np.arange(0, 601.0, 2.0)):
-        live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
+        live, joint = _standing("cogiro-desk")
         for time in times:
             now = live.step(time, joint)
         ends.append(now.position_m)
-    drift = np.linalg.norm(ends[1] - robot.home_m)
+    drift = np.linalg.norm(ends[1] - live.robot.home_m)
     assert np.linalg.norm(ends[0] - ends[1]) < 0.005 * drift
 
 
 def test_before_anything_has_crept_corrections_do_not_depend_on_the_seed():
-    robot, line = schema.read_robot_file("hangprinter-4"), _line(64)
-    joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
     for errors in (Uncertain(), Uncertain(2e-3)):
         ends = []
         for seed in range(10):
-            live = LiveEstimator(robot, line, errors, (robot.home_m, np.eye(3)), reads=False, seed=seed)
+            live, joint = _standing(draws=64, errors=errors, seed=seed)
             ends.append([(now.correction_m, now.joint_sd_m) for now in (live.step(0.0, joint), live.step(60.0, joint))])
         correction, sd = np.moveaxis(ends, 2, 0)
-        standard_error = sd.mean(0) / np.sqrt(line.count)  # of independent draws
+        standard_error = sd.mean(0) / np.sqrt(64)  # of independent draws
         assert (correction.std(0) < 0.25 * standard_error).all()
 
 
 def test_a_payload_that_is_set_starts_the_clocks_and_lowers_the_platform():
-    robot = schema.read_robot_file("cogiro-desk")
-    live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
-    joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    live, joint = _standing("cogiro-desk")
+    robot = live.robot
     before = live.step(0.0, joint)
     live.load(0.5 * robot.mass_kg)
     after = live.step(1.0, joint)
@@ -143,20 +143,12 @@ def test_a_payload_that_is_set_starts_the_clocks_and_lowers_the_platform():
 
 
 def test_time_goes_on_and_readings_are_asked_for():
-    robot = schema.read_robot_file("cogiro-desk")
-    live = LiveEstimator(robot, _line(2), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
-    joint = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    live, joint = _standing("cogiro-desk", 2)
     live.step(1.0, joint)
     with pytest.raises(ValueError, match="found 1 after 1, expected a later time"):
         live.step(1.0, joint)
     with pytest.raises(ValueError, match="expected none"):
         live.step(2.0, joint, tension_N=np.ones(8))
-
-
-def _standing(reads=False, name="hangprinter-4"):
-    robot = schema.read_robot_file(name)
-    live = LiveEstimator(robot, _line(4), Uncertain(), (robot.home_m, np.eye(3)), reads=reads)
-    return live, _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
 
 
 NAN4, INF4 = np.array([0, np.nan, 0, 0]), np.array([0, 0, np.inf, 0])
@@ -246,9 +238,8 @@ def test_the_sample_for_firmware_takes_the_creep_off(monkeypatch):
     spec = importlib.util.spec_from_file_location("live_firmware", path)
     sample = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(sample)
-    robot = schema.read_robot_file("hangprinter-4")
-    live = LiveEstimator(robot, _line(8), Uncertain(), (robot.home_m, np.eye(3)), reads=False)
-    nominal = _joint_values_for(robot, [0, 9], [robot.home_m] * 2).joint_m[0]
+    live, nominal = _standing(draws=8)
+    robot = live.robot
     now, sent = [0.0], []
     believed = (nominal - robot.beyond_m) / robot.lines
     made = sample.correct(

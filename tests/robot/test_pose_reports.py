@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.robot.lines import STRONGER, line_about
 from wirebayes.notice import Notice
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.description import GivenWire
@@ -187,11 +188,12 @@ def test_a_band_is_the_mean_the_spread_and_nine_in_ten_of_the_draws() -> None:
 @pytest.fixture(scope="module")
 def hung() -> Any:
     """A small robot, ten draws of a wire that creeps, and a request with no spread between specimens but a tenth."""
-    rng = np.random.default_rng(0)
-    wire = {"k1": 800.0, "B": 0.3, "U": 0.9, "k2": 0.03, "N": 0.64}
-    line = draws.WireDraws({k: v * np.exp(0.02 * rng.standard_normal(10)) for k, v in wire.items()}, 1000.0)
     robot = schema.read_robot_file("hangprinter-4")
-    return robot, line, PoseRequest(robot.home_m, np.eye(3), np.array([0.0, 60.0]), specimen_spread=0.1)
+    return (
+        robot,
+        line_about(STRONGER, 0.02, 10),
+        PoseRequest(robot.home_m, np.eye(3), np.array([0.0, 60.0]), specimen_spread=0.1),
+    )
 
 
 def test_a_calibration_lasts_longer_on_wires_that_crept_before_or_are_compensated(hung: Any) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.robot.lines import STRONGER, line_about
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, drift, forward, inverse
@@ -20,9 +21,7 @@ TIMES = np.array([0.0, 60.0, 600.0])
 def hung() -> Any:
     """A platform on four wires, thirty draws of them, and their drift."""
     pytest.importorskip("flint")
-    rng = np.random.default_rng(0)
-    wire = {"k1": 5000.0, "B": 0.03, "U": 0.9, "k2": 0.03, "N": 0.64}
-    line = draws.WireDraws({k: v * np.exp(0.01 * rng.standard_normal(30)) for k, v in wire.items()}, 1000.0)
+    line = line_about(STRONGER | {"k1": 5000.0, "B": 0.03}, 0.01, 30)
     robot = schema.read_robot_file("hangprinter-4")
     wires = draws.for_robot(robot, line)
     return robot, wires, drift.from_command(robot, wires, robot.home_m, np.eye(3), TIMES)

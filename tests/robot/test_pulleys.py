@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 from tests.robot import cases
 from tests.robot.cases import HANGING
+from tests.robot.lines import CORE, line_about
 from tests.robot.test_statics import check_derivatives
 from wirebayes.robot.mechanics import draws, pulleys, rotation, schema, statics
 from wirebayes.robot.mechanics.description import Pulleys
@@ -182,10 +183,8 @@ def test_proofs_know_pulleys(name):
 
 
 def test_drift_and_maps_run_over_pulleys():
-    robot, rng = _robot("cogiro-desk"), np.random.default_rng(2)
-    values = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}
-    line = draws.WireDraws({k: v * np.exp(0.05 * rng.standard_normal(20)) for k, v in values.items()}, 1000.0)
-    wires = draws.for_robot(robot, line)
+    robot = _robot("cogiro-desk")
+    wires = draws.for_robot(robot, line_about(CORE, 0.05, 20, seed=2))
     course = drift.from_command(robot, wires, robot.home_m, np.eye(3), np.array([0.0, 60.0]))
     assert course.found.all()
     assert np.abs(course.position_m[:, 0] - robot.home_m).max() < 1e-9
