@@ -1,5 +1,6 @@
 """Which column is which: by the words of several languages, by its unit, or by what the user says."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ from wirebayes.io.bench.header import (
     may_be,
     name_and_unit,
 )
+from wirebayes.io.bench.multiples import multiple_of_unit, unit_in_header
 from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, quantity_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
@@ -171,9 +173,9 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
     moments = role == "time" and has_moments(table, index)
     _, from_header = name_and_unit(header, role)
     row_text = table.units[index]
-    from_row = quantity_unit(row_text, role) if row_text else None
+    from_row = unit_in_header(row_text, role) if row_text else None
     if stated:
-        unit = quantity_unit(stated, role)
+        unit = quantity_unit(stated, role) or multiple_of_unit(stated, role)
         if unit is None:
             raise InputError(f"--map: found the unit {stated!r} for {header}, expected one of {role}{_units(role)}")
         return Column(role, index, header, unit)
@@ -184,23 +186,47 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
         raise table.complain(table.header_line, index, found, "one unit")
     unit = from_row or from_header
     if unit is None and not moments:
-        bracket = UNIT_IN_BRACKETS.match(header)
-        if bracket and bracket[2] not in NO_UNIT and not bracket[2].isdigit():
-            raise table.complain(
-                table.header_line,
-                index,
-                f"the unit {bracket[2]!r}",
-                f'one of {role}{_units(role)}; or --map "{header}={role} [{UNITS[role]}]" if that is what it means',
-            )
-        first = table.rows[0]
-        if role == "time" and looks_like_a_moment(first.cell(index)):
-            raise table.complain(first.line, index, shown(first.cell(index)), UNDERSTOOD)
-        raise Undecided(
-            f"{table.sheet.path}, {table.place(table.header_line, index)}: found no unit",
-            f"the unit of {role}",
-            {f"--map {header}={role} [{name}]": name for name in _usual(table, index, role)},
-        )
+        raise _no_unit(table, index, role)
+    if unit is not None and unit.multiple != 1.0:
+        _check_counts(table, index, role, unit)
     return Column(role, index, header, unit)
+
+
+def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
+    """What is wrong with a column that says no unit of its quantity: another unit, odd clocks, or none at all."""
+    header = table.header[index]
+    bracket = UNIT_IN_BRACKETS.match(header)
+    if bracket and bracket[2] not in NO_UNIT and not bracket[2].isdigit():
+        return table.complain(
+            table.header_line,
+            index,
+            f"the unit {bracket[2]!r}",
+            f'one of {role}{_units(role)}; or --map "{header}={role} [{UNITS[role]}]" if that is what it means, '
+            f"or [0.5 {UNITS[role]}] if one {bracket[2]} is 0.5 {UNITS[role]}",
+        )
+    first = table.rows[0]
+    if role == "time" and looks_like_a_moment(first.cell(index)):
+        return table.complain(first.line, index, shown(first.cell(index)), UNDERSTOOD)
+    return Undecided(
+        f"{table.sheet.path}, {table.place(table.header_line, index)}: found no unit",
+        f"the unit of {role}",
+        {f"--map {header}={role} [{name}]": name for name in _usual(table, index, role)},
+    )
+
+
+def _check_counts(table: RawTable, index: int, role: Role, unit: Unit) -> None:
+    """Ask what a graduation in the header means where numbers are no counts of it: it may be the step of the gauge."""
+    row = next((row for row in table.rows if row.cell(index) and not row.cell(index).lstrip("+-−").isdigit()), None)
+    if row is None:
+        return
+    place = f"{table.sheet.path}, {table.place(row.line, index)}"
+    whole = re.sub(r"[\d.,/·×*\s]", "", unit.text)
+    map_to = f"--map {table.header[index]}={role}"
+    raise Undecided(
+        f"{place}: found {row.cell(index)!r} under {unit.text!r}, which may be the unit or the step of the gauge",
+        "which",
+        {f"{map_to} [{whole}]": f"{unit.text} is the step", f"{map_to} [{unit.text}]": f"{unit.text} is the unit"},
+    )
 
 
 def _usual(table: RawTable, index: int, role: Role) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 import re
 
 from wirebayes.io.bench.compound_times import announced
+from wirebayes.io.bench.multiples import unit_in_header
 from wirebayes.io.bench.quantities import ROLES, Role, Unit, is_foreign, quantity_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.words import LETTERS, RIG_WORDS, SAMPLE_WORDS, last_named, plain_letters, speaks_of, words_in
@@ -27,7 +28,7 @@ def is_of_sample(table: RawTable, index: int, role: Role) -> bool:
     role : str
         The quantity.
     """
-    unit = quantity_unit(table.units[index], role) or name_and_unit(table.header[index], role)[1]
+    unit = unit_in_header(table.units[index], role) or name_and_unit(table.header[index], role)[1]
     return unit is not None and unit.of_sample
 
 
@@ -50,11 +51,11 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
     A time may begin with its unit in full: hours at load.
     """
     bracket = UNIT_IN_BRACKETS.match(header)
-    in_brackets = quantity_unit(_IN.sub("", bracket[2]), role) if bracket else None
+    in_brackets = unit_in_header(_IN.sub("", bracket[2]), role) if bracket else None
     if bracket and in_brackets:
         return bracket[1], in_brackets
     for sign in _BEFORE_UNIT.finditer(header):
-        unit = quantity_unit(header[sign.end() :], role)
+        unit = unit_in_header(header[sign.end() :], role)
         if unit and sign.start():
             return header[: sign.start()], unit
     whole = announced(header) if role == "time" else None
@@ -88,7 +89,7 @@ def may_be(table: RawTable, index: int, role: Role) -> bool:
     row_unit = table.units[index]
     units: dict[Role, Unit] = {}
     for other in ROLES:
-        found = (quantity_unit(row_unit, other) if row_unit else None) or name_and_unit(header, other)[1]
+        found = (unit_in_header(row_unit, other) if row_unit else None) or name_and_unit(header, other)[1]
         if found:
             units[other] = found
     if not units and _has_foreign_unit(header, row_unit):
@@ -116,7 +117,7 @@ def is_of_rig(table: RawTable, index: int, role: Role) -> bool:
         The quantity.
     """
     name, unit = name_and_unit(table.header[index], role)
-    unit = quantity_unit(table.units[index], role) or unit
+    unit = unit_in_header(table.units[index], role) or unit
     named = words_in(name) & {word for known in RIG_WORDS.get(role, ()) for word in (known, known + "s")}
     return unit is not None and bool(named)
 

@@ -65,6 +65,8 @@ class Unit:
         A mass that stands for its weight.
     of_sample : bool
         A strain, which is times the sample's length in mm, or a stress, which is times its area in mm².
+    multiple : float
+        How many of a unit with a name it is.
     """
 
     text: str
@@ -73,6 +75,7 @@ class Unit:
     clock: Announced | None = None
     is_mass: bool = False
     of_sample: bool = False
+    multiple: float = 1.0
 
     def convert(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values in our unit; to twelve digits, as factors are binary and units decimal."""

@@ -1,0 +1,66 @@
+"""Readings counted in divisions of a gauge, steps of a motor or shares of a load."""
+
+import pytest
+
+from tests.io.bench_files import convert
+from wirebayes.errors import InputError
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.multiples import unit_in_header
+from wirebayes.io.bench.undecided import Choices, Undecided
+
+ABOUT = About("wire", "line", 1000.0)
+
+
+def displacements(tmp_path, header, cells=("403", "413", "424"), mapping=()):
+    path = tmp_path / "raw.csv"
+    path.write_text(f"Weight (kg);Time (min);{header}\n" + "".join(f"2;{i};{cell}\n" for i, cell in enumerate(cells)))
+    return [row[1] for row in convert(path, ABOUT, Choices(mapping=mapping, control="force", zero_mm=0.0)).rows]
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["Dial (1/100 mm)", "Dial [0.01 mm]", "Dial 0.01 mm", "Messuhr in 1/100 mm", "Dial [mm/100]", "Dial 0,01mm",
+     "Dial (1 / 100 mm)", "Dial (0.01 × mm)"],
+)  # fmt: skip
+def test_divisions_of_a_gauge_are_counted(tmp_path, header):
+    assert displacements(tmp_path, header) == [4.03, 4.13, 4.24]
+
+
+def test_divisions_of_another_unit_and_in_the_row_of_units(tmp_path):
+    assert displacements(tmp_path, "Dial (0.001 in)", ("100", "200", "300")) == [2.54, 5.08, 7.62]
+    path = tmp_path / "raw.csv"
+    path.write_text("Weight;Time;Dial\nkg;min;0.01 mm\n2;0;403\n2;1;413\n2;2;424\n")
+    assert [row[1] for row in convert(path, ABOUT, Choices(control="force")).rows] == [4.03, 4.13, 4.24]
+
+
+def test_numbers_that_are_no_counts_are_asked_about(tmp_path):
+    header, cells = "Dial (0.001 in)", ("0.1", "0.2", "0.3")
+    with pytest.raises(Undecided, match="found '0.1' under '0.001 in', which may be the unit or the step") as found:
+        displacements(tmp_path, header, cells)
+    step, unit = (answer.removeprefix("--map ") for answer in found.value.answers)
+    assert displacements(tmp_path, header, cells, (step,)) == [2.54, 5.08, 7.62]
+    assert displacements(tmp_path, header, cells, (unit,)) == [0.00254, 0.00508, 0.00762]
+
+
+@pytest.mark.parametrize(
+    ("text", "factor"),
+    [("0.1 N", 0.1), ("0.2 N", None), ("2 N", None), ("50 N", None), ("0.05 N", 0.05), ("0.03 N", None), ("0 N", None),
+     ("1/10 N", 0.1), ("N/0", None), ("-0.1 N", -0.1), ("0.1 mm", None)],
+)  # fmt: skip
+def test_a_header_names_divisions_of_a_tenth_or_finer(text, factor):
+    unit = unit_in_header(text, "tension")
+    assert (unit and unit.factor) == factor
+
+
+@pytest.mark.parametrize(("unit", "first"), [("5 mm", 2015.0), ("0.005 mm", 2.015), ("1/200 mm", 2.015), ("mm", 403.0)])
+def test_any_number_of_a_unit_may_be_said(tmp_path, unit, first):
+    assert displacements(tmp_path, "Steps", mapping=(f"Steps=displacement [{unit}]",))[0] == first
+
+
+def test_a_share_of_the_breaking_load_asks_for_what_one_is(tmp_path):
+    path = tmp_path / "raw.csv"
+    path.write_text("Time (s),x (mm),Load (%MBL)\n0,2,20\n1,2,19\n2,2,18\n")
+    with pytest.raises(InputError, match=r"found the unit '%MBL', .* or \[0.5 N\] if one %MBL is 0.5 N"):
+        convert(path, ABOUT, Choices())
+    made = convert(path, ABOUT, Choices(mapping=("Load (%MBL)=tension [0.5 N]",)))
+    assert [row[3] for row in made.rows] == [10.0, 9.5, 9.0]
