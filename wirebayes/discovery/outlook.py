@@ -7,6 +7,7 @@ import numpy as np
 from wirebayes.discovery import next_measurement, power
 from wirebayes.discovery.global_test import Gate
 from wirebayes.discovery.material_answer import MaterialAnswer
+from wirebayes.discovery.power import Cosines
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.settings import Settings
 from wirebayes.inference.laplace_fit import LaplaceFit
@@ -14,9 +15,7 @@ from wirebayes.json_files.discovery import DetectableAmplitude, Outlook
 from wirebayes.wire.effect import Effect
 
 
-def outlook(
-    gate: Gate, i: int, settings: Settings, answer: MaterialAnswer, alike: dict[tuple[str, str], float]
-) -> Outlook:
+def outlook(gate: Gate, i: int, settings: Settings, answer: MaterialAnswer, alike: Cosines) -> Outlook:
     """What could have been seen in block `i`, what cannot be, and what to measure next.
 
     Parameters
@@ -42,7 +41,7 @@ def outlook(
     return {"power": seen, "not_identifiable": hidden, "next_measurement": proposal}
 
 
-def _rivals(answer: MaterialAnswer, alike: dict[tuple[str, str], float]) -> list[str]:
+def _rivals(answer: MaterialAnswer, alike: Cosines) -> list[str]:
     """The names between which a verdict is undecided, or that the accepted one might be taken for; the best first."""
     if answer.verdict not in ("ambiguous", "named", "partial"):
         return []

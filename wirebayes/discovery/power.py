@@ -17,6 +17,7 @@ from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Control
 
+Cosines = dict[tuple[str, str], float]  # of the angles between the signatures of two effects, without sign
 ALIKE = 0.95  # |cos| from which names form a group: an effect of δ = 10 then differs from its twin by δ = 3 only
 
 
@@ -79,9 +80,7 @@ def detectable(
     return {name: (k, amplitude_80(null, trials[k], k, level.threshold(name, ALPHA))) for name, k in best.items()}
 
 
-def similarity(
-    expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]
-) -> dict[tuple[str, str], float]:
+def similarity(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> Cosines:
     """Largest |cos| between the projected signatures of any two effects, over their forms, at a noise ratio a block.
 
     An effect with one amplitude a block may put any size on each, so it is as alike as the best sizes make it.
@@ -101,7 +100,7 @@ def similarity(
     """
     cosines = _cosines(expansions, trials, ratios)
     names = [t.effect.name for t in trials]
-    out: dict[tuple[str, str], float] = {}
+    out: Cosines = {}
     for i, a in enumerate(names):
         for j, b in enumerate(names):
             out[a, b] = max(out.get((a, b), 0.0), float(cosines[i, j]))
@@ -135,7 +134,7 @@ def cosines(parts: Sequence[Array], has_own: Array) -> Array:
     return np.sqrt(np.minimum(np.maximum(square, square.T), 1.0))
 
 
-def group_of(members: Sequence[str], alike: dict[tuple[str, str], float]) -> list[str]:
+def group_of(members: Sequence[str], alike: Cosines) -> list[str]:
     """The members and every effect whose signature is as good as one of theirs."""
     names = dict.fromkeys([*members, *(b for (a, b), cos in alike.items() if a in members and cos > ALIKE)])
     return list(names)

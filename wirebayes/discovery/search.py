@@ -23,6 +23,7 @@ from wirebayes.discovery.material_answer import MaterialAnswer, answer_material
 from wirebayes.discovery.naming import Named, name_effects
 from wirebayes.discovery.noise_integral import Expansion
 from wirebayes.discovery.outlook import outlook
+from wirebayes.discovery.power import Cosines
 from wirebayes.discovery.screening import GlobalTest
 from wirebayes.discovery.settings import ALPHA, LEAST_HOLDS, Settings
 from wirebayes.effects import CATALOGUE
@@ -221,7 +222,7 @@ def _common(
     plain: list[LaplaceFit],
     test: GlobalTest,
     where: list[Disagreement],
-    alike: dict[tuple[str, str], float],
+    alike: Cosines,
 ) -> SharedFindings:
     """What the experiments of one block share in the report; of amplitudes those of the effects that act on `e`."""
     answer = answers[i]

@@ -1,5 +1,6 @@
 """One test as checks of its readings see it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,13 @@ import numpy as np
 from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol
+
+
+def reading_noise(each: Sequence[Floats], resolution: float) -> float:
+    """Standard deviation of a reading beside the course of its hold; rounding at least."""
+    bends = [np.diff(row, 2) / np.sqrt(6.0) for row in each if len(row) > 2]
+    spread = float(np.median(np.abs(np.concatenate(bends)))) / 0.6745 if bends else 0.0
+    return max(spread, resolution / np.sqrt(12.0))
 
 
 @dataclass(frozen=True)
@@ -60,6 +68,4 @@ class CheckedTest:
     @property
     def noise(self) -> float:
         """Standard deviation of a reading beside the course of its hold; rounding at least."""
-        bends = [np.diff(row, 2) / np.sqrt(6.0) for row in self.each if len(row) > 2]
-        spread = float(np.median(np.abs(np.concatenate(bends)))) / 0.6745 if bends else 0.0
-        return max(spread, self.resolution / np.sqrt(12.0))
+        return reading_noise(self.each, self.resolution)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wirebayes.io.checked_test import reading_noise
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold
 from wirebayes.numeric.typing import Floats, Ints
@@ -108,7 +109,7 @@ def of_readings(protocol: Protocol, readings: Floats, resolution: float) -> list
         protocol.setting[rows],
         protocol.time_s[protocol.mask],
         readings[protocol.mask],
-        _noise(each, resolution),
+        reading_noise(each, resolution),
         "tension" if forces else "displacement",
         "N" if forces else "mm",
     )
@@ -169,12 +170,6 @@ def without_gross_events(experiment: Experiment, events: Sequence[Event]) -> Exp
     if holds and begin - 1 in dropped:  # how long the last one was as it should be, its last reading says
         holds[-1] = replace(holds[-1], duration_s=float(holds[-1].time_s[-1]))
     return replace(experiment, holds=tuple(holds))
-
-
-def _noise(each: Sequence[Floats], resolution: float) -> float:
-    bends = [np.diff(row, 2) / np.sqrt(6.0) for row in each if len(row) > 2]
-    spread = float(np.median(np.abs(np.concatenate(bends)))) / 0.6745 if bends else 0.0
-    return max(spread, resolution / np.sqrt(12.0))
 
 
 def _falls(test: _Test) -> list[Event]:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Array, Floats
 
 
 def geometric_mean(values: Iterable[float]) -> float:
@@ -21,3 +21,7 @@ def mean_of_finite(values: Floats) -> Floats:
     """Mean over the first axis of the values that are finite; NaN where none is."""
     good = np.isfinite(values)
     return np.asarray(np.where(good, values, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan))
+
+
+def root_mean_square(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

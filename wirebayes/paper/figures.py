@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from wirebayes.numeric.typing import Array
+from wirebayes.paper.page_tables import column_values
 from wirebayes.report.figures import CHAIN, COLOURS, HOLD, INK, QUIET, WORDS, legend_below, logarithmic, panel
 from wirebayes.wire.protocol import Protocol
 
@@ -21,7 +22,7 @@ def intervals(rows: Sequence[Mapping[str, Any]], title: str) -> Figure:
         Of `wirebayes.paper.verdicts.verdict_rows`, both likelihoods.
     """
     figure, axes = panel("multiple of the published value", "", title)
-    names = list(dict.fromkeys(row["parameter"] for row in rows))
+    names = column_values(rows, "parameter")
     for row in rows:
         y = len(names) - names.index(row["parameter"])
         one = row["published"]
@@ -80,7 +81,7 @@ def drifts(rows: Sequence[Mapping[str, Any]], limit_mm: float, title: str) -> Fi
         What the paper claims.
     """
     figure, axes = panel("drift within a minute, mm", "", title)
-    names = list(dict.fromkeys(row["experiment"] for row in rows))
+    names = column_values(rows, "experiment")
     shown = [row for row in rows if row["specimen_spread"] > 0]
     for row in shown:
         loaded = row["loaded_before_s"] > 0

@@ -6,6 +6,7 @@ import numpy as np
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.single_holds import hold_courses
+from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Array, Ints
 from wirebayes.prediction.predictive import PredictionRequest, draw_predictive
 from wirebayes.results.read_back import Stored
@@ -41,7 +42,7 @@ class Forecast:
     @property
     def rms_N(self) -> float:
         """Root mean square of measured minus median prediction."""
-        return float(np.sqrt(np.mean((self.measured_N - self.band_N[1]) ** 2)))
+        return root_mean_square(self.measured_N - self.band_N[1])
 
     @property
     def coverage(self) -> float:

@@ -17,6 +17,7 @@ from wirebayes.model.sample import MATERIAL
 from wirebayes.model.scales import scales_of
 from wirebayes.model.single_holds import hold_courses
 from wirebayes.model.spec import ModelSpec
+from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Array, Bools
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
@@ -90,7 +91,7 @@ def tension_residuals(experiment: Experiment, theta: Mapping[str, Array], varian
 def rms(residuals_N: Array) -> float:
     """Root mean square of what was predicted, N; NaN when nothing was."""
     values = residuals_N[np.isfinite(residuals_N)]
-    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
+    return root_mean_square(values) if values.size else float("nan")
 
 
 def at(parameters: Mapping[str, float]) -> dict[str, Array]:

@@ -7,7 +7,7 @@ from typing import Any
 from wirebayes.io.run_folder import read_json
 from wirebayes.paper import page_tables as paper_tables
 from wirebayes.paper.page_summary import creep_of_each_wire, in_a_minute, of_table_4, unbroken
-from wirebayes.paper.page_tables import LEAST_COVERAGE, Rows
+from wirebayes.paper.page_tables import LEAST_COVERAGE, Rows, column_values
 from wirebayes.report.blocks import Block, Page, Picture, Pictures, Section, Text, embedded, files_beside
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
@@ -230,7 +230,7 @@ def _robot(tables: Tables, gallery: Gallery) -> Section:
 
 def _claim(rows: Rows) -> str:
     """Where the paper's claim holds and what takes it away."""
-    wires = list(dict.fromkeys(r["experiment"] for r in rows))
+    wires = column_values(rows, "experiment")
     of = {(r["experiment"], r["step"]): r["q50_drift_mm"] for r in rows}
     printed = [r for r in rows if r["step"] == "table_4_elongation"]
     holds = sum(r["within_claim"] for r in printed)

@@ -1,5 +1,6 @@
 """Tables of the paper reproduced, from the rows that ``reproduce`` wrote."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from wirebayes.report.blocks import Table, number, span, unit_text
@@ -9,6 +10,11 @@ VERDICTS = {"inside": "good", "outside": "bad", "not determined": "open", "yes":
 LIKELIHOOD = {"chain": "chain", "hold": "hold by hold"}
 LEAST_COVERAGE = 0.75  # of readings in a band that promises 0.9
 _TIMES = {120.0: "2 min", 3600.0: "1 h", 86400.0: "1 day"}  # as people say them
+
+
+def column_values(rows: Sequence[Mapping[str, Any]], key: str) -> list[Any]:
+    """What stands under a key, each once, in the order of the rows."""
+    return list(dict.fromkeys(row[key] for row in rows))
 
 
 def test_table(rows: Rows) -> Table:
@@ -112,7 +118,7 @@ CLAIM_STEPS = {
 
 def robot_claim(rows: Rows) -> Table:
     """The paper's claim taken apart, one thing changed a line."""
-    wires = list(dict.fromkeys(r["experiment"] for r in rows))
+    wires = column_values(rows, "experiment")
     found = {(r["experiment"], r["step"]): r for r in rows}
     lines = []
     for step, words in CLAIM_STEPS.items():
@@ -131,8 +137,8 @@ def robot_claim(rows: Rows) -> Table:
 
 def robot_mass(rows: Rows) -> Table:
     """What mass and size the claim needs."""
-    sizes = list(dict.fromkeys(r["size_factor"] for r in rows))
-    wires = list(dict.fromkeys(r["experiment"] for r in rows))
+    sizes = column_values(rows, "size_factor")
+    wires = column_values(rows, "experiment")
     masses = {(r["experiment"], r["size_factor"]): r["largest_mass_kg"] for r in rows}
     lines = [[wire, *(number(1e3 * masses[wire, size], 2) for size in sizes)] for wire in wires]
     caption = (

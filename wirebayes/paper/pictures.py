@@ -12,6 +12,7 @@ from wirebayes.io.run_folder import write_bytes, write_json
 from wirebayes.model.build import build
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.model.spec import ModelSpec
+from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Array
 from wirebayes.paper import figures as paper_figures
 from wirebayes.paper.held_out import Forecast, last_hold_course, published_course, some
@@ -81,7 +82,7 @@ class Gallery:
         figure = paper_figures.last_hold(times, drawn, curve, (hold.time_s, hold.tension_N), title)
         missed = np.interp(hold.time_s[1:], times, curve) - hold.tension_N[1:]
         alt = f"The last hold of {e.name}: measured tension, the paper's curve and the predicted band."
-        caption = f"The paper's curve misses these readings by {number(float(np.sqrt(np.mean(missed**2))), 2)} N (rms)."
+        caption = f"The paper's curve misses these readings by {number(root_mean_square(missed), 2)} N (rms)."
         self.add("figures-1-to-4", e.name, figure, alt, caption)
 
     def unused_holds(self, e: Experiment, published: dict[str, float], seen: Mapping[str, Forecast]) -> None:

@@ -13,6 +13,7 @@ from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.numeric.log_sum import or_impossible
+from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Array, Bools, Ints
 from wirebayes.prediction.leave_one_hold_out import evenly_thinned
 from wirebayes.prediction.predictive import PredictionRequest, draw_predictive, given_first
@@ -59,7 +60,7 @@ class Scores:
     @property
     def rmse_N(self) -> float:
         """Of the predictive mean."""
-        return float(np.sqrt(np.mean((self.observed_N - self.mean_N) ** 2)))
+        return root_mean_square(self.observed_N - self.mean_N)
 
     def coverage(self) -> dict[float, float]:
         """Share of readings inside each central interval."""

@@ -87,10 +87,15 @@ class Protocol:
         """(H,) elapsed time at which each hold begins; moves take none."""
         return np.concatenate([[0.0], np.cumsum(self.duration_s)[:-1]])
 
+    @property
+    def _asked_s(self) -> Floats:
+        """(H, R) times of the readings, of an unrecorded hold its end."""
+        return np.where(self.recorded[:, None], self.time_s, self.duration_s[:, None])
+
     @cached_property
     def distinct_times(self) -> tuple[Floats, tuple[slice | Ints, ...]]:
         """Times of readings (T,), of an unrecorded hold its end, each once, and for every hold where its own stand."""
-        time = np.where(self.recorded[:, None], self.time_s, self.duration_s[:, None])
+        time = self._asked_s
         times, where = np.unique(time, return_inverse=True)
         rows = where.reshape(time.shape)
         # A slice copies nothing, and most holds are read in the same order.
@@ -144,7 +149,7 @@ class Protocol:
     @cached_property
     def holds(self) -> tuple[dict[str, Any], ...]:
         """What `wirebayes.wire.effect.HoldContext` says of each hold whatever the wire."""
-        start, time = self.start_s, np.where(self.recorded[:, None], self.time_s, self.duration_s[:, None])
+        start, time = self.start_s, self._asked_s
         warming = np.zeros_like(time) if self.warming_K is None else self.warming_K
         directions = _directions(self.setting)
         out = []

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Bools, Floats, Indices
 
 Actuator = Literal["drum", "linear"]
@@ -262,4 +263,9 @@ class Robot:
     def size_m(self) -> float:
         """Typical lever arm of the platform, by which rotations are compared with displacements."""
         arms = np.linalg.norm(self.platform_m - self.platform_m.mean(0), axis=1)
-        return float(max(np.sqrt(np.mean(arms**2)), 1e-3 * self.span_m))
+        return max(root_mean_square(arms), 1e-3 * self.span_m)
+
+    @property
+    def edge_scale(self) -> Floats:
+        """(d,) What makes turns of metres at the platform's edge; 1 for displacements."""
+        return np.where(np.arange(self.degrees) < 3, 1.0, 1.0 / self.size_m)

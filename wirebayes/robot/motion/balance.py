@@ -52,8 +52,7 @@ def balance_at(
     hessian : (6, 6, n) or (3, 3, n) array
         N/m.
     """
-    scale = np.ones((robot.degrees, 1))
-    scale[3:] = 1.0 / robot.size_m
+    scale = robot.edge_scale[:, None]
     R = rotation.transpose(1, 2, 0)
     shape = statics.geometry(robot, position_m.T, R)
     tau, slope = tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)

@@ -169,8 +169,7 @@ def _in_one_chunk(
 ) -> Solved:
     """One chunk; solved cases leave the batch as they finish."""
     solved = Solved.not_yet(x, R, robot.legs)
-    scale = np.ones((robot.degrees, 1))
-    scale[3:] = 1.0 / robot.size_m  # rotations are stepped in metres at the platform's edge
+    scale = robot.edge_scale[:, None]  # rotations are stepped in metres at the platform's edge
     cases = _begin(robot, wires, zero, offset, x, R, scale)
     for iteration in range(1, max_iterations + 1):
         cases, ended = _iterate(robot, cases, scale)

@@ -16,7 +16,6 @@ from wirebayes.robot.motion import inverse
 from wirebayes.robot.motion.loose_balance import (
     equations,
     null_space,
-    scale_of,
     stiffness_at_tension,
     vector_by_turn,
 )
@@ -168,7 +167,7 @@ def commandable(robot: Robot, position_m: Floats, rotation: Floats, tension_N: F
     """
     shape = statics.geometry_at(robot, position_m, rotation)
     tau = tension_N[:, None]
-    scale = scale_of(robot)
+    scale = robot.edge_scale
     K = stiffness_at_tension(robot, shape, rotation[..., None], tau)[0] * scale * scale[:, None]
     J = statics.jacobian(robot, shape)[..., 0] * (robot.lines * scale[:, None])
     free = null_space(np.concatenate([K / max(float(tension_N.max()), 1e-300), J], 1))[: robot.degrees].T
@@ -198,7 +197,7 @@ def nearest_position(robot: Robot, position_m: Floats, reference: Floats) -> Flo
 def _stable(robot: Robot, found: Balances) -> Bools:
     """(n,) Whether every motion that stretches no wire raises the energy."""
     out = np.zeros(len(found.rotation), bool)
-    scale = scale_of(robot)
+    scale = robot.edge_scale
     for k in np.flatnonzero(found.balanced):
         turn = found.rotation[k][..., None]
         shape = statics.geometry(robot, found.position_m[k][:, None], turn)

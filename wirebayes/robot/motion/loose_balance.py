@@ -10,13 +10,6 @@ from wirebayes.robot.mechanics.description import GRAVITY, Robot
 DEPENDENT = 1e-9  # singular value, of the largest, of equations that depend on each other
 
 
-def scale_of(robot: Robot) -> Floats:
-    """(d,) What makes turns of metres at the platform's edge."""
-    out = np.ones(robot.degrees)
-    out[3:] = 1.0 / robot.size_m
-    return out
-
-
 def stiffness_at_tension(robot: Robot, shape: statics.Geometry, turn: Floats, tau: Floats) -> Floats:
     """(n, d, d) Stiffness of wires whose tension does not change: what turns and swings leave of the balance.
 
@@ -42,7 +35,7 @@ def equations(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, 
     turn = np.moveaxis(R, 0, -1)
     shape = statics.geometry(robot, x.T, turn)
     force, H = statics.unbalance_and_stiffness(robot, shape, turn, tau.T, np.zeros_like(tau.T))
-    scale = scale_of(robot)
+    scale = robot.edge_scale
     by_turn = np.zeros((len(x), robot.degrees, 3))  # of a platform that cannot turn
     by_turn[..., : robot.degrees - 3] = np.moveaxis(H, -1, 0)[:, :, 3:] * scale[:, None]
     by_tension = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0) * scale[:, None]
@@ -60,7 +53,7 @@ def slope_by_place(robot: Robot, x: Floats, R: Floats, tau: Floats) -> Floats:
     """
     turn = np.moveaxis(R, 0, -1)
     shape = statics.geometry(robot, x.T, turn)
-    return np.asarray(stiffness_at_tension(robot, shape, turn, tau.T)[:, :, :3] * scale_of(robot)[:, None])
+    return np.asarray(stiffness_at_tension(robot, shape, turn, tau.T)[:, :, :3] * robot.edge_scale[:, None])
 
 
 def largest_imbalance(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, Floats]:

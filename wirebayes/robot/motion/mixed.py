@@ -50,8 +50,7 @@ def newton_step_with_tensions(
     """
     zero, offset = lengths[0].T, np.broadcast_to(lengths[1], lengths[0].shape).T
     tau, R = tension_N.T, pose[1].transpose(1, 2, 0)
-    scale = np.ones((robot.degrees, 1))
-    scale[3:] = 1.0 / robot.size_m
+    scale = robot.edge_scale[:, None]
     shape = statics.geometry(robot, pose[0].T, R)
     _, K = statics.unbalance_and_stiffness(robot, shape, R, tau, np.zeros_like(tau))
     K *= scale[:, None] * scale.T[..., None]

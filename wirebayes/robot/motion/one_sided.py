@@ -64,7 +64,7 @@ def _bounds(
     stretched = statics.stretched(robot, shape, np.broadcast_to(lengths[1], lengths[0].shape).T)
     touching = np.abs(stretched / zero - 1.0) < TOUCHING
     tau, slope = (np.where(touching, 0.0, value) for value in tension(wires, stretched, zero))
-    scale = _at_the_edge(robot)
+    scale = robot.edge_scale[:, None]
     both = np.moveaxis(statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)[1], -1, 0)
     both = np.where(np.isfinite(both), both, 0.0) * (scale * scale.T)
     values = np.asarray(np.linalg.eigvalsh(both), np.float64)
@@ -76,13 +76,6 @@ def _bounds(
     for k in np.flatnonzero(decided & touching.any(0) & (least <= _APART * values[:, -1])):
         least[k] = _least_of(both[k], resisting[:, touching[:, k], k])
     return np.asarray(touching.any(0)), np.where(known, least, np.nan), values[:, -1]
-
-
-def _at_the_edge(robot: Robot) -> Floats:
-    """(d, 1) what turns motions into metres, rotations at the platform's edge."""
-    scale = np.ones((robot.degrees, 1))
-    scale[3:] = 1.0 / robot.size_m
-    return scale
 
 
 def _least_of(both: Floats, one_way: Floats) -> Floats:

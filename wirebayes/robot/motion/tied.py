@@ -16,7 +16,6 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.winches import lengths, mean_of_each_winch, turned_by
 from wirebayes.robot.mechanics.wires import Wires, tension
-from wirebayes.robot.motion.loose_balance import scale_of
 
 _STEPS = 60  # half a dozen are usual; every line that comes to its bound takes as many more
 _LONGEST_RAD, _LONGEST = 0.3, 0.1  # turned and, in spans, moved in a step: beyond, what was linearised means little
@@ -102,7 +101,7 @@ def tied(
     cases = _Cases(
         position_m[live], rotation[live], mean_of_each_winch(robot, joint_m)[live], np.zeros((len(live), legs), int)
     )
-    scale = scale_of(robot)
+    scale = robot.edge_scale
     for _ in range(_STEPS):
         if not live.size:
             break

@@ -123,7 +123,6 @@ def _named(robot: Robot, prior: LengthPrior, session: Session, known: LengthPost
     sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
     turn = rotation.vector(np.where(np.isfinite(known.ended_rotation[0]), known.ended_rotation[0], np.eye(3)))
     pose = np.hstack([known.ended_m[0], turn])
-    numbers = np.arange(1, len(session.duration_s) + 1) if session.number is None else session.number
     determined = int((sd < 0.5 * prior.reference_sd_m).sum())
     open_ = [
         f"the reference length of wire {i + 1}: known to {1e3 * prior.reference_sd_m:.2g} mm before, to "
@@ -135,7 +134,7 @@ def _named(robot: Robot, prior: LengthPrior, session: Session, known: LengthPost
         "platform_points_m": interval_about(robot.platform_m, zero, half),
         "zero_tension_lengths_m": interval_about(known.length_m[0], known.length_sd_m[0], half),
         "references_m": interval_about(known.unknowns[0, : robot.legs], sd, half),
-        "poses": {"hold": np.asarray(numbers, float).tolist(), **interval_about(pose, known.ended_sd[0], half)},
+        "poses": {"hold": np.asarray(session.numbers, float).tolist(), **interval_about(pose, known.ended_sd[0], half)},
         "identified": {"determined": determined, "of": robot.legs, "combinations": [], "not_determined": open_},
     }
 
@@ -190,10 +189,9 @@ def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: Len
     angle = np.linalg.norm(rotation.vector(np.swapaxes(session.rotation, 1, 2) @ known.begun_rotation[0]), axis=1)
     apart = np.maximum(shift, robot.size_m * angle)
     plausible = _FAR * (prior.reference_sd_m + float((known.creep[0] * known.length_m[0]).max()))
-    numbers = np.arange(1, len(apart) + 1) if session.number is None else session.number
     texts = [
-        f"hold {numbers[i]:g}: the requested pose is {shift[i]:.3g} m and {angle[i]:.2g} rad from the one that its "
-        f"joint values lead to, more than errors of the lengths and creep explain ({plausible:.2g} m); check both"
+        f"hold {session.numbers[i]:g}: the requested pose is {shift[i]:.3g} m and {angle[i]:.2g} rad from the one that "
+        f"its joint values lead to, more than errors of the lengths and creep explain ({plausible:.2g} m); check both"
         for i in np.flatnonzero(apart > plausible)
     ]
     return [Notice("misfit", text) for text in texts]

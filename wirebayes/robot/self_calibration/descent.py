@@ -10,7 +10,7 @@ from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.self_calibration.equations import Equations, Holds, Noise, State, linearised, scale
+from wirebayes.robot.self_calibration.equations import Equations, Holds, Noise, State, linearised
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
@@ -152,7 +152,7 @@ def cost_of(e: Equations, white: Floats) -> float:
 
 def _stepped(robot: Robot, state: State, change: Floats, hold: Floats) -> State:
     d = robot.degrees
-    motion = hold[:, :d] * scale(robot)
+    motion = hold[:, :d] * robot.edge_scale
     turn = state.rotation
     if d == 6:
         turn = np.moveaxis(turns.compose(motion[:, 3:].T, np.moveaxis(turn, 0, -1)), -1, 0)

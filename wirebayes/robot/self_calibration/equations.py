@@ -110,11 +110,6 @@ class Equations:
     known: Bools
 
 
-def scale(robot: Robot) -> Floats:
-    """(d,) what makes small motions of metres at the platform's edge."""
-    return np.where(np.arange(robot.degrees) < 3, 1.0, 1.0 / robot.size_m)
-
-
 def pulled(latent_N: Floats, soft_N: float) -> tuple[Floats, Floats]:
     """What wires of latent tensions pull, N, and its slope: nothing when slack."""
     around = np.hypot(latent_N, soft_N)
@@ -153,7 +148,7 @@ def linearised(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, cre
 
     R = np.moveaxis(state.rotation, 0, -1)
     shape = statics.geometry(here, state.position_m.T, R)
-    J = np.moveaxis(statics.jacobian(here, shape) * robot.lines[:, None], -1, 0).swapaxes(1, 2) * scale(robot)
+    J = np.moveaxis(statics.jacobian(here, shape) * robot.lines[:, None], -1, 0).swapaxes(1, 2) * robot.edge_scale
     out = Equations(residual, by_robot, by_hold, rows, known)
     _loops(out, unknowns, holds, noise, state, creep, since, shape, J)
     _balance(out, unknowns, noise, state, here, shape, J)
@@ -249,15 +244,15 @@ def _balance(
     pull, taut = pulled(state.pull_N, noise.soft_N)
     gradient, H = statics.unbalance_and_stiffness(here, shape, R, pull.T, np.zeros_like(pull.T))
     force = noise.balance * robot.mass_kg * GRAVITY
-    residual[:, balance] = gradient.T * scale(robot) / force
-    by_hold[:, balance, :d] = np.moveaxis(H, -1, 0) * scale(robot) * scale(robot)[:, None] / force
+    residual[:, balance] = gradient.T * robot.edge_scale / force
+    by_hold[:, balance, :d] = np.moveaxis(H, -1, 0) * robot.edge_scale * robot.edge_scale[:, None] / force
     by_hold[:, balance, d:] = J.swapaxes(1, 2) * taut[:, None] / force
     by_exit, by_platform = _swing(here, shape, state.rotation, pull)
     _points(
         by_robot[:, balance],
         unknowns,
-        by_exit * scale(robot)[:, None, None] / force,
-        by_platform * scale(robot)[:, None, None] / force,
+        by_exit * robot.edge_scale[:, None, None] / force,
+        by_platform * robot.edge_scale[:, None, None] / force,
     )
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
+from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds
@@ -55,7 +56,7 @@ def length_rms_m(found: Whole) -> float:
     """Root mean square of what is left of the loops, along one line each, m."""
     e = found.equations
     left = e.residual[:, e.rows["loop"]] * found.noise.joint_m / found.unknowns.robot.lines
-    return float(np.sqrt(np.mean(left**2)))
+    return root_mean_square(left)
 
 
 def lost(found: Whole) -> bool:

@@ -12,7 +12,7 @@ from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.equations import Holds, State, moved, scale
+from wirebayes.robot.self_calibration.equations import Holds, State, moved
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.residuals import lost, trust
 from wirebayes.robot.self_calibration.strain import stretch
@@ -59,7 +59,7 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: np.random.Generat
 def _carrying(robot: Robot, position_m: Floats, turn: Floats) -> Floats:
     """(w,) tensions above the lowest that carry the platform at a pose as nearly as they can, small ones rather."""
     shape = statics.geometry_at(robot, position_m, turn)
-    unit = scale(robot)
+    unit = robot.edge_scale
     structure = -statics.jacobian(robot, shape)[..., 0] * robot.lines * unit[:, None]
     load = -statics.weight(robot, turn[..., None])[:, 0] * unit
     lowest = robot.rule.lowest_N
@@ -128,7 +128,7 @@ class _PoseSearch:
         robot = self.robot
         shape = statics.geometry(robot, x, R)
         gap = self.gap(shape)
-        J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0).swapaxes(1, 2) * scale(robot)
+        J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0).swapaxes(1, 2) * robot.edge_scale
         reach = 10 * self.half
         toward, pull = np.zeros((len(gap), robot.degrees)), np.zeros(robot.degrees)
         toward[:, :3] = (x.T - self.middle) * (robot.span_m / reach)
@@ -141,7 +141,7 @@ class _PoseSearch:
         b = (J.swapaxes(1, 2) @ gap[..., None])[..., 0] + _WEAK**2 * pull * toward
         step = -solve(A, b[..., None])[..., 0]
         size = np.linalg.norm(step, axis=1, keepdims=True)
-        return step * np.minimum(1.0, 0.2 * robot.span_m / np.maximum(size, 1e-300)) * scale(robot)
+        return step * np.minimum(1.0, 0.2 * robot.span_m / np.maximum(size, 1e-300)) * robot.edge_scale
 
     def misfit(self, x: Floats, R: Floats) -> Floats:
         """(n,) how badly poses close the loops, and how far outside the workspace they are."""

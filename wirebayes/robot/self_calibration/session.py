@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.numeric.typing import Array, Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import (
     CORE,
@@ -56,6 +56,11 @@ class Session:
     tilt_sd_rad: float | None = None
     motion: Floats | None = None
     number: Floats | None = None
+
+    @property
+    def numbers(self) -> Array:
+        """(p,) What the holds are called."""
+        return np.arange(1, len(self.duration_s) + 1) if self.number is None else self.number
 
     @property
     def readings(self) -> int:

@@ -83,18 +83,13 @@ def starting_references(
         change, move = _step(equations, error, prior.reference_sd_m)
         error = error + change
         move *= np.minimum(1.0, 0.1 * robot.size_m / np.maximum(np.abs(move).max(0), 1e-300))
-        move *= _scale(robot)
+        move *= robot.edge_scale[:, None]
         x = x + move[:3]
         R = rotation.compose(move[3:], R) if robot.degrees == 6 else R
         if not np.abs(change).max() >= 1e-7:
             break
     # Absurd readings lead nowhere: such a robot starts from its references.
     return np.where(np.isfinite(error).all(1, keepdims=True), error, 0.0)
-
-
-def _scale(robot: Robot) -> Floats:
-    """(d, 1) What makes displacements and turns of metres at the platform's edge."""
-    return np.where(np.arange(robot.degrees) < 3, 1.0, 1.0 / robot.size_m)[:, None]
 
 
 def _loops(robot: Robot, prior: LengthPrior, session: Session, readings: Floats, expected: PredictedSession) -> _Loops:
@@ -112,7 +107,7 @@ def _loops(robot: Robot, prior: LengthPrior, session: Session, readings: Floats,
 
 def _linearised(robot: Robot, loops: _Loops, x: Floats, R: Floats, error: Floats) -> _Equations:
     """Equations about poses ``(3, r)``, ``(3, 3, r)`` and reference errors ``(r, w)``."""
-    d, legs, scale = robot.degrees, robot.legs, _scale(robot)
+    d, legs, scale = robot.degrees, robot.legs, robot.edge_scale[:, None]
     tau = loops.tension_N.T
     shape = statics.geometry(robot, x, R)
     J = statics.jacobian(robot, shape) * robot.lines[:, None]

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Floats
 from wirebayes.progress import Progress
 from wirebayes.robot.motion import inverse
@@ -186,5 +187,5 @@ def _shown(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: 
     """Root mean square of the loops (m) or of the balance (over the weight) at a state, no less than what is exact."""
     e = linearised(unknowns, holds, noise, state, creep, state)
     unit = noise.joint_m if rows == "loop" else noise.balance
-    size = float(np.sqrt(np.mean(e.residual[:, e.rows[rows]] ** 2))) * unit
+    size = root_mean_square(e.residual[:, e.rows[rows]]) * unit
     return max(size, unit) if np.isfinite(size) else 1e3 * unit

@@ -180,9 +180,8 @@ def _prior(robot: Robot, prior: LengthPrior, errors: StatedErrors, session: Sess
 
 
 def _poses(s: Summary, session: Session) -> EstimatedPoses:
-    numbers = np.arange(1, len(session.duration_s) + 1) if session.number is None else session.number
     mean, sd, half = (np.hstack([place, turn]) for place, turn in zip(s.position_m, s.turn_rad, strict=True))
-    return {"hold": np.asarray(numbers, float).tolist(), **interval_about(mean, sd, half)}
+    return {"hold": np.asarray(session.numbers, float).tolist(), **interval_about(mean, sd, half)}
 
 
 def _lengths(found: Whole, s: Summary) -> EstimatedLengths:
