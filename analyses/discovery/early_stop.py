@@ -6,7 +6,6 @@ with all simulations; on the way it is noted where the test would have stopped a
     python -m analyses.discovery.early_stop --clean 600 --output out/early-stop.jsonl
 """
 
-import argparse
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,6 +14,7 @@ from unittest.mock import patch
 
 from analyses.hidden_effects.cases import SIZES, Plan, Spec, seal, specs
 from analyses.hidden_effects.rates import rate
+from analyses.options import study_options
 from analyses.resumable import records
 from analyses.speed.gate_cost import plain_fits
 from wirebayes.discovery import global_test
@@ -70,8 +70,7 @@ def plan(clean: int, seed: int) -> list[Spec]:
 
 def main() -> None:
     """Run the cases and print how often the decisions differ."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--clean", type=int, default=600)
+    parser = study_options(__doc__, clean=600)
     parser.add_argument("--simulations", type=int, default=SIMULATIONS)
     parser.add_argument("--seed", type=int, default=135)
     parser.add_argument("--workers", type=int, default=2)

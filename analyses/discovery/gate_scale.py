@@ -7,7 +7,6 @@ simulations, taken for readings, have p <= 0.04. Each for several ways to read o
     python -m analyses.discovery.gate_scale --cases 0 3 11
 """
 
-import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from unittest.mock import patch
@@ -15,6 +14,7 @@ from unittest.mock import patch
 import numpy as np
 from scipy import stats
 
+from analyses.options import study_options
 from analyses.speed.checkouts import benchmark_files
 from analyses.speed.gate_cost import experiments_of, plain_fits
 from wirebayes.discovery import screening
@@ -68,7 +68,7 @@ def spread(data: dict[str, Array], chance: dict[str, Array], lot: int, way: str)
 
 def main() -> None:
     """Print a line for each file, lot and way."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_options(__doc__)
     parser.add_argument("--cases", nargs="+", type=int, default=[0, 3, 11], help="of the benchmark of hidden effects")
     options = parser.parse_args()
     with TemporaryDirectory() as folder:

@@ -14,7 +14,6 @@ Coverage is averaged within a test first, so its interval is that of independent
     python -m analyses.field.bench_to_robot --tests 100 --output out/bench-to-robot
 """
 
-import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,7 +24,9 @@ from typing import Any
 import numpy as np
 
 from analyses.hidden_effects.truth import draw_wire
+from analyses.options import study_options
 from analyses.resumable import records
+from analyses.robots.bands import at_tension, mean_share
 from wirebayes.commands.wires import wire_draws
 from wirebayes.discovery.investigation import final_models
 from wirebayes.discovery.search import investigate
@@ -45,7 +46,7 @@ from wirebayes.results.summary import CREEP_TIMES_S
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
-from wirebayes.robot.motion import claim, inverse
+from wirebayes.robot.motion import claim
 from wirebayes.simulation.synthetic import Bench, Simulated, Truth, draw, write_tests
 from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.fresh import FreshSample
@@ -200,12 +201,6 @@ def figures(stored: Stored, simulated: Simulated, folder: Path) -> list[dict[str
     return out
 
 
-def at_tension(robot: Any, tension_N: float) -> Any:
-    """The robot with the platform's mass that puts its wires at a mean tension where it is at home."""
-    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
-    return claim.scaled_robot(robot, 1.0, robot.mass_kg * tension_N / float(np.mean(tau)))
-
-
 def case(index: int) -> dict[str, Any]:
     """One test through everything."""
     made, truth, seed, simulated = invent(index)
@@ -244,10 +239,7 @@ def case(index: int) -> dict[str, Any]:
 
 def coverage(tests: Sequence[Sequence[dict[str, Any]]]) -> str:
     """Share of intervals that hold the truth, with a 95 % interval over tests."""
-    share = np.array([np.mean([f["q05"] <= f["truth"] <= f["q95"] for f in figs]) for figs in tests if figs])
-    if len(share) < 2:
-        return "–"
-    return f"{100 * share.mean():5.1f} % ± {196 * share.std(ddof=1) / len(share) ** 0.5:.1f} ({len(share)} tests)"
+    return mean_share([[f["q05"] <= f["truth"] <= f["q95"] for f in figs] for figs in tests if figs], "tests")
 
 
 def table(records: Sequence[dict[str, Any]]) -> str:
@@ -278,11 +270,7 @@ def table(records: Sequence[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Run what is not done yet, a line a test, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tests", type=int, default=100)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--output", type=Path, default=Path("out/bench-to-robot"))
-    options = parser.parse_args()
+    options = study_options(__doc__, tests=100, workers=2, output=Path("out/bench-to-robot")).parse_args()
     cases = [(index,) for index in range(options.tests)]
     print(table(records(options.output / "tests.jsonl", case, cases, workers=options.workers)))
 

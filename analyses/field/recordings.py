@@ -8,7 +8,6 @@ the sampler.
     python -m analyses.field.recordings [--tests 60] [--seed 1]
 """
 
-import argparse
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
+from analyses.options import study_options
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.inference.rough_draws import draws
@@ -131,10 +131,7 @@ def one(job: tuple[int, int]) -> dict[str, tuple[float, float]] | None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tests", type=int, default=60)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+    options = study_options(__doc__, tests=60, seed=1).parse_args()
     with workers() as parallel_map:
         results = list(parallel_map(one, [(options.seed, number) for number in range(options.tests)]))
     whole = [result for result in results if result is not None]

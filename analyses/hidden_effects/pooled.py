@@ -8,10 +8,11 @@ plain model, whose noise is not known, leaves most to be seen. With --stated: th
 five bins, and how often what they were of was there.
 """
 
-import argparse
 import json
 from pathlib import Path
 from typing import Any
+
+from analyses.options import study_options
 
 from . import stated
 from .rates import Row
@@ -42,15 +43,20 @@ def signed(text: str) -> str:
     return text
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+def asked_rows(doc: str | None, flag: str, text: str) -> tuple[list[Row], bool]:
+    """Rows of all scores that the command line names, and whether it has a flag, of which its help says a text."""
+    parser = study_options(doc)
     parser.add_argument("scores", type=Path, nargs="+")
     parser.add_argument("--answer", default="api", help="who was asked (default api)")
-    parser.add_argument("--stated", action="store_true", help="stated probabilities instead of the targets")
+    parser.add_argument(flag, action="store_true", dest="flag", help=text)
     options = parser.parse_args()
     every = [json.loads(path.read_text(encoding="utf-8"))[options.answer] for path in options.scores]
-    rows = [row for scores in every for row in scores["rows"]]
-    print_table(*(stated_lines(rows) if options.stated else target_lines(rows)))
+    return [row for scores in every for row in scores["rows"]], options.flag
+
+
+def main() -> None:
+    rows, stated_only = asked_rows(__doc__, "--stated", "stated probabilities instead of the targets")
+    print_table(*(stated_lines(rows) if stated_only else target_lines(rows)))
 
 
 def target_lines(rows: list[Row]) -> tuple[str, list[list[str]]]:

@@ -7,13 +7,10 @@ remainder, of names and of families with 95 % intervals, as the cases are and as
 bold.
 """
 
-import argparse
-import json
 from collections.abc import Callable
-from pathlib import Path
 
 from .cases import LONG
-from .pooled import cell, signed
+from .pooled import asked_rows, cell, signed
 from .rates import Row
 from .score import left_over
 from .stated import Bins, families, names, prior_weights, remainders
@@ -97,14 +94,8 @@ def listed(table: list[list[str]], widths: str) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scores", type=Path, nargs="+")
-    parser.add_argument("--answer", default="api", help="who was asked (default api)")
-    parser.add_argument("--left", action="store_true", help="print what the best names leave, and nothing else")
-    options = parser.parse_args()
-    every = [json.loads(path.read_text(encoding="utf-8"))[options.answer] for path in options.scores]
-    rows = [row for scores in every for row in scores["rows"]]
-    if options.left:
+    rows, left_only = asked_rows(__doc__, "--left", "print what the best names leave, and nothing else")
+    if left_only:
         print("\n".join(left_lines(rows)))
         return
     print(listed(names_table(rows), "36 10 18 18 18"))

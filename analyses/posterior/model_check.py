@@ -8,7 +8,6 @@ test of uniformity.
     python -m analyses.posterior.model_check --cases 600 --simulations 199 --output out/model-check
 """
 
-import argparse
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -20,6 +19,7 @@ from scipy import stats
 
 from analyses.hidden_effects.rig import Rig
 from analyses.hidden_effects.truth import draw_rig
+from analyses.options import study_options
 from analyses.resumable import records
 from wirebayes.discovery.model_check import check_model
 from wirebayes.effects import CATALOGUE
@@ -119,9 +119,7 @@ def table(records: Sequence[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Run what is not done yet, a line a case, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--cases", type=int, default=600)
-    parser.add_argument("--simulations", type=int, default=199)
+    parser = study_options(__doc__, cases=600, simulations=199)
     parser.add_argument("--kinds", nargs="+", default=list(KINDS), choices=KINDS)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--output", type=Path, default=Path("out/model-check"))

@@ -10,11 +10,11 @@ and largest; the same of the shares of draws in the 5 % tails; the largest diffe
 standard deviations. Parameters that are positive are compared as logarithms.
 """
 
-import argparse
 from functools import partial
 
 import numpy as np
 
+from analyses.options import study_options
 from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import DEFAULT, Policy
@@ -56,7 +56,7 @@ def agreement(runs):
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_options(__doc__)
     parser.add_argument("--effects", nargs="+", choices=[*CATALOGUE, "all"], default=[])
     parser.add_argument("--wires", nargs="+", type=int, choices=range(4), default=list(range(4)))
     parser.add_argument("--seeds", type=int, default=12)

@@ -7,7 +7,6 @@ platform, law (3), and law (1) where MuJoCo's has not come to rest, against a ge
 anew; round trips for both.
 """
 
-import argparse
 import json
 import sys
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from analyses.options import study_options
 from tests.robot import cases
 from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.motion import forward, outcome
@@ -69,7 +69,7 @@ def compare(robot, make, law, count, rng):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_options(__doc__)
     parser.add_argument("count", type=int, nargs="?", default=40)
     parser.add_argument("--output", type=Path)
     options = parser.parse_args()

@@ -9,7 +9,6 @@ A line a wire is written, so that a run goes on where it ended; coverage is aver
     python -m analyses.robots.bands --wires 200 --output out/robot-bands
 """
 
-import argparse
 import json
 import time
 from collections.abc import Sequence
@@ -23,6 +22,7 @@ from analyses.hidden_effects.files import logged_temperature, write_experiments
 from analyses.hidden_effects.noise import measure
 from analyses.hidden_effects.rig import Rig
 from analyses.hidden_effects.truth import draw_rig
+from analyses.options import study_options
 from analyses.resumable import records
 from tests.robot import independent
 from wirebayes.commands.wires import read_wires
@@ -107,13 +107,19 @@ def case(index: int) -> dict[str, Any]:
     }
 
 
+def mean_share(inside: Sequence[Sequence[bool]], of: str) -> str:
+    """Share that is inside, in the mean of what is named, with a 95 % interval over these."""
+    share = np.array([np.mean(each) for each in inside])
+    if len(share) < 2:
+        return "–"
+    return f"{100 * share.mean():5.1f} % ± {196 * share.std(ddof=1) / len(share) ** 0.5:.1f} ({len(share)} {of})"
+
+
 def coverage(wires: Sequence[Sequence[dict[str, Any]]]) -> str:
     """Share of bands that hold the truth, with a 95 % interval over wires."""
     held = [[f for f in figures if np.isfinite(f["truth_mm"])] for figures in wires]
-    share = np.array([np.mean([f["band_mm"][0] <= f["truth_mm"] <= f["band_mm"][2] for f in fs]) for fs in held if fs])
-    if len(share) < 2:
-        return "–"
-    return f"{100 * share.mean():5.1f} % ± {196 * share.std(ddof=1) / len(share) ** 0.5:.1f} ({len(share)} wires)"
+    inside = [[f["band_mm"][0] <= f["truth_mm"] <= f["band_mm"][2] for f in fs] for fs in held if fs]
+    return mean_share(inside, "wires")
 
 
 def table(records: Sequence[dict[str, Any]]) -> str:
@@ -145,10 +151,7 @@ def table(records: Sequence[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Run what is not done yet, a line a wire, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--wires", type=int, default=200)
-    parser.add_argument("--output", type=Path, default=Path("out/robot-bands"))
-    options = parser.parse_args()
+    options = study_options(__doc__, wires=200, output=Path("out/robot-bands")).parse_args()
     print(table(records(options.output / "wires.jsonl", case, [(index,) for index in range(options.wires)])))
 
 

@@ -9,17 +9,17 @@ is written, so that a run goes on where it ended; intervals are of independent t
     python -m analyses.robots.history_coverage --truths 60 --output out/history-coverage
 """
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analyses.options import study_options
 from analyses.resumable import records
 from wirebayes.inference.fit import seed_of
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.estimate import estimate_poses
 from wirebayes.robot.history.follow import clock_starts, follow_log
 from wirebayes.robot.history.history import History, roll_and_pitch
@@ -29,7 +29,6 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import inverse
 
-Floats = NDArray[np.float64]
 MEANS = {"k1": 800.0, "B": 0.3, "U": 0.8, "k2": 0.03, "N": 0.64}  # a thin braided line
 TIMES_S = (0.0, 60.0, 70.0, 400.0, 420.0, 900.0)
 HOLDS = (1, 1, 2, 2, 3, 3)
@@ -123,11 +122,9 @@ def table(records: Sequence[dict[str, Any]]) -> str:
 
 def main() -> None:
     """Run what is not done yet, a line a truth, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--truths", type=int, default=60, help="in all, the robots in turn")
-    parser.add_argument("--draws", type=int, default=200)
-    parser.add_argument("--output", type=Path, default=Path("out/history-coverage"))
-    options = parser.parse_args()
+    options = study_options(
+        __doc__, truths=(60, "in all, the robots in turn"), draws=200, output=Path("out/history-coverage")
+    ).parse_args()
     cases = [(ROBOTS[index % len(ROBOTS)], index, options.draws) for index in range(options.truths)]
     print(table(records(options.output / "truths.jsonl", case, cases, ("robot", "index", "draws"))))
 

@@ -11,8 +11,8 @@ import resource
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 
+from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.estimate import estimate_poses
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.live import LiveEstimator, LivePose
@@ -22,7 +22,6 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import inverse
 
-Floats = NDArray[np.float64]
 MEANS = {"k1": 803.0, "B": 0.31, "U": 1.0, "k2": 0.03, "N": 0.64}  # a thin braided line
 WAYPOINT_S = 60.0
 

@@ -7,12 +7,12 @@ effective draws of its own proposal before each round of learning and when it is
     python -m analyses.speed.carried_proposals
 """
 
-import argparse
 from typing import Any
 
 import numpy as np
 
 import wirebayes as wb
+from analyses.options import study_options
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import DEFAULT
 from wirebayes.inference.sampler import burn_in, proposal
@@ -55,9 +55,7 @@ def learned(experiment: Any) -> tuple[list[float], Any, np.ndarray, np.ndarray]:
 
 def main() -> None:
     """Print a line a test, then medians."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tests", type=int, default=14)
-    options = parser.parse_args()
+    options = study_options(__doc__, tests=14).parse_args()
     experiments = wb.simulate_tests(tests=options.tests, seed=3).experiments
     with workers() as parallel_map:
         found = list(parallel_map(learned, experiments))

@@ -19,6 +19,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from analyses.options import study_options
 from wirebayes.io import paper
 
 DATA = paper.FOLDER / "experiments.toml"
@@ -83,7 +84,7 @@ def whole(command: str, wire: str) -> float:
 
 def main() -> None:
     """Print a line for each phase of the fastest run."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = study_options(__doc__)
     parser.add_argument("--wire", default="nylon-1.5m")
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--output", type=Path, help="JSON with the phases, and whole commands of each wire")
