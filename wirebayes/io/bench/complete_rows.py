@@ -1,5 +1,6 @@
 """The rows of a table that are readings: gaps filled, repetitions left out."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,6 +13,7 @@ from wirebayes.io.bench.words import STATISTICS
 from wirebayes.sentences import counted, listed
 
 _SHOWN = 3  # lines that a note names
+_WORD = re.compile(r"(?!nan|null|none)[^\W\d_]{3,}", re.IGNORECASE)  # and none that stands for a missing number
 WHERE_MISSING = "; where a reading is missing, delete its row"
 
 
@@ -19,7 +21,7 @@ def complete_rows(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTabl
     """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows."""
     indices = [column.index for column in columns.values()]
     rows, below = _without_what_is_below(table, indices)
-    rows, words = _without_words(rows, indices)
+    rows, words = _without_words(rows, indices, columns["time"].index)
     weights_once = _weights_are_written_once(rows, columns)
     written_once: tuple[Role, ...] = ("hold", "tension") if weights_once else ("hold", "displacement")
     filled = _filled(rows, table, [columns[role].index for role in written_once if role in columns])
@@ -48,14 +50,20 @@ def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Sh
     return [row for row in rows if any(row.cell(i) for i in indices)], below
 
 
-def _without_words(rows: list[SheetRow], indices: list[int]) -> tuple[list[SheetRow], list[SheetRow]]:
-    """Rows without those that name a part of the test, such as ``Cycle 2``, or a statistic below; and these."""
+def _without_words(rows: list[SheetRow], indices: list[int], time: int) -> tuple[list[SheetRow], list[SheetRow]]:
+    """Rows without those that name a part of the test, such as ``Cycle 2``, or a statistic below; and these.
+
+    Those are rows without a time, in which words stand where numbers are read: ``Points: | 9`` between blocks.
+    """
     end = len(rows)
     while end and _is_statistic(rows[end - 1]):
         end -= 1
     kept, words = list[SheetRow](), list[SheetRow]()
     for row in rows[:end]:
-        (kept if any(is_value(row.cell(i)) for i in indices) else words).append(row)
+        read = [row.cell(i) for i in indices]
+        has_time = any(c.isdigit() for c in row.cell(time))
+        of_words = not has_time and any(_WORD.search(cell) for cell in read)
+        (words if of_words or not any(map(is_value, read)) else kept).append(row)
     return kept, [*words, *rows[end:]]
 
 

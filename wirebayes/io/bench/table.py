@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import ROLES, quantity_unit
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
+from wirebayes.io.bench.words import speaks_of_a_quantity
 
 _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
 LONGEST_HEADER = 200  # characters: names and units take a few words, prose is no header
@@ -124,6 +125,7 @@ def find_table(sheet: Sheet) -> RawTable:
     names = tuple(above[-2].cell(column) for column in every) if len(above) > 1 else ()
     body = tuple(row for row in rows[first:] if not row.comment)
     _check_width(sheet, head, body, width)
+    _check_headers_repeat(sheet, rows[:first], head, body)
     return RawTable(sheet, header, padded, body, head.line, names)
 
 
@@ -149,11 +151,25 @@ def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: 
     """Refuse values to the right of the header."""
     named = len(head.cells)
     for row in body:
-        if len(row.cells) > width or any(map(is_value, row.cells[named:])):
+        too_long = len(row.cells) > width or any(map(is_value, row.cells[named:]))
+        if too_long and is_measured(row.filled):
             sign = " (a comma as decimal sign needs another sign between cells)" if "comma" in sheet.described else ""
             raise InputError(
                 f"{sheet.path}, line {row.line}, column {sheet.column_name(named)}: found {len(row.cells)} cells, "
                 f"expected {named} as in the header of line {head.line}{sign}"
+            )
+
+
+def _check_headers_repeat(sheet: Sheet, above: Sequence[SheetRow], head: SheetRow, body: Sequence[SheetRow]) -> None:
+    """Refuse a header between readings, or its row of units, that is another than the one above the first of them."""
+    known = {row.cells for row in above}
+    for row in body:
+        if len(row.filled) == 1 or any(map(is_value, row.filled)) or row.cells in known:
+            continue
+        if _are_units(row) or sum(map(speaks_of_a_quantity, row.filled)) > 1:
+            raise InputError(
+                f"{sheet.path}, line {row.line}: found another header, {', '.join(row.filled)}, expected the one of "
+                f"line {head.line}; readings in other columns or units belong in a file of their own"
             )
 
 
