@@ -1,6 +1,6 @@
 """Laws, histories, likelihoods and effects side by side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from wirebayes.sentences import counted
 from wirebayes.strict.files import PathLike
 from wirebayes.views.comparison import Comparison
 from wirebayes.views.result import ResultFolder
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Kinds
 from wirebayes.wire.laws import ElasticLaw, History
 
 
@@ -204,9 +204,7 @@ def _check_holds(experiment: Experiment, train_holds: int | None) -> None:
         raise InputError(f"{experiment.source}, experiment {experiment.name}: {found}")
 
 
-def _chosen(
-    experiment: Experiment, base: ModelToCompare, known: Mapping[str, type[Effect]], names: Sequence[str]
-) -> list[ModelToCompare]:
+def _chosen(experiment: Experiment, base: ModelToCompare, known: Kinds, names: Sequence[str]) -> list[ModelToCompare]:
     """The models to compare; every name that is given must be one of them."""
     chosen = candidates(experiment, base, known, names or None)
     missing = set(names) - {candidate.name for candidate in chosen}

@@ -1,12 +1,13 @@
 """What a test would teach before it is done."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import above_zero, check_seed, model_spec, path_of
@@ -40,7 +41,7 @@ from wirebayes.simulation.synthetic import Bench
 from wirebayes.strict.files import PathLike
 from wirebayes.views.plan import Plan
 from wirebayes.views.result import ResultFolder
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Kinds
 from wirebayes.wire.laws import ElasticLaw, History
 
 TESTS = 120  # simulated of each protocol: a mean width is then known to some 5 %
@@ -160,9 +161,7 @@ def _check_tests(tests: object) -> None:
         raise InputError(f"tests: found {tests!r}, expected a whole number, 2 or more")
 
 
-def _judged(
-    request: PlanRequest, kinds: Mapping[str, type[Effect]], spec: ModelSpec, seed: int, report: Progress
-) -> list[Judged]:
+def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, report: Progress) -> list[Judged]:
     """What each test would teach, and what it would show of missing effects."""
     planned = [(at_centre(test, request.guess.at(test.length_mm), spec), words) for test, words in request.tests]
     tension = middle_tension(planned[0][0])  # all state their creep for the tension of the first
@@ -198,7 +197,7 @@ def _request(
     effects: list[str],
     spec: ModelSpec,
     own: Path | None,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> PlanRequest:
     """Tests and guess of whatever was given."""
     if not isinstance(source, str | os.PathLike | Experiment):
@@ -218,7 +217,7 @@ def _request(
     return PlanRequest(_like(measured), guess, ("parameters",), None, None, about)
 
 
-def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: np.random.Generator) -> PlanRequest:
+def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: Generator) -> PlanRequest:
     tests = [(_experiment(test, file), "") for test in file.tests]
     for test, _ in tests:
         build([test])  # checks priors

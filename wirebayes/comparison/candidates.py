@@ -14,7 +14,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.problem import Problem
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
-from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.effect import Effect, EventEffect, Kinds
 
 HOOKE, TIME = "Is Hooke's law enough?", "Which time law?"
 LAW, HISTORY, LIKELIHOOD = "Which elastic law?", "Which history?", "One history, or every hold by itself?"
@@ -54,7 +54,7 @@ class ModelToCompare:
 
 
 def candidates(
-    experiment: Experiment, base: ModelToCompare, known: Mapping[str, type[Effect]], only: Sequence[str] | None = None
+    experiment: Experiment, base: ModelToCompare, known: Kinds, only: Sequence[str] | None = None
 ) -> list[ModelToCompare]:
     """The base and everything that may be set beside it for this experiment.
 
@@ -132,9 +132,7 @@ def _other_model(base: ModelToCompare) -> list[ModelToCompare]:
     return out
 
 
-def _with_effects(
-    experiment: Experiment, base: ModelToCompare, known: Mapping[str, type[Effect]]
-) -> list[ModelToCompare]:
+def _with_effects(experiment: Experiment, base: ModelToCompare, known: Kinds) -> list[ModelToCompare]:
     """The model with each effect that the test may show."""
     protocol = experiment.protocol()
     out = []
@@ -146,9 +144,7 @@ def _with_effects(
     return out
 
 
-def effects_of(
-    candidate: ModelToCompare, training: Experiment, known: Mapping[str, type[Effect]], seed: int
-) -> list[Effect]:
+def effects_of(candidate: ModelToCompare, training: Experiment, known: Kinds, seed: int) -> list[Effect]:
     """The candidate's effects; an event is put at the training hold where it has the most evidence (Laplace).
 
     Parameters

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
+from numpy.random import Generator
 
 from wirebayes.discovery.model_space import EffectSet
 from wirebayes.discovery.name_evidence import NameEvidence
@@ -112,9 +112,7 @@ class Fits:
     rng : numpy.random.Generator
     """
 
-    def __init__(
-        self, plain: list[LaplaceFit], explored: Explored, settings: Settings, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, plain: list[LaplaceFit], explored: Explored, settings: Settings, rng: Generator) -> None:
         self._explored, self._settings, self._rng = explored, settings, rng
         self._known: dict[Key, list[LaplaceFit]] = {frozenset(): plain}
         self._known |= {key: s.blocks for key, s in explored.fitted.items()}
@@ -145,7 +143,7 @@ class Fits:
 
 
 def added(
-    parent: FittedSet, name: str, settings: Settings, rng: np.random.Generator
+    parent: FittedSet, name: str, settings: Settings, rng: Generator
 ) -> tuple[list[LaplaceFit], dict[int, Effect]]:
     """The parent's blocks refitted with one more effect in its best form, and that form by block.
 

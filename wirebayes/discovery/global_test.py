@@ -4,12 +4,12 @@ Its p-value comes from data sets simulated at the fit and refitted. `discover` a
 both use it, so they give the same answer for the same readings.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import repeat
 from typing import Any
 
-import numpy as np
+from numpy.random import Generator
 from scipy.special import bdtr, bdtrc
 
 from wirebayes.discovery import gross_errors, residual_patterns, screening
@@ -25,7 +25,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.json_files.discovery import GrossError
 from wirebayes.processes.workers import ParallelMap
 from wirebayes.progress import Progress, silent
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Kinds
 
 CLOSE = 0.00135  # risk on either side that a p on the level itself gives so few, or so many, exceedances
 _AT_ONCE = 100  # simulations of one piece: a tenth of a second or two, beside which what is sent hardly counts
@@ -64,9 +64,9 @@ class Gate:
 
 def examine(
     blocks: Sequence[LaplaceFit],
-    kinds: Mapping[str, type[Effect]],
+    kinds: Kinds,
     simulations: int,
-    rng: np.random.Generator,
+    rng: Generator,
     *,
     alpha: float = ALPHA,
     report: Progress = silent,
@@ -184,7 +184,7 @@ def is_close(p: float, alpha: float, simulations: int) -> bool:
     return bool(min(at_most, at_least) > CLOSE)
 
 
-def simulated_with_patterns(block: LaplaceFit, trials: Sequence[Probe], n: int, rng: np.random.Generator) -> Replicates:
+def simulated_with_patterns(block: LaplaceFit, trials: Sequence[Probe], n: int, rng: Generator) -> Replicates:
     """Data sets simulated at a block's fit and refitted, scanned for probes and for residual patterns.
 
     Parameters
@@ -208,7 +208,7 @@ def with_more(
     blocks: Sequence[LaplaceFit],
     trials: Sequence[Probe],
     n: int,
-    rng: np.random.Generator,
+    rng: Generator,
     parallel_map: ParallelMap,
 ) -> list[Replicates]:
     """What was simulated for each block, with more data sets (see `simulated_with_patterns`).
@@ -246,7 +246,7 @@ def _pieces(n: int) -> list[int]:
 
 
 def _strike_gross_errors(
-    block: LaplaceFit, trials: list[Probe], candidates: list[Candidate], i: int, rng: np.random.Generator
+    block: LaplaceFit, trials: list[Probe], candidates: list[Candidate], i: int, rng: Generator
 ) -> tuple[LaplaceFit, list[GrossError]]:
     struck: list[GrossError] = []
     most = max(1, int(gross_errors.MOST * gross_errors.readings_of(block.experiments)))

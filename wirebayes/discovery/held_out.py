@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.random import Generator
 from scipy.special import logsumexp
 
 from wirebayes.discovery.settings import LEAST_HOLDS
@@ -74,7 +75,7 @@ def predicted(
     train: Sequence[int],
     effects: Sequence[Effect],
     block: LaplaceFit,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> list[HeldOut]:
     """Train a block's samples on their first holds with some effects, predict their other holds freely.
 
@@ -102,7 +103,7 @@ def predicted(
     ]
 
 
-def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng: np.random.Generator) -> HeldOut:
+def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng: Generator) -> HeldOut:
     """The recorded holds of a sample after the first `train`, predicted with draws of its own parameters."""
     line = linearise(sample.protocol, own, model)
     variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
@@ -143,7 +144,7 @@ def _scored_hold(
     carried: likelihoods.Filtered,
     j: int,
     noise: tuple[Array, Array],
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> _ScoredHold:
     """One hold predicted from the creep that is carried into it; `noise` are reading variance and setting sd."""
     variance, setting_sd = noise
@@ -163,7 +164,7 @@ def gap_closed(plain: HeldOut, final: HeldOut) -> float | None:
     return None if excess <= 0 else float(1.0 - (final.squares - final.floor) / excess)
 
 
-def truncated_leave_one_hold_out(block: LaplaceFit, rng: np.random.Generator) -> Array:
+def truncated_leave_one_hold_out(block: LaplaceFit, rng: Generator) -> Array:
     """(H,) log predictive density of each recorded hold of a block from all its others, by importance sampling.
 
     A search scores many fits by rough draws about their modes: there is no time for refits, and a tail fitted to such
@@ -193,7 +194,7 @@ class LeftOut:
         The built-in `map`, or one over processes.
     """
 
-    def __init__(self, rng: np.random.Generator, parallel_map: ParallelMap) -> None:
+    def __init__(self, rng: Generator, parallel_map: ParallelMap) -> None:
         self._rng, self._map = rng, parallel_map
         self._known: dict[int, tuple[LaplaceFit, Array]] = {}  # by id, which is taken as long as the fit is kept
 
@@ -205,7 +206,7 @@ class LeftOut:
         return [self._known[id(fit)][1] for fit in fits]
 
 
-def _draws(block: LaplaceFit, rng: np.random.Generator, n: int) -> tuple[Problem, Array]:
+def _draws(block: LaplaceFit, rng: Generator, n: int) -> tuple[Problem, Array]:
     """The problem with all parameters of a block, and n rough draws of its posterior."""
     problem, theta, _ = completed(block.target.problem, rough_draws.draws(block.target, block.modes, rng, n), rng)
     return problem, theta

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
+from numpy.random import Generator
 
 from wirebayes.discovery import shrinking
 from wirebayes.discovery.fitted_sets import Accepted, Explored
@@ -79,7 +79,7 @@ def answer_material(
     i: int,
     where: list[Disagreement],
     left_out: LeftOut,
-    rng: np.random.Generator,
+    rng: Generator,
     parallel_map: ParallelMap,
 ) -> MaterialAnswer:
     """The verdict on block `i`, and its fits with what was accepted.
@@ -128,7 +128,7 @@ def answer_material(
 
 
 def _stages(
-    plain: LaplaceFit, accepted: Sequence[Accepted], explored: Explored, i: int, rng: np.random.Generator
+    plain: LaplaceFit, accepted: Sequence[Accepted], explored: Explored, i: int, rng: Generator
 ) -> list[LaplaceFit]:
     """Block `i` with the first accepted effect, the first two, and so on; fitted here where the search has not."""
     stages: list[LaplaceFit] = []

@@ -4,10 +4,10 @@ An effect counts as detectable where the global test of `discover` would detect 
 simulated at the rough fit and refitted (`wirebayes.discovery.power`).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.discovery import power, screening
 from wirebayes.discovery.linear_scan import expand
@@ -24,7 +24,7 @@ from wirebayes.results import hold_ends
 from wirebayes.results.contraction import contraction, source
 from wirebayes.results.parameters import unit_of
 from wirebayes.results.posterior_checks import of_posterior
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Effect, Kinds
 from wirebayes.wire.protocol import Control
 
 SIMULATIONS = 199  # the level that one in twenty-five passes by chance is then the eighth largest
@@ -55,7 +55,7 @@ class Preview:
     hold_ends: HoldEnds | None
 
 
-def preview(experiment: Experiment, kinds: Mapping[str, type[Effect]], rng: np.random.Generator) -> Preview:
+def preview(experiment: Experiment, kinds: Kinds, rng: Generator) -> Preview:
     """Fit the plain model roughly and see what the test would determine.
 
     Parameters
@@ -94,7 +94,7 @@ def _range(draws: Array, before: Array, unit: str) -> ParameterRange:
     }
 
 
-def _effects(block: LaplaceFit, kinds: Mapping[str, type[Effect]], rng: np.random.Generator) -> dict[str, EffectSize]:
+def _effects(block: LaplaceFit, kinds: Kinds, rng: Generator) -> dict[str, EffectSize]:
     """Each effect at the size at which it would be seen, in the form and at the hold where it is seen best."""
     trials, candidates = screening.candidate_probes([block], kinds)
     control = block.experiments[0].control

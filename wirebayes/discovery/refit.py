@@ -5,7 +5,7 @@ the plain fit, integrated to one: a wide catalogue does not count against an eff
 possible does. Fits with the effect inside, folds, samples and predictions have the same density.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -16,7 +16,7 @@ from wirebayes.discovery.profile import Profile, has_near_neighbours, integral_o
 from wirebayes.discovery.sharing import alike
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
 from wirebayes.inference.optimum import Optimum
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Function
 from wirebayes.wire.effect import Effect
 
 # δ; end of an amplitude's prior. Hardly matters: twice as much takes ln 2 from every name alike
@@ -121,7 +121,7 @@ class _Amplitude:
     low: float
     high: float
     per_delta: float
-    added: Callable[[Array], Array]
+    added: Function
 
     @classmethod
     def of(cls, blocks: Sequence[LaplaceFit], effect: Effect, per_delta: float, reach: float) -> "_Amplitude":
@@ -215,7 +215,7 @@ def _followed(amplitude: _Amplitude, profile: Profile) -> Profile:
     return profile
 
 
-def within(prior: Any, neutral: float, reach: float) -> Callable[[Array], Array]:
+def within(prior: Any, neutral: float, reach: float) -> Function:
     """The log density of a prior as far as `reach` from neutral, integrated to one.
 
     Parameters

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.discovery import residual_patterns, screening
 from wirebayes.discovery.fitted_sets import Explored, FittedSet, Key
@@ -51,7 +52,7 @@ def complete(
     explored: Explored,
     best: FittedSet,
     predicts: Callable[[FittedSet], bool],
-    rng: np.random.Generator,
+    rng: Generator,
     parallel_map: ParallelMap,
 ) -> _Passing | None:
     """A set nearly as probable as the best one that leaves nothing over where that does; None where there is none.
@@ -88,7 +89,7 @@ def complete(
     return None
 
 
-def retested(best: FittedSet, rng: np.random.Generator, parallel_map: ParallelMap) -> Retest:
+def retested(best: FittedSet, rng: Generator, parallel_map: ParallelMap) -> Retest:
     """The global test with the set inside, and where its residuals still depend on something.
 
     Half of the simulations decide where p is clearly above the level; below it, the odds depend on how small p is.

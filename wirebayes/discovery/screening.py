@@ -23,7 +23,7 @@ from wirebayes.model.replicate import readings as replicate
 from wirebayes.model.sample import LENGTH_EXPONENT
 from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Ints
-from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.effect import Effect, EventEffect, Kinds
 from wirebayes.wire.protocol import Protocol
 
 _ROWS = 100  # replicates linearised at once, at most
@@ -59,9 +59,7 @@ class Candidate:
     others: tuple[int, ...] = ()
 
 
-def candidate_probes(
-    blocks: Sequence[LaplaceFit], kinds: Mapping[str, type[Effect]]
-) -> tuple[list[Probe], list[Candidate]]:
+def candidate_probes(blocks: Sequence[LaplaceFit], kinds: Kinds) -> tuple[list[Probe], list[Candidate]]:
     """Every form of every effect that these blocks could show."""
     tests = [e.protocol() for b in blocks for e in b.experiments]
     trials: list[Probe] = []

@@ -5,12 +5,13 @@ beside a flexible reference; further effects by leave-one-hold-out; the gap on h
 detected.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import repeat
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.discovery import gross_errors, power, residual_patterns, shrinking
 from wirebayes.discovery.alternatives import Alternative, alternatives
@@ -46,10 +47,10 @@ from wirebayes.processes.workers import ParallelMap
 from wirebayes.progress import Progress, silent
 from wirebayes.sentences import counted
 from wirebayes.wire.control import READ_UNIT
-from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.effect import Effect, EventEffect, Kinds
 
 
-def catalogue_without(names: Sequence[str], known: Mapping[str, type[Effect]] = CATALOGUE) -> dict[str, type[Effect]]:
+def catalogue_without(names: Sequence[str], known: Kinds = CATALOGUE) -> dict[str, type[Effect]]:
     """The catalogue less some effects.
 
     Raises
@@ -123,7 +124,7 @@ def investigate(
 
 
 def _plain_fits(
-    experiments: Sequence[Experiment], settings: Settings, rng: np.random.Generator, parallel_map: ParallelMap
+    experiments: Sequence[Experiment], settings: Settings, rng: Generator, parallel_map: ParallelMap
 ) -> list[LaplaceFit]:
     """The experiments of each material, fitted jointly, all on one scale: they may share an instrument's amplitude."""
     materials = by_material(experiments)
@@ -156,7 +157,7 @@ def _own_reports(
     i: int,
     answer: MaterialAnswer,
     left_out: LeftOut,
-    rng: np.random.Generator,
+    rng: Generator,
     parallel_map: ParallelMap,
 ) -> dict[str, HeldOutReport]:
     """What the report says of each experiment of block `i` apart from the others."""

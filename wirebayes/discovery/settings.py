@@ -3,12 +3,11 @@
 docs/thresholds.rst says how each number was set.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from wirebayes.effects import CATALOGUE
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Kinds
 
 ALPHA = 0.04  # level of the global test: one clean file in twenty-five is called incomplete
 BY_LARGER = 0.02  # p up to which what only larger effects show counts
@@ -72,5 +71,5 @@ class Settings:
     """
 
     spec: ModelSpec = PLAIN_SPEC
-    kinds: Mapping[str, type[Effect]] = field(default_factory=lambda: CATALOGUE)
+    kinds: Kinds = field(default_factory=lambda: CATALOGUE)
     simulations: int = SIMULATIONS

@@ -4,14 +4,14 @@ Materials share nothing else but the amplitude's shape constants, so the likelih
 theirs, and for one of them the others act as a prior: normal, or log-normal for what cannot change sign.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from wirebayes.inference.laplace_fit import LaplaceFit, fitted
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Function
 from wirebayes.wire.effect import Amplitude, Effect
 
 _CLEAR = 2.0  # standard deviations from its edge from which on a one-sided amplitude is nearly log-normal
@@ -66,7 +66,7 @@ def _table(amplitude: Amplitude, mean: float, sd: float) -> dict[str, Any] | Non
     return {"distribution": "log-normal", "median": mean, "sd_log": sd / mean}
 
 
-def alike(means: Array, sds: Array, log_prior: Callable[[Array], Array]) -> Array:
+def alike(means: Array, sds: Array, log_prior: Function) -> Array:
     """(n,) log of how much likelier readings are where blocks have one value of a constant than where each has its own.
 
     That is the integral of the product of the blocks' posteriors, which are normal, over the prior to the power of

@@ -6,6 +6,7 @@ from functools import partial
 from itertools import repeat
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.discovery import held_out
 from wirebayes.discovery.settings import KEEP_ELPD, LEAST_HOLDS
@@ -49,7 +50,7 @@ def shrinking(
     names: Sequence[str],
     remains: bool,
     left_out: held_out.LeftOut,
-    rng: np.random.Generator,
+    rng: Generator,
     parallel_map: ParallelMap,
 ) -> list[Shrinking]:
     """Score the models of one block on the last third of the holds, and by leaving out one hold at a time.
@@ -118,7 +119,7 @@ class _Trained:
     block: LaplaceFit
 
 
-def _predicted(trained: _Trained, rng: np.random.Generator) -> list[held_out.HeldOut]:
+def _predicted(trained: _Trained, rng: Generator) -> list[held_out.HeldOut]:
     return held_out.predicted(trained.experiments, trained.train, trained.effects, trained.block, rng)
 
 
@@ -146,7 +147,7 @@ def _to_be_trained(
 
 
 def _beside_discrepancy(
-    bases: Sequence[LaplaceFit], train: Sequence[int], rng: np.random.Generator, parallel_map: ParallelMap
+    bases: Sequence[LaplaceFit], train: Sequence[int], rng: Generator, parallel_map: ParallelMap
 ) -> list[_Smooth]:
     """A smooth discrepancy beside the effects of each base, its size what they leave over in the holds trained on."""
     n, handed_over = len(train), []
@@ -194,7 +195,7 @@ def _gain(elpd: Sequence[Array], named: int, n: int, remains: bool) -> _Gain:
 
 
 def discrepancy_gain(
-    base: LaplaceFit, left_out: held_out.LeftOut, rng: np.random.Generator, parallel_map: ParallelMap
+    base: LaplaceFit, left_out: held_out.LeftOut, rng: Generator, parallel_map: ParallelMap
 ) -> float | None:
     """What a smooth discrepancy gains beside a block's effects by leaving out one hold at a time.
 
@@ -241,7 +242,7 @@ def _compared(
     }
 
 
-def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: np.random.Generator) -> tuple[Effect, ...]:
+def with_discrepancy(block: LaplaceFit, experiment: Experiment, rng: Generator) -> tuple[Effect, ...]:
     """A block's effects that one of its experiments can show alone, and a discrepancy as large as what they leave.
 
     Parameters

@@ -12,6 +12,7 @@ from dataclasses import replace
 from itertools import repeat
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.discovery import screening
 from wirebayes.discovery.families import Family
@@ -50,7 +51,7 @@ def explore(
     trials: Sequence[Probe],
     families: Sequence[Family],
     settings: Settings,
-    rng: np.random.Generator,
+    rng: Generator,
     parallel_map: ParallelMap,
 ) -> Explored:
     """Fit the sets of effects that may hold a good share of the probability.
@@ -160,7 +161,7 @@ def _fit(
     families: Sequence[Family],
     references: Sequence[Reference],
     settings: Settings,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> FittedSet:
     """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
     blocks, effects = added(parent, name, settings, rng)

@@ -3,13 +3,12 @@
 import importlib.util
 import os
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import get_args
 
 from wirebayes.effects import creep, elastic, event, instrument, unknown
 from wirebayes.errors import InputError
-from wirebayes.wire.effect import Effect, EventEffect
+from wirebayes.wire.effect import Effect, EventEffect, Kinds
 from wirebayes.wire.protocol import Control
 
 CONTROLS = get_args(Control)
@@ -92,7 +91,7 @@ def source_of(own: Path | None) -> str | None:
     return None if own is None else own.read_text(encoding="utf-8", errors="backslashreplace")
 
 
-def effect_named(key: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> Effect:
+def effect_named(key: str, known: Kinds = CATALOGUE) -> Effect:
     """The effect of a key: a name, ``grip_slip@7`` (or ``grip_slip@EXPERIMENT:7``) for one that belongs to a hold.
 
     Raises

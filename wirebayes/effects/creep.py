@@ -6,11 +6,9 @@ import numpy as np
 
 from wirebayes.numeric.distributions import HalfNormal, LogNormal, Normal, Uniform
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own
 from wirebayes.wire.laws import creep_fraction
 from wirebayes.wire.protocol import Protocol
-
-Own = dict[str, Array]
 
 
 class PermanentCreep(Effect):

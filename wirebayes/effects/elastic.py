@@ -8,10 +8,9 @@ import numpy as np
 
 from wirebayes.numeric.distributions import HalfNormal, Normal, TruncatedNormal
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own
 from wirebayes.wire.protocol import Protocol
 
-Own = dict[str, Array]
 _DEPENDENT = ("k1", "B", "U", "N")  # parameters that may depend on the length; compiled code counts them in this order
 
 

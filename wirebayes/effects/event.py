@@ -4,9 +4,7 @@ from dataclasses import dataclass
 
 from wirebayes.numeric.distributions import HalfNormal, Normal
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import Amplitude, EventEffect, HoldContext
-
-Own = dict[str, Array]
+from wirebayes.wire.effect import Amplitude, EventEffect, HoldContext, Own
 
 
 @dataclass(frozen=True)

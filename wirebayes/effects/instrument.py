@@ -7,10 +7,8 @@ import numpy as np
 
 from wirebayes.numeric.distributions import HalfNormal, LogNormal, LogUniform, Normal, Uniform
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own
 from wirebayes.wire.protocol import Protocol
-
-Own = dict[str, Array]
 
 
 class ReadingDelay(Effect):

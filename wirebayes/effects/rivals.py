@@ -10,9 +10,8 @@ import numpy as np
 
 from wirebayes.numeric.distributions import LogNormal, Uniform
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import Amplitude, Effect, HoldContext
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own
 
-Own = dict[str, Array]
 LONG = 720.0  # typical holds: a day, where they last two minutes
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from scipy import optimize
 
 from wirebayes.numeric.distributions import LogNormal
@@ -45,9 +46,7 @@ class LineDraws:
     effective: float
 
 
-def between_specimens(
-    logarithms: list[Floats], prior: tuple[Floats, Floats], count: int, rng: np.random.Generator
-) -> LineDraws:
+def between_specimens(logarithms: list[Floats], prior: tuple[Floats, Floats], count: int, rng: Generator) -> LineDraws:
     """Line and spread given posteriors of specimens.
 
     Parameters
@@ -84,7 +83,7 @@ def between_specimens(
 
 
 def _weighted(
-    log_density: Callable[[Floats], Floats], mode: Floats, root: Floats, rng: np.random.Generator
+    log_density: Callable[[Floats], Floats], mode: Floats, root: Floats, rng: Generator
 ) -> tuple[Floats, Floats]:
     """Points ``(n, p)`` of a Student t about the mode, and their weights for the density, which sum to one."""
     p = len(mode)

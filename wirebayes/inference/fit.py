@@ -1,7 +1,7 @@
 """One fit: a problem sampled until the policy is satisfied, thinned to the draws worth storing."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from wirebayes.inference.sampler.ensemble import Chains
 from wirebayes.model.linear_amplitudes import completed, integrated
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.typing import Array
+from wirebayes.progress import ShareDone
 
 STORED_DRAWS = 5000  # per ensemble: beyond that, quantiles no longer move
 
@@ -59,7 +60,7 @@ def fit_problem(
     *,
     policy: Policy = DEFAULT,
     checkpoint: Path | None = None,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: ShareDone = lambda share: None,
     near: Mapping[str, float] | None = None,
     rough: Array | None = None,
 ) -> Fit:

@@ -12,10 +12,10 @@ J.-M. Cornuet, J.-M. Marin, A. Mira and C. P. Robert, Adaptive multiple importan
 A. Vehtari, D. Simpson, A. Gelman, Y. Yao and J. Gabry, Pareto smoothed importance sampling, JMLR 25 (2024).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.random import Generator
 from scipy.special import logsumexp
 
 from wirebayes.inference.chain_statistics import pareto_smoothed
@@ -29,7 +29,7 @@ from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.resampling import truncated_rows
 from wirebayes.numeric.spread_rows import spread_rows
-from wirebayes.numeric.typing import Array, Bools, Ints
+from wirebayes.numeric.typing import Array, Bools, Function, Ints
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Weighted:
         """(n, m) logarithms of density over proposal."""
         return self.log_density - self.log_proposal[:, None]
 
-    def drawn(self, density: int, n: int, rng: np.random.Generator) -> Array:
+    def drawn(self, density: int, n: int, rng: Generator) -> Array:
         """(n, d) draws that follow one density, as far as the weights allow.
 
         Parameters
@@ -123,11 +123,11 @@ class _Past:
 
 
 def importance_sample(
-    densities: Callable[[Array], Array],
+    densities: Function,
     start: Mixture,
     draws: Array,
     order: Ints,
-    rng: np.random.Generator,
+    rng: Generator,
     ess: float,
 ) -> Weighted:
     """Learn a proposal, then draw from it until there are enough effective draws of each density.
@@ -188,10 +188,10 @@ def _remembering(points: WeightedPoints, witness: Array) -> WeightedPoints:
 
 
 def from_draws(
-    densities: Callable[[Array], Array],
+    densities: Function,
     draws: Array,
     order: Ints,
-    rng: np.random.Generator,
+    rng: Generator,
     ess: float,
 ) -> Weighted:
     """`importance_sample`, begun from draws: climbs start at the highest, and for the first density at others too.
@@ -223,11 +223,11 @@ def widened(modes: Optimum) -> Mixture:
 
 
 def _weighted(
-    densities: Callable[[Array], Array],
+    densities: Function,
     current: Mixture | Proposal,
     n: int,
     ess: float,
-    rng: np.random.Generator,
+    rng: Generator,
     settled: Bools,
 ) -> Weighted:
     """Weighted draws of a proposal.
@@ -292,7 +292,7 @@ def _learned(
     cold: WeightedPoints,
     start: Mixture,
     order: Ints,
-    rng: np.random.Generator,
+    rng: Generator,
     before: Mixture | Proposal,
 ) -> Mixture | Proposal:
     """The proposal fitted to points, or the one before where they are too few."""

@@ -4,13 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.inference.climb import climb, curved
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.optimum import REACH, Optimum, distinct, together
 from wirebayes.numeric.resampling import next_power, systematic_rows
 from wirebayes.numeric.spread_rows import spread_rows
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Function
 
 _ANNEALED = 400  # prior draws
 _EFFECTIVE = 0.2  # share of the rows that stays so at each step of the cooling
@@ -31,7 +32,7 @@ _WITHIN = 0.1  # added to these, at most
 _LED, _LED_TO = 12, 0.1  # steps, at most, with a ratio kept, and the gain in nats that ends them
 
 
-def modes(target: LogPosterior, rng: np.random.Generator, extra: Array | None = None) -> Optimum:
+def modes(target: LogPosterior, rng: Generator, extra: Array | None = None) -> Optimum:
     """The distinct modes of a posterior, best first (see `searches`).
 
     Parameters
@@ -46,7 +47,7 @@ def modes(target: LogPosterior, rng: np.random.Generator, extra: Array | None = 
 
 def searches(
     target: LogPosterior,
-    rng: np.random.Generator,
+    rng: Generator,
     n: int,
     readings: Sequence[Array] | None = None,
     *,
@@ -108,7 +109,7 @@ class Search:
     height: Array
 
 
-def search(target: LogPosterior, rng: np.random.Generator, *, extra: Array | None = None) -> Search:
+def search(target: LogPosterior, rng: Generator, *, extra: Array | None = None) -> Search:
     """Look for the modes, and for places that roughly follow the posterior: prior draws are annealed to it, too.
 
     Climbs begin as in `searches`, and at places that the annealing passed, the highest one and some far from one
@@ -231,12 +232,12 @@ class _SideBySide:
         return [found.rows(of == i) for i in range(self.n)]
 
 
-def _prior(target: LogPosterior, n: int, rng: np.random.Generator) -> Array:
+def _prior(target: LogPosterior, n: int, rng: Generator) -> Array:
     """(n, d) prior draws in sampled coordinates."""
     return target.coordinates.to_sampled(target.problem.prior.rvs(n, rng))
 
 
-def _some(z: Array, n: int, rng: np.random.Generator) -> Array:
+def _some(z: Array, n: int, rng: Generator) -> Array:
     """(n, d) of the places (m, d), none twice where there are enough."""
     return np.asarray(z[rng.choice(len(z), n, replace=n > len(z))])
 
@@ -247,7 +248,7 @@ def _possible(z: Array, value: Array) -> Array:
     return z[inside] if inside.any() else z
 
 
-def _spread(target: LogPosterior, z: Array, n: int, rng: np.random.Generator) -> Array:
+def _spread(target: LogPosterior, z: Array, n: int, rng: Generator) -> Array:
     """(n, d) of the places (m, d): where the creep is slow, fast and between, each with a small and a large power."""
     kinds = target.coordinates.kinds_of_creep
     if not kinds:
@@ -257,7 +258,7 @@ def _spread(target: LogPosterior, z: Array, n: int, rng: np.random.Generator) ->
     return np.asarray(z[((found - wanted[:, None]) ** 2).sum(axis=2).argmin(axis=1)])
 
 
-def _cooled(density: Callable[[Array], Array], z: Array, value: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def _cooled(density: Function, z: Array, value: Array, rng: Generator) -> tuple[Array, Array]:
     """Places (n, d) and their log densities (n,), from the density to powers that grow from 0 to 1, all together.
 
     Each step of the power leaves a fifth of the rows effective and moves them by differential evolution: near enough to

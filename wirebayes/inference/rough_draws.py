@@ -5,6 +5,7 @@ sampler. For numbers that are reported, sample with `wirebayes.inference.fit`, w
 """
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.inference.importance import LARGEST_K, effective, tail
 from wirebayes.inference.log_posterior import LogPosterior
@@ -21,7 +22,7 @@ from wirebayes.numeric.typing import Array
 _SHORT = Policy(ensembles=2, walkers=64, rounds=3, most_rounds=5, tail=np.inf, block=32, most_steps=32)
 
 
-def draws(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int = 1000) -> Array:
+def draws(target: LogPosterior, found: Optimum, rng: Generator, n: int = 1000) -> Array:
     """Posterior draws from known modes.
 
     Parameters
@@ -44,7 +45,7 @@ def draws(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int
     return target.coordinates.to_natural(z)
 
 
-def _weighted(target: LogPosterior, found: Optimum, rng: np.random.Generator, n: int) -> Array | None:
+def _weighted(target: LogPosterior, found: Optimum, rng: Generator, n: int) -> Array | None:
     """(n, d) sampled coordinates by importance sampling, or nothing where the weights of all rounds are too uneven.
 
     A mixture is learned from all draws so far, and all of them are weighted against all mixtures together.

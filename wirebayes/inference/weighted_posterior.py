@@ -11,6 +11,7 @@ posterior is said not to be settled, and the caller has to sample it (`wirebayes
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.inference import importance
 from wirebayes.inference.fit import Fit
@@ -79,7 +80,7 @@ def weighted_posterior(problem: Problem, seed: int, ess: float) -> WeightedPoste
     return WeightedPosterior(problem, theta, log_evidence, bool(pool.settled[0]), why)
 
 
-def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Weighted:
+def witnessed(target: LogPosterior, rng: Generator, ess: float) -> Weighted:
     """Draws of a proposal that was learned from the modes, and against which a further search has nothing to say.
 
     Parameters
@@ -117,7 +118,7 @@ def witnessed(target: LogPosterior, rng: np.random.Generator, ess: float) -> Wei
     return pool if agreed(pool, others) else replace(pool, settled=np.zeros(1, bool))
 
 
-def _of_both(target: LogPosterior, pool: Weighted, others: Mixture, rng: np.random.Generator) -> Array:
+def _of_both(target: LogPosterior, pool: Weighted, others: Mixture, rng: Generator) -> Array:
     """(n, d) rough draws of a posterior, from those of a proposal and of where another search would draw."""
     z = others.rvs(_WITNESSES, rng)
     height, _, of_both = _balanced(target, pool, 0, others, z)
@@ -138,7 +139,7 @@ def _balanced(
 
 
 def overlooked_share(
-    target: LogPosterior, pool: Weighted, column: int, log_integral: float, others: Mixture, rng: np.random.Generator
+    target: LogPosterior, pool: Weighted, column: int, log_integral: float, others: Mixture, rng: Generator
 ) -> float:
     """Share of a posterior that its integral by draws of a proposal lacks, as draws of another proposal tell.
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
@@ -73,7 +74,7 @@ class MarginalisedProblem(Problem):
         total = seen.total + 0.5 * (explained - ((self.mean / self.sd) ** 2).sum()) - np.log(seen.diagonal).sum(axis=1)
         return np.where(regular & np.isfinite(total), total, -np.inf)
 
-    def drawn(self, theta: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    def drawn(self, theta: Array, rng: Generator) -> tuple[Array, Array]:
         """(n, k) amplitudes given the other parameters, and (n,) the log density of being drawn."""
         seen = self._seen(self._lines(theta), None)
         normal = rng.normal(size=seen.along.shape)
@@ -164,7 +165,7 @@ def integrated(problem: Problem) -> Problem:
     )
 
 
-def completed(problem: Problem, theta: Array, rng: np.random.Generator) -> tuple[Problem, Array, Array]:
+def completed(problem: Problem, theta: Array, rng: Generator) -> tuple[Problem, Array, Array]:
     """Draws with everything that was integrated out.
 
     Parameters

@@ -48,7 +48,7 @@ from wirebayes.numeric.distributions import (
     log_normal,
     ours,
 )
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Function
 from wirebayes.wire.protocol import Control
 
 ABOVE_ZERO, NOT_BELOW_ZERO = ("k1", "N"), ("B", "k2", "sensor_sd", "setting_sd")  # as stiffness, creep and errors are
@@ -125,7 +125,7 @@ class Prior:
             theta[:, self.names.index(name)] *= np.exp(-self.log_factor(name, known))
         return theta
 
-    def log_density(self) -> Callable[[Array], Array]:
+    def log_density(self) -> Function:
         """A function of (n, d) parameters that returns the (n,) log density."""
         forms = [ours(d) for d in self.distributions.values()]
         # most columns are of this form, and a call for each would take longer than the arithmetic

@@ -5,7 +5,6 @@ their arithmetic. What these draw from a generator is what scipy draws, to the l
 distribution of scipy; `ours` turns it into one of these where it can.
 """
 
-from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.special import expit, log_ndtr, logit, ndtr, ndtri, ndtri_exp
 
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Function
 
 _HALF_LOG_2PI = 0.5 * float(np.log(2.0 * np.pi))
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(64)  # of means over a standard normal number
@@ -23,7 +22,7 @@ _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(64)  # of means over a sta
 class Distribution:
     """A distribution; each kind says how it is drawn, and what its density and quantiles are."""
 
-    def log_density(self) -> Callable[[Array], Array]:
+    def log_density(self) -> Function:
         """A function of an array that returns its log density."""
         raise NotImplementedError
 
@@ -71,7 +70,7 @@ class Normal(Distribution):
     centre: float = 0.0
     sd: float = 1.0
 
-    def log_density(self) -> Callable[[Array], Array]:
+    def log_density(self) -> Function:
         centre, sd = self.centre, self.sd
         constant = float(np.log(sd)) + _HALF_LOG_2PI
         return lambda x: -0.5 * ((x - centre) / sd) ** 2 - constant
@@ -105,7 +104,7 @@ class HalfNormal(Distribution):
     sd: float
     least: float = 0.0
 
-    def log_density(self) -> Callable[[Array], Array]:
+    def log_density(self) -> Function:
         least, sd = self.least, self.sd
         constant = 0.5 * float(np.log(2.0 / np.pi)) - float(np.log(sd))
         return lambda x: np.where(x >= least, constant - 0.5 * ((x - least) / sd) ** 2, -np.inf)
@@ -140,7 +139,7 @@ class TruncatedNormal(Distribution):
     centre: float
     sd: float
 
-    def log_density(self) -> Callable[[Array], Array]:
+    def log_density(self) -> Function:
         centre, sd, least = self.centre, self.sd, self.support()[0]
         whole = float(np.log(sd)) + _HALF_LOG_2PI + float(log_ndtr(-self.least_sd))
         return lambda x: np.where(x >= least, -0.5 * ((x - centre) / sd) ** 2 - whole, -np.inf)
@@ -184,7 +183,7 @@ class LogNormal(Distribution):
     sd_log: float
     middle: float
 
-    def log_density(self) -> Callable[[Array], Array]:
+    def log_density(self) -> Function:
         return log_normal(self.sd_log, self.middle)
 
     def cdf(self, x: Any) -> Any:
@@ -219,7 +218,7 @@ class LogitNormal(Distribution):
     sd: float
     most: float = 1.0
 
-    def log_density(self) -> Callable[[Array], Array]:
+    def log_density(self) -> Function:
         return _logit_normal(self.middle, self.sd, self.most)
 
     def cdf(self, x: Any) -> Any:
@@ -253,7 +252,7 @@ class Uniform(Distribution):
     low: float
     width: float
 
-    def log_density(self) -> Callable[[Array], Array]:
+    def log_density(self) -> Function:
         low, high, height = self.low, self.low + self.width, -np.log(self.width)
         return lambda x: np.where((x >= low) & (x <= high), height, -np.inf)
 
@@ -283,7 +282,7 @@ class LogUniform(Distribution):
     low: float
     high: float
 
-    def log_density(self) -> Callable[[Array], Array]:
+    def log_density(self) -> Function:
         low, high, constant = self.low, self.high, float(np.log(np.log(self.high / self.low)))
 
         def evaluate(x: Array) -> Array:
@@ -347,13 +346,13 @@ def scaled(distribution: Any, factor: float) -> Any:
     return other
 
 
-def log_density_of(distribution: Any) -> Callable[[Array], Array]:
+def log_density_of(distribution: Any) -> Function:
     """The log density of a distribution of this module or of scipy, as a function of an array."""
     known = ours(distribution)
     return known.log_density() if isinstance(known, Distribution) else lambda x: np.asarray(known.logpdf(x))
 
 
-def log_normal(sd_log: Any, median: Any) -> Callable[[Array], Array]:
+def log_normal(sd_log: Any, median: Any) -> Function:
     """The log density of a log-normal distribution, or of several, a column each."""
     middle, constant = np.log(median), np.log(sd_log) + _HALF_LOG_2PI
 
@@ -365,7 +364,7 @@ def log_normal(sd_log: Any, median: Any) -> Callable[[Array], Array]:
     return evaluate
 
 
-def _logit_normal(middle: float, sd: float, most: float) -> Callable[[Array], Array]:
+def _logit_normal(middle: float, sd: float, most: float) -> Function:
     constant = float(np.log(sd)) + _HALF_LOG_2PI + float(np.log(most))
 
     def evaluate(x: Array) -> Array:

@@ -1,11 +1,12 @@
 """Draws from weighted ones, and how far weights may go before too few draws have them all."""
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.numeric.typing import Array, Indices
 
 
-def systematic_rows(weight: Array, n: int, rng: np.random.Generator) -> Indices:
+def systematic_rows(weight: Array, n: int, rng: Generator) -> Indices:
     """Rows drawn in proportion to their weights by systematic resampling, in their order.
 
     Parameters
@@ -28,7 +29,7 @@ def systematic_rows(weight: Array, n: int, rng: np.random.Generator) -> Indices:
     return np.minimum(np.searchsorted(shares / shares[-1], (np.arange(n) + rng.uniform()) / n), len(weight) - 1)
 
 
-def truncated_rows(log_weight: Array, n: int, rng: np.random.Generator) -> Indices:
+def truncated_rows(log_weight: Array, n: int, rng: Generator) -> Indices:
     """Rows drawn in proportion to their weights, none of which counts for more than the root of all rows.
 
     Parameters
@@ -68,7 +69,7 @@ def effective_number(weight: Array) -> float:
     return float(weight.sum() ** 2 / (weight**2).sum())
 
 
-def thinned(weight: Array, n: int, rng: np.random.Generator) -> tuple[Indices, Array]:
+def thinned(weight: Array, n: int, rng: Generator) -> tuple[Indices, Array]:
     """At most n rows and new weights, which are the old ones on average.
 
     Rows above a threshold stay as they are. The others are drawn in proportion to their weights and count as much as

@@ -1,5 +1,6 @@
 """The types that many modules share."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,3 +11,4 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 Indices = NDArray[np.intp]  # what numpy returns when it is asked where
+Function = Callable[[Array], Array]

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.single_holds import hold_courses
@@ -51,7 +52,7 @@ class Forecast:
         return float(np.mean((self.measured_N >= low) & (self.measured_N <= high)))
 
 
-def forecast_held_out(stored: Stored, experiment: Experiment, rng: np.random.Generator) -> Forecast:
+def forecast_held_out(stored: Stored, experiment: Experiment, rng: Generator) -> Forecast:
     """Predict what `stored`, trained on the first holds of an experiment, has not seen.
 
     As a chain the training readings fix the creep carried in, the displacements say the rest; hold by hold each hold
@@ -77,7 +78,7 @@ def forecast_held_out(stored: Stored, experiment: Experiment, rng: np.random.Gen
     return Forecast(number[wanted], protocol.time_s[wanted], measured[wanted], drawn[wanted])
 
 
-def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng: np.random.Generator) -> Array:
+def last_hold_course(stored: Stored, experiment: Experiment, time_s: Array, rng: Generator) -> Array:
     """Predicted readings of the last hold given its first reading, hold by hold.
 
     Parameters

@@ -4,7 +4,7 @@ Least squares weights all readings equally and has neither priors nor setting er
 published parameters, and with the posterior.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,7 +18,7 @@ from wirebayes.model.scales import scales_of
 from wirebayes.model.single_holds import hold_courses
 from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.means import root_mean_square
-from wirebayes.numeric.typing import Array, Bools
+from wirebayes.numeric.typing import Array, Bools, Function
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
 
@@ -164,7 +164,7 @@ def _predicted(experiment: Experiment, variant: ModelSpec) -> Bools:
     return predicted
 
 
-def _best_descent(misfit: Callable[[Array], Array], points: Array, low: Array, high: Array) -> tuple[Array, float]:
+def _best_descent(misfit: Function, points: Array, low: Array, high: Array) -> tuple[Array, float]:
     """Where the best descent ends, of those from the best of many points, and its rms misfit."""
     with np.errstate(all="ignore"):
         starts = np.clip(points, low + 1e-9, high - 1e-9)
@@ -183,20 +183,20 @@ def _logged(values: Array, logarithmic: Bools) -> Array:
     return np.where(logarithmic, np.log(np.where(logarithmic, values, 1.0)), values)
 
 
-def _jacobian(misfit: Callable[[Array], Array], z: Array) -> Array:
+def _jacobian(misfit: Function, z: Array) -> Array:
     """(m, d) derivatives of the residuals at a point (d,), by central differences in one batch."""
     moves = _STEP * np.concatenate([np.eye(len(z)), -np.eye(len(z))])
     values = misfit(z + moves)
     return (values[:, : len(z)] - values[:, len(z) :]) / (2.0 * _STEP)
 
 
-def _per_unit_misfit(misfit: Callable[[Array], Array], z: Array) -> Array:
+def _per_unit_misfit(misfit: Function, z: Array) -> Array:
     """(d,) standard errors at a point (d,) if residuals had a standard deviation of one."""
     _, singular, directions = np.linalg.svd(_jacobian(misfit, z), full_matrices=False)
     return np.sqrt(((directions / np.maximum(singular, 1e-12)[:, None]) ** 2).sum(axis=0))
 
 
-def _descend(misfit: Callable[[Array], Array], start: Array, low: Array, high: Array) -> Array:
+def _descend(misfit: Function, start: Array, low: Array, high: Array) -> Array:
     """One least-squares descent."""
 
     def at_point(z: Array) -> Array:

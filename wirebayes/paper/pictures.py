@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.random import Generator
 
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import write_bytes, write_json
@@ -65,7 +66,7 @@ class Gallery:
         alt = f"90 % intervals of the parameters of {e.name} before and after the test, in multiples of Table 4."
         self.add("known", e.name, paper_figures.intervals(rows, e.name), alt)
 
-    def last_hold(self, e: Experiment, published: dict[str, float], first: Stored, rng: np.random.Generator) -> None:
+    def last_hold(self, e: Experiment, published: dict[str, float], first: Stored, rng: Generator) -> None:
         """The paper's figures 1 to 4: the last hold of a wire, with the paper's curve and the predicted band.
 
         Parameters
@@ -158,7 +159,7 @@ class Gallery:
         alt = f"Posterior draws of k2 and k1 B of {e.name}: much slow creep looks like little fast creep."
         self.add("amount-and-rate", e.name, figure, alt, caption)
 
-    def prior(self, e: Experiment, rng: np.random.Generator) -> None:
+    def prior(self, e: Experiment, rng: Generator) -> None:
         """What the prior expects of this test."""
         problem = build([e])
         sample, theta = problem.samples[0], problem.prior.rvs(4000, rng)

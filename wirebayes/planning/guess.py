@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.inference.rough_draws import draws as rough_draws
@@ -51,7 +52,7 @@ def from_tables(
     source: Path,
     tests: Sequence[Experiment],
     n: int,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> GuessedWire:
     """A guess as a plan file writes it; what it leaves out is as wide as the model's prior.
 
@@ -108,7 +109,7 @@ def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n:
     return GuessedWire({name: draws[name][pick] for name in (*MATERIAL, *SAMPLE)}, length_mm, source)
 
 
-def from_readings(experiment: Experiment, n: int, rng: np.random.Generator, spec: ModelSpec) -> GuessedWire:
+def from_readings(experiment: Experiment, n: int, rng: Generator, spec: ModelSpec) -> GuessedWire:
     """The posterior of what was measured, by a short run of the sampler.
 
     Parameters

@@ -19,7 +19,7 @@ from wirebayes.json_files.plan import EffectPower
 from wirebayes.model.build import build
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.planning.widths import Guess, central
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Kinds
 
 SIMULATIONS = 300  # an amplitude seen in 80 % of tests is then known to some 5 %
 
@@ -52,7 +52,7 @@ class Sensitivity:
 def sensitivity(
     test: Experiment,
     guess: Guess,
-    kinds: Mapping[str, type[Effect]],
+    kinds: Kinds,
     rng: np.random.Generator,
     spec: ModelSpec = PLAIN_SPEC,
     *,

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import Density, LogPosterior
@@ -98,7 +99,7 @@ def middle_tension(test: Experiment) -> float:
 def expected_widths(
     test: Experiment,
     guess: Guess,
-    rng: np.random.Generator,
+    rng: Generator,
     spec: ModelSpec = PLAIN_SPEC,
     *,
     tension_N: float | None = None,
@@ -145,7 +146,7 @@ def expected_widths(
     return Expected(expected, tension, length, longest, bits, len(good), tuple(draws))
 
 
-def _simulated(problem: Problem, truth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+def _simulated(problem: Problem, truth: Array, rng: Generator) -> tuple[Array, Array]:
     """Parameters with readings of a test that they give, without those that the prior or the model excludes."""
     (sample,) = problem.samples
     y = readings(problem, truth, sample, rng)
@@ -161,7 +162,7 @@ class _Posteriors:
     weight: Array
 
 
-def _kept(part: _Posteriors, values: dict[str, Array], count: int, rng: np.random.Generator) -> list[dict[str, Array]]:
+def _kept(part: _Posteriors, values: dict[str, Array], count: int, rng: Generator) -> list[dict[str, Array]]:
     """Draws of the first so many tests, each as likely as its weight says."""
     out = []
     for weight, row in list(zip(part.weight, _rows(values), strict=True))[:count]:
@@ -179,9 +180,7 @@ def _expected(widths: list[dict[str, Array]], before: dict[str, Array], test: Ex
     return out
 
 
-def _posteriors(
-    target: LogPosterior, found: Optimum, good: Indices, y: Array, rng: np.random.Generator
-) -> Iterator[_Posteriors]:
+def _posteriors(target: LogPosterior, found: Optimum, good: Indices, y: Array, rng: Generator) -> Iterator[_Posteriors]:
     """Weighted draws around the best parameters of each test, some tests at once."""
     covariance = found.covariance
     for begin in range(0, len(good), _ROWS):
@@ -214,9 +213,7 @@ def _bits(problem: Problem, log_volumes: Array) -> float:
     return float((known[0] - np.median(log_volumes)) / np.log(2.0))
 
 
-def _weighted(
-    target: LogPosterior, z: Array, covariance: Array, y: Array, rng: np.random.Generator
-) -> tuple[Array, Array]:
+def _weighted(target: LogPosterior, z: Array, covariance: Array, y: Array, rng: Generator) -> tuple[Array, Array]:
     """(m * k, d) natural draws at m modes, and their (m, k) weights, each row summing to one.
 
     The first draws are spread as the curvature at the mode says, those of each further round as the weighted draws
@@ -237,7 +234,7 @@ def _weighted(
 
 
 def _round(
-    target: LogPosterior, density: Density, centre: Array, covariance: Array, k: int, rng: np.random.Generator
+    target: LogPosterior, density: Density, centre: Array, covariance: Array, k: int, rng: Generator
 ) -> tuple[Array, Array]:
     """(m, k, d) draws of Student t's, and their (m, k) weights in the posteriors."""
     m, d = centre.shape

@@ -8,7 +8,7 @@ densities are ratios of integrals, found by importance sampling from a proposal 
 reaches what is likely only without a hold. What is not settled then is left to walkers.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.prediction.left_out_density import log_densities, without_hold
+from wirebayes.progress import ShareDone
 
 # Above 0.7 importance sampling cannot be trusted (Vehtari et al., Pareto smoothed importance sampling). Stricter here:
 # a posterior without a hold may have a second mode that the one with it never visits, and k says little of that.
@@ -76,7 +77,7 @@ def smoothed_leave_one_hold_out(
     *,
     policy: Policy = REFIT,
     exact: bool = False,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: ShareDone = lambda share: None,
 ) -> LeftOutHolds:
     """Leave out each recorded hold in turn, by Pareto-smoothed importance sampling, and by sampling where it fails.
 

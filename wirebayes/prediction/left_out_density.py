@@ -6,7 +6,6 @@ a hold exclude. Posteriors without a hold that are far from the others, or that 
 themselves.
 """
 
-from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
 
@@ -19,7 +18,7 @@ from wirebayes.inference.modes import searches
 from wirebayes.inference.weighted_posterior import overlooked_share, weighted_posterior
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.log_sum import or_impossible
-from wirebayes.numeric.typing import Array, Bools
+from wirebayes.numeric.typing import Array, Bools, Function
 
 Holds = list[tuple[int, int]]
 
@@ -129,7 +128,7 @@ def without_holds(problem: Problem, holds: Holds) -> list[Array]:
     return out
 
 
-def joined_densities(target: LogPosterior, holds: Holds) -> Callable[[Array], Array]:
+def joined_densities(target: LogPosterior, holds: Holds) -> Function:
     """Log posterior densities (n, 1 + m), with all readings and without those of each hold, of sampled points (n, d).
 
     Parameters

@@ -11,6 +11,7 @@ each draw is shifted by the regression of all readings on the given ones, which 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.problem import Problem
@@ -47,7 +48,7 @@ class PredictionRequest:
 
 
 def draw_predictive(
-    problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: np.random.Generator
+    problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: Generator
 ) -> Floats:
     """Draws of the requested readings.
 
@@ -74,9 +75,7 @@ def draw_predictive(
     return drawn if problem.likelihood == "hold" else given_first(drawn, request)
 
 
-def _readings(
-    problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: np.random.Generator
-) -> Floats:
+def _readings(problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: Generator) -> Floats:
     own, protocol = problem.parameters(theta, sample), request.protocol
     shape = (*protocol.time_s.shape, len(theta))
     error = rng.normal(size=shape) * own["sensor_sd"] + rng.uniform(-0.5, 0.5, shape) * sample.resolution
@@ -86,7 +85,7 @@ def _readings(
     return np.where(request.requested[:, None, None], course + error, 0.0)
 
 
-def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np.random.Generator) -> Floats:
+def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: Generator) -> Floats:
     """Readings without sensor error along the chain of holds; trained holds appear as replicates.
 
     A replicate has a setting error of its own, while the creep carried on from a trained hold is the one that its
@@ -130,7 +129,7 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: np
     return np.array(out)
 
 
-def settings_given_readings(own: Theta, sample: Sample, rng: np.random.Generator) -> Floats:
+def settings_given_readings(own: Theta, sample: Sample, rng: Generator) -> Floats:
     """A draw of the setting errors of a sample's holds, unrecorded ones included, given all its readings.
 
     Parameters

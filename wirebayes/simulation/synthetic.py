@@ -28,7 +28,7 @@ from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Array
 from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Effect, Kinds
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.model import tension_reference
 from wirebayes.wire.protocol import Control
@@ -244,7 +244,7 @@ def write_tests(folder: Path, benches: Sequence[Bench], truth: Truth = Truth(), 
     return made
 
 
-def effect_option(text: str, known: Mapping[str, type[Effect]] = CATALOGUE) -> tuple[Effect, dict[str, float]]:
+def effect_option(text: str, known: Kinds = CATALOGUE) -> tuple[Effect, dict[str, float]]:
     """An effect and the amplitude given with it, from ``NAME``, ``NAME.p=VALUE`` or ``NAME@HOLD.p=VALUE``.
 
     Parameters

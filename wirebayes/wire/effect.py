@@ -75,6 +75,7 @@ class Amplitude:
     of_each_test: bool = False
 
 
+Own = dict[str, Array]  # an effect's own amplitudes, by name
 Clock = tuple[Any, Array, Array]  # when it began, the creep that it heads for, its rate
 
 
@@ -380,3 +381,6 @@ class EventEffect(Effect):
     def variants(cls, protocols: Sequence[Protocol]) -> list[Effect]:
         """One a recorded hold; the protocols are those of one experiment."""
         return [cls(hold=int(number)) for p in protocols for number in p.number[p.recorded]]
+
+
+Kinds = Mapping[str, type[Effect]]  # effects by name

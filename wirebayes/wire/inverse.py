@@ -1,10 +1,8 @@
 """The inverse of a rising function, by Newton's steps between bounds; its derivatives come with it."""
 
-from collections.abc import Callable
-
 import numpy as np
 
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Function
 
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
 _MOST_STEPS = 200  # halving a bracket takes 60 from any start; a root far above the first guess some more
@@ -12,7 +10,7 @@ _EXACT = 4.0 * np.finfo(float).eps  # relative; a smaller step is rounding
 _MISSED = 1e-9  # of the target: no step got nearer, so the function never rises so high
 
 
-def inverse(function: Callable[[Array], Array], target: Array) -> Array:
+def inverse(function: Function, target: Array) -> Array:
     """Where a function takes given values.
 
     Parameters
@@ -52,7 +50,7 @@ def inverse(function: Callable[[Array], Array], target: Array) -> Array:
     return np.where(wanted > 0, found, target)
 
 
-def _with_slope(function: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
+def _with_slope(function: Function, at: Array) -> tuple[Array, Array]:
     """Real value, and slope by the argument alone: what else the function refers to may be complex."""
     moved = function(at + 1j * _STEP)
     rest = function(at + 0j).imag if np.iscomplexobj(function(at)) else 0.0

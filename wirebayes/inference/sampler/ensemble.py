@@ -19,7 +19,6 @@ later ones disagree with them, where places that the proposal overlooks lead to 
 walkers have lost one that it had found, and where the proposal is so poor that a mode may be about to be found.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +28,7 @@ from wirebayes.inference.policy import DEFAULT, Policy, describe
 from wirebayes.inference.sampler import burn_in, kept, resume
 from wirebayes.inference.sampler.state import BurnIn, State, by_ensemble
 from wirebayes.numeric.typing import Array
+from wirebayes.progress import ShareDone
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def sample_posterior(
     policy: Policy = DEFAULT,
     *,
     checkpoint: Path | None = None,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: ShareDone = lambda share: None,
     found: Optimum | None = None,
     near: Array | None = None,
     rough: Array | None = None,

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from scipy.special import gammaln
 
 from wirebayes.inference.sampler.points import WeightedPoints
@@ -100,7 +101,7 @@ def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixtur
 
 def fit_mixture(
     points: WeightedPoints,
-    rng: np.random.Generator,
+    rng: Generator,
     *,
     most: int = 8,
     degrees: float = DEGREES,
@@ -151,7 +152,7 @@ def fit_mixture(
     raise np.linalg.LinAlgError("the points do not span their space")
 
 
-def fit_around(points: WeightedPoints, of: Mixture, rng: np.random.Generator, *, most: int, wider: float) -> Mixture:
+def fit_around(points: WeightedPoints, of: Mixture, rng: Generator, *, most: int, wider: float) -> Mixture:
     """A mixture of few points, the components of which lean on the covariance of another mixture.
 
     Parameters

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.inference.sampler import mixture, transport_map
 from wirebayes.inference.sampler.components import Components
@@ -118,7 +119,7 @@ def fit_proposal(
     cold: WeightedPoints,
     start: Mixture,
     order: Ints,
-    rng: np.random.Generator,
+    rng: Generator,
     shares: Shares,
     *,
     most: int,
@@ -173,7 +174,7 @@ def fit_proposal(
     )
 
 
-def with_excess(of: Proposal, drawn: WeightedPoints, value: Array, rng: np.random.Generator) -> Proposal:
+def with_excess(of: Proposal, drawn: WeightedPoints, value: Array, rng: Generator) -> Proposal:
     """The proposal with a part for where the posterior lies far above its other parts.
 
     A mixture fitted to all points has no component to spare for a thousandth of the mass, however far the posterior

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.policy import Policy
@@ -101,7 +102,7 @@ class BurnIn:
 
     walkers: Walkers
     learned: Learned
-    generator: np.random.Generator
+    generator: Generator
     evaluations: int
     round: int = 0
     walk: tuple[Array, Array, Array] | None = None
@@ -185,7 +186,7 @@ class Sampling:
 
     walkers: Walkers
     learned: Learned
-    generator: np.random.Generator
+    generator: Generator
     evaluations: int
     kept: Kept = field(default_factory=Kept)
     diagnostics: Diagnostics | None = None

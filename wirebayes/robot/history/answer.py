@@ -25,7 +25,7 @@ from wirebayes.robot.history.tables import correction_table, pose_table, rotatio
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, winches
 from wirebayes.robot.mechanics import rotation as turning
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import drift as drifting
 from wirebayes.robot.motion.course import Course
@@ -69,7 +69,7 @@ def history_report(
     line: WireDraws,
     history: History,
     errors: Uncertain,
-    start: tuple[Floats, Floats],
+    start: Poses,
     seed: int,
     progress: Progress = silent,
 ) -> HistoryAnswer:
@@ -128,7 +128,7 @@ class _Asked:
 
     robot: Robot
     history: History
-    start: tuple[Floats, Floats]
+    start: Poses
     errors: Uncertain
     seed: int
 

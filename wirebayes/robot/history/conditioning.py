@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.numeric.resampling import systematic_rows
 from wirebayes.numeric.typing import Bools, Floats
@@ -148,9 +149,7 @@ def find_mode(known: LogUnknowns, read: LogReadings, way: Way, without: Bools) -
     return best
 
 
-def draw_posterior(
-    known: Callable[[], LogUnknowns], read: LogReadings, mode: Mode, way: Way, rng: np.random.Generator
-) -> Draws:
+def draw_posterior(known: Callable[[], LogUnknowns], read: LogReadings, mode: Mode, way: Way, rng: Generator) -> Draws:
     """Draws of the posterior: moved from draws of the prior, weighted, and drawn again by their weights.
 
     Parameters
@@ -188,9 +187,7 @@ def _shares(logs: Floats) -> tuple[Floats, float]:
     return np.asarray(share), float(1.0 / (share**2).sum())
 
 
-def _moved(
-    prior: Floats, read: LogReadings, mode: Mode, way: Way, rng: np.random.Generator
-) -> tuple[Floats, Track, Floats]:
+def _moved(prior: Floats, read: LogReadings, mode: Mode, way: Way, rng: Generator) -> tuple[Floats, Track, Floats]:
     """Draws ``(n, d + m)`` that fit readings of their own, their way, and the logarithms of their weights."""
     (n, d), m, every = prior.shape, len(read.of.offset), np.zeros(1, bool)
     noise = rng.standard_normal((n, d + m))

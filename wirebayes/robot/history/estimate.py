@@ -12,7 +12,7 @@ from wirebayes.robot.history.follow import Track, clock_starts, follow_log, refi
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.readings import reading_weight, sensors
 from wirebayes.robot.history.unknowns import LogUnknowns, Uncertain, unknowns
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState
@@ -61,7 +61,7 @@ def estimate_poses(
     robot: Robot,
     line: WireDraws,
     history: History,
-    start: tuple[Floats, Floats],
+    start: Poses,
     errors: Uncertain,
     rng: np.random.Generator,
     progress: Progress = silent,
@@ -123,9 +123,7 @@ def weights(times_s: Floats) -> Floats:
     return np.array([reading_weight(None)] + [reading_weight(float(since)) for since in np.diff(times_s)])
 
 
-def plain_track(
-    known: LogUnknowns, history: History, start: tuple[Floats, Floats], progress: Progress
-) -> tuple[Track, Floats]:
+def plain_track(known: LogUnknowns, history: History, start: Poses, progress: Progress) -> tuple[Track, Floats]:
     """The mean wire, which never creeps, under measured joint values; and when it makes the wires' clocks start.
 
     Those times do not depend on how finely an even motion was sampled: it is divided where rows are far apart.
@@ -169,7 +167,7 @@ class _Way:
 
     known: LogUnknowns
     history: History
-    start: tuple[Floats, Floats]
+    start: Poses
     plain: Track
     starts_s: Floats
     progress: Progress

@@ -7,7 +7,7 @@ import numpy as np
 
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.history.history import History, divided
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
 from wirebayes.robot.motion.drift import CreepingHold
@@ -76,7 +76,7 @@ def follow_log(
     wires: Wires,
     history: History,
     joint_m: Floats,
-    start: tuple[Floats, Floats],
+    start: Poses,
     starts_s: Floats,
     error_m: Floats | float = 0.0,
     progress: Callable[[int], None] = lambda row: None,
@@ -193,7 +193,7 @@ def _begin(
     wires: Wires,
     schedule: Callable[[float], Floats],
     since_s: float,
-    start: tuple[Floats, Floats],
+    start: Poses,
     carried: CreepState,
     error_m: Floats | float,
 ) -> CreepingHold:

@@ -20,7 +20,7 @@ from wirebayes.robot.history.live_input import checked_number, checked_reading, 
 from wirebayes.robot.history.readings import Information, reading_weight, sensors
 from wirebayes.robot.history.unknowns import Uncertain, slopes, unknowns
 from wirebayes.robot.mechanics import firmware
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts
 from wirebayes.robot.mechanics.rotation import antisymmetric, matrix
 from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch
@@ -120,7 +120,7 @@ class LiveEstimator:
         robot: Robot,
         line: WireDraws,
         errors: Uncertain,
-        start: tuple[Floats, Floats],
+        start: Poses,
         reads: bool = True,
         seed: int = 0,
     ) -> None:

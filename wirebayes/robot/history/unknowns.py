@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 from scipy.linalg import solve_triangular
 from scipy.special import ndtri
 
@@ -97,7 +98,7 @@ def slopes(values: Floats) -> Floats:
     return np.asarray((values[1:] - values[0]) / _STEP)
 
 
-def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Generator) -> LogUnknowns:
+def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: Generator) -> LogUnknowns:
     """The unknowns of a robot whose wires are cut from one line.
 
     Parameters
@@ -123,7 +124,7 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: np.random.Ge
     return LogUnknowns(robot, prior, mean, root, np.asarray(white))
 
 
-def even_normals(n: int, m: int, rng: np.random.Generator) -> Floats:
+def even_normals(n: int, m: int, rng: Generator) -> Floats:
     """Independent columns of standard normal draws, one in each n-th part of the probability and symmetric about zero.
 
     Each draw is standard normal, but the mean over all of what is nearly a sum of functions of single columns has next

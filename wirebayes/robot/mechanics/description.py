@@ -12,6 +12,8 @@ from wirebayes.numeric.typing import Bools, Floats, Indices
 Actuator = Literal["drum", "linear"]
 Freedom = Literal["pose", "position", "orientation"]
 Contact = Literal["table", "rail"]
+Poses = tuple[Floats, Floats]  # positions and rotations, (3,) and (3, 3) of one, (n, 3) and (n, 3, 3) of several
+Lengths = tuple[Floats, Floats]  # zero-tension lengths, and what lies beyond the exit points, (n, w) each
 GRAVITY = 9.80665  # m/s^2, standard
 
 

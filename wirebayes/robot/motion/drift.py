@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from wirebayes.numeric.typing import Bools, Floats
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.rotation import antisymmetric
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, one_sided, outcome, path
@@ -109,7 +109,7 @@ class CreepingHold:
         robot: Robot,
         wires: Wires,
         joint_m: Floats | Callable[[float], Floats],
-        start: tuple[Floats, Floats],
+        start: Poses,
         carried: CreepState | None = None,
         follow: Follow = "current",
         tolerance: float = _TOLERANCE,
@@ -272,7 +272,7 @@ class CreepingHold:
         lost = ~self.live & ~fell
         here.status[lost] = self.here.status[lost]
 
-    def _stiffness(self, pose: tuple[Floats, Floats] | None = None) -> Floats:
+    def _stiffness(self, pose: Poses | None = None) -> Floats:
         pose = pose or (self.here.position_m, self.here.rotation)
         return one_sided.lowest_stiffness(self.robot, self.wires, pose, self.lengths)
 

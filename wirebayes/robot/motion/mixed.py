@@ -14,7 +14,7 @@ from wirebayes.numeric import cholesky
 from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
 
 _SETS = 40  # of taut wires tried in a step; one or two are usual
@@ -25,7 +25,7 @@ _BARELY = 1e-9  # strain at which a slack wire's stiffness is taken
 
 
 def newton_step_with_tensions(
-    robot: Robot, wires: Wires, pose: tuple[Floats, Floats], tension_N: Floats, lengths: tuple[Floats, Floats]
+    robot: Robot, wires: Wires, pose: Poses, tension_N: Floats, lengths: Lengths
 ) -> tuple[Floats, Floats]:
     """One step of poses and tensions towards equilibrium at lengths.
 
@@ -143,7 +143,7 @@ def _share(energy: _Quadratic, here: Floats, way: Floats) -> Floats:
 
 
 def approach(
-    robot: Robot, wires: Wires, pose: tuple[Floats, Floats], tension_N: Floats, lengths: tuple[Floats, Floats]
+    robot: Robot, wires: Wires, pose: Poses, tension_N: Floats, lengths: Lengths
 ) -> tuple[tuple[Floats, Floats], Floats]:
     """Poses near equilibrium at lengths, and the first step towards them.
 
@@ -174,7 +174,7 @@ def approach(
     return (x, R), ahead
 
 
-def after_step(robot: Robot, pose: tuple[Floats, Floats], step: Floats) -> tuple[Floats, Floats]:
+def after_step(robot: Robot, pose: Poses, step: Floats) -> Poses:
     """Poses after small steps.
 
     Parameters

@@ -12,7 +12,7 @@ import numpy as np
 
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires, tension
 
 TOUCHING = 1e-9  # strain from zero within which a wire is neither taut nor slack: a nanometre a metre
@@ -21,7 +21,7 @@ TOUCHING = 1e-9  # strain from zero within which a wire is neither taut nor slac
 _APART = 1e-9
 
 
-def lowest_stiffness(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Floats:
+def lowest_stiffness(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> Floats:
     """Least stiffness against any displacement, rotations in metres at the platform's edge.
 
     Parameters
@@ -42,7 +42,7 @@ def lowest_stiffness(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], le
     return _bounds(robot, wires, pose, lengths)[1]
 
 
-def held(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Bools:
+def held(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> Bools:
     """Whether wires that are just not slack make balances stable that the taut ones alone leave loose, ``(n,)``.
 
     Parameters
@@ -54,9 +54,7 @@ def held(robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple
     return np.asarray(touching & (least > _APART * largest))
 
 
-def _bounds(
-    robot: Robot, wires: Wires, pose: tuple[Floats, Floats], lengths: tuple[Floats, Floats]
-) -> tuple[Bools, Floats, Floats]:
+def _bounds(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> tuple[Bools, Floats, Floats]:
     """Where any wire is just not slack, and least and largest stiffness, ``(n,)`` each; NaN where there is no pose."""
     known = np.asarray(np.isfinite(pose[0]).all(1))
     turn, zero = np.moveaxis(pose[1], 0, -1), lengths[0].T

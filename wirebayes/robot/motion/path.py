@@ -12,7 +12,7 @@ import numpy as np
 
 from wirebayes.numeric import cholesky
 from wirebayes.numeric.typing import Bools, Floats, Indices
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, mixed, outcome
 from wirebayes.robot.motion.balance import balance_at, tensions_at
@@ -65,7 +65,7 @@ class Followed:
 def follow(
     robot: Robot,
     wires: Wires,
-    start: tuple[Floats, Floats],
+    start: Poses,
     old: tuple[Floats, Floats],
     new: tuple[Floats, Floats],
     smallest: float = SMALLEST,
@@ -108,9 +108,7 @@ def follow(
     return followed
 
 
-def _undivided(
-    robot: Robot, wires: Wires, start: tuple[Floats, Floats], old: tuple[Floats, Floats], new: tuple[Floats, Floats]
-) -> tuple[Followed, Bools]:
+def _undivided(robot: Robot, wires: Wires, start: Poses, old: Lengths, new: Lengths) -> tuple[Followed, Bools]:
     """All at once, as most need no division; the others are where they were, and (n,) says which are not."""
     x, R = (np.array(v) for v in start)
     tau = tensions_at(robot, wires, x, R, *old)
@@ -147,7 +145,7 @@ class _Divided:
 
 
 def _step(
-    robot: Robot, wires: Wires, start: tuple[Floats, Floats], tension_N: Floats, lengths: tuple[Floats, Floats]
+    robot: Robot, wires: Wires, start: Poses, tension_N: Floats, lengths: Lengths
 ) -> tuple[forward.Equilibria, Bools]:
     """Solutions from starts, and whether each is where one Newton step says that it is.
 
@@ -171,9 +169,7 @@ def _step(
     return there, np.asarray(there.found & close)
 
 
-def _let_go(
-    robot: Robot, wires: Wires, there: forward.Equilibria, loose: Indices, lengths: tuple[Floats, Floats]
-) -> None:
+def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, loose: Indices, lengths: Lengths) -> None:
     """Put in place of unstable balances the equilibria next to them, to which the least disturbance leads.
 
     Where wires that were just not slack part from a symmetric platform, it tilts until some are taut again.
@@ -190,9 +186,7 @@ def _let_go(
         getattr(there, field.name)[loose[held]] = getattr(found, field.name)[held]
 
 
-def settle(
-    robot: Robot, wires: Wires, near: tuple[Floats, Floats], lengths: tuple[Floats, Floats], small: float = _SMALL
-) -> forward.Equilibria:
+def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: float = _SMALL) -> forward.Equilibria:
     """Solutions hardly away from poses: one Newton step is exact enough for most, the others are solved in full.
 
     Parameters
@@ -226,7 +220,7 @@ def settle(
     return out
 
 
-def newton_step(robot: Robot, wires: Wires, start: tuple[Floats, Floats], lengths: tuple[Floats, Floats]) -> Floats:
+def newton_step(robot: Robot, wires: Wires, start: Poses, lengths: Lengths) -> Floats:
     """Where one Newton step towards equilibrium leads.
 
     Parameters

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.json_files.pose import (
     Claim,
@@ -137,7 +138,7 @@ def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, cont
     return PoseAnswer(content, courses, spaces)
 
 
-def _courses(held: _Held, rng: np.random.Generator) -> dict[float, Course]:
+def _courses(held: _Held, rng: Generator) -> dict[float, Course]:
     """The drift from the pose, by the spread between specimens."""
     request = held.request
     courses = {}
@@ -281,7 +282,7 @@ def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Float
     }
 
 
-def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: np.random.Generator) -> EquilibriaJson:
+def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: Generator) -> EquilibriaJson:
     """The commanded pose, and every stable pose that the same lengths of the mean wire allow, from many starts."""
     mean = control.known(wires)
     tau = inverse.tensions(robot, x[None], R[None])

@@ -1,6 +1,7 @@
 """Pose error under controllers with different models of the wires, and how long a calibration lasts."""
 
 import numpy as np
+from numpy.random import Generator
 
 from wirebayes.json_files.pose import BetweenCalibrations, ControllerError, TimeWithin, Tolerances
 from wirebayes.numeric.evenly import evenly
@@ -18,7 +19,7 @@ _DRAWS = 300  # each drifts through all of these times; a 95 % probability is th
 
 
 def errors(
-    robot: Robot, line: WireDraws, request: PoseRequest, rng: np.random.Generator, other: WireDraws | None = None
+    robot: Robot, line: WireDraws, request: PoseRequest, rng: Generator, other: WireDraws | None = None
 ) -> list[ControllerError]:
     """Pose error under controllers that know the posterior, and how long each stays within tolerance.
 
@@ -61,7 +62,7 @@ def errors(
 
 
 def between_calibrations(
-    robot: Robot, line: WireDraws, request: PoseRequest, rng: np.random.Generator
+    robot: Robot, line: WireDraws, request: PoseRequest, rng: Generator
 ) -> list[BetweenCalibrations]:
     """Longest time between calibrations with P(within tolerance) of 95 %, after a load history.
 

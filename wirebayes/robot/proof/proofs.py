@@ -4,7 +4,7 @@ import numpy as np
 
 from wirebayes.json_files.pose import CertificateJson, EnclosedBand
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, forward, inverse
 from wirebayes.robot.motion.course import Course
@@ -163,7 +163,7 @@ class _Way:
                 return None
         return None if here is None else self._reach(here, at, strain, self.strain)
 
-    def _certain(self, near: tuple[Floats, Floats], k1_N: Floats, strain: Floats) -> _Pose | None:
+    def _certain(self, near: Poses, k1_N: Floats, strain: Floats) -> _Pose | None:
         """A pose proved for known wires, with the width of its proof."""
         pose = self._solved(near, k1_N, strain)
         if pose is None:
@@ -172,7 +172,7 @@ class _Way:
         proof = certify(self.robot, self.law, (k1_N, k1_N), (zero, zero), self.offset, *pose, how_alone=False)
         return (*pose, proof.radius_m) if proof.proved else None
 
-    def _solved(self, near: tuple[Floats, Floats], k1_N: Floats, strain: Floats) -> tuple[Floats, Floats] | None:
+    def _solved(self, near: Poses, k1_N: Floats, strain: Floats) -> tuple[Floats, Floats] | None:
         wires = Wires(self.law, "saturating", {"k1": k1_N[:, None]}, np.full((self.robot.legs, 1), 1000.0))
         found = forward.solve_equilibrium(self.robot, wires, (self.bare * (1 + strain))[None], self.offset, *near)
         left, _, right = np.linalg.svd(found.rotation[0])

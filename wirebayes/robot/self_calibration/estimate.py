@@ -4,7 +4,6 @@ The posterior is Gaussian about its mode, found by Gauss-Newton over the whole l
 creep model makes readings at different times speak of the same unknowns.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -13,8 +12,9 @@ from scipy.special import ndtri
 from wirebayes.numeric.linear_algebra import inv, solve
 from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats, Indices
+from wirebayes.progress import ShareDone
 from wirebayes.robot.mechanics import rotation
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.predicted import PredictedSession, predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
@@ -82,7 +82,7 @@ def length_posterior(
     readings: Floats,
     iterations: int = 40,
     patience: int = PATIENT,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: ShareDone = lambda share: None,
 ) -> LengthPosterior:
     """Posterior of the wires' lengths from standardised readings of one session on ``m`` robots.
 
@@ -145,9 +145,9 @@ class _Target:
     readings: Floats
     mean: Floats
     root: Floats
-    progress: Callable[[float], None]
+    progress: ShareDone
 
-    def predicted(self, white: Floats, near: tuple[Floats, Floats] | None = None) -> PredictedSession:
+    def predicted(self, white: Floats, near: Poses | None = None) -> PredictedSession:
         """What unknowns ``(m, d)`` lead to; `near` are poses at the beginning of every hold."""
         return predict_session(self.robot, self.prior, self.session, self.mean + white @ self.root.T, near=near)
 

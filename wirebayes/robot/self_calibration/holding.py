@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, mixed, path
 from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
@@ -49,7 +49,7 @@ def holds(
     session: Session,
     resolved_N: float,
     longest_step: float = LONGEST,
-    near: tuple[Floats, Floats] | None = None,
+    near: Poses | None = None,
 ) -> Iterator[SessionHold]:
     """Every hold of a session, in order.
 
@@ -100,8 +100,8 @@ class _Walk:
         self,
         robot: Robot,
         wires: Wires,
-        lengths: tuple[Floats, Floats],
-        start: tuple[Floats, Floats],
+        lengths: Lengths,
+        start: Poses,
         carried: CreepState,
         resolved_N: float,
     ) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.numeric.typing import Bools, Floats
-from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.description import GRAVITY, Poses, Robot
 from wirebayes.robot.motion import forward
 from wirebayes.robot.motion.creep import CreepState
 from wirebayes.robot.self_calibration.holding import LONGEST, holds
@@ -55,7 +55,7 @@ def predict_session(
     session: Session,
     unknowns: Floats,
     longest_step: float = LONGEST,
-    near: tuple[Floats, Floats] | None = None,
+    near: Poses | None = None,
 ) -> PredictedSession:
     """Run the session for every row of unknowns ``(n, d)``: every creep step under the tensions it meets.
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.random import Generator
 from scipy.optimize import nnls
 
 from wirebayes.numeric.linear_algebra import solve
@@ -26,7 +27,7 @@ _SMALL = 1e-3  # N of imbalance for which a tension may be 1 N smaller: decides 
 _OTHERS = 2  # further starts, where the first does not explain the readings
 
 
-def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: np.random.Generator) -> State:
+def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: Generator) -> State:
     """A state about a robot's unknowns: stated poses where there are some, else those that close the loops best.
 
     Parameters
@@ -75,7 +76,7 @@ def _located(
     lost: Indices,
     position: Floats,
     turn: Floats,
-    rng: np.random.Generator,
+    rng: Generator,
 ) -> tuple[Floats, Floats]:
     """Poses ``(l, 3)``, ``(l, 3, 3)`` of holds that close the loops best, of many trials each."""
     parts = unknowns.parts(white)
@@ -153,7 +154,7 @@ class _PoseSearch:
 def best(
     unknowns: Unknowns,
     holds: Holds,
-    rng: np.random.Generator,
+    rng: Generator,
     progress: Progress = silent,
     called: str = "start",
 ) -> Whole:

@@ -5,7 +5,6 @@ are, given that one, it is the one; where that is true of several, the readings 
 have more errors than one: where none explains all, one that explains most of it is still named.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +14,7 @@ from wirebayes.json_files.calibrate import SensorsAtFault
 from wirebayes.notice import Notice
 from wirebayes.numeric.linear_algebra import inv, solve
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import ShareDone
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance
@@ -81,7 +81,7 @@ def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
     return Suspects(score / own, own**-0.5, float(chdtrc(w, max(total, 0.0))), alone, share)
 
 
-def suspects(found: Whole, holds: Holds, progress: Callable[[float], None] = lambda share: None) -> Suspects | None:
+def suspects(found: Whole, holds: Holds, progress: ShareDone = lambda share: None) -> Suspects | None:
     """Estimate an error of every sensor beside all else; None where they have one already, or nothing converged.
 
     Parameters

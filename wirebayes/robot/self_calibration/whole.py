@@ -4,14 +4,13 @@ Levenberg-Marquardt over robot and holds together, the holds eliminated one by o
 then ever smaller ones, lead from rough geometry to the mode.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Floats
-from wirebayes.progress import Progress
+from wirebayes.progress import Progress, ShareDone
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.approach import onward
 from wirebayes.robot.self_calibration.descent import descend
@@ -65,14 +64,12 @@ def with_levels(unknowns: Unknowns, holds: Holds) -> Unknowns:
     return replace(unknowns, errors=replace(unknowns.errors, level_N=_LEVEL * (rule.highest_N - rule.lowest_N)))
 
 
-def progress_of(progress: Progress, name: str) -> Callable[[float], None]:
+def progress_of(progress: Progress, name: str) -> ShareDone:
     """The progress of one search, of which only the share is known that is done."""
     return lambda share: progress(name, share, 1.0)
 
 
-def estimate(
-    unknowns: Unknowns, holds: Holds, state: State, progress: Callable[[float], None] = lambda share: None
-) -> Whole:
+def estimate(unknowns: Unknowns, holds: Holds, state: State, progress: ShareDone = lambda share: None) -> Whole:
     """The posterior next to a start; not converged where nothing near the robot has such joint values.
 
     Parameters
@@ -95,9 +92,7 @@ def estimate(
     return replace(found, converged=found.converged and not lost(found))
 
 
-def _at_rest(
-    unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, progress: Callable[[float], None]
-) -> Whole:
+def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, progress: ShareDone) -> Whole:
     """State, noise and creep in turns, each from the others, until none of them moves on."""
     rounds: list[tuple[Floats, Floats]] = []
     passed, roughly, cost = [state], ROUGHLY, np.inf
