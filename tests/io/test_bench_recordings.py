@@ -273,3 +273,22 @@ def test_thinned_readings_are_early_and_few(count):
     assert kept[-1] == count - 1
     assert (np.diff(kept) > 0).all()
     assert len(kept) == count if count <= MOST else len(kept) <= KEPT
+
+
+@pytest.mark.parametrize(("pause_s", "recorded_move"), [(30.0, False), (0.0, True)])
+def test_a_move_in_a_pause_of_the_recording_has_no_duration(pause_s, recorded_move, tmp_path):
+    """Measured displacements, read at doubling times: between two holds is no more than the pause before a reading."""
+    noise = np.random.default_rng(1)
+    times = np.array([0.0, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0]) if pause_s > 1.0 else np.arange(0.0, 60.0, 0.1)
+    path = tmp_path / "raw.csv"
+    rows = [
+        f"{hold * (60.0 + pause_s) + t:.2f},{hold + noise.normal(0.0, 0.0005):.5f},{5 * hold - t / 200:.4f}\n"
+        for hold in range(1, 5)
+        for t in times
+    ]
+    path.write_text("Time (s),Displacement (mm),Force (N)\n" + "".join(rows))
+    imported = wb.import_bench(path, length_mm=1300.0, output=tmp_path / "out").summary()
+    notes = " ".join(imported["experiments"]["raw"]["notes"])
+    assert imported["warnings"] == []
+    assert ("each hold begins at its first reading, for no move to one was recorded" in notes) != recorded_move
+    assert ("moves took 0.1 s (median)" in notes) == recorded_move

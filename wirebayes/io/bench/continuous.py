@@ -53,10 +53,15 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
 def _moves_to(x: Floats, time: Floats, found_holds: Sequence[Plateau]) -> tuple[list[float], list[float]]:
     """How long the move to each hold took, and when the hold begins."""
     lefts = [0, *(p.left - 1 for p in found_holds[:-1])]
-    moves = [float(time[p.begin] - time[left]) for p, left in zip(found_holds, lefts, strict=True)]
     zeros = [_moved(x, time, left, p) for p, left in zip(found_holds, lefts, strict=True)]
+    moves = [_lasted(time, left, p, zero) for p, left, zero in zip(found_holds, lefts, zeros, strict=True)]
     moves[0] = min(moves[0], 2.0 * (float(time[found_holds[0].begin]) - zeros[0]))  # without a rest before the test
     return moves, zeros
+
+
+def _lasted(time: Floats, left: int, hold: Plateau, zero_s: float) -> float:
+    """How long a move took; 0 where nothing was recorded on the way, and a hold begins with its first reading."""
+    return float(time[hold.begin] - time[left]) if zero_s < time[hold.begin] else 0.0
 
 
 def _check_rising(readings: Readings) -> None:
@@ -71,11 +76,16 @@ def _notes(readings: Readings, holds: int, kept: int, move_s: float) -> list[str
     """What was understood and done."""
     noise = noise_of(readings.setting, readings.step)
     count = len(readings.setting)
+    begins = "each hold begins at its first reading, for no move to one was recorded"
+    if move_s > 0.0:
+        begins = (
+            "each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
+            f"{move_s:.3g} s (median), and readings as soon after one are left out, up to a tenth of the hold"
+        )
     return [
         f"a continuous recording of {count} readings: {counted(holds, 'hold')} where the {readings.role} stays within "
         f"{noise:.2g} {readings.unit} or so, {count - kept} readings of moves dropped",
-        f"each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
-        f"{move_s:.3g} s (median), and readings as soon after one are left out, up to a tenth of the hold",
+        begins,
     ]
 
 
