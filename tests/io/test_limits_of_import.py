@@ -53,6 +53,17 @@ def test_a_hold_goes_on_unread_beyond_half_of_what_was_read_and_one_and_a_half_o
     assert bool(holds._unread_ends(times, [times_s[-1] + after_s, None], "displacement")) == said
 
 
+@pytest.mark.parametrize(("first", "asked"), [(29, False), (31, True)])
+def test_an_only_hold_begins_within_three_of_its_readings_or_its_clock_is_asked_about(first, asked, tmp_path):
+    path = file_of(tmp_path, "x [mm],Time [s],Force [N]", [(2, first + 10 * i, 5 - i / 10) for i in range(5)])
+    if asked:
+        with pytest.raises(Undecided, match="found 31 s at the first reading of the only hold, expected --time-since"):
+            convert(path, ABOUT, Choices())
+        assert [convert(path, ABOUT, Choices(time_since=s)).rows[0][2] for s in ("hold", "test")] == [31.0, 0.0]
+    else:
+        assert convert(path, ABOUT, Choices()).rows[0][2] == 29.0
+
+
 @pytest.mark.parametrize(("falling", "refused"), [(10, False), (11, True)])
 def test_rows_stand_the_other_way_round_where_most_times_fall(falling, refused, tmp_path):
     """Of twenty steps in time within one hold."""

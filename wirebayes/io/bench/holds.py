@@ -36,6 +36,7 @@ from wirebayes.sentences import counted, lasting, listed
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
 UNREAD, LONGER = 0.5, 1.5  # of the time that was read, and times its longest pause: beyond, it may be a rest
+LATE = 3.0  # times the least time between readings: nobody who counts from the beginning of a hold begins so late
 BACKWARDS = 0.5  # of the steps in time: holds of two readings or more whose times start again fall at fewer
 
 
@@ -241,6 +242,8 @@ def _since(readings: Readings, times: list[Floats], stated: TimeSince | None) ->
     if readings.of_day:
         return "test"
     runs_on = [bool(after[0] >= before[-1]) for before, after in zip(times, times[1:], strict=False)]
+    if len(times) == 1 and _begins_late(times[0]):
+        raise _which_zero(readings, 0, f"{times[0][0]:g} s at the first reading of the only hold")
     if not any(runs_on):
         return "hold"
     resets = [j + 1 for j, on in enumerate(runs_on) if not on]
@@ -252,10 +255,19 @@ def _since(readings: Readings, times: list[Floats], stated: TimeSince | None) ->
         return "hold"
     at = next(j for j, on in enumerate(runs_on) if on)
     row = sum(len(of_hold) for of_hold in times[: at + 1])
-    answers = {"--time-since hold": "each hold", "--time-since test": "the whole test"}
     ordinal = (
         "the second hold, after {:g} s in the first" if at == 0 else f"hold {at + 2}, after {{:g}} s in the one before"
     )
     found = f"{times[at + 1][0]:g} s at the first reading of {ordinal.format(times[at][-1])}"
+    raise _which_zero(readings, row, found)
+
+
+def _begins_late(of_hold: Floats) -> bool:
+    """Whether the times of an only hold begin later than somebody would who reads from its beginning on."""
+    return len(of_hold) > 1 and bool(of_hold[0] > LATE * np.diff(of_hold).min())
+
+
+def _which_zero(readings: Readings, row: int, found: str) -> Undecided:
+    answers = {"--time-since hold": "each hold", "--time-since test": "the whole test"}
     place = str(readings.complain(row, "time", found, "")).removesuffix(", expected ")
-    raise Undecided(place, "what times count from", answers)
+    return Undecided(place, "what times count from", answers)
