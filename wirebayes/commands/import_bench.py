@@ -25,6 +25,9 @@ from wirebayes.wire.protocol import Control
 
 TOGETHER = "experiments"  # the file of all, where there are several
 
+# where each of several files has one hold, as some loggers write the steps of a test
+OWN_SAMPLE = "one hold in each file: each is taken for a fresh sample; holds of one sample belong in one file, in order"
+
 
 def import_bench(
     raw: PathLike | Sequence[PathLike],
@@ -179,6 +182,8 @@ def _read_all(
         found, choices = _decided(path, about, choices, ask)
         tests += [(path, test) for test in found]
     _check_names([(path, test.experiment.name) for path, test in tests])
+    if len(paths) > 1 and all(len(test.experiment.holds) == 1 for _, test in tests):
+        tests = [(path, replace(test, notes=[*test.notes, OWN_SAMPLE])) for path, test in tests]
     return tests, choices
 
 

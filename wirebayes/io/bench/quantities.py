@@ -78,10 +78,10 @@ class Unit:
     multiple: float = 1.0
 
     def convert(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values in our unit; to twelve digits, as factors are binary and units decimal."""
+        """Values in our unit; to fifteen digits, as factors are binary and units decimal; clocks count from 1970."""
         if self.factor == 1.0 and self.offset == 0.0:
             return values
-        return np.array([float(f"{value * self.factor + self.offset:.12g}") for value in values])
+        return np.array([float(f"{value * self.factor + self.offset:.15g}") for value in values])
 
 
 def quantity_unit(text: str, role: Role) -> Unit | None:

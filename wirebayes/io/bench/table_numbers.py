@@ -14,7 +14,7 @@ from wirebayes.io.bench.about import About
 from wirebayes.io.bench.columns import Column, understand
 from wirebayes.io.bench.complete_rows import WHERE_MISSING, complete_rows
 from wirebayes.io.bench.numerals import decimal_sign, plain_number
-from wirebayes.io.bench.quantities import UNITS, Role
+from wirebayes.io.bench.quantities import UNITS, Role, quantity_unit
 from wirebayes.io.bench.recorded import Readings
 from wirebayes.io.bench.resolution import evident_step
 from wirebayes.io.bench.sheet import is_number
@@ -38,6 +38,7 @@ _SIZE: dict[Role, str] = {"displacement": "length", "tension": "area"}  # what a
 READS: dict[Control, Role] = {"displacement": "tension", "force": "displacement"}  # by what is set
 FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
 FAR_STEPS = 2.0  # and this many times the range of the test
+_AFTER_NUMBER = re.compile(r"^[-+−\d.,\s]+")
 MOST_HOLDS = 1e9  # numbers of holds stay below, as in the files that are written
 
 
@@ -185,6 +186,8 @@ def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
             expected = f"a number (decimal {sign}, as elsewhere in the file)"
             if not any(c.isdigit() for c in row.cell(column.index)):  # NaN, n/a, #N/A, a dash
                 expected += WHERE_MISSING
+            elif quantity_unit(_AFTER_NUMBER.sub("", row.cell(column.index)), column.role):
+                expected = "a number alone, and its unit in the header"
             if column.role == "time" and clock.looks_like_a_moment(row.cell(column.index)):
                 expected = clock.UNDERSTOOD
             raise table.complain(row.line, column.index, shown(row.cell(column.index)), expected)
