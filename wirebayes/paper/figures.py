@@ -9,7 +9,18 @@ from matplotlib.ticker import FuncFormatter
 
 from wirebayes.numeric.typing import Array
 from wirebayes.paper.page_tables import column_values
-from wirebayes.report.figures import CHAIN, COLOURS, HOLD, INK, QUIET, WORDS, legend_below, logarithmic, panel
+from wirebayes.report.figures import (
+    CHAIN,
+    COLOURS,
+    HOLD,
+    INK,
+    QUIET,
+    WORDS,
+    legend_below,
+    logarithmic,
+    panel,
+    without_frame,
+)
 from wirebayes.wire.protocol import Protocol
 
 
@@ -127,7 +138,7 @@ def prior_predictive(protocol: Protocol, drawn_N: Array, tension_N: Array, title
     below.plot(times, 100 * tension_N[first][protocol.mask[first]] / tension_N[first, 0], "o", ms=4.5, color=CHAIN)
     below.set(xlabel="time in the first hold, s", ylabel="tension left, %")
     for axes in (above, below):
-        axes.spines[["top", "right"]].set_visible(False)
+        without_frame(axes)
         axes.tick_params(labelsize=9)
     legend_below(figure, above, 4)
     return figure

@@ -32,7 +32,7 @@ def paper_page(folder: Path, configuration: dict[str, Any]) -> Page:
     gallery = _gallery(folder / "figures")
     sections = [build(tables, gallery) for needed, build in _SECTIONS if all(name in tables for name in needed)]
     sections.append(Section("The robot in three dimensions", robot_view(folder / "figures")))
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     sections.append(meaning(_TERMS))
     return Page(
         "Four wires that creep",

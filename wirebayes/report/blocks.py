@@ -320,19 +320,26 @@ def picture_file(folder: Path, name: str) -> Path | None:
     return next((path for path in (folder / f"{name}{kind}" for kind in _KINDS) if path.is_file()), None)
 
 
-def files_beside(folder: Path, contents: Sequence[tuple[str, str]]) -> Links:
+def files_beside(folder: Path, contents: Sequence[tuple[str, str]], title: str = "Raw results") -> Section:
     """Links to those files of a folder that are there; a name may be a pattern.
 
     Parameters
     ----------
     contents : sequence of (name, what it holds)
+    title : str
+        Of the section.
     """
     found = [
         (path.relative_to(folder).as_posix(), holds)
         for name, holds in contents
         for path in sorted(folder.glob(name))[:_MOST_LINKS]
     ]
-    return Links([(quote(name), holds) for name, holds in found])
+    return Section(title, [Links([(quote(name), holds) for name, holds in found])])
+
+
+def seed_of_page(configuration: Mapping[str, Any]) -> str:
+    """The line at the foot of a page that says which seed its results had."""
+    return f"Seed {configuration.get('seed')}."
 
 
 def as_sentence(text: str) -> str:

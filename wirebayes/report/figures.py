@@ -48,9 +48,14 @@ def panel(xlabel: str, ylabel: str, title: str = "", size: tuple[float, float] =
     if title:
         # at a stated height: to look for one that clears the ticks takes as long as to draw the rest
         axes.set_title(title, fontsize=10.5, loc="left", color=INK, y=1.0)
-    axes.spines[["top", "right"]].set_visible(False)
+    without_frame(axes)
     axes.tick_params(labelsize=9)
     return figure, axes
+
+
+def without_frame(axes: Any) -> None:
+    """Only the two axes as lines."""
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def legend(axes: Any, **where: Any) -> None:

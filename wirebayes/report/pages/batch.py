@@ -23,6 +23,7 @@ from wirebayes.report.blocks import (
     drawn,
     files_beside,
     number,
+    seed_of_page,
     unit_text,
 )
 from wirebayes.report.glossary import meaning
@@ -53,10 +54,10 @@ def batch_page(folder: Path, configuration: dict[str, Any]) -> Page:
     sections += [Section("Warnings", warned, folded=len(found["warnings"]) > _MOST_WARNINGS)] if warned else []
     sections += [Section("Outlying specimens", _outliers(fitted, far))]
     sections.append(Section("Experiments", _table(rows), folded=len(rows) > 50))
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     effects = [effect for row in fitted for effect in (*row["effects"], row["best_effect"] or "")]
     sections.append(meaning(("90 % interval", "p", "robust z"), effects))
-    return Page("Many experiments", lead, sections, f"Seed {configuration.get('seed')}.")
+    return Page("Many experiments", lead, sections, seed_of_page(configuration))
 
 
 _PICTURE = "A dot a specimen, at its posterior median, with its 90 % interval; red ones are outliers of their material."

@@ -23,6 +23,7 @@ from wirebayes.report.blocks import (
     drawn,
     files_beside,
     number,
+    seed_of_page,
     span,
 )
 from wirebayes.report.glossary import meaning
@@ -45,10 +46,10 @@ def calibrate_page(folder: Path, configuration: dict[str, Any]) -> Page:
         Section("What to do", _next(found)),
     ]
     sections += [Section("Where the platform is", view)] if (view := robot_view(folder)) else []
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     sections.append(meaning(("90 % interval", "zero-tension length", "specimen spread"), model=False))
     lead = calibration_in_a_sentence(found)
-    return Page(f"Calibration of {found['robot']}", lead, sections, f"Seed {configuration.get('seed')}.")
+    return Page(f"Calibration of {found['robot']}", lead, sections, seed_of_page(configuration))
 
 
 _FILES = (

@@ -25,6 +25,7 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     picture_file,
+    seed_of_page,
     span,
     unit_text,
 )
@@ -44,7 +45,7 @@ _DETERMINED_BY = {"data": "the readings", "data and prior": "readings and prior"
 
 def check_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``check.json`` or ``import.json``, a section for each experiment."""
-    files = Section("Raw results", [files_beside(folder, _FILES)])
+    files = files_beside(folder, _FILES)
     if configuration["command"] == "import":
         imported: ImportJson = read_json(folder / "import.json")
         sections = [
@@ -59,7 +60,7 @@ def check_page(folder: Path, configuration: dict[str, Any]) -> Page:
     effects = [effect for e in found.values() for effect in e["effects"]]
     sections += [files, meaning(("hold", "90 % interval", "prior"), effects, symbols=False)]
     lead = " ".join(check_in_a_sentence(name, e) for name, e in list(found.items())[:_MOST_SENTENCES])
-    return Page("What this test can determine", lead, sections, f"Seed {configuration.get('seed')}.")
+    return Page("What this test can determine", lead, sections, seed_of_page(configuration))
 
 
 def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:

@@ -20,6 +20,7 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     pictures_in,
+    seed_of_page,
 )
 from wirebayes.report.glossary import meaning
 
@@ -48,10 +49,10 @@ def compare_page(folder: Path, configuration: dict[str, Any]) -> Page:
     found = content["experiments"]
     sections = [_section(folder, name, table) for name, table in found.items()]
     lead = " ".join(comparison_in_words(name, table) for name, table in list(found.items())[:_MOST_SENTENCES])
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     effects = [effect for table in found.values() for row in table["models"] for effect in row["name"].split(" + ")]
     sections.append(meaning(("hold", "held out", "rms", "elpd", "weight"), effects))
-    return Page("Models side by side", lead, sections, f"Seed {configuration.get('seed')}.")
+    return Page("Models side by side", lead, sections, seed_of_page(configuration))
 
 
 def _section(folder: Path, name: str, table: ComparedModels) -> Section:

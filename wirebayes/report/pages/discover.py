@@ -28,6 +28,7 @@ from wirebayes.report.blocks import (
     number,
     picture_file,
     pictures_in,
+    seed_of_page,
     span,
     unit_text,
 )
@@ -53,10 +54,10 @@ def discover_page(folder: Path, configuration: dict[str, Any]) -> Page:
     sentences = [findings_in_a_sentence(name, v) for name, v in found.items()]
     lead = " ".join(sentences[:_MOST_SENTENCES])
     named = [e for v in found.values() for e in (*v["effects"], *v["probabilities"], *v["power"], *v.get("group", []))]
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     explained = all(_has_parameters(folder / name) for name in found)
     sections.append(meaning(_TERMS, named, symbols=not explained))
-    return Page("What the model is missing", lead, sections, f"Seed {configuration.get('seed')}.")
+    return Page("What the model is missing", lead, sections, seed_of_page(configuration))
 
 
 _FILES = (

@@ -18,6 +18,7 @@ from wirebayes.report.blocks import (
     drawn,
     files_beside,
     number,
+    seed_of_page,
     span,
 )
 from wirebayes.report.glossary import meaning
@@ -62,7 +63,7 @@ def export_page(folder: Path, configuration: dict[str, Any]) -> Page:
     creep = [*before_the_answer(summary), Pictures(pictures), *beside_the_answer(summary), words]
     sections = [
         Section("Creep of the line", creep),
-        Section("Files", [files_beside(folder, _FILES)]),
+        files_beside(folder, _FILES, "Files"),
         Section("Table of the creep", [Table(header, lines, caption)]),
         meaning(("90 % interval",), model=False),
     ]
@@ -73,7 +74,7 @@ def export_page(folder: Path, configuration: dict[str, Any]) -> Page:
         f"A metre of the line grows by {grown} ({interval}) under {float(last['tension_N']):g} N within "
         f"{lasting(float(last['time_s']))}; the interval holds 90 %."
     )
-    return Page("Settings for a robot", lead, sections, f"Seed {configuration.get('seed')}.")
+    return Page("Settings for a robot", lead, sections, seed_of_page(configuration))
 
 
 _HEADER = ("tension, N", "after, s", "growth, mm per m", "90 % interval")

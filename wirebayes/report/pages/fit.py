@@ -31,6 +31,7 @@ from wirebayes.report.blocks import (
     drawn_together,
     files_beside,
     number,
+    seed_of_page,
     span,
     unit_text,
 )
@@ -65,10 +66,10 @@ def fit_page(folder: Path, configuration: dict[str, Any]) -> Page:
             effects |= {effect.name: effect for effect in stored.sample.model.effects}
             sections.append(section(stored, prior, summary))
     lead = " ".join(sentences[:_MOST_SENTENCES])
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     from_summaries = bool(configuration.get("own_effects"))  # without the table that explains each parameter
     sections.append(meaning(("hold", "90 % interval", "prior"), effects, effects, symbols=from_summaries))
-    return Page("What the readings determine", lead, sections, f"Seed {configuration.get('seed')}.")
+    return Page("What the readings determine", lead, sections, seed_of_page(configuration))
 
 
 def _of_summary(summary: SummaryJson) -> Section:

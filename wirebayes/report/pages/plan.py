@@ -22,6 +22,7 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     picture_file,
+    seed_of_page,
     span,
     unit_text,
 )
@@ -48,11 +49,11 @@ def plan_page(folder: Path, configuration: dict[str, Any]) -> Page:
     first += [*beside_the_answer(found), columns, _ranking(found)]
     sections = [Section("Summary", first)]
     sections += [Section(f"{row['rank']}. {row['name']}", _protocol(row), folded=row["rank"] > 1) for row in rows]
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     effects = [effect for row in rows for effect in row["effects"]]
     sections.append(meaning(("hold", "90 % interval", "information", "δ"), effects))
     lead = plan_in_a_sentence(found)
-    return Page("What a test would teach", lead, sections, f"Seed {configuration.get('seed')}.")
+    return Page("What a test would teach", lead, sections, seed_of_page(configuration))
 
 
 _PICTURE = (

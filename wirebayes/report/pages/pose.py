@@ -24,6 +24,7 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     picture_file,
+    seed_of_page,
     span,
 )
 from wirebayes.report.glossary import meaning
@@ -70,11 +71,11 @@ def pose_page(folder: Path, configuration: dict[str, Any]) -> Page:
         Section("Sources of uncertainty", _variance_shares(pose)),
     ]
     sections += [Section("How many equilibria", _equilibria(pose))]
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     effects = pose.get("wires", {}).get("effects", [])
     sections.append(meaning(_TERMS, effects))
     lead = pose_in_a_sentence(pose)
-    return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], f"Seed {configuration.get('seed')}.")
+    return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], seed_of_page(configuration))
 
 
 _FILES = (

@@ -21,6 +21,7 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     picture_file,
+    seed_of_page,
     span,
 )
 from wirebayes.report.glossary import meaning
@@ -73,9 +74,9 @@ def pose_history_page(folder: Path, configuration: dict[str, Any], pose: PoseHis
     rest = [Pictures(list(pictures.values()))] if pictures else []
     sections = [Section("Summary", first), Section("More pictures", [*wide, *rest])]
     sections += [Section("Poses", _poses(pose)), Section("Corrections", _corrections(pose))]
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     sections.append(meaning(("90 % interval", "drift", "specimen spread"), pose["wires"]["effects"]))
-    seed = f"Seed {configuration.get('seed')}."
+    seed = seed_of_page(configuration)
     return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], seed)
 
 

@@ -71,7 +71,7 @@ def predict_page(predicted: Prediction, table: Path) -> Page:
         _rows(predicted),
     ]
     beside = files_beside(table.parent, [(table.name, "every row, with mean and standard deviation")])
-    sections = [Section(about["experiment"], blocks), Section("Raw results", [beside])]
+    sections = [Section(about["experiment"], blocks), beside]
     return Page("What later holds will read", in_a_sentence(predicted), sections, f"Seed {about['seed']}.")
 
 

@@ -20,6 +20,7 @@ from wirebayes.report.blocks import (
     drawn,
     files_beside,
     number,
+    seed_of_page,
     unit_text,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning
@@ -44,11 +45,11 @@ def simulate_page(folder: Path, configuration: dict[str, Any]) -> Page:
     if len(experiments) > _MOST:
         more = Text(f"The first {_MOST} of {len(experiments)} tests are shown; the files hold all.")
         sections.append(Section("More tests", [more]))
-    sections.append(Section("Raw results", [files_beside(folder, _FILES)]))
+    sections.append(files_beside(folder, _FILES))
     sections.append(meaning(("hold",), configuration["effects"]))
     stiff = listed([f"{number(truth['parameters']['k1'])} N" for truth in list(truths.values())[:_MOST]])
     lead = f"Simulated readings of {counted(len(experiments), 'test')}, whose true parameters are known: k1 is {stiff}."
-    return Page("Simulated tests", lead, sections, f"Seed {configuration.get('seed')}.")
+    return Page("Simulated tests", lead, sections, seed_of_page(configuration))
 
 
 def _section(e: Experiment, truth: TrueWire) -> Section:

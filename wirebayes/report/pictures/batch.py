@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from wirebayes.json_files.batch import OutlierRow, Row
 from wirebayes.json_files.values import INTERVAL
-from wirebayes.report.figures import CHAIN, HOLD, logarithmic, verbatim
+from wirebayes.report.figures import CHAIN, HOLD, logarithmic, verbatim, without_frame
 
 _SHOWN = {"k1": "k1, N", "B": "B, mm N⁻ᵁ per m of length", "U": "U", "k2": "k2, s⁻ᴺ", "N": "N"}
 _MOST_BARS = 200  # specimens of which intervals are drawn: more are a smear
@@ -43,7 +43,7 @@ def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
         axis.set_title(label, fontsize=9, loc="left")
         axis.set_xticks(range(len(materials)), [verbatim(m) for m in materials])
         axis.tick_params(axis="x", labelsize=7.5, rotation=0 if upright else 90)
-        axis.spines[["top", "right"]].set_visible(False)
+        without_frame(axis)
         axis.set_xlim(-0.6, len(materials) - 0.4)
         axis.tick_params(axis="y", which="both", labelsize=7)
         if name in ("k1", "B", "k2"):

@@ -12,7 +12,7 @@ from wirebayes.io.bench.convert import Recording
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold
 from wirebayes.report.blocks import save_figure
-from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, verbatim
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, verbatim, without_frame
 from wirebayes.wire.protocol import Control
 
 _MOST_NUMBERS = 40  # holds that can all be numbered in a picture
@@ -39,7 +39,7 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
         what_is_set.reverse()
     for axes, label in zip((upper, lower), what_is_set, strict=True):
         axes.set_ylabel(label)
-        axes.spines[["top", "right"]].set_visible(False)
+        without_frame(axes)
         axes.tick_params(labelsize=9)
         axes.margins(x=0.01)
     if recording is not None:

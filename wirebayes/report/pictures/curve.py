@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest, chain_course
-from wirebayes.report.figures import CHAIN, HALF_90, HOLD, INK, QUIET, apart
+from wirebayes.report.figures import CHAIN, HALF_90, HOLD, INK, QUIET, apart, without_frame
 from wirebayes.results.read_back import Stored
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol
@@ -97,7 +97,7 @@ def through_the_readings(stored: Stored, title: str = "") -> Figure:
     above.set_title(title, loc="left", fontsize=10.5, color=INK, y=1.0)
     above.legend(frameon=False, fontsize=8.5, loc="best")
     for axes in (above, below):
-        axes.spines[["top", "right"]].set_visible(False)
+        without_frame(axes)
     return figure
 
 

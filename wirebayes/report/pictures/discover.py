@@ -16,6 +16,7 @@ from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.model import likelihoods
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array, Floats
+from wirebayes.report.figures import without_frame
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.results.read_back import Stored
 from wirebayes.sentences import spoken
@@ -68,7 +69,7 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings) 
     above.set_ylabel(f"{READ[control]}, {READ_UNIT[control]}")
     name_holds(axes[-1], plain)
     for axis in (above, *axes):
-        axis.spines[["top", "right"]].set_visible(False)
+        without_frame(axis)
     handles = axes[0].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
     return figure
@@ -106,7 +107,7 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     axis.set_xticks(range(len(names)), [textwrap.fill(n, 12) for n in names], fontsize=9)
     axis.set_ylabel(f"rms error on held-out holds ({unit})")
     axis.margins(y=0.12)
-    axis.spines[["top", "right"]].set_visible(False)
+    without_frame(axis)
     return figure
 
 
