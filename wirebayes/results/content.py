@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.random import Generator
 
 from wirebayes._version import __version__
 from wirebayes.inference.fit import Fit
@@ -13,7 +13,7 @@ from wirebayes.io.readings import READ, SET, UNIT
 from wirebayes.model.problem import Problem
 from wirebayes.model.replicate import readings as replicate
 from wirebayes.model.sample import Sample
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 from wirebayes.results.netcdf import Group, Variable
 from wirebayes.results.parameters import unit_of, variables
 from wirebayes.wire.protocol import Control
@@ -25,9 +25,7 @@ _PRIOR_DRAWS = 2000  # a 5 % quantile is then one between 4.2 % and 5.8 %
 _CHUNK = 2000  # draws at a time: bounds the memory
 
 
-def groups_of(
-    fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: np.random.Generator
-) -> dict[str, Group]:
+def groups_of(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rng: Generator) -> dict[str, Group]:
     """The content of ``posterior.nc``: of one sample as if it stood alone, or of all samples.
 
     Parameters
@@ -57,9 +55,7 @@ def groups_of(
     return groups
 
 
-def _of_parameters(
-    fit: Fit, sample: Sample | None, members: Sequence[Sample], rng: np.random.Generator
-) -> dict[str, Group]:
+def _of_parameters(fit: Fit, sample: Sample | None, members: Sequence[Sample], rng: Generator) -> dict[str, Group]:
     """Posterior and prior draws of the parameters, and the log density."""
     problem, (m, draws, _) = fit.problem, fit.theta.shape
     prior = problem.prior.rvs(_PRIOR_DRAWS, rng)
@@ -77,7 +73,7 @@ def _of_parameters(
     }
 
 
-def _steps(chains: int, draws: NDArray[np.int64]) -> dict[str, Variable]:
+def _steps(chains: int, draws: Ints) -> dict[str, Variable]:
     """Coordinates of draws."""
     return {"chain": Variable(("chain",), np.arange(chains)), "draw": Variable(("draw",), draws)}
 

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+
+from wirebayes.numeric.typing import Array
 
 _NO_VARIABLE = "This is a netCDF dimension but not a netCDF variable."  # words of the format
 
@@ -33,7 +34,7 @@ class Variable(NamedTuple):
     """
 
     dims: tuple[str, ...]
-    values: NDArray[Any]
+    values: Array
 
 
 @dataclass
@@ -56,7 +57,7 @@ class Group:
     units: dict[str, str] = field(default_factory=dict)
     attributes: dict[str, Any] = field(default_factory=dict)
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
+    def __getitem__(self, name: str) -> Array:
         """The values of a variable or coordinate."""
         return (self.variables if name in self.variables else self.coordinates)[name].values
 
@@ -115,7 +116,7 @@ def _write(node: Any, group: Group, numbers: Iterator[int]) -> None:
             written[name].attrs["coordinates"] = " ".join(labelling)
 
 
-def _dataset(node: Any, name: str, values: NDArray[Any]) -> Any:
+def _dataset(node: Any, name: str, values: Array) -> Any:
     if values.dtype.kind in "UO":
         return node.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype(), track_order=True)
     if values.dtype.kind != "f":
@@ -162,7 +163,7 @@ def _entry(value: Any) -> Any:
     return entry.decode() if isinstance(entry, bytes) else entry
 
 
-def _values(dataset: Any) -> NDArray[Any]:
+def _values(dataset: Any) -> Array:
     """The values in this machine's order of bytes; text as Python's own."""
     values = np.asarray(dataset[...])
     if values.dtype.kind in "OSU":

@@ -5,12 +5,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.coordinates.edges import Edge, edge
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.distributions import LogitNormal
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools
 
 ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
 
@@ -33,7 +32,7 @@ class ColumnMap:
         Standard deviations of the logarithms under the prior; 1 for what is no logarithm.
     """
 
-    positive: NDArray[np.bool_]
+    positive: Bools
     most: Array
     edges: dict[int, Edge]
     scale: Array

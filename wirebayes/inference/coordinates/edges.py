@@ -1,6 +1,5 @@
 """Amplitudes whose prior ends at an edge, transformed to scores that are standard normal under that prior."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
 
 from wirebayes.numeric.distributions import HalfNormal, Normal, TruncatedNormal, Uniform, ours
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Function
 
 _NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite
 _log_normal = Normal().log_density()
@@ -25,9 +24,9 @@ class Edge:
         Whether the values have an upper end.
     """
 
-    score: Callable[[Array], Array]
-    value: Callable[[Array], Array]
-    log_prior: Callable[[Array], Array]
+    score: Function
+    value: Function
+    log_prior: Function
     ends: bool
 
     def log_slope(self, value: Array) -> Array:
@@ -47,7 +46,7 @@ def edge(distribution: Any) -> Edge | None:
     return None
 
 
-def _half_normal(sd: float, log_prior: Callable[[Array], Array]) -> Edge:
+def _half_normal(sd: float, log_prior: Function) -> Edge:
     """Each half from its own tail, where it keeps its digits."""
     unit = sd * np.sqrt(2.0)
 
@@ -81,7 +80,7 @@ def _cut_off(known: TruncatedNormal) -> Edge:
     return Edge(score, value, known.log_density(), False)
 
 
-def _uniform(low: float, width: float, log_prior: Callable[[Array], Array]) -> Edge:
+def _uniform(low: float, width: float, log_prior: Function) -> Edge:
     def score(value: Array) -> Array:
         return np.asarray(ndtri(np.clip((value - low) / width, _NEAREST, 1.0 - _NEAREST)))
 

@@ -6,14 +6,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.inference.coordinates.columns import ONE_SD, ColumnMap
 from wirebayes.inference.coordinates.power_of_tension import suiting_powers
 from wirebayes.inference.coordinates.shares import Elongation
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import MATERIAL, Sample
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 from wirebayes.wire import compiled
 from wirebayes.wire.effect import Effect, HoldContext, Placed
 
@@ -33,7 +32,7 @@ class Ridge:
     log_tension: Array
     log_step: float
     times_s: Array
-    which_time: NDArray[np.int64]
+    which_time: Ints
     kept: float
     hold_s: float
     log_length: float

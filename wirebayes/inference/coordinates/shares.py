@@ -11,10 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_ndtr, ndtri_exp
 
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Floats
 from wirebayes.wire.effect import Effect, HoldContext
 
 _LEAST = np.log(1e-9)  # share of an amount of nothing, whose score would be infinite
@@ -52,7 +51,7 @@ class Elongation:
         theta : (n, d) array
             Natural parameters.
         """
-        own: dict[str, NDArray[np.float64]] = {self.effect.amplitudes[0].name: np.ones(len(theta))}
+        own: dict[str, Floats] = {self.effect.amplitudes[0].name: np.ones(len(theta))}
         for name, x in self.others.items():
             own[name] = theta[:, x] if isinstance(x, int) else np.full(len(theta), x)
         carried, square = np.zeros((1, len(theta))), np.zeros(len(theta))

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from datetime import date
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import shown
 from wirebayes.io.bench.compound_times import is_spelt, spelt_s
@@ -13,6 +12,7 @@ from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.sheet import MONTHS, is_moment, is_number, is_value, moment
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
+from wirebayes.numeric.typing import Bools, Floats
 
 _DAY, _HOUR = 86400.0, 3600.0
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
@@ -48,7 +48,7 @@ def is_clock(table: RawTable, column: int, unit: Unit | None) -> bool:
     return (unit is not None and unit.clock is not None) or has_moments(table, column)
 
 
-def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np.float64], bool, int]:
+def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[Floats, bool, int]:
     """Times of a column of clocks or dates.
 
     Parameters
@@ -89,7 +89,7 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[NDArray[np
     return values + _DAY * midnights, of_day, int(midnights[-1])
 
 
-def _days_begin(values: NDArray[np.float64], of_day: bool) -> NDArray[np.bool_]:
+def _days_begin(values: Floats, of_day: bool) -> Bools:
     """(r,) where a clock (r,) has passed midnight since the row before.
 
     On the next day a clock of the day may read nearly as much as before. A clock that starts again counts from zero:
@@ -102,7 +102,7 @@ def _days_begin(values: NDArray[np.float64], of_day: bool) -> NDArray[np.bool_]:
     return (steps < -_MIDNIGHT) | (falls & goes_on & (values > _LATE * closest))
 
 
-def _spelt(table: RawTable, column: int) -> NDArray[np.float64]:
+def _spelt(table: RawTable, column: int) -> Floats:
     """Seconds of cells that name their units; nothing is zero in every unit."""
     values = [0.0 if row.cell(column) == "0" else spelt_s(row.cell(column)) for row in table.rows]
     for row, value in zip(table.rows, values, strict=True):
@@ -200,7 +200,7 @@ def _leading(table: RawTable, column: int, unit: Unit | None, moments: Sequence[
     )
 
 
-def _days(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> NDArray[np.float64]:
+def _days(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> Floats:
     """Seconds from the beginning of the calendar to each date."""
     day_first = _day_first(table, column, moments)
     days = []

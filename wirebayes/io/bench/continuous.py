@@ -6,13 +6,12 @@ A wire creeps while it moves, to first order as if the whole move were made at t
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
 from wirebayes.io.bench.recorded import CONTINUOUS, PAUSE, Cut, Readings, level_of
 from wirebayes.notice import Notice
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.sentences import counted
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
@@ -157,7 +156,7 @@ def _moved(x: Floats, time: Floats, left: int, hold: Plateau) -> float:
     return float(time[left]) + (float(np.clip(to_go / whole, 0.0, lasts)) if whole else 0.5 * lasts)
 
 
-def _after_move(time: Floats, hold: Plateau, move_s: float) -> NDArray[np.int64]:
+def _after_move(time: Floats, hold: Plateau, move_s: float) -> Ints:
     """The rows of a hold that are as long after the move before it as that move took, or nearly all."""
     rows = np.arange(hold.begin, hold.end)
     since = time[rows] - time[hold.begin]

@@ -7,14 +7,13 @@ stays. Which of the two drifts within holds decides, in steps of the test: no sc
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc, stdtr
 
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.wire.protocol import Control
 
-Rows = NDArray[np.int64]
+Rows = Ints
 
 BY_CHANCE = 1e-3  # that scatter alone has such a trend: files without creep are common, and then steps are the rule
 BY_CHANCE_CONSTANT = 0.01  # where every hold has one tension to the last digit, which no relaxing wire has

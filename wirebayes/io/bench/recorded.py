@@ -2,18 +2,17 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import UNITS
 from wirebayes.notice import Notice
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Array, Bools, Floats, Ints
 
 Complain = Callable[[int, str, str, str], InputError]  # row, role, found, expected
-Rows = NDArray[np.int64]
+Rows = Ints
 
 CONTINUOUS = 30  # readings of the usual hold that nobody writes by hand
 PAUSE = 1.5  # of the usual interval between readings: a longer one is a pause in the recording
@@ -43,7 +42,7 @@ class Readings:
     setting: Floats
     read: Floats
     time_s: Floats
-    hold: NDArray[np.int64] | None
+    hold: Ints | None
     of_day: bool
     step: float
     time_name: str
@@ -80,7 +79,7 @@ class Cut:
         What of the recording has no place in holds.
     """
 
-    rows: list[NDArray[np.int64]]
+    rows: list[Ints]
     number: list[int]
     setting: list[float]
     time_s: list[Floats]
@@ -91,18 +90,18 @@ class Cut:
     warnings: tuple[Notice, ...] = ()
 
 
-def restarts(readings: Readings) -> NDArray[np.bool_]:
+def restarts(readings: Readings) -> Bools:
     """Where a clock that counts from a beginning starts again."""
     falls = np.concatenate([[False], np.diff(readings.time_s) < 0])
     return falls & (not readings.of_day)
 
 
-def changes(values: NDArray[Any]) -> NDArray[np.bool_]:
+def changes(values: Array) -> Bools:
     """Where a value is another than the one before."""
     return np.concatenate([[False], np.diff(values) != 0])
 
 
-def groups_between(border: NDArray[np.bool_]) -> list[Rows]:
+def groups_between(border: Bools) -> list[Rows]:
     """The rows between borders; each is the first row of a group."""
     return np.split(np.arange(len(border)), np.flatnonzero(border))
 

@@ -1,10 +1,9 @@
 """Clocks too coarse for their rate: readings that share a time stamp are spread over the time to the next one."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wirebayes.io.bench.table import RawTable
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats, Ints
 
 TICKS_S = (0.001, 0.01, 0.1, 1.0, 60.0)  # what clocks count; rarer stamps are a person's, or a test's own steps
 FEWEST = 10  # stamps between the first and the last that show a habit
@@ -33,11 +32,11 @@ def is_coarse(table: RawTable, column: int) -> bool:
     return not any(_takes_turns(other, begins) for other in others)
 
 
-def _runs(changes: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _runs(changes: Bools) -> Ints:
     return np.concatenate([[0], np.flatnonzero(changes)])
 
 
-def _takes_turns(cells: list[str], begins: NDArray[np.int64]) -> bool:
+def _takes_turns(cells: list[str], begins: Ints) -> bool:
     under = [cells[begin:end] for begin, end in zip(begins[1:-1], begins[2:], strict=True)]
     same = sum(a == b and len(set(a)) > 1 for a, b in zip(under, under[1:], strict=False))
     return same > IN_TURN * (len(under) - 1)

@@ -1,13 +1,14 @@
 """Fewer readings of a hold: relaxation is fast at first, so they are spaced evenly in the logarithm of time."""
 
 import numpy as np
-from numpy.typing import NDArray
+
+from wirebayes.numeric.typing import Floats, Ints
 
 MOST = 60  # readings of a hold that are all kept: nobody writes down more by hand
 KEPT = MOST  # of longer ones: twenty or so a decade of time
 
 
-def kept_readings(time_s: NDArray[np.float64]) -> NDArray[np.int64]:
+def kept_readings(time_s: Floats) -> Ints:
     """Which readings of a hold are kept.
 
     Parameters

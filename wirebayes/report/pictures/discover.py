@@ -8,14 +8,13 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from wirebayes.discovery.residual_patterns import COVARIATES
 from wirebayes.json_files.discovery import Disagreement, ExperimentFindings
 from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.model import likelihoods
 from wirebayes.model.sample import Sample
-from wirebayes.numeric.typing import Array, Floats
+from wirebayes.numeric.typing import Array, Floats, Ints
 from wirebayes.report.figures import without_frame
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds
 from wirebayes.results.read_back import Stored
@@ -162,7 +161,7 @@ def _along(sample: Sample, left: Floats, finding: Disagreement, x: Floats) -> Fi
     return figure
 
 
-def _neighbours(x: Floats) -> list[NDArray[np.int64]]:
+def _neighbours(x: Floats) -> list[Ints]:
     """Rows whose mean is shown: those of each value where there are few, else of equally many neighbours."""
     values = np.unique(x)
     if len(values) <= _GROUPS:

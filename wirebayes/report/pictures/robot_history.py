@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
 
 from wirebayes.io.run_folder import write_bytes, write_text
 from wirebayes.json_files.pose_history import Corrections, DriftOverTime
 from wirebayes.json_files.values import INTERVAL, Numbers
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.report.blocks import svg
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
 from wirebayes.report.pictures.robot import Distance, platform_edges, round_factor
@@ -104,7 +103,7 @@ def _in_time(figure: Figure, axes: Any, history: History, columns: int = 2) -> N
     legend_below(figure, axes, columns)
 
 
-def _shapes(robot: Robot, found: HistoryAnswer, rows: NDArray[np.intp]) -> tuple[Floats, Floats, float]:
+def _shapes(robot: Robot, found: HistoryAnswer, rows: Indices) -> tuple[Floats, Floats, float]:
     """Platform points meant and drifted, ``(r, w, 3)``, the drift enlarged by a round factor."""
     assert found.found is not None and found.to is not None
     track, to = found.found.track, found.to
