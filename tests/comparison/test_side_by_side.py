@@ -10,9 +10,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from tests.comparison.test_compare import PLAIN, row
 from wirebayes.comparison import candidates as module
 from wirebayes.comparison import compare
-from wirebayes.comparison.candidates import BASE, ModelToCompare
+from wirebayes.comparison.candidates import BASE
 from wirebayes.comparison.compare import Task, judge, side_by_side, stacking
 from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.policy import Policy
@@ -20,20 +21,6 @@ from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction.held_out import HeldOutPrediction, Scores
-
-PLAIN = ModelToCompare(BASE, "", "")
-
-
-def row(name: str, elpd: list[float], **more: object) -> dict[str, object]:
-    return {
-        "name": name,
-        "scored": "all readings",
-        "failed": None,
-        "converged": True,
-        "held_out": None,
-        "warnings": [],
-        "leave_one_hold_out": {"per_hold": elpd, "elpd": sum(elpd)},
-    } | more
 
 
 def twelve(gain: float, spread: float = 0.0) -> list[float]:

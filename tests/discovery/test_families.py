@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.simulated import simulated_tests
+from tests.simulated import WIRE, simulated_tests
 from wirebayes.discovery import screening
 from wirebayes.discovery.families import (
     PATTERNS,
@@ -23,8 +23,6 @@ from wirebayes.inference.laplace_fit import fitted
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.sentences import families_said, said_beside, undecided
 from wirebayes.simulation.synthetic import Bench, Truth
-
-WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
 
 
 def likeness(pairs: dict[tuple[int, int], float], m: int) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.simulated import WIRE
 from wirebayes import cli
 from wirebayes.discovery import global_test, model_check, screening
 from wirebayes.discovery.model_check import ModelCheck, check_model, level
@@ -23,7 +24,6 @@ from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.results.jobs import Job
 from wirebayes.simulation.synthetic import Bench, Truth, write_tests
 
-WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
 BENCH = Bench(displacements_mm=tuple(range(1, 8)))
 
 

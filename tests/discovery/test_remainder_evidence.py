@@ -9,7 +9,7 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from analyses.hidden_effects.cases import Spec, seal
-from tests.simulated import simulated_tests
+from tests.simulated import WIRE, simulated_tests
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.noise_integral import RATIOS, SIZES, evidences
 from wirebayes.discovery.remainder_evidence import (
@@ -26,7 +26,6 @@ from wirebayes.io.experiment_file import read_experiments
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.simulation.synthetic import Bench, Truth
 
-WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
 DRAWS = 10_000
 
 

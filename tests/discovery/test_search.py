@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from analyses.hidden_effects.cases import Spec, seal
+from tests.simulated import WIRE
 from wirebayes import cli
 from wirebayes.discovery import held_out, linear_scan, next_measurement, noise_integral, power, screening
 from wirebayes.discovery.investigation import final_models
@@ -24,7 +25,6 @@ from wirebayes.processes import workers
 from wirebayes.simulation.synthetic import Bench, Truth, write_tests
 from wirebayes.wire.effect import Effect
 
-WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
 UP_AND_DOWN = (*range(1, 11), *range(9, 0, -1))
 DENSE_S = (0.0, *np.geomspace(2, 600, 24).round(1))
 FEW = 199  # simulations behind a p-value here; the command uses 999

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.simulated import simulated_tests
+from tests.simulated import WIRE, simulated_tests
 from wirebayes.discovery import screening, stepwise
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import EffectSet
@@ -16,7 +16,6 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.simulation.synthetic import Bench, Truth
 
-WIRE = {"k1": 900.0, "B": 0.25, "U": 0.5, "k2": 0.02, "N": 0.8, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.008}
 UP_AND_DOWN = (*range(1, 11), *range(9, 0, -1))
 
 

@@ -9,17 +9,8 @@ from analyses.hidden_effects.noise import measure
 from analyses.hidden_effects.truth import PROTOCOLS, draw_rig
 from wirebayes.io import data_checks, paper
 from wirebayes.io.arrays import from_arrays
-from wirebayes.simulation.synthetic import Bench, Truth, draw
+from wirebayes.simulation.synthetic import Bench, draw
 from wirebayes.wire.protocol import Protocol
-
-WIRE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 0.9, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}
-
-
-@pytest.fixture(scope="module")
-def sound():
-    """Protocol and (H, R) tensions of a sound test, resolution 0.01 N."""
-    sample = draw([Bench()], Truth(WIRE), seed=1).problem.samples[0]
-    return sample.protocol, sample.readings[..., 0]
 
 
 def warning(protocol, tension, resolution=0.01):

@@ -6,18 +6,10 @@ import numpy as np
 import pytest
 
 import wirebayes as wb
+from tests.simulated import SOFTER
 from wirebayes.io import data_checks, gross_events, paper
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.simulation.synthetic import Bench, Truth, draw
-
-WIRE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 0.9, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}
-
-
-@pytest.fixture(scope="module")
-def sound():
-    """Protocol and (H, R) tensions of a sound test of 12 holds, resolution 0.01 N."""
-    sample = draw([Bench()], Truth(WIRE), seed=1).problem.samples[0]
-    return sample.protocol, sample.readings[..., 0]
 
 
 def broken(tension):
@@ -78,7 +70,7 @@ def test_a_fall_counts_where_next_to_nothing_is_left(sound, share, named):
     assert bool(gross_events.of_readings(protocol, tension, 0.01)) == named
 
 
-HUNG = WIRE | {"sensor_sd": 0.003, "setting_sd": 0.002}
+HUNG = SOFTER | {"sensor_sd": 0.003, "setting_sd": 0.002}
 TWICE = (2.0, 4.0, 6.0, 8.0, 6.0, 4.0)
 
 

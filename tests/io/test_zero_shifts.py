@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.io.test_limits_of_checks import checked, flat
+from tests.simulated import SOFTER
 from wirebayes.effects import effect_named
 from wirebayes.io.checked_test import CheckedTest
 from wirebayes.io.zero_shifts import zero_shift
@@ -29,9 +30,6 @@ HONEST = [  # a move larger than the others, and a hold that was first read late
     Bench(times_s=[TIMES_S[4:] if hold == 5 else TIMES_S for hold in range(12)], resolution_N=0.0),
     Bench(weights_N=UP, times_s=[TIMES_S[4:] if hold == 5 else TIMES_S for hold in range(12)], resolution_mm=0.0),
 ]
-
-
-WIRE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 0.9, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}
 
 
 def simulated(bench, seed, *effects, wire=None):
@@ -77,7 +75,7 @@ def test_another_zero_is_found_with_its_place(part):
     """
     right = []
     for seed in range(50):
-        test = simulated(BENCHES[seed % 2], 500 + seed, wire=WIRE)
+        test = simulated(BENCHES[seed % 2], 500 + seed, wire=SOFTER)
         hold = 2 + seed % 7
         move = float(np.median(np.abs(np.diff([row[0] for row in test.each]))))
         said = zero_shift(shifted(test, hold, -test.each[hold - 1][-1] if part == "all" else part * move))

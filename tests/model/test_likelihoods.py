@@ -23,7 +23,10 @@ from wirebayes.wire.staircase import linearise, simulate
 
 TIMES = [0.0, 30.0, 60.0, 120.0]
 ERRORS = {"sensor_sd": 0.01, "setting_sd": 0.03}
-LOADING = protocol([1.0, 2.0, 4.0, 6.0, 3.0, 7.0], [TIMES] * 6, unrecorded={2})
+LOADING, WEIGHTS = (
+    protocol([1.0, 2.0, 4.0, 6.0, 3.0, 7.0], [TIMES] * 6, unrecorded={2}, control=control)
+    for control in ("displacement", "force")
+)
 
 
 def measured(p, theta, model=None, seed=0):
@@ -71,12 +74,13 @@ STRONG = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("p", [LOADING, WEIGHTS], ids=["steps", "weights"])
 @pytest.mark.parametrize("key", SINGLE_STATE)
-def test_the_chain_with_an_effect_is_the_dense_normal(key):
+def test_the_chain_with_an_effect_is_the_dense_normal(key, p):
     model, theta = Model(effects=(effect_named(key),), tension_ref_N=2.0), PLAIN | ERRORS | STRONG
-    y = measured(LOADING, theta, model)
-    r, covariance, _ = normal(LOADING, theta, model, y, 0.01)
-    found = filtered(LOADING, theta, y, model, 0.01).log_likelihood.sum()
+    y = measured(p, theta, model)
+    r, covariance, _ = normal(p, theta, model, y, 0.01)
+    found = filtered(p, theta, y, model, 0.01).log_likelihood.sum()
     assert found == pytest.approx(log_density(r, covariance), rel=1e-9)
 
 

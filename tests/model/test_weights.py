@@ -7,15 +7,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from tests.model.dense import log_density, normal
-from tests.model.test_likelihoods import SINGLE_STATE, STRONG, filtered, measured, models, noises
+from tests.model.test_likelihoods import ERRORS, TIMES, WEIGHTS, filtered, measured, models, noises
 from tests.wire.protocols import PLAIN, columns, parameters, protocol, protocols
-from wirebayes.effects import effect_named
 from wirebayes.model import single_holds
 from wirebayes.wire.model import Model
-
-TIMES = [0.0, 30.0, 60.0, 120.0]
-ERRORS = {"sensor_sd": 0.01, "setting_sd": 0.03}
-WEIGHTS = protocol([1.0, 2.0, 4.0, 6.0, 3.0, 7.0], [TIMES] * 6, unrecorded={2}, control="force")
 
 
 @given(protocols(control="force"), parameters(), noises, models, st.sampled_from([0.0, 0.01]), st.integers(0, 99))
@@ -27,15 +22,6 @@ def test_the_chain_is_the_dense_normal(p, theta, errors, model, resolution, seed
     found = filtered(p, theta, y, model, resolution).log_likelihood.sum()
     scale = np.linalg.cond(covariance) * 1e-16 * (len(r) + r @ np.linalg.solve(covariance, r))
     assert found == pytest.approx(log_density(r, covariance), rel=1e-9, abs=1e-9 + 10 * scale)
-
-
-@pytest.mark.parametrize("key", SINGLE_STATE)
-def test_the_chain_with_an_effect_is_the_dense_normal(key):
-    model, theta = Model(effects=(effect_named(key),), tension_ref_N=2.0), PLAIN | ERRORS | STRONG
-    y = measured(WEIGHTS, theta, model)
-    r, covariance, _ = normal(WEIGHTS, theta, model, y, 0.01)
-    found = filtered(WEIGHTS, theta, y, model, 0.01).log_likelihood.sum()
-    assert found == pytest.approx(log_density(r, covariance), rel=1e-9)
 
 
 def test_an_error_of_a_weight_moves_later_holds_through_the_creep():

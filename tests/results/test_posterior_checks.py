@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.simulated import SOFTER
 from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.model.build import FINEST, build
@@ -15,12 +16,11 @@ from wirebayes.results import posterior_checks, store
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 HASTY = Policy(walkers=64, rounds=2, round_draws=2048, most_rounds=2, block=4, most_steps=4)
-WIRE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 0.9, "preload": 0.5, "sensor_sd": 0.006, "setting_sd": 0.02}
 
 
 @pytest.fixture(scope="module")
 def simulated():
-    return draw([Bench()], Truth(WIRE), seed=1)
+    return draw([Bench()], Truth(SOFTER), seed=1)
 
 
 def test_a_sound_test_gets_no_warning_and_a_gross_one_is_first_in_summary_and_page(simulated, tmp_path):
@@ -38,7 +38,7 @@ def test_a_sound_test_gets_no_warning_and_a_gross_one_is_first_in_summary_and_pa
 def draws(problem, **changes):
     """Draws of every parameter within a thousandth of the truth, some of them changed."""
     rng = np.random.default_rng(0)
-    return {name: value * np.exp(0.001 * rng.normal(size=500)) for name, value in (WIRE | changes).items()}
+    return {name: value * np.exp(0.001 * rng.normal(size=500)) for name, value in (SOFTER | changes).items()}
 
 
 def test_the_setting_error_is_compared_with_the_steps(simulated):
@@ -89,7 +89,7 @@ def test_a_posterior_that_is_the_prior_is_named(simulated):
 
 def test_readings_without_noise_have_a_floor_and_say_so(simulated):
     sample = simulated.problem.samples[0]
-    bare = draw([Bench(resolution_N=0.0)], Truth(WIRE | {"sensor_sd": 1e-12}), seed=1)
+    bare = draw([Bench(resolution_N=0.0)], Truth(SOFTER | {"sensor_sd": 1e-12}), seed=1)
     experiment = Bench(resolution_N=0.0).experiment()
     assert build([experiment]).samples[0].resolution == 0.0  # no tension, no floor
     read = with_tensions(experiment, bare.problem.samples[0].readings[..., 0])

@@ -11,10 +11,6 @@ from wirebayes.robot.mechanics.wires import tension
 from . import cases
 
 
-def _turned(R, d):
-    return np.moveaxis(rotation.matrix(d), 0, -1) if R is None else rotation.matrix(d) @ R
-
-
 @pytest.mark.parametrize("name", HANGING)
 @pytest.mark.parametrize("law", ["hooke", "modified"])
 def test_wrench_and_stiffness_are_derivatives_of_the_energy(name, law):

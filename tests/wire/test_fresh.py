@@ -160,12 +160,6 @@ def test_final_creep_and_the_time_to_half_of_it(key):
     assert half == pytest.approx(np.exp(expected), rel=1e-10)
 
 
-def bench_draws(law, effects, **amplitudes):
-    rng = np.random.default_rng(5)
-    values = {name: value * np.exp(0.1 * rng.standard_normal(6)) for name, value in (PLAIN | amplitudes).items()}
-    return values, Model(law, "saturating", tuple(effects), REFERENCE, LENGTH_REF)
-
-
 OF_THE_WIRE = {key for key, (effects, _) in CASES.items() if all(e.scope == "material" for e in effects)}
 
 
