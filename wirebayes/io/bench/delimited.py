@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench import labview
+from wirebayes.io.bench import labview, serial_monitor
 from wirebayes.io.bench.decode import UNICODE
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
 
@@ -37,6 +37,9 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     lines = text.splitlines() or [""]
     if labview.is_measurement(lines):
         return labview.sheet_of_measurement(path, lines, encoding)
+    if serial_monitor.is_log(lines):
+        sent, arrivals = serial_monitor.without_stamps(lines)
+        return serial_monitor.with_arrivals(sheet_of_text(path, "\n".join(sent), encoding), arrivals)
     longest = max(range(len(lines)), key=lambda i: len(lines[i]))
     if len(lines[longest]) > LONGEST_LINE:
         found = f"a line of {len(lines[longest])} characters"

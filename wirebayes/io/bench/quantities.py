@@ -14,7 +14,7 @@ Role = Literal["hold", "displacement", "time", "tension", "temperature"]
 ROLES: tuple[Role, ...] = get_args(Role)
 UNITS: dict[Role, str] = {"displacement": "mm", "time": "s", "tension": "N", "temperature": "°C"}
 COMMON: dict[Role, tuple[str, ...]] = {
-    "displacement": ("mm", "cm", "m", "in"), "time": ("s", "min", "h", "ms"), "tension": ("N", "kN", "kgf", "lbf"),
+    "displacement": ("mm", "cm", "m", "in"), "time": ("s", "min", "h", "ms", "d"), "tension": ("N", "kN", "kgf", "lbf"),
     "temperature": ("°C", "°F", "K"),
 }  # fmt: skip
 # What strains and stresses may be in, where a column of that name says no unit; or it is a length or a force after all.
@@ -27,7 +27,7 @@ _SPELLINGS = {
     "min.": "min", "mins": "min", "minuten": "min", "minutos": "min", "std": "h", "std.": "h", "hrs": "h",
     "stunden": "h", "heures": "h", "newton": "N", "newtons": "N", "kn": "kN", "kp": "kgf", "pond": "gf", "p": "gf",
     "kg-f": "kgf", "kg_f": "kgf", "lb-f": "lbf", "lb_f": "lbf", "lbsf": "lbf", "lbs": "lb", "n": "N",
-    "millimeter": "mm", "inches": "inch", "\"": "inch",
+    "millis": "ms", "micros": "µs", "millimeter": "mm", "inches": "inch", "\"": "inch",
     "毫米": "mm", "厘米": "cm", "米": "m", "ミリ": "mm", "秒": "s", "分": "min", "分钟": "min", "小时": "h", "牛": "N",
     "牛顿": "N", "千牛": "kN", "千克": "kg", "公斤": "kg", "克": "g",
     "мм": "mm", "см": "cm", "м": "m", "мкм": "µm", "с": "s", "сек": "s", "мин": "min", "ч": "h", "мс": "ms", "н": "N",

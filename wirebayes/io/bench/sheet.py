@@ -23,6 +23,8 @@ _CLOCK = (
     r"(?P<first>\d{1,12}):(?P<second>\d{1,2})(:(?P<third>\d{1,2}))?([.,](?P<fraction>\d+))?"
     r"( ?(?P<half>[ap])\.?m\.?)?(?(date) ?(?P<zone>Z|UTC|[+\-\u2212]\d{2}(:?\d{2})?)?)"
 )
+# 2026年6月14日 9時58分0秒 in Japanese, and in Chinese
+_EAST_ASIAN = str.maketrans({"年": "-", "月": "-", "日": " ", "時": ":", "时": ":", "点": ":", "分": ":", "秒": " "})
 _MOMENT = re.compile(rf"(?P<date>{_DATE})([T ]+{_CLOCK})?", re.IGNORECASE)
 _BARE_CLOCK = re.compile(rf"(?P<date>(?!))?{_CLOCK}", re.IGNORECASE)  # the same groups, without a date
 
@@ -99,6 +101,8 @@ def is_number(cell: str) -> bool:
 
 def moment(cell: str) -> re.Match[str] | None:
     """The parts of a cell that is a clock, a date, or both: the groups of the patterns above; None where it is none."""
+    if any(sign in cell for sign in "年時时"):
+        cell = cell.translate(_EAST_ASIAN).strip(" :")
     return _BARE_CLOCK.fullmatch(cell) or _MOMENT.fullmatch(cell)
 
 

@@ -17,7 +17,7 @@ WORDS: dict[Role, tuple[str, ...]] = {
         "displacement", "extension", "elongation", "position", "pos", "stroke", "crosshead", "travel", "stretch", "weg",
         "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
         "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
-        "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp", "ext",
+        "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp", "displ", "ext",
         "forlangning", "forskjutning", "forskydning", "forskyvning", "forlengelse", "siirtyma", "venyma",
         "posunuti", "prodlouzeni", "uzama",
         "extensometer", "extensometre", "extensometro", "estensimetro", "ekstensometr", "lvdt",
@@ -25,7 +25,8 @@ WORDS: dict[Role, tuple[str, ...]] = {
         "変位", "伸び", "ストローク", "位移", "伸长", "伸長", "變形", "变形", "행정", "변위", "신율",
     ),
     "time": (
-        "time", "elapsed", "seconds", "minutes", "hours", "timestamp", "clock", "stopwatch", "zeit", "uhrzeit",
+        "time", "elapsed", "millis", "micros", "seconds", "minutes", "hours", "timestamp", "clock", "stopwatch",
+        "zeit", "uhrzeit",
         "zeitpunkt", "sekunden", "minuten", "stunden", "temps", "duree", "heure",
         "tiempo", "tempo", "hora", "tijd", "czas", "tid", "aika", "cas", "zaman",
         "время", "時間", "时间", "時刻", "시간",
