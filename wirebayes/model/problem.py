@@ -66,6 +66,11 @@ class Problem:
                 return candidate
         raise KeyError(name)
 
+    def place(self, name: str, sample: Sample) -> int | float:
+        """Where a parameter of one sample stands: the number of its column, or the number at which it is fixed."""
+        column = self.column(name, sample)
+        return self.names.index(column) if column in self.names else float(self.prior.fixed[column])
+
     def parameters(self, theta: Array, sample: Sample) -> dict[str, Array]:
         """The parameters of one sample, each (n,), from an (n, d) array of all columns."""
         columns = dict(zip(self.names, np.ascontiguousarray(theta.T), strict=True))

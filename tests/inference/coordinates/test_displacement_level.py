@@ -5,6 +5,7 @@ import pytest
 
 from wirebayes.inference.coordinates.steps import WeightLevel
 from wirebayes.inference.coordinates.transform import Transformation
+from wirebayes.model.sample import LENGTH_EXPONENT
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
 LENGTH_MM, WEIGHT_N, HOLD_S = 1000.0, 20.0, 120.0
@@ -60,6 +61,25 @@ def test_the_last_of_several_holds_is_read_after_the_creep_of_all():
     assert z[:, column["preload"]] == pytest.approx(np.zeros(200), abs=1e-9)
 
 
+def test_tests_of_several_wires_end_where_each_was_read():
+    """The same for two tests, whose weights, lengths and numbers of holds differ."""
+    benches = [Bench("a", length_mm=LENGTH_MM, weights_N=(10.0, 10.0)), Bench("b", length_mm=1500.0, weights_N=(20.0,))]
+    problem = draw(benches, Truth(WIRE), seed=3).problem
+    theta = problem.prior.rvs(200, np.random.default_rng(0))
+    k1, B, U, k2, N = (theta[:, problem.names.index(name)] for name in NAMES[:5])
+    reached = -np.expm1(-k2 * HOLD_S**N)
+    gained = {"a": 10.0**U * (1.0 - (1.0 - reached) ** 2), "b": 20.0**U * reached}
+    longer = problem.prior.fixed[LENGTH_EXPONENT]
+    columns = [problem.names.index(f"preload[{name}]") for name in "ab"]
+    for sample, column in zip(problem.samples, columns, strict=True):
+        weight, length = sample.protocol.setting[0], sample.protocol.length_mm
+        creep = B * gained[sample.name] * (length / sample.model.length_ref_mm) ** longer
+        end = sample.readings[-1, -1, 0]
+        theta[:, column] = length * weight / k1 + creep * (1.0 + weight / k1) - end
+    z = Transformation(problem).to_sampled(theta)
+    assert z[:, columns] == pytest.approx(np.zeros((200, 2)), abs=1e-9)
+
+
 @pytest.mark.parametrize("weights", [(WEIGHT_N,), (WEIGHT_N, 0.1 * WEIGHT_N, WEIGHT_N)], ids=["one hold", "a rest"])
 @pytest.mark.parametrize("law", ["hooke", "modified"])
 def test_the_map_goes_back_and_its_jacobian_is_that_of_differences(law, weights):
@@ -82,10 +102,22 @@ def test_the_map_goes_back_and_its_jacobian_is_that_of_differences(law, weights)
         (one_weight(weights=(20.0, 17.9, 20.0)), False),
         (one_weight(weights=(20.0, 2.0, 20.0), unrecorded=(2,)), True),
         (one_weight(weights=(20.0, 2.0, 20.0)), False),
-        (one_weight(count=2), False),
+        (one_weight(count=2), True),
+        (draw([Bench("a", weights_N=(20.0,)), Bench("b", "other", weights_N=(20.0,))], seed=1).problem, False),
+        (draw([Bench("a", weights_N=(20.0,)), Bench("b", weights_N=(20.0, 10.0))], seed=1).problem, False),
         (draw([Bench(displacements_mm=(3.0,))], seed=1).problem, False),
     ],
-    ids=["one weight", "alike", "two weights", "rest between", "rest that was read", "two tests", "one displacement"],
+    ids=[
+        "one weight",
+        "alike",
+        "two weights",
+        "rest between",
+        "rest that was read",
+        "two tests",
+        "two materials",
+        "two weights in one of two",
+        "one displacement",
+    ],
 )
 def test_only_a_test_of_one_weight_has_this_coordinate(problem, has_one):
     def has_it(for_draws):

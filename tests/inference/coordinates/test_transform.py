@@ -37,6 +37,9 @@ PROBLEMS = {
     ).problem,
     "toe": draw([Bench()], Truth(effects=(effect_named("toe"),)), seed=9).problem,
     "toes of one wire": draw([*LINE, Bench("c")], Truth(effects=(effect_named("toe"),)), seed=9).problem,
+    "one weight each": draw(
+        [Bench("a", weights_N=(10.0,)), Bench("b", length_mm=1710.0, weights_N=(20.0, 20.0))], Truth(), seed=3
+    ).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
     "one hold": draw([Bench(displacements_mm=(1.0,))], Truth({"k1": 800.0}), seed=8).problem,
     "one displacement": draw([Bench(displacements_mm=(3.0, 0.0, 3.0))], Truth({"k1": 800.0}), seed=8).problem,

@@ -1,4 +1,4 @@
-"""Coordinates of the preload and B for a test of one weight, which determines displacements, not the preload nor k1.
+"""Coordinates of preloads and B for tests of one weight each, which determine displacements, not the preloads nor k1.
 
 Under a weight w the wire is stretched by ``L0 w / k1``, and by its creep; what is read is the stretch less the preload.
 So the preload lies on a curve over k1, as narrow as the error of the weight is small: a bent funnel, which walkers
@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.inference.coordinates.one_setting import is_one_setting
+from wirebayes.inference.coordinates.ridge import Ridge, for_sample
 from wirebayes.model.problem import Problem
+from wirebayes.model.sample import LENGTH_EXPONENT, Sample
 from wirebayes.numeric.typing import Array
 
 
@@ -31,6 +33,12 @@ class DisplacementLevel:
         Of the test until that reading; those that were not read, as rests between, may be of another weight.
     modified : bool
         Whether strain is relative to the stretched length (`wirebayes.wire.laws.Modified`).
+    ridge : Ridge
+        Of the material, as this test has it.
+    log_ratio : float
+        Log of the length over that to which parameters refer.
+    length_exponent : int or float
+        With which the creep grows with the length: a column, or the number at which it is fixed.
     """
 
     k1: int
@@ -40,6 +48,23 @@ class DisplacementLevel:
     last: float
     holds: int
     modified: bool
+    ridge: Ridge
+    log_ratio: float
+    length_exponent: int | float
+
+    def log_total(self, theta: Array, log_B: Array) -> Array:
+        """(n,) log of what the weight as stated has gained by creep until the last reading, which is stretched, mm.
+
+        Parameters
+        ----------
+        theta : (n, d) array
+            Natural parameters; B in it is not looked at.
+        log_B : (n,) array
+        """
+        longer = self.length_exponent
+        exponent = theta[:, longer] if isinstance(longer, int) else longer
+        log_gained = self.ridge.log_creep(theta) + self.ridge.log_total(theta, self.holds)
+        return np.asarray(log_B + exponent * self.log_ratio + log_gained + np.log1p(self._strain(theta)))
 
     def log_beyond(self, theta: Array, U: Array | float) -> Array:
         """(n,) log of what the readings show of a creep over the creep, which is stretched itself."""
@@ -112,32 +137,49 @@ class DisplacementLevel:
         return share / np.maximum(1.0 - share, _LEAST) if self.modified else share
 
 
-def displacement_level(problem: Problem) -> DisplacementLevel | None:
-    """The coordinates for the test of a problem.
+def displacement_levels(problem: Problem, ridge: Ridge) -> list[DisplacementLevel]:
+    """The coordinates for the tests of a problem.
 
     Parameters
     ----------
     problem : Problem
-        Of one sample, whose k1 is open.
+        Of samples of one material, whose k1 is open.
+    ridge : Ridge
+        Of the material.
 
     Returns
     -------
-    DisplacementLevel or None
-        None unless all that was read is of one weight, and the preload open.
+    list of DisplacementLevel
+        One a sample; none at all unless all that was read of each is of one weight, and its preload open.
     """
-    (sample,) = problem.samples
+    found = [_level(problem, ridge, sample) for sample in problem.samples]
+    levels = [level for level in found if level is not None]
+    return levels if len(levels) == len(found) else []
+
+
+def _level(problem: Problem, ridge: Ridge, sample: Sample) -> DisplacementLevel | None:
+    """The coordinates for one sample."""
     protocol = sample.protocol
     weights = protocol.setting[protocol.recorded]
     if protocol.control != "force" or not is_one_setting(weights):
         return None
+    names = problem.names
     k1, preload = (problem.column(name, sample) for name in ("k1", "preload"))
-    if preload not in problem.names:
+    if preload not in names:
         return None
-    last = float(sample.readings[..., 0][protocol.mask][-1])
-    holds = 1 + int(np.flatnonzero(protocol.recorded)[-1])
-    modified = sample.model.law == "modified"
-    k1_at, preload_at = map(problem.names.index, (k1, preload))
-    return DisplacementLevel(k1_at, preload_at, float(weights[-1]), protocol.length_mm, last, holds, modified)
+    ratio = protocol.length_mm / (sample.model.length_ref_mm or protocol.length_mm)
+    return DisplacementLevel(
+        k1=names.index(k1),
+        preload=names.index(preload),
+        weight=float(weights[-1]),
+        length=protocol.length_mm,
+        last=float(sample.readings[..., 0][protocol.mask][-1]),
+        holds=1 + int(np.flatnonzero(protocol.recorded)[-1]),
+        modified=sample.model.law == "modified",
+        ridge=for_sample(ridge, problem, sample),
+        log_ratio=float(np.log(ratio)),
+        length_exponent=0.0 if ratio == 1.0 else problem.place(LENGTH_EXPONENT, sample),
+    )
 
 
 _LEAST = 1e-3  # of the stretched length that is left without strain: below, the law has no wire

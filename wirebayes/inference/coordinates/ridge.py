@@ -154,6 +154,21 @@ def ridges_of(problem: Problem, columns: ColumnMap, for_draws: bool) -> list[Rid
     return found
 
 
+def for_sample(ridge: Ridge, problem: Problem, sample: Sample) -> Ridge:
+    """The ridge of a material as one of its samples has it: its holds and tensions.
+
+    Parameters
+    ----------
+    ridge : Ridge
+    problem : Problem
+    sample : Sample
+        Of the same material.
+    """
+    if sample is problem.samples[0]:
+        return ridge
+    return _ridge(problem, sample, dict(ridge.where), dict(ridge.fixed), ridge.shifted - {"U"})
+
+
 def _parameters(problem: Problem, sample: Sample, columns: ColumnMap) -> tuple[dict[str, int], dict[str, float]]:
     """Columns of a sample's positive creep parameters, and what others are fixed at."""
     names, mark = problem.names, _mark(problem, sample.material)

@@ -94,13 +94,13 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
     """
     prior, protocol, readings = problem.prior, sample.protocol, sample.readings[..., 0]
 
-    def place(name: str) -> int | float:
-        column = problem.column(name, sample)
-        return problem.names.index(column) if column in problem.names else float(prior.fixed[column])
-
     if protocol.control == "force":
         return None
-    if problem.likelihood != "chain" or not isinstance(preload := place("preload"), int) or protocol.mask[0].sum() < 2:
+    if (
+        problem.likelihood != "chain"
+        or not isinstance(preload := problem.place("preload", sample), int)
+        or protocol.mask[0].sum() < 2
+    ):
         return None
     first, largest = readings[0, protocol.mask[0]], readings[protocol.mask].max()
     if first[0] < _CLEARLY * largest or first[0] - first[-1] < _CLEARLY * first[0]:
@@ -116,8 +116,8 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
         _WIDTH * typical,
         protocol.length_mm,
         sample.model.law == "modified",
-        place("k1"),
-        place(below[0]) if below else 0.0,
+        problem.place("k1", sample),
+        problem.place(below[0], sample) if below else 0.0,
     )
 
 

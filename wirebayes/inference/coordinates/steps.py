@@ -148,33 +148,47 @@ class Level(Step):
 
 @dataclass(frozen=True)
 class WeightLevel(Step):
-    """Under one weight, the preload becomes an error of the weight, and log B is that under the true weight."""
+    """Where each test is of one weight, preloads become errors of weights, and log B is that under the true ones."""
 
     ridge: Ridge
-    level: DisplacementLevel
-    scale: float
+    levels: tuple[DisplacementLevel, ...]
+    scale: Array
+
+    @property
+    def preloads(self) -> list[int]:
+        """Their columns."""
+        return [level.preload for level in self.levels]
 
     def to_sampled(self, z: Array, theta: Array) -> None:
         B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
-        error = self.level.score(theta, U, self._log_total(theta, z[:, B]))
-        z[:, self.level.preload] = error
-        z[:, B] += self.level.log_gain(theta, U, error)
+        log_B = self._log_B(theta, z[:, B])
+        for level in self.levels:
+            z[:, level.preload] = level.score(theta, U, level.log_total(theta, log_B))
+        z[:, B] += self._log_gain(theta, z)
 
     def to_natural(self, theta: Array, z: Array) -> None:
-        column, B, U = self.level.preload, self.ridge.where["B"], self.ridge.get(theta, "U")
-        error = z[:, column]
-        z[:, B] -= self.level.log_gain(theta, U, error)  # for the steps before this one
-        theta[:, column] = self.level.value(error, theta, U, self._log_total(theta, z[:, B]))
+        B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
+        z[:, B] -= self._log_gain(theta, z)  # for the steps before this one
+        log_B = self._log_B(theta, z[:, B])
+        for level in self.levels:
+            theta[:, level.preload] = level.value(z[:, level.preload], theta, U, level.log_total(theta, log_B))
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
-        log_lost = z[:, B] - self.level.log_gain(theta, U, z[:, self.level.preload])
-        slope = self.level.slope(theta, U, self._log_total(theta, log_lost))
-        return np.asarray(np.log(slope) - np.log(self.scale))
+        log_B = self._log_B(theta, z[:, B] - self._log_gain(theta, z))
+        slopes = [level.slope(theta, U, level.log_total(theta, log_B)) for level in self.levels]
+        return np.asarray(np.log(slopes).sum(axis=0) - np.log(self.scale[self.preloads]).sum())
 
-    def _log_total(self, theta: Array, log_lost: Array) -> Array:
-        """(n,) log of what was gained until the last reading, by that of what is gained in a hold, mm."""
-        return log_lost + self.ridge.log_total(theta, self.level.holds)
+    def _log_gain(self, theta: Array, z: Array) -> Array:
+        """(n,) log of the creep under the true weights over that under the stated ones: the mean of the tests."""
+        U = self.ridge.get(theta, "U")
+        gains = [level.log_gain(theta, U, z[:, level.preload]) for level in self.levels]
+        return np.asarray(np.mean(gains, axis=0))
+
+    def _log_B(self, theta: Array, log_lost: Array) -> Array:
+        """(n,) log B, by the log of what is gained in a hold, as if what creeps beside the creep were creep."""
+        beyond = self.levels[0].log_beyond(theta, self.ridge.get(theta, "U"))
+        return np.asarray(log_lost - self.ridge.log_creep(theta) - beyond)
 
 
 @dataclass(frozen=True)

@@ -86,16 +86,16 @@ def tension_level(problem: Problem, slack_edges: list[SlackEdge]) -> TensionLeve
     Parameters
     ----------
     problem : Problem
-        Of one sample, whose k1 is open, and whose preload is open or fixed.
+        Of samples whose k1 is open, and whose preloads are open or fixed.
     slack_edges : list of SlackEdge
         Coordinates of preloads; one that depends on k1 leaves no place for these.
 
     Returns
     -------
     TensionLevel or None
-        None unless all holds are at one displacement, but for rests at zero or below, and taut.
+        None unless there is one sample, all its holds at one displacement, but for rests at zero or below, and taut.
     """
-    if any(edge.threshold != 0.0 for edge in slack_edges):
+    if len(problem.samples) != 1 or any(edge.threshold != 0.0 for edge in slack_edges):
         return None
     (sample,) = problem.samples
     protocol = sample.protocol
@@ -107,11 +107,10 @@ def tension_level(problem: Problem, slack_edges: list[SlackEdge]) -> TensionLeve
     read = sample.readings[..., 0][protocol.mask & pulled[:, None]]
     if read[0] <= 0.0 or read[-1] <= 0.0:
         return None
-    k1, column = (problem.column(name, sample) for name in ("k1", "preload"))
-    preload = problem.names.index(column) if column in problem.names else float(problem.prior.fixed[column])
+    k1, preload = problem.names.index(problem.column("k1", sample)), problem.place("preload", sample)
     begin_s, end_s = float(protocol.time_s[0, 0]), float(protocol.duration_s[0])
     at, length = float(protocol.setting[0]), protocol.length_mm
-    return TensionLevel(problem.names.index(k1), preload, at, length, float(read[0]), begin_s, end_s)
+    return TensionLevel(k1, preload, at, length, float(read[0]), begin_s, end_s)
 
 
 _LEAST = 1e-3  # of the stretch without a preload: with less the wire is slack, and k1 is what it is

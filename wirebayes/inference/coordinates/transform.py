@@ -40,7 +40,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.inference.coordinates.columns import ColumnMap, columns_of
-from wirebayes.inference.coordinates.displacement_level import displacement_level
+from wirebayes.inference.coordinates.displacement_level import DisplacementLevel, displacement_levels
 from wirebayes.inference.coordinates.ridge import Ridge, ridges_of
 from wirebayes.inference.coordinates.slack_edge import SlackEdge, slack_edge
 from wirebayes.inference.coordinates.steps import (
@@ -54,7 +54,7 @@ from wirebayes.inference.coordinates.steps import (
     Straightened,
     WeightLevel,
 )
-from wirebayes.inference.coordinates.tension_level import tension_level
+from wirebayes.inference.coordinates.tension_level import TensionLevel, tension_level
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import NOISES
 from wirebayes.numeric.typing import Array
@@ -120,13 +120,14 @@ class Transformation:
             if (tension := tension_level(problem, slack)) is not None:
                 ridges = [replace(ridge, log_step=np.inf)]  # the level says what k1 is beside the creep
                 levels = [Level(ridges[0], tension)]
-            elif (weight := displacement_level(problem)) is not None:
-                levels = [WeightLevel(ridge, weight, self.scale[weight.preload])]
+            elif weights := displacement_levels(problem, ridge):
+                levels = [WeightLevel(ridge, tuple(weights), self.scale)]
         toes = _toes(problem, self.columns) if for_draws and not any(isinstance(s, WeightLevel) for s in levels) else []
         self.steps = [*_steps(ridges, levels, [Preload(edge, self.scale[edge.preload]) for edge in slack]), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
-        preloads = {edge.preload for edge in slack} | {s.level.preload for s in levels if isinstance(s, WeightLevel)}
+        preloads = {edge.preload for edge in slack}
+        preloads |= {column for s in levels if isinstance(s, WeightLevel) for column in s.preloads}
         self._own_scale = [*self.shares, *sorted(preloads | {toe.preload for toe in toes})]
 
     @property
@@ -190,7 +191,7 @@ class Transformation:
 def _steps(ridges: Sequence[Ridge], levels: Sequence[Level | WeightLevel], preloads: Sequence[Preload]) -> list[Step]:
     """The steps, each kind for all materials: what one asks for may be a column that an earlier material owns."""
     asks_for_k1 = [step for step in preloads if step.edge.threshold != 0.0]
-    level = levels[0].level if levels else None
+    level = _read_beside(levels)
     return [
         *asks_for_k1,
         *(Loss(ridge, level) for ridge in ridges if "B" in ridge.shifted),
@@ -200,6 +201,13 @@ def _steps(ridges: Sequence[Ridge], levels: Sequence[Level | WeightLevel], prelo
         *(Power(ridge) for ridge in ridges if "U" in ridge.shifted),
         *(step for step in preloads if step not in asks_for_k1),
     ]
+
+
+def _read_beside(levels: Sequence[Level | WeightLevel]) -> TensionLevel | DisplacementLevel | None:
+    """What tests of one setting show over what the ridge says: the first of them stands for all."""
+    for step in levels:
+        return step.levels[0] if isinstance(step, WeightLevel) else step.level
+    return None
 
 
 def _slack_edges(problem: Problem, columns: ColumnMap) -> list[SlackEdge]:
@@ -222,15 +230,17 @@ def _toes(problem: Problem, columns: ColumnMap) -> list[Straightened]:
 
 
 def _is_usual(problem: Problem, columns: ColumnMap, ridges: Sequence[Ridge]) -> bool:
-    """Whether stiffness, preload and creep of a problem of one sample have the usual coordinates."""
-    if problem.likelihood != "chain" or len(problem.samples) != 1:
+    """Whether stiffness, preloads and creep of a problem of one material have the usual coordinates."""
+    if problem.likelihood != "chain" or len(ridges) != 1 or "B" not in ridges[0].shifted:
         return False
-    if len(ridges) != 1 or "B" not in ridges[0].shifted:
-        return False
-    k1, preload = (problem.column(name, problem.samples[0]) for name in ("k1", "preload"))
-    if k1 not in problem.names or not columns.positive[problem.names.index(k1)]:
-        return False
-    return preload in problem.prior.fixed or columns.is_linear(problem.names.index(preload))
+    names = problem.names
+    for sample in problem.samples:
+        k1, preload = (problem.column(name, sample) for name in ("k1", "preload"))
+        if k1 not in names or not columns.positive[names.index(k1)]:
+            return False
+        if preload in names and not columns.is_linear(names.index(preload)):
+            return False
+    return True
 
 
 def _noises(problem: Problem, columns: ColumnMap) -> tuple[Noises, ...]:
