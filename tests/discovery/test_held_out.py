@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from tests.model.dense import jacobian, normal
+from tests.model.dense import given, jacobian, normal
 from tests.simulated import simulated_tests
 from wirebayes.discovery import held_out
 from wirebayes.effects import effect_named
@@ -30,8 +30,8 @@ def moved(experiment: Experiment, deviations: float) -> Experiment:
     """The readings of the holds after training, so many predictive standard deviations above their prediction."""
     r, covariance, hold = normal(experiment.protocol(), WIRE, Model(), experiment.tension(), experiment.resolution_N)
     past = hold < TRAIN
-    gain = covariance[np.ix_(~past, past)] @ np.linalg.inv(covariance[np.ix_(past, past)])
-    sd = np.sqrt(np.diag(covariance[np.ix_(~past, ~past)] - gain @ covariance[np.ix_(past, ~past)]))
+    gain, left = given(covariance, past)
+    sd = np.sqrt(np.diag(left))
     nominal = experiment.tension()[TRAIN:].ravel() - r[~past]
     readings = (nominal + gain @ r[past] + deviations * sd).reshape(-1, experiment.tension().shape[1])
     later = [replace(h, readings=row) for h, row in zip(experiment.holds[TRAIN:], readings, strict=True)]
@@ -114,8 +114,7 @@ def test_scores_of_several_draws_are_averages_over_them() -> None:
         _, derivative = jacobian(sample.protocol, values, sample.model)
         own = np.concatenate([derivative[j, sample.protocol.mask[j], j] for j in range(12)])
         past = hold < 9  # the first eight that were recorded
-        gain = covariance[np.ix_(~past, past)] @ np.linalg.inv(covariance[np.ix_(past, past)])
-        left = covariance[np.ix_(~past, ~past)] - gain @ covariance[np.ix_(past, ~past)]
+        gain, left = given(covariance, past)
         error = r[~past] - gain @ r[past]
         densities.append(
             [
@@ -194,8 +193,7 @@ def test_what_is_not_known_of_the_creep_widens_the_bands(
     sample = problem.samples[0]
     r, covariance, hold = normal(sample.protocol, wire, Model(), experiment.tension(), sample.resolution)
     past = hold < 2
-    gain = covariance[np.ix_(~past, past)] @ np.linalg.inv(covariance[np.ix_(past, past)])
-    left = covariance[np.ix_(~past, ~past)] - gain @ covariance[np.ix_(past, ~past)]
+    gain, left = given(covariance, past)
     readings = sample.readings.copy()
     readings[2, :, 0] += gain @ r[past] - r[~past] + deviations * np.sqrt(np.diag(left))
     own = problem.parameters(np.tile([wire[name] for name in problem.names], (4000, 1)), sample)

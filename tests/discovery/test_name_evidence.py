@@ -106,10 +106,23 @@ def test_a_refit_adds_the_same_prior(name: str, monkeypatch: pytest.MonkeyPatch)
     assert found.log_bayes == pytest.approx(log_evidence(9.0, one_sided), abs=0.02)
 
 
+def slips() -> tuple[list[Any], list[Candidate]]:
+    """Trials and candidates of a grip that slipped at one of twelve holds."""
+    trials = [p for hold in range(1, 13) for p in probes(effect_named(f"grip_slip@{hold}"))[:1]]
+    return trials, [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
+
+
+def seen(effects: np.ndarray) -> Scan:
+    """What a scan says of two-sided effects, one data set a row: these log Bayes factors, each at delta 8."""
+    one = scan_of(np.array([8.0]), False)
+    pieces = Pieces(**(vars(one.pieces) | {"one_sided": np.zeros(effects.shape[1], bool)}))
+    norm = np.full(effects.shape, NORM)
+    return Scan(effects, one.flexible, one.two, np.full(effects.shape, 8.0 / NORM), norm, pieces)
+
+
 def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> None:
     """Twelve holds at which a grip may have slipped are one name: its evidence is their mean, not their sum."""
-    trials = [p for hold in range(1, 13) for p in probes(effect_named(f"grip_slip@{hold}"))[:1]]
-    candidates = [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
+    trials, candidates = slips()
 
     def refitted(
         blocks: Any, which: Any, effect: Any, per_delta: float, guess: float, reach: float, shapes: Any
@@ -117,15 +130,7 @@ def test_forms_of_a_name_share_its_weight(monkeypatch: pytest.MonkeyPatch) -> No
         return refit.Refit(effect, tuple(which), 9.0 if effect.hold == 7 else -30.0, 8.0, 1.0, ())
 
     monkeypatch.setattr(name_evidence, "refit", refitted)
-    pieces = scan_of(np.array([8.0]), False)
-    data = Scan(
-        np.where(np.arange(12) == 6, 32.0, 0.0)[None],
-        pieces.flexible,
-        pieces.two,
-        np.full((1, 12), 8.0 / NORM),
-        np.full((1, 12), NORM),
-        Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(12, bool)})),
-    )
+    data = seen(np.where(np.arange(12) == 6, 32.0, 0.0)[None])
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
     assert found.log_bayes["grip_slip"] == pytest.approx(9.0 - np.log(12.0), abs=1e-3)
     assert found.winners["grip_slip"][0].effect.hold == 7 and found.presence["grip_slip"] == pytest.approx([1.0])
@@ -162,16 +167,7 @@ def test_a_value_of_the_scan_takes_no_name_off_the_list(
 
     monkeypatch.setattr(name_evidence, "refit", climbed)
     monkeypatch.setattr(name_evidence, "_WAVE", 1)
-    pieces = scan_of(np.array([8.0]), False)
-    effects = np.array([[60.0, 12.0, -9.0]])
-    data = Scan(
-        effects,
-        pieces.flexible,
-        pieces.two,
-        np.full((1, 3), 8.0 / NORM),
-        np.full((1, 3), NORM),
-        Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(3, bool)})),
-    )
+    data = seen(np.array([[60.0, 12.0, -9.0]]))
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data], before=before)  # type: ignore[list-item]
     assert asked == refitted and set(found.winners) == set(refitted)
     assert dict(found.tried) == {**before, **{name: own[name] for name in refitted}}
@@ -179,20 +175,11 @@ def test_a_value_of_the_scan_takes_no_name_off_the_list(
 
 def test_a_form_that_was_not_refitted_counts_for_no_more_than_one_that_was(monkeypatch: pytest.MonkeyPatch) -> None:
     """Twelve holds, each 30 nats by the scan; three are refitted and come to 2."""
-    trials = [p for hold in range(1, 13) for p in probes(effect_named(f"grip_slip@{hold}"))[:1]]
-    candidates = [Candidate(k, "grip_slip", (0,), True) for k in range(12)]
+    trials, candidates = slips()
     monkeypatch.setattr(
         name_evidence, "refit", lambda b, which, effect, *_: refit.Refit(effect, tuple(which), 2.0, 8.0, 1.0, ())
     )
-    pieces = scan_of(np.array([8.0]), False)
-    data = Scan(
-        np.full((1, 12), 34.0),
-        pieces.flexible,
-        pieces.two,
-        np.full((1, 12), 8.0 / NORM),
-        np.full((1, 12), NORM),
-        Pieces(**(vars(pieces.pieces) | {"one_sided": np.zeros(12, bool)})),
-    )
+    data = seen(np.full((1, 12), 34.0))
     found = name_evidence.weigh_names([SimpleNamespace()], trials, candidates, [data])  # type: ignore[list-item]
     assert found.log_bayes["grip_slip"] == pytest.approx(2.0)
 

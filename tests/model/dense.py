@@ -42,6 +42,12 @@ def conditional(r, covariance, own):
     return log_density(r, covariance) - (log_density(r[rest], covariance[np.ix_(rest, rest)]) if rest.any() else 0.0)
 
 
+def given(covariance, past):
+    """What others are expected to be by unit of what is known, (others, past), and the covariance that is left."""
+    gain = covariance[np.ix_(~past, past)] @ np.linalg.inv(covariance[np.ix_(past, past)])
+    return gain, covariance[np.ix_(~past, ~past)] - gain @ covariance[np.ix_(past, ~past)]
+
+
 def information(normal_at, d, step=1e-5):
     """(d, d) expected information of d parameters; `normal_at` moves (d,) gives residuals and covariance there."""
     moves = step * np.eye(d)

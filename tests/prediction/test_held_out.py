@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from tests.model.dense import given
 from wirebayes.inference.fit import Fit, fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
@@ -45,10 +46,10 @@ def dense_conditional(fitted: Fit, experiment: Experiment) -> tuple[np.ndarray, 
     j = jacobian.reshape(-1, holds)
     v = (truth["sensor_sd"] ** 2 + 0.01**2 / 12) * np.eye(len(j)) + truth["setting_sd"] ** 2 * j @ j.T
     rows = np.repeat(past, protocol.time_s.shape[1])
-    gain = v[np.ix_(~rows, rows)] @ np.linalg.inv(v[np.ix_(rows, rows)])
+    gain, left = given(v, rows)
     residual = (experiment.tension() - nominal).ravel()
     mean = nominal.ravel()[~rows] + gain @ residual[rows]
-    return mean, v[np.ix_(~rows, ~rows)] - gain @ v[np.ix_(rows, ~rows)], experiment.tension().ravel()[~rows]
+    return mean, left, experiment.tension().ravel()[~rows]
 
 
 def test_log_scores_are_those_of_the_dense_normal(fitted: Fit) -> None:

@@ -205,11 +205,16 @@ def test_the_page_of_a_fit_tells_known_from_unknown(fitted):
     assert any("k1:" in text for text in known) and any("k1:" in text for text in loose)
 
 
-def test_a_fit_that_did_not_converge_says_so_first(fitted, tmp_path):
-    summary = json.loads((fitted / "chain" / "summary.json").read_text())
-    copy = folder_of(tmp_path / "out", "fit")
+def copied(fitted, folder):
+    """A folder of the same posterior, whose summary is not written yet, and that summary."""
+    copy = folder_of(folder, "fit")
     (copy / "chain").mkdir()
     (copy / "chain" / "posterior.nc").write_bytes((fitted / "chain" / "posterior.nc").read_bytes())
+    return copy, json.loads((fitted / "chain" / "summary.json").read_text())
+
+
+def test_a_fit_that_did_not_converge_says_so_first(fitted, tmp_path):
+    copy, summary = copied(fitted, tmp_path / "out")
     for converged in (True, False):
         unsure = [] if converged else [{"kind": "not-converged", "text": "the chains stand apart"}]
         content = summary | {"converged": converged, "warnings": unsure}
@@ -258,11 +263,8 @@ def test_a_fit_with_effects_of_the_users_own_runs_none_of_their_code(fitted, tmp
 
 
 def test_the_table_of_creep_names_its_tension_and_what_it_includes(fitted, tmp_path):
-    summary = json.loads((fitted / "chain" / "summary.json").read_text())
+    copy, summary = copied(fitted, tmp_path / "out")
     derived = summary["derived"] | {"tension_N": 4.25, "final_creep_mm": None, "median_creep_time_s": None}
-    copy = folder_of(tmp_path / "out", "fit")
-    (copy / "chain").mkdir()
-    (copy / "chain" / "posterior.nc").write_bytes((fitted / "chain" / "posterior.nc").read_bytes())
     (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"derived": derived}))
     words = read(write_page(copy)).words
     assert (
