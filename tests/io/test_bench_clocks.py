@@ -146,6 +146,33 @@ def test_times_of_day_pass_midnight_however_they_are_written(tmp_path, clock):
     assert "the clock passes midnight 1 time" in made.notes
 
 
+@pytest.mark.parametrize(
+    ("moments", "refused"),
+    [
+        (("12:15", "12:30", "6:30", "6:45"), True),  # half a round
+        (("12:15", "12:30", "6:31", "6:45"), False),
+        (("12:15", "12:59", "1:00", "1:15"), True),
+        (("12:15", "12:59", "0:59", "1:15"), False),  # an hour that no clock with hands writes
+        (("12:15", "13:00", "1:00", "1:15"), False),  # the other one
+        (("12:15", "12:16", "0:59", "1:15"), False),
+        (("1:00", "5:00", "12:00", "1:00"), False),  # durations that begin anew
+    ],
+)
+@pytest.mark.parametrize("seconds", ["", ":00"])
+def test_a_clock_that_may_go_round_twice_a_day_is_refused(tmp_path, moments, refused, seconds):
+    path = tmp_path / "raw.csv"
+    rows = [f"{1 + i // 2};{1 + i // 2};{moment}{seconds};{9 - i}\n" for i, moment in enumerate(moments)]
+    path.write_text("Hold;x [mm];Time [hh:mm];Force [N]\n" + "".join(rows))
+    if refused:
+        with pytest.raises(InputError, match="and no hour above 12, expected AM or PM behind the times, hours to 24"):
+            convert(path, ABOUT, Choices(time_since="test"))
+    else:
+        try:
+            convert(path, ABOUT, Choices(time_since="test"))
+        except InputError as error:
+            assert "no hour above 12" not in str(error)
+
+
 def test_durations_that_begin_anew_at_zero_pass_no_midnight(tmp_path):
     assert times_of(tmp_path, "Time", ["0 h 0 min", "14 h 0 min"]) == [0.0, 50400.0]
     path = bench_file(tmp_path, "Time", ["0 h 0 min", "14 h 0 min"])

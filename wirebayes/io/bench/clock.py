@@ -15,6 +15,7 @@ from wirebayes.io.bench.undecided import Undecided
 from wirebayes.numeric.typing import Bools, Floats
 
 _DAY, _HOUR = 86400.0, 3600.0
+_ROUND = 0.5 * _DAY  # of a clock with hands
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
 _PUT_BACK = 3600.0  # clocks are put back by an hour in autumn
 _LATE = 3.0  # times the least time between readings: nobody who counts from zero begins so late
@@ -84,9 +85,23 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[Floats, bo
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
         return (days - days[0]) + values, True, 0
+    if all(of_clock):
+        _check_hours_go_beyond_twelve(table, column, values)
     of_day = short is None and (not of_clock[0] or values[0] >= _HOUR)
     midnights = np.cumsum(_days_begin(values, of_day))
     return values + _DAY * midnights, of_day, int(midnights[-1])
+
+
+def _check_hours_go_beyond_twelve(table: RawTable, column: int, values: Floats) -> None:
+    """Refuse clocks (r,) in s that may go round twice a day: they fall by half a round or more, and know no hour 13."""
+    steps = np.diff(values, prepend=values[0])
+    closest = steps[steps > 0.0].min(initial=np.inf)
+    goes_round = (steps > -_ROUND) & (steps <= -0.5 * _ROUND) & (values > _LATE * closest)
+    if goes_round.any() and values.min() >= _HOUR and values.max() < _ROUND + _HOUR:
+        row = int(np.flatnonzero(goes_round)[0])
+        before, after = (table.rows[i].cell(column) for i in (row - 1, row))
+        found = f"{shown(after)} after {shown(before)}, and no hour above 12"
+        raise table.complain(table.rows[row].line, column, found, "AM or PM behind the times, hours to 24, or dates")
 
 
 def _days_begin(values: Floats, of_day: bool) -> Bools:
