@@ -226,3 +226,19 @@ def test_clocks_that_part_are_asked_about_with_the_line(tmp_path, wrong):
     ):
         read(path)
     assert read(path, mapping=("Time (s)=time", "Elapsed (s)=ignore")).rows
+
+
+@pytest.mark.parametrize("ranges", ["50 mm;;500 N", "50 mm;600 s;500 N", "±50 mm;;0,5 kN"])
+def test_ranges_of_sensors_under_their_names_are_no_header(tmp_path, ranges):
+    path = tmp_path / "raw.csv"
+    path.write_text(f"Export\n\nWegaufnehmer [mm];Zeit [s];Kraftaufnehmer [N]\n{ranges}\n" + body(";", ","))
+    assert [row[3] for row in read(path).rows] == [pytest.approx(f) for _, _, f in ROWS]
+
+
+@pytest.mark.parametrize("above", ["Kraft [N];Zeit", "Kraft [N];Kraft [N];Kraft [N];Kraft [N]"])
+def test_settings_of_columns_are_no_ranges(tmp_path, above):
+    """Fewer names above them, or one name for all."""
+    path = tmp_path / "raw.csv"
+    path.write_text(f"{above}\n0 s;1 mm;2 mm;3 mm\n" + "0;5,1;9,2;12,3\n30;5,0;9,1;12,2\n60;4,9;9,0;12,1\n")
+    with pytest.raises(wb.InputError, match="line 2: "):
+        read(path)

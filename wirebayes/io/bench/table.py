@@ -1,5 +1,6 @@
 """The readings of a sheet: where the header stands, whether a row of units follows, where the numbers begin and end."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,6 +12,7 @@ from wirebayes.io.bench.words import speaks_of_a_quantity
 _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
 LONGEST_HEADER = 200  # characters: names and units take a few words, prose is no header
 LONGEST_MARK = 2  # characters: a number or a letter says nothing without the word specimen
+_NUMBER_BEFORE = re.compile(r"^±?[-+−]?\d+([.,]\d+)?\s*")
 _SHOWN = 5  # rows that show how many columns there are
 
 
@@ -108,6 +110,8 @@ def find_table(sheet: Sheet) -> RawTable:
     above = [*rows[:first]]
     while len(above) > 1 and _is_subheading(above[-1]):
         above.pop()
+    if len(above) > 1 and _are_ranges(above[-1]) and _names_more(above[-2], above[-1]):
+        above.pop()
     units: tuple[str, ...] = ()
     if len(above) > 1 and _are_units(above[-1]) and len(above[-2].filled) >= max(2, len(above[-1].filled)):
         units = tuple(cell.strip("[]() ") for cell in above.pop().cells)
@@ -132,6 +136,21 @@ def find_table(sheet: Sheet) -> RawTable:
 def _is_subheading(row: SheetRow) -> bool:
     """Whether a row between header and readings names a part of the test, as ``Cycle 1``."""
     return len(row.filled) == 1 and not is_value(row.filled[0]) and not row.comment and not _are_units(row)
+
+
+def _are_ranges(row: SheetRow) -> bool:
+    """Whether all cells are numbers with units, as the ranges of sensors under their names: ``500 N; 50 mm``."""
+    if not all(map(_NUMBER_BEFORE.match, row.filled)):
+        return False
+    units = [_NUMBER_BEFORE.sub("", cell) for cell in row.filled]
+    return all(any(quantity_unit(unit, role) for role in ROLES) for unit in units)
+
+
+def _names_more(row: SheetRow, below: SheetRow) -> bool:
+    """Whether a row names as many columns as the one below it or more, each by another name."""
+    names = set(row.filled)
+    named = sum(map(speaks_of_a_quantity, names))
+    return named > 1 and len(names) == len(row.filled) >= len(below.filled)
 
 
 def _is_header(row: SheetRow) -> bool:

@@ -16,6 +16,7 @@ WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": (
         "displacement", "extension", "elongation", "position", "pos", "stroke", "crosshead", "travel", "stretch", "weg",
         "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
+        "wegaufnehmer", "wegsensor",
         "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
         "posizione", "deslocamento", "alongamento", "verplaatsing", "verlenging", "disp", "displ", "ext",
         "forlangning", "forskjutning", "forskydning", "forskyvning", "forlengelse", "siirtyma", "venyma",
