@@ -16,7 +16,6 @@ import pytest
 
 from wirebayes.cli import COMMANDS, command_function
 from wirebayes.commands.options import text_of
-from wirebayes.processes import workers
 
 # command -> module and name of its function
 FUNCTIONS = {
@@ -82,7 +81,6 @@ def called(name: str, monkeypatch: pytest.MonkeyPatch, given: dict[str, Any]) ->
 
     module, _, place = FUNCTIONS[name].partition(".")
     monkeypatch.setattr(import_module(f"wirebayes.commands.{module}"), place, recorded)
-    monkeypatch.setattr(workers, "load_early", lambda: None)
     with pytest.raises(Called) as stopped:
         command_of(name)(**given)
     found: dict[str, Any] = stopped.value.args[0]

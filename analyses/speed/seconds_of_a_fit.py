@@ -23,20 +23,21 @@ from analyses.options import study_options
 from wirebayes.io import paper
 
 DATA = paper.FOLDER / "experiments.toml"
-# Where a phase is spent: module, function, and what it does. The check runs beside the others, in another process.
+# Where a phase is spent: module, function, and what it does. Processes beside this one do the check, and load
+# what draws the page.
 PHASES = (
     ("wirebayes.results.jobs", "fit_job", "modes and draws"),
     ("wirebayes.results.jobs", "store", "posterior.nc and summary.json"),
     ("wirebayes.discovery.model_check", "check_model", "the check, beside these"),
-    ("wirebayes.cli.answer", "write_report", "the page, matplotlib included"),
+    ("wirebayes.cli.answer", "conclude", "the page"),
 )
 
 
 def watched(wire: str, folder: Path) -> None:
     """Run a fit in this process and print when each phase began and ended, s since the epoch, as JSON."""
-    from wirebayes.processes.workers import load_early
+    from wirebayes.processes.workers import one_thread_each
 
-    load_early()
+    one_thread_each()
     import wirebayes.cli.fit
     import wirebayes.commands.fit  # noqa: F401
 

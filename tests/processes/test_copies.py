@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-from wirebayes.processes.copies import in_copies
+from wirebayes.processes.copies import in_copies, loaded_meanwhile, prepared_copy
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux alone")
 
@@ -85,13 +85,92 @@ def test_a_process_with_several_threads_is_not_copied():
 @LINUX
 def test_a_worker_is_not_copied():
     found = run("""
-        from concurrent.futures import ProcessPoolExecutor
-        from multiprocessing import get_context
+        from wirebayes.processes.workers import processes
         def piece():
             time.sleep(0.3)
             return os.getpid()
         def work():
             return len(set(in_copies([piece] * 2)))
-        print(work(), ProcessPoolExecutor(1, get_context("fork")).submit(work).result())
+        with processes(1) as pool:
+            there = pool.submit(work).result()
+        print(work(), there)
     """)
     assert found == "2 1"
+
+
+PREPARED = """
+    import sys
+    from pathlib import Path
+    from wirebayes.processes.copies import prepared_copy
+    def prepare():
+        sys.modules["prepared"] = os
+    def asked(number):
+        if number == 0:
+            raise ValueError("of a copy")
+        if number == 9 and os.getpid() != here:
+            os._exit(1)
+        return number, "prepared" in sys.modules, os.getpid() == here
+    here = os.getpid()
+"""
+
+
+@LINUX
+def test_a_copy_prepares_and_does_what_is_asked():
+    found = run(
+        textwrap.dedent(PREPARED)
+        + textwrap.dedent("""
+        with prepared_copy(prepare) as in_copy:
+            print(in_copy(asked, 1), in_copy(asked, 2))
+            try:
+                in_copy(asked, 0)
+            except ValueError as error:
+                print(error)
+            print(in_copy(asked, 3), "prepared" in sys.modules)
+        """)
+    )
+    assert found.splitlines() == ["(1, True, False) (2, True, False)", "of a copy", "(3, True, False) False"]
+
+
+@LINUX
+def test_what_a_copy_that_is_gone_was_asked_for_is_done_here():
+    found = run(
+        textwrap.dedent(PREPARED)
+        + textwrap.dedent("""
+        with prepared_copy(prepare) as in_copy:
+            print(in_copy(asked, 9), in_copy(asked, 1))
+        """)
+    )
+    assert found == "(9, False, True) (1, False, True)"
+
+
+@LINUX
+def test_a_copy_that_nobody_needs_ends_at_once():
+    found = run("""
+        from wirebayes.processes.copies import prepared_copy
+        from multiprocessing import active_children
+        begin = time.monotonic()
+        with prepared_copy(lambda: time.sleep(60)):
+            pass
+        print(active_children(), time.monotonic() - begin < 30)
+    """)
+    assert found == "[] True"
+
+
+def test_where_other_threads_run_what_a_copy_is_asked_for_is_done_here():
+    end = threading.Event()
+    other = threading.Thread(target=end.wait)
+    other.start()
+    try:
+        with prepared_copy(lambda: None) as in_copy:
+            assert in_copy(os.getpid) == os.getpid()
+    finally:
+        end.set()
+        other.join()
+
+
+def test_a_module_is_loaded_at_the_end_of_the_block(tmp_path, monkeypatch):
+    (tmp_path / "loaded_late.py").write_text("import time\ntime.sleep(0.2)\nready = True")
+    monkeypatch.syspath_prepend(tmp_path)
+    with loaded_meanwhile("loaded_late"):
+        assert not hasattr(sys.modules.get("loaded_late"), "ready")
+    assert sys.modules.pop("loaded_late").ready

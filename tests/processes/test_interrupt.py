@@ -130,7 +130,7 @@ def test_ctrl_c(what: Callable, whole_group: bool, tmp_path: Path) -> None:
     out = tmp_path / "out"
     arguments, ready = what(out)
     line = said_once(*interrupted(arguments, ready, INT, whole_group))
-    assert ("to go on" in line) == (what is fit)
+    assert "to go on" in line or what is discover  # which keeps its plain fits, if they have begun
     assert not list(out.rglob("*.partial"))
 
 

@@ -54,43 +54,90 @@ def _run(script: str, folder: Path) -> str:
     return done.stdout.strip()
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere processes are not forked")
-def test_processes_find_their_modules_loaded(tmp_path: Path) -> None:
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere processes are not forked")
+SECOND_THREAD = """
+import threading
+end = threading.Event()
+threading.Thread(target=end.wait).start()
+"""
+
+
+@LINUX
+@pytest.mark.parametrize(("before", "copied"), [("", True), (SECOND_THREAD, False)])
+def test_processes_are_copies_unless_other_threads_run(before: str, copied: bool, tmp_path: Path) -> None:
+    script = f"""{before}
+import sys
+sys.modules["only_here"] = sys
+from wirebayes.processes.workers import workers
+with workers(2) as parallel_map:
+    print(*parallel_map(abs, [-1, -2]), *parallel_map(eval, ["'only_here' in __import__('sys').modules"]))
+if "threading" in globals(): end.set()
+"""
+    assert _run(script, tmp_path) == f"1 2 {copied}"
+
+
+@LINUX
+def test_processes_that_are_no_copies_find_their_modules_loaded(tmp_path: Path) -> None:
     loaded = "'wirebayes.discovery.model_check' in __import__('sys').modules"
-    script = f"""
+    script = f"""{SECOND_THREAD}
 from wirebayes.processes.workers import load_early, workers
 {{}}
 with workers(2) as parallel_map:
     print(*parallel_map(eval, ["{loaded}"]))
+end.set()
 """
     assert _run(script.format("load_early()"), tmp_path) == "True"
     assert _run(script.format(""), tmp_path) == "False"
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere processes are not forked")
+@LINUX
 def test_ctrl_c_while_modules_load_is_not_heard_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "interrupting.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    script = """
+    script = f"""{SECOND_THREAD}
 from wirebayes.processes.workers import _prepared, workers
 _prepared(["interrupting"])
 with workers(2) as parallel_map:
     print(*parallel_map(abs, [-1, -2]))
     print(*parallel_map(eval, ["'interrupting' in __import__('sys').modules"]))
+end.set()
 """
     assert _run(script, tmp_path) == "1 2\nTrue"
 
 
 def test_a_users_files_are_not_taken_for_pythons(tmp_path: Path) -> None:
     (tmp_path / "random.py").write_text("raise RuntimeError('this is not the module you look for')")
-    script = """
+    script = f"""
 import sys
 sys.path = [place for place in sys.path if place]  # as in a command that was installed
+{SECOND_THREAD}
 from wirebayes.processes.workers import workers
 with workers(2) as parallel_map:
     print(*parallel_map(abs, [-1, -2]))
+end.set()
 """
     assert _run(script, tmp_path) == "1 2"
+
+
+@LINUX
+def test_a_copy_hears_sigterm_at_once_and_leaves_its_parents_files(tmp_path: Path) -> None:
+    script = """
+import os, signal, time
+from pathlib import Path
+from wirebayes.processes.interrupt import unfinished, watch
+from wirebayes.processes.workers import processes
+watch([])
+with unfinished(Path("half")):
+    Path("half").write_text("of a file")
+    try:
+        with processes(1) as pool:
+            worker = pool.submit(os.getpid).result()
+            os.kill(worker, signal.SIGTERM)
+            pool.submit(time.sleep, 60).result()
+    except Exception as error:
+        print(type(error).__name__, Path("half").is_file())
+"""
+    assert _run(script, tmp_path) == "BrokenProcessPool True"
 
 
 def test_while_computing_linear_algebra_has_one_thread_and_then_what_it_had() -> None:

@@ -1,22 +1,46 @@
 """What a command says at its end: the answer in a few lines, where the results lie, and what to do next."""
 
 import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from wirebayes.commands.write_report import write_report
 from wirebayes.json_files.plain import plain
+from wirebayes.processes.copies import prepared_copy
 from wirebayes.views.result import NOTHING, Given, Result
 
 PAGE = "report.html"
 
 
-def conclude(result: Result[Any], given: Given = NOTHING, *, as_json: bool = False, quiet: bool = False) -> None:
+PageWriter = Callable[[Path], object]
+
+
+@contextmanager
+def page_writer() -> Iterator[PageWriter]:
+    """What writes the page of a folder; what draws it is loaded within the block, while the command computes."""
+    with prepared_copy(partial(import_module, "wirebayes.report.page")) as in_copy:
+        yield lambda folder: in_copy(write_report, folder)
+
+
+def conclude(
+    result: Result[Any],
+    given: Given = NOTHING,
+    write_page: PageWriter = write_report,
+    *,
+    as_json: bool = False,
+    quiet: bool = False,
+) -> None:
     """Write the page of a command's results and print the answer.
 
     Parameters
     ----------
     result : Result
     given : Given
+    write_page : PageWriter
     as_json : bool
         Print the summary as JSON instead.
     quiet : bool
@@ -24,7 +48,7 @@ def conclude(result: Result[Any], given: Given = NOTHING, *, as_json: bool = Fal
     """
     folder = result.place.path
     if result.computed or not (folder / PAGE).is_file():
-        write_report(folder)
+        write_page(folder)
     print_answer(result, given, as_json=as_json, quiet=quiet)
 
 

@@ -50,9 +50,6 @@ def batch_command(
     quiet: Quiet = False,
 ) -> None:
     """Fit many experiments and find what each model is missing: DIR/summary.csv and a folder DIR/NAME for each."""
-    from wirebayes.processes.workers import load_early
-
-    load_early()
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.commands.batch import batch as run

@@ -44,9 +44,6 @@ def compare_command(
     Every model is judged twice: each hold left out in turn, and the last third of the holds (with --train-holds K, all
     after the K-th, and none of them is used before) predicted from the rest.
     """
-    from wirebayes.processes.workers import load_early
-
-    load_early()
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.commands.compare import carry_out, plan_comparison

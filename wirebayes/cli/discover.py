@@ -34,9 +34,6 @@ def discover_command(
     quiet: Quiet = False,
 ) -> None:
     """Find the missing effect: DIR/discovery.json, pictures, and DIR/NAME/{plain,final}/posterior.nc."""
-    from wirebayes.processes.workers import load_early
-
-    load_early()
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.commands.discover import discover as run

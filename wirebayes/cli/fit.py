@@ -50,32 +50,29 @@ def fit_command(
     quiet: Quiet = False,
 ) -> None:
     """Posterior of the wire's parameters: DIR/NAME/posterior.nc and DIR/NAME/summary.json for each experiment."""
-    from wirebayes.processes.workers import load_early
-
-    if check:
-        load_early()
-    from wirebayes.cli.answer import conclude
+    from wirebayes.cli.answer import conclude, page_writer
     from wirebayes.cli.progress import progress
     from wirebayes.commands.fit import fit as run
     from wirebayes.views.result import Given
 
-    with progress() as report:
-        fitted = run(
-            file,
-            experiment=experiment,
-            train_holds=train_holds,
-            elastic_law=elastic_law,
-            history=history,
-            likelihood=likelihood,
-            effects=effect or (),
-            own_effects=own_effects,
-            drop_breaks=drop_breaks,
-            together=together,
-            check=check,
-            seed=seed,
-            output=folder_for("fit", file, output),
-            progress=report,
-        )
-    for line in fitted.messages:
-        print(line, file=sys.stderr)
-    conclude(fitted, Given(str(file)), as_json=as_json, quiet=quiet)
+    with page_writer() as write_page:
+        with progress() as report:
+            fitted = run(
+                file,
+                experiment=experiment,
+                train_holds=train_holds,
+                elastic_law=elastic_law,
+                history=history,
+                likelihood=likelihood,
+                effects=effect or (),
+                own_effects=own_effects,
+                drop_breaks=drop_breaks,
+                together=together,
+                check=check,
+                seed=seed,
+                output=folder_for("fit", file, output),
+                progress=report,
+            )
+        for line in fitted.messages:
+            print(line, file=sys.stderr)
+        conclude(fitted, Given(str(file)), write_page, as_json=as_json, quiet=quiet)

@@ -8,9 +8,6 @@ from wirebayes.cli.options import Output, Seed
 
 def reproduce_command(output: Output = None, seed: Seed = 0) -> None:
     """Reproduce the paper from its own tables, with posteriors: DIR/report.html, its tables and pictures."""
-    from wirebayes.processes.workers import load_early
-
-    load_early()
     from wirebayes.cli.progress import progress
     from wirebayes.commands.reproduce_paper import reproduce_paper
 

@@ -1,6 +1,6 @@
 """What the plain model is missing, added to it where it has a name."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -19,12 +19,14 @@ from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
+from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, read_json, write_bytes, write_json
 from wirebayes.json_files.discovery import IntervalJson
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.model.spec import ModelSpec
 from wirebayes.notice import from_json, notices_by_part, to_json
-from wirebayes.processes.workers import computing, workers
+from wirebayes.processes.copies import loaded_meanwhile, prepared_copy
+from wirebayes.processes.workers import computing, give_way, workers
 from wirebayes.progress import Progress, silent
 from wirebayes.results.jobs import Job, run
 from wirebayes.results.mixture import write_mixture
@@ -35,6 +37,8 @@ from wirebayes.views.posterior import POSTERIOR, SUMMARY
 from wirebayes.views.result import ResultFolder
 from wirebayes.wire.laws import ElasticLaw, History
 
+_PICTURES = "wirebayes.report.pictures.discover"
+_GAPS = 10  # steps of niceness, a tenth of the weight
 _OTHERS = "undecided"  # folder of the models that a final one shares the probability with
 
 
@@ -125,14 +129,23 @@ def discover(
         if opened.state == "done":
             return Findings(place, own, computed=False)
         settings = Settings(spec, kinds, simulations or SIMULATIONS)
-        with computing():
-            with workers(prepare=partial(catalogue, own)) as parallel_map:
-                found = investigate(experiments, settings, seed, progress or silent, parallel_map)
-            jobs = jobs_of(found, spec, own)
-            run(jobs, place.path, seed, policy=policy or DEFAULT, report=progress or silent)
+        report = progress or silent
+        sampled = partial(run, directory=place.path, seed=seed, policy=policy or DEFAULT)
+        plain = partial(sampled, plain_jobs(experiments, spec, own))
+        with computing(), prepared_copy(partial(_in_gaps, plain)) as in_copy:
+            with workers(prepare=partial(catalogue, own)) as parallel_map, loaded_meanwhile(_PICTURES):
+                found = investigate(experiments, settings, seed, report, parallel_map)
+                sampled(jobs_of(found, spec, own), report=report, parallel_map=parallel_map)
+            in_copy(plain)
         write_findings(found, place.path, own)
         opened.finish()
     return Findings(place, own)
+
+
+def _in_gaps(work: Callable[[], object]) -> None:
+    """Do some work where the search leaves a core idle."""
+    give_way(_GAPS)
+    work()
 
 
 def write_findings(found: Investigation, output: Path, own_effects: Path | None) -> None:
@@ -158,33 +171,42 @@ def write_findings(found: Investigation, output: Path, own_effects: Path | None)
     write_json(output / "discovery.json", found.report)
 
 
+def plain_jobs(experiments: Sequence[Experiment], spec: ModelSpec, own_effects: Path | None) -> list[Job]:
+    """Plain fit of every experiment.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    spec : ModelSpec
+        The plain model.
+    own_effects : Path or None
+        File of a user's own effects, which the workers load again.
+    """
+    return [_job("plain", JointModel((e,)), spec, own_effects) for e in experiments]
+
+
 def jobs_of(found: Investigation, spec: ModelSpec, own_effects: Path | None) -> list[Job]:
-    """Plain fit of every experiment, and the final ones that have more effects than it.
+    """The final fits that have more effects than the plain ones.
+
+    Where the findings are ambiguous, there is one for each effect that could be the missing one.
 
     Parameters
     ----------
     found : Findings
         Of the search.
-    spec : ModelSpec
-        The plain model.
-    own_effects : Path or None
-        File of a user's own effects, which the workers load again.
-
-    Returns
-    -------
-    list of Job
-        Where the findings are ambiguous, one for each effect that could be the missing one.
+    spec, own_effects
+        As for `plain_jobs`.
     """
-    models = [("plain", JointModel((e,))) for block in found.final for e in block.experiments]
-    models += [("final", model) for model in final_models(found) if model.effects]
+    models = [("final", model) for model in final_models(found) if model.effects]
     models += [(f"final/{_OTHERS}/{k}", m) for k, m in _others(found)]
-    out = []
-    for kind, model in models:
-        folders = tuple(f"{e.name}/{kind}" for e in model.experiments)
-        keys = tuple(f.key for f in model.effects)
-        provenance = {"data_sha256": {e.name: e.data_hash for e in model.experiments}}
-        out.append(Job(folders[0], model.experiments, keys, own_effects, spec, provenance, model.near, folders))
-    return out
+    return [_job(kind, model, spec, own_effects) for kind, model in models]
+
+
+def _job(kind: str, model: JointModel, spec: ModelSpec, own_effects: Path | None) -> Job:
+    folders = tuple(f"{e.name}/{kind}" for e in model.experiments)
+    keys = tuple(f.key for f in model.effects)
+    provenance = {"data_sha256": {e.name: e.data_hash for e in model.experiments}}
+    return Job(folders[0], model.experiments, keys, own_effects, spec, provenance, model.near, folders)
 
 
 def _others(found: Investigation) -> list[tuple[int, JointModel]]:

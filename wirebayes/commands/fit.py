@@ -1,8 +1,8 @@
 """The posterior of each experiment, or of all samples of a material together."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from wirebayes.io.run_folder import open_run
 from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
 from wirebayes.numeric.distributions import Normal
-from wirebayes.processes.workers import computing
+from wirebayes.processes.workers import computing, workers
 from wirebayes.progress import Progress, silent
 from wirebayes.results.jobs import Job, run
 from wirebayes.strict.files import PathLike
@@ -171,12 +171,15 @@ def _provenance(members: Sequence[Experiment], file: Path) -> dict[str, Any]:
 
 def _compute(jobs: Sequence[Job], folder: Path, seed: int, check: bool, policy: Policy, report: Progress) -> None:
     """Do the fits, and check them where that is asked for: a single one while it is sampled, several afterwards."""
-    alone = check and len(jobs) == 1
     with computing():
-        with checked_meanwhile(jobs[0], folder, seed) if alone else nullcontext():
-            run(jobs, folder, seed, policy=policy, report=report)
-        if check and not alone:
-            write_checks(jobs, folder, seed, report)
+        if check and len(jobs) == 1:
+            with checked_meanwhile(jobs[0], folder, seed):
+                run(jobs, folder, seed, policy=policy, report=report)
+            return
+        with workers(len(jobs), partial(catalogue, jobs[0].own_effects)) as parallel_map:
+            run(jobs, folder, seed, policy=policy, report=report, parallel_map=parallel_map)
+            if check:
+                write_checks(jobs, folder, seed, report, parallel_map)
 
 
 def fits_in(

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from threading import Lock
 
 from wirebayes._version import __version__
-from wirebayes.commands.discover import jobs_of, write_findings
+from wirebayes.commands.discover import jobs_of, plain_jobs, write_findings
 from wirebayes.discovery.model_check import write_checks
 from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import ALPHA, Settings
@@ -158,7 +158,8 @@ def _fit_and_store(job: Job, folder: Path, task: BatchTask, *, draws: bool) -> N
 def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> DiscoveryColumns:
     kinds = catalogue_without(task.without, catalogue(task.own_effects))
     found = investigate([experiment], Settings(task.spec, kinds, task.simulations), task.seed)
-    for job in jobs_of(found, task.spec, task.own_effects):
+    jobs = plain_jobs([experiment], task.spec, task.own_effects) + jobs_of(found, task.spec, task.own_effects)
+    for job in jobs:
         _fit_and_store(job, folder, task, draws=True)  # pictures show them
     write_findings(found, folder, task.own_effects)
     report = found.report["experiments"][experiment.name]

@@ -26,11 +26,12 @@ from wirebayes.io.run_folder import write_json
 from wirebayes.json_files.discovery import GrossError
 from wirebayes.json_files.summary import ModelCheckResult, SummaryJson
 from wirebayes.notice import Notice, from_json, to_json
-from wirebayes.processes.workers import ParallelMap, workers
+from wirebayes.processes.workers import ParallelMap, give_way, workers
 from wirebayes.progress import Progress
 from wirebayes.results.jobs import Job
 from wirebayes.sentences import spoken
 
+_BESIDE = 3  # steps of niceness, half the weight: two workers of the check leave one of two cores to the sampler
 _SHOWN = 3  # most surprising effects that are listed
 
 
@@ -244,10 +245,16 @@ def checked_meanwhile(job: Job, directory: Path, seed: int) -> Iterator[None]:
         yield
         return
     # the processes are the inner ones: where the block fails, they end at once, and with them the check
-    with ThreadPoolExecutor(1) as beside, workers(prepare=partial(catalogue, job.own_effects)) as parallel_map:
+    with ThreadPoolExecutor(1) as beside, workers(prepare=partial(_prepared_beside, job.own_effects)) as parallel_map:
         check = beside.submit(check_model, job, seed, parallel_map=parallel_map)
         yield
         write_check(job, directory, check.result())
+
+
+def _prepared_beside(own_effects: Path | None) -> None:
+    """Prepare a worker of a check that goes on beside the sampler, which a fit takes longest for."""
+    give_way(_BESIDE)
+    catalogue(own_effects)
 
 
 def is_checked(job: Job, directory: Path) -> bool:

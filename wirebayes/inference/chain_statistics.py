@@ -27,7 +27,7 @@ def bulk_ess(values: Array) -> float:
 
 def tail_ess(values: Array) -> float:
     """Effective number of draws in the worse of the two 5 % tails, of (chains, draws)."""
-    return min(_ess(_split((values <= np.quantile(values, level)).astype(float))) for level in _TAILS)
+    return min(_ess(_split((values <= end).astype(float))) for end in np.quantile(values, _TAILS))
 
 
 def r_hat(values: Array) -> float:

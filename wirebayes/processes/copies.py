@@ -1,32 +1,32 @@
-"""Work shared with copies of this process, which have in memory whatever it has: nothing is loaded or sent anew.
+"""Work for copies of this process, which have in memory whatever it has: nothing is loaded or sent anew.
 
-For pieces of some hundredths of a second, such as pictures: a worker of `wirebayes.processes.workers` would take longer
-to load what draws them.
+`in_copies` is for pieces of some hundredths of a second, such as pictures: a worker of `wirebayes.processes.workers`
+would take longer to be sent what they show. `prepared_copy` is for what can begin while this process is busy, and
+`loaded_meanwhile` loads here what is needed later, while this process waits.
 """
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from contextlib import contextmanager
+from importlib import import_module
+from threading import Thread
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from wirebayes.processes.interrupt import held_back, watch_silently
-from wirebayes.processes.workers import cores
+from wirebayes.processes.workers import cores, may_be_copied
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from multiprocessing.process import BaseProcess
 
 T = TypeVar("T")
-_THREADS = Path("/proc/self/task")  # one folder a thread; on Linux alone
 _BYTES = 4  # of the number of a piece
 
 
 def in_copies(pieces: Sequence[Callable[[], T]]) -> list[T]:
     """The results of some pieces of work, done on all cores where this process can be copied, in their order.
 
-    A copy has only the thread that made it, and waits for ever for a lock that another one held: a process with several
-    threads does all pieces itself, and so does every process where systems other than Linux run. A worker does, too:
-    the other cores have work of their own.
+    A worker cannot: it has a second thread, and the other cores have work of their own.
 
     Parameters
     ----------
@@ -38,13 +38,11 @@ def in_copies(pieces: Sequence[Callable[[], T]]) -> list[T]:
     Exception
         What a piece raises.
     """
-    from multiprocessing import parent_process
-
     copies = min(cores(), len(pieces)) - 1
-    if copies < 1 or parent_process() is not None or not _has_one_thread():
+    if copies < 1 or not may_be_copied():
         return [piece() for piece in pieces]
     waiting = _queue(len(pieces))
-    started = _started(copies, pieces, waiting)
+    started = [_with_pipe(_work, pieces, waiting) for _ in range(copies)]
     done: dict[int, T] = {}
     try:
         for number in _numbers(waiting):
@@ -59,24 +57,90 @@ def in_copies(pieces: Sequence[Callable[[], T]]) -> list[T]:
     return [done[number] if number in done else piece() for number, piece in enumerate(pieces)]
 
 
-def _started(copies: int, pieces: Sequence[Callable[[], T]], waiting: int) -> "list[tuple[BaseProcess, Connection]]":
-    """Copies that work on the pieces, each with the end of a pipe where its results arrive."""
+@contextmanager
+def prepared_copy(prepare: Callable[[], object]) -> Iterator[Callable[..., Any]]:
+    """Let a copy of this process prepare something while the block runs, for what needs it at the block's end.
+
+    The yielded function takes another one and its arguments, and returns what that returns in the copy, or raises what
+    that raises. Where this process cannot be copied, has one core, or the copy is gone, it is done here, unprepared.
+
+    Parameters
+    ----------
+    prepare : function without arguments
+        Such as what loads a module.
+    """
+    if cores() == 1 or not may_be_copied():
+        yield lambda function, *arguments: function(*arguments)
+        return
+    process, end = _with_pipe(_prepare_and_serve, prepare)
+
+    def ask(function: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            end.send((function, arguments))
+            answer = end.recv()
+        except (EOFError, OSError):
+            return function(*arguments)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    try:
+        yield ask
+    finally:
+        end.close()
+        process.terminate()
+        process.join()
+
+
+@contextmanager
+def loaded_meanwhile(module: str) -> Iterator[None]:
+    """Load a module while the block runs, which has this process wait for others most of the time.
+
+    Parameters
+    ----------
+    module : str
+        Its full name.
+    """
+    thread = Thread(target=import_module, args=(module,))
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join()
+
+
+def _with_pipe(function: Callable[..., None], *arguments: object) -> "tuple[BaseProcess, Connection[Any, Any]]":
+    """Start a function in a copy of this process, with the far end of a pipe as its last argument."""
     from multiprocessing import get_context
 
     context = get_context("fork")
-    started: list[tuple[BaseProcess, Connection]] = []
+    here, there = context.Pipe()
+    process = context.Process(target=_begin, args=(here, function, (*arguments, there)))
     with held_back():
-        for _ in range(copies):
-            here, there = context.Pipe(duplex=False)
-            process = context.Process(target=_work, args=(pieces, waiting, there))
-            process.start()
-            there.close()
-            started.append((process, here))
-    return started
+        process.start()
+    there.close()
+    return process, here
 
 
-def _has_one_thread() -> bool:
-    return _THREADS.is_dir() and sum(1 for _ in _THREADS.iterdir()) == 1
+def _begin(here: "Connection[Any, Any]", function: Callable[..., None], arguments: tuple[object, ...]) -> None:
+    """In a copy: let go of the end of the pipe that is its parent's, so that it hears when the parent is gone."""
+    watch_silently()
+    here.close()
+    function(*arguments)
+
+
+def _prepare_and_serve(prepare: Callable[[], object], there: "Connection[Any, Any]") -> None:
+    """In a copy: prepare, and then do what is asked for until the parent needs no more."""
+    prepare()
+    while True:
+        try:
+            function, arguments = there.recv()
+        except EOFError:
+            return
+        try:
+            there.send(function(*arguments))
+        except Exception as error:
+            there.send(error)
 
 
 def _queue(length: int) -> int:
@@ -93,16 +157,15 @@ def _numbers(waiting: int) -> Iterator[int]:
         yield int.from_bytes(number, "little")
 
 
-def _work(pieces: Sequence[Callable[[], T]], waiting: int, answers: "Connection") -> None:
+def _work(pieces: Sequence[Callable[[], T]], waiting: int, answers: "Connection[Any, Any]") -> None:
     """In a copy: do pieces until none is left, and send all results, or what went wrong."""
-    watch_silently()
     try:
         answers.send({number: pieces[number]() for number in _numbers(waiting)})
     except Exception as error:
         answers.send(error)
 
 
-def _answer(process: "BaseProcess", end: "Connection") -> "dict[int, T] | Exception":
+def _answer(process: "BaseProcess", end: "Connection[Any, Any]") -> "dict[int, T] | Exception":
     """What a copy sends before it ends; nothing where it was ended before."""
     try:
         answer: dict[int, T] | Exception = end.recv()

@@ -41,9 +41,17 @@ def watch(arguments: Sequence[str]) -> None:
 
 
 def watch_silently() -> None:
-    """The same for a worker process: its parent speaks, and hears Ctrl-C for both."""
+    """The same for a worker process: its parent speaks, and hears Ctrl-C for both.
+
+    A copy of its parent forgets what that one was doing when it was made: holding signals back, and writing files.
+    """
+    global _held_back
+    _held_back = False
+    _unfinished.clear()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _handle(signal.SIGTERM, lambda number: "")
+    for number in _arrived:
+        signal.raise_signal(number)
 
 
 @contextmanager

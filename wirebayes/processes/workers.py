@@ -5,6 +5,8 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
+from pathlib import Path
+from time import sleep
 from typing import TYPE_CHECKING, Any
 
 from wirebayes._version import __version__
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
 ParallelMap = Callable[..., Iterable[Any]]  # as the built-in `map`
 _PATIENCE_S = 10.0  # for a scheduler and its first worker to answer: a cluster's network takes a second at most
 _FORKS = sys.platform == "linux"  # elsewhere system libraries do not survive a fork, or there is none
+_THREADS_OF_THIS = Path("/proc/self/task")  # one folder a thread; on Linux alone
+_LOOKS, _MOMENT_S = 10, 0.001  # ten times as long as a thread takes to be gone
 _TRACKER = "ignore:resource_tracker"
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
@@ -33,10 +37,39 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def load_early() -> None:
-    """Begin to load what processes will need, while this one still loads its own: for commands that will start some.
+def may_be_copied() -> bool:
+    """Whether a copy of this process would work, and may be made.
 
-    On Linux processes are forked from one, which loads their modules once for all of them (`wirebayes.preloaded`);
+    A copy has only the thread that made it, and waits for ever for a lock that another one held. A worker of
+    `multiprocessing.Pool` may start no processes. Systems other than Linux do not say how many threads there are.
+    """
+    from multiprocessing import current_process  # every command imports this module, few start processes
+
+    return not current_process().daemon and _THREADS_OF_THIS.is_dir() and _is_alone()
+
+
+def _is_alone() -> bool:
+    """Whether no other thread runs; one that has just ended is listed for a moment longer."""
+    for _ in range(_LOOKS):
+        if sum(1 for _ in _THREADS_OF_THIS.iterdir()) == 1:
+            return True
+        sleep(_MOMENT_S)
+    return False
+
+
+def give_way(steps: int) -> None:
+    """Let this process come second where another one wants its core, by so many steps of niceness.
+
+    Three are half of the weight, ten a tenth: on a machine that is busy otherwise, the other work goes first, too.
+    """
+    if hasattr(os, "nice"):
+        os.nice(steps)
+
+
+def load_early() -> None:
+    """Begin to load what processes will need, for a program of several threads, which cannot be copied.
+
+    On Linux its processes are forked from one that loads their modules once for all of them (`wirebayes.preloaded`);
     elsewhere each loads its own when it starts, and nothing happens here.
     """
     if _FORKS:
@@ -65,6 +98,12 @@ def _prepared(preload: list[str]) -> None:
     finally:
         if safe is None:
             del os.environ["PYTHONSAFEPATH"]
+
+
+def _started_anew() -> str:
+    """Prepare to start processes that are no copies, and say how that is called."""
+    _prepared([])
+    return "forkserver" if _FORKS else "spawn"
 
 
 @contextmanager
@@ -117,9 +156,9 @@ def workers(most: int | None = None, prepare: Callable[[], object] | None = None
 def processes(most: int | None = None, prepare: Callable[[], object] | None = None) -> Iterator["Executor"]:
     """Processes of this machine, as many as there are cores and no more than `most`; `prepare` as for `workers`.
 
-    A worker of `multiprocessing.Pool` may not start any: there one thread does the work.
+    They are copies of this one where it may be copied, which have in memory whatever it has. A worker of
+    `multiprocessing.Pool` may not start any: there one thread does the work.
     """
-    # every command imports this module, few start processes
     from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
     from multiprocessing import active_children, current_process, get_context
 
@@ -129,8 +168,8 @@ def processes(most: int | None = None, prepare: Callable[[], object] | None = No
         return
     n = cores() if most is None else max(1, min(cores(), most))
     before = active_children()
-    _prepared([])
-    pool = ProcessPoolExecutor(n, get_context("forkserver" if _FORKS else "spawn"), _prepare, (prepare,))
+    how = "fork" if may_be_copied() else _started_anew()
+    pool = ProcessPoolExecutor(n, get_context(how), _prepare, (prepare,))
     try:
         with held_back():
             for _ in range(n):
@@ -156,8 +195,7 @@ def start_apart(function: Callable[..., object], *arguments: Any) -> "BaseProces
     """
     from multiprocessing import get_context
 
-    _prepared([])
-    context = get_context("forkserver" if _FORKS else "spawn")
+    context = get_context(_started_anew())
     process = context.Process(target=_apart, args=(function, arguments))  # type: ignore[attr-defined]
     with held_back():
         process.start()

@@ -1,6 +1,7 @@
 """Many fits at once: each in its own folder, on all cores, resumed after an interruption."""
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,7 @@ from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.model.build import build
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
-from wirebayes.processes.workers import cores, workers
+from wirebayes.processes.workers import ParallelMap, cores, workers
 from wirebayes.progress import Progress, silent
 from wirebayes.results.store import save_posterior, save_summary
 
@@ -60,6 +61,7 @@ def run(
     *,
     policy: Policy = DEFAULT,
     report: Progress = silent,
+    parallel_map: ParallelMap | None = None,
 ) -> None:
     """Do all fits that are not in the directory yet, on all cores.
 
@@ -77,6 +79,8 @@ def run(
         When a fit counts as converged and when it gives up.
     report : callable
         Called with a name, what is done, and the total: the share of one fit that runs alone, or the number of fits.
+    parallel_map : callable, optional
+        Takes the place of processes that share the work.
     """
     todo = [job for job in jobs if not all((directory / f / "summary.json").exists() for f in job.folders)]
     if len(todo) == 1 or cores() == 1:
@@ -86,7 +90,7 @@ def run(
     work = partial(one, directory=directory, seed=seed, policy=policy)
     # those that take longest begin first, so that no core waits for one that began last
     longest = sorted(todo, key=lambda job: -len(job.experiments) * (1 + len(job.effects)))
-    with workers(len(todo)) as parallel_map:
+    with workers(len(todo)) if parallel_map is None else nullcontext(parallel_map) as parallel_map:
         for done, _ in enumerate(parallel_map(work, longest), 1):
             report("fits", done, len(todo))
 

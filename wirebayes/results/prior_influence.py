@@ -34,7 +34,8 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
     before = np.quantile(theta, _ENDS, axis=0)
     spread = np.maximum(theta.std(axis=0, ddof=1), np.finfo(float).tiny)
     known = prior.known(theta)
-    order = np.argsort(theta, axis=0)
+    order = np.argsort(theta.T, axis=1)
+    ordered = np.take_along_axis(theta.T, order, axis=1)
     deciding: list[str] = []
     open_ones: set[int] = set()
     for name in columns:
@@ -44,7 +45,8 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
             continue
         log_weight = log_density_of(wide)(known[:, i]) - log_density_of(prior.distributions[name])(known[:, i])
         weight = np.exp(log_weight - log_weight.max())
-        after = np.stack([_weighted_ends(theta[order[:, j], j], weight[order[:, j]]) for j in range(theta.shape[1])], 1)
+        pairs = zip(ordered, order, strict=True)
+        after = np.stack([_weighted_ends(values, weight[ranked]) for values, ranked in pairs], 1)
         moved = np.flatnonzero(np.abs(after - before).max(axis=0) > MOVED * spread)
         of_sample = all(_parameter(prior.names[j]) in SAMPLE for j in moved)
         if len(moved) and not (_parameter(name) in NOISES and of_sample):
