@@ -32,7 +32,7 @@ def test_the_densities_are_those_of_problems_without_a_hold(likelihood: str) -> 
     theta = problem.prior.rvs(200, np.random.default_rng(0))
     holds = [(0, 0), (0, 5), (1, 3)]
     likelihoods = [p.log_likelihood(theta) for p in (problem, *(without_hold(problem, s, j) for s, j in holds))]
-    prior = target.log_prior(theta) + target.coordinates.log_jacobian(theta, target.coordinates.to_sampled(theta))
+    prior = target.sampled_prior(theta, target.coordinates.to_sampled(theta))
     found, expected = joined_densities(target, holds)(target.coordinates.to_sampled(theta)), prior + likelihoods
     good = np.isfinite(expected).all(axis=0)
     assert good.sum() > 100
@@ -44,14 +44,14 @@ def test_where_a_density_cannot_be_computed_it_is_zero() -> None:
     n = 2500
     whole, without = np.arange(float(n)), np.stack([np.arange(n) + 0.5, np.zeros(n)])
     whole[7], without[0, 9], without[0, 2100] = np.nan, np.inf, -np.inf
-    coordinates = SimpleNamespace(to_natural=lambda z: z, log_jacobian=lambda theta, z: 3.0 + 0.0 * theta[:, 0])
+    coordinates = SimpleNamespace(to_natural=lambda z: z)
 
     def parts(theta: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         rows = theta[:, 0].astype(int)
         return whole[rows], [without[:, rows]]
 
     problem = SimpleNamespace(without_each_hold=parts)
-    target = SimpleNamespace(problem=problem, coordinates=coordinates, log_prior=lambda theta: -theta[:, 0])
+    target = SimpleNamespace(problem=problem, coordinates=coordinates, sampled_prior=lambda theta, z: 3.0 - theta[:, 0])
     found = joined_densities(target, [(0, 1), (0, 0)])(np.arange(float(n))[:, None])  # type: ignore[arg-type]
     expected = np.column_stack([np.full(n, 3.0), 3.0 - np.arange(n), np.full(n, 3.5)])
     expected[7, 0] = expected[9, 2] = expected[2100, 2] = -np.inf
@@ -85,14 +85,12 @@ class Normals:
 @pytest.fixture
 def pools(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The number of densities in each pool that was sampled, of `Normals`."""
-    identity = SimpleNamespace(
-        to_sampled=lambda x: x, to_natural=lambda x: x, log_jacobian=lambda x, z: np.zeros(len(x)), order=np.arange(2)
-    )
+    identity = SimpleNamespace(to_sampled=lambda x: x, to_natural=lambda x: x, order=np.arange(2))
     monkeypatch.setattr(
         module,
         "LogPosterior",
         lambda problem: SimpleNamespace(
-            problem=problem, coordinates=identity, log_prior=lambda theta: np.zeros(len(theta))
+            problem=problem, coordinates=identity, sampled_prior=lambda theta, z: np.zeros(len(theta))
         ),
     )
     sampled, true = [], importance.importance_sample

@@ -10,7 +10,6 @@ from wirebayes.discovery.path_weights import Weighed, weigh, without_last
 from wirebayes.discovery.tangent import Tangent, damp, moving_columns, residuals, tangent
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.model import likelihoods
 from wirebayes.numeric.distributions import Normal
 from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Bools, Ints
@@ -110,7 +109,7 @@ def _log_units(target: LogPosterior, z: Array) -> Array:
     theta, total = target.coordinates.to_natural(z), np.zeros(len(z))
     for sample in target.problem.samples:
         own = target.problem.parameters(theta, sample)
-        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
+        variance = sample.variance(own)
         total += 0.5 * sample.protocol.mask.sum() * np.log(variance)
     return total
 

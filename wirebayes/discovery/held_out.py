@@ -106,7 +106,7 @@ def predicted(
 def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng: Generator) -> HeldOut:
     """The recorded holds of a sample after the first `train`, predicted with draws of its own parameters."""
     line = linearise(sample.protocol, own, model)
-    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
+    variance = sample.variance(own)
     noise = variance, own["setting_sd"]
     last = np.flatnonzero(sample.protocol.recorded)[train:]
     mask = sample.protocol.mask.copy()

@@ -9,7 +9,6 @@ from wirebayes.discovery.probes import Probe, forms
 from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import Candidate
 from wirebayes.inference.laplace_fit import LaplaceFit
-from wirebayes.model import likelihoods
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect, EventEffect
 
@@ -132,6 +131,6 @@ def _raw(block: LaplaceFit, probe: Probe) -> float:
     theta, total = block.theta, 0.0
     for sample, shape in zip(block.target.problem.samples, shapes, strict=True):
         own = block.target.problem.parameters(theta, sample)
-        variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
+        variance = sample.variance(own)
         total += float((shape[sample.protocol.mask] ** 2).sum() / variance[0])
     return total

@@ -109,6 +109,11 @@ def family_of(name: str, families: Sequence[Family]) -> Family:
     return next((f for f in families if name in f), (name,))
 
 
+def largest_first(shares: Mapping[Any, float]) -> dict[Any, float]:
+    """The same by falling share; what is equal stays in its order."""
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+
 def log_prior(size: int, kinds: int) -> float:
     """Log weight of one set of `size` of so many kinds of effect; that of a single one is zero.
 
@@ -256,15 +261,14 @@ class _Sums:
 def _shares(leading: Mapping[str, float]) -> dict[str, float]:
     """Probabilities that sum to one, the largest first; none where nothing is missing for certain."""
     missing = sum(leading.values())
-    ordered = sorted(leading.items(), key=lambda item: -item[1])
-    return {name: value / missing for name, value in ordered} if missing > 0.0 else {}
+    return {name: value / missing for name, value in largest_first(leading).items()} if missing > 0.0 else {}
 
 
 def smallest_set(shares: Mapping[str, float], level: float = IN_SET) -> list[str]:
     """The fewest names that together hold `level` of the probability, most probable first."""
     out: list[str] = []
     total = 0.0
-    for name, share in sorted(shares.items(), key=lambda item: -item[1]):
+    for name, share in largest_first(shares).items():
         out.append(name)
         total += share
         if total >= level:

@@ -15,7 +15,6 @@ from wirebayes.discovery.noise_integral import RATIOS, SIZES, Expansion, evidenc
 from wirebayes.discovery.tangent import moving_columns, residuals, whitened
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior
-from wirebayes.model import likelihoods
 from wirebayes.numeric.linear_algebra import solve
 from wirebayes.numeric.log_sum import log_sum, or_impossible
 from wirebayes.numeric.typing import Array
@@ -90,7 +89,7 @@ def _log_units(target: LogPosterior, z: Array) -> float:
     problem, theta = target.problem, target.coordinates.to_natural(z)
     total = 0.0
     for sample in problem.samples:
-        variance = likelihoods.reading_variance(problem.parameters(theta, sample)["sensor_sd"], sample.resolution)
+        variance = sample.variance(problem.parameters(theta, sample))
         total += 0.5 * float(np.log(variance[0])) * int(sample.protocol.mask.sum())
     return total
 

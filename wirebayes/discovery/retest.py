@@ -10,7 +10,7 @@ from wirebayes.discovery import residual_patterns, screening
 from wirebayes.discovery.fitted_sets import Explored, FittedSet, Key
 from wirebayes.discovery.global_test import is_close, with_more
 from wirebayes.discovery.linear_scan import expand, scan
-from wirebayes.discovery.model_space import ModelPosterior
+from wirebayes.discovery.model_space import ModelPosterior, largest_first
 from wirebayes.discovery.screening import Replicates
 from wirebayes.discovery.settings import ALPHA_AFTER, GIVE_WAY, MOST_RETESTS, RETESTS
 from wirebayes.json_files.discovery import Disagreement
@@ -75,7 +75,7 @@ def complete(
     """
     weights = found.weights
     least = weights[best.effects.key] * np.exp(-GIVE_WAY)
-    near = [k for k, w in sorted(weights.items(), key=lambda item: -item[1]) if k in explored.fitted and w > least]
+    near = [k for k, w in largest_first(weights).items() if k in explored.fitted and w > least]
     failed: set[Key] = set()
     for key in near[:MOST_RETESTS]:
         candidate = explored.fitted[key]

@@ -21,6 +21,7 @@ from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.investigation import Investigation
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence
 from wirebayes.discovery.material_answer import MaterialAnswer, answer_material
+from wirebayes.discovery.model_space import largest_first
 from wirebayes.discovery.naming import Named, name_effects
 from wirebayes.discovery.noise_integral import Expansion
 from wirebayes.discovery.outlook import outlook
@@ -213,7 +214,7 @@ def _amplitude(final: LaplaceFit, effect: Effect) -> AmplitudeEstimate:
 def _inclusion(found: Evidence | None) -> dict[str, float]:
     """Probability of each name to be missing, the most probable first."""
     each = {} if found is None else {n: p for family in found.families for n, p in family.members.items()}
-    return dict(sorted(each.items(), key=lambda item: -item[1]))
+    return largest_first(each)
 
 
 def _common(

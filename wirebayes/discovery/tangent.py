@@ -177,7 +177,7 @@ def points_of(target: LogPosterior, around: Around, readings: Sequence[Array] | 
     for at, sample in enumerate(problem.samples):
         mask = sample.protocol.mask
         own = problem.parameters(theta, sample)
-        sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution))
+        sd = np.sqrt(sample.variance(own))
         line = linearise(sample.protocol, own, sample.model)
         y = sample.readings if readings is None else readings[at]
         moved = simulate(sample.protocol, problem.parameters(both, sample), sample.model)
@@ -246,7 +246,7 @@ def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None =
     with np.errstate(all="ignore"):
         for at, sample in enumerate(target.problem.samples):
             own = target.problem.parameters(theta, sample)
-            sd = np.sqrt(likelihoods.reading_variance(own["sensor_sd"], sample.resolution))
+            sd = np.sqrt(sample.variance(own))
             y = sample.readings if readings is None else readings[at]
             left = y - simulate(sample.protocol, own, sample.model)
             parts.append((left[sample.protocol.mask] / sd).T)
@@ -256,7 +256,7 @@ def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None =
 def _prior_density(target: LogPosterior, theta: Array, z: Array) -> Array:
     """(n,) log density of the prior in the sampled coordinates, at points whose natural parameters are known."""
     with np.errstate(all="ignore"):  # a parameter that underflows to zero has no density
-        return np.asarray(target.log_prior(theta) + target.coordinates.log_jacobian(theta, z))
+        return np.asarray(target.sampled_prior(theta, z))
 
 
 def _prior(target: LogPosterior, around: Around) -> tuple[Array, Array, Array]:

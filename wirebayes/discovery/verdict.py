@@ -13,7 +13,7 @@ from wirebayes.discovery.fitted_sets import Accepted, Explored, Fits, FittedSet,
 from wirebayes.discovery.gains import family_gain, name_gain
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence
-from wirebayes.discovery.model_space import EffectSet, ModelPosterior
+from wirebayes.discovery.model_space import EffectSet, ModelPosterior, largest_first
 from wirebayes.discovery.predicting import Predicting
 from wirebayes.discovery.retest import Retest, complete, fails, retested
 from wirebayes.discovery.settings import ALPHA_AFTER, LEAST_HOLDS, P_SLOPE, Settings
@@ -206,7 +206,7 @@ def evidence(decision: Decision, p: float, block: int, remainder_gain: float | N
     families = []
     for family in dict.fromkeys([*accepted, *ranked]):
         each = {name: float(found.inclusion[name][block]) for name in family if name in found.inclusion}
-        members = dict(sorted(each.items(), key=lambda item: -item[1]))
+        members = largest_first(each)
         families.append(FamilyEvidence(members, float(together[family][block]), decision.gains.get(family)))
     return Evidence(
         p=p,

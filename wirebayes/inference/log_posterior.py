@@ -64,10 +64,14 @@ class LogPosterior:
     def _pieces(self, count: int) -> list[slice]:
         return [slice(i, i + self._rows) for i in range(0, count, self._rows)]
 
+    def sampled_prior(self, theta: Array, z: Array) -> Array:
+        """(n,) log prior density of (n, d) sampled coordinates, by the parameters that they stand for."""
+        return self.log_prior(theta) + self.coordinates.log_jacobian(theta, z)
+
     def _standardised(self, z: Array, readings: Any) -> tuple[Array, Array]:
         theta = self.coordinates.to_natural(z)
         with np.errstate(all="ignore"):
-            prior = self.log_prior(theta) + self.coordinates.log_jacobian(theta, z)
+            prior = self.sampled_prior(theta, z)
             residuals = self.coordinates.prior_residuals(theta, z)
         value, left = self.problem.standardised(theta, readings)
         return np.where(np.isfinite(prior), prior + value, -np.inf), np.concatenate([left, residuals])
@@ -75,7 +79,7 @@ class LogPosterior:
     def _values(self, z: Array, readings: Any) -> Array:
         theta = self.coordinates.to_natural(z)
         with np.errstate(all="ignore"):
-            value = self.log_prior(theta) + self.coordinates.log_jacobian(theta, z)
+            value = self.sampled_prior(theta, z)
         inside = np.isfinite(value)
         if not inside.any():
             return np.full(len(z), -np.inf)

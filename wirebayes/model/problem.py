@@ -95,7 +95,7 @@ class Problem:
         for i, sample in enumerate(self.samples):
             own = self.parameters(theta, sample)
             y = sample.readings if readings is None else readings[i]
-            variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
+            variance = sample.variance(own)
             if self.likelihood == "hold":
                 out.append(single_holds.hold_by_hold(sample.protocol, own, sample.model, y, variance))
             else:
@@ -119,7 +119,7 @@ class Problem:
             for i, sample in enumerate(self.samples):
                 y = sample.readings if readings is None else readings[i]
                 own = self.parameters(theta, sample)
-                variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
+                variance = sample.variance(own)
                 if self.likelihood == "hold":
                     found = single_holds.standardised_hold_by_hold(sample.protocol, own, sample.model, y, variance)
                 else:
@@ -234,7 +234,7 @@ class Problem:
         own = self.parameters(theta, sample)
         return (
             linearise(sample.protocol, own, sample.model),
-            likelihoods.reading_variance(own["sensor_sd"], sample.resolution),
+            sample.variance(own),
             own["setting_sd"],
         )
 

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from wirebayes.model.likelihoods import reading_variance
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
 from wirebayes.wire.model import Model
@@ -47,6 +48,10 @@ class Sample:
             return MATERIAL + SAMPLE
         wire = MATERIAL if self.protocol.control == "displacement" else MATERIAL[1:]
         return (*wire, "sensor_sd")
+
+    def variance(self, own: Mapping[str, Array]) -> Array:
+        """(n,) variance of one reading, N² or mm², by the sample's own parameters."""
+        return reading_variance(own["sensor_sd"], self.resolution)
 
     @property
     def typical_hold_s(self) -> float:

@@ -208,7 +208,7 @@ def _chain_scores(
     for start in range(0, len(theta), _CHUNK):
         own = fitted.problem.parameters(theta[start : start + _CHUNK], here)
         line = linearise(protocol, own, here.model)
-        noise = likelihoods.reading_variance(own["sensor_sd"], here.resolution), own["setting_sd"]
+        noise = here.variance(own), own["setting_sd"]
         with np.errstate(all="ignore"):
             before = likelihoods.chain(line, read, protocol.mask & ~requested[:, None], *noise)
             whole.append(likelihoods.held_out_density(line, before, read, later, *noise))
@@ -223,7 +223,7 @@ def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, request
     problem, here = fitted.problem, fitted.problem.samples[sample]
     own = problem.parameters(evenly_thinned(fitted.flat), here)
     own = own | {"preload": 0.0 * own["B"]}
-    variance = likelihoods.reading_variance(own["sensor_sd"], here.resolution)
+    variance = here.variance(own)
     log_p = single_holds.hold_by_hold(
         experiment.protocol(), own, here.model, experiment.readings()[..., None], variance
     )

@@ -140,7 +140,7 @@ def joined_densities(target: LogPosterior, holds: Holds) -> Function:
         theta = target.coordinates.to_natural(z)
         whole, without = target.problem.without_each_hold(theta)
         with np.errstate(all="ignore"):
-            prior = target.log_prior(theta) + target.coordinates.log_jacobian(theta, z)
+            prior = target.sampled_prior(theta, z)
             value = prior[:, None] + np.column_stack([whole, *(without[s][j] for s, j in holds)])
         return or_impossible(value)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from wirebayes.model import likelihoods, single_holds
+from wirebayes.model import single_holds
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.linear_algebra import eigh, solve
@@ -143,7 +143,7 @@ def settings_given_readings(own: Theta, sample: Sample, rng: Generator) -> Float
         One draw of all holds for each draw of the parameters.
     """
     line = linearise(sample.protocol, own, sample.model)
-    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
+    variance = sample.variance(own)
     holds, _, n = line.reading.shape
     carried = np.zeros((holds, n))
     # Normal equations of eta in units of its own sd; hold by hold, so that the whole Jacobian is never in memory.

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from wirebayes.discovery.residual_patterns import COVARIATES
 from wirebayes.json_files.discovery import Disagreement, ExperimentFindings
 from wirebayes.json_files.read_units import read_value, unit_read
-from wirebayes.model import likelihoods
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array, Floats, Ints
 from wirebayes.report.figures import without_frame
@@ -191,7 +190,7 @@ def _walked(stored: Stored) -> tuple[Linearised, dict[str, Array]]:
 def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
     sample = stored.sample
     line, own = _walked(stored)
-    variance = likelihoods.reading_variance(own["sensor_sd"], sample.resolution)
+    variance = sample.variance(own)
     width = np.sqrt(variance + (line.by_setting * own["setting_sd"]) ** 2)
     drawn = line.reading + np.random.default_rng(1).normal(size=line.reading.shape) * width
     middle = line.reading.mean(axis=2)
