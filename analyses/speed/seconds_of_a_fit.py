@@ -21,6 +21,7 @@ from typing import Any
 
 from analyses.options import study_options
 from wirebayes.io import paper
+from wirebayes.processes.workers import one_thread_each
 
 DATA = paper.FOLDER / "experiments.toml"
 # Where a phase is spent: module, function, and what it does. Processes beside this one do the check, and load
@@ -35,9 +36,6 @@ PHASES = (
 
 def watched(wire: str, folder: Path) -> None:
     """Run a fit in this process and print when each phase began and ended, s since the epoch, as JSON."""
-    from wirebayes.processes.workers import one_thread_each
-
-    one_thread_each()
     import wirebayes.cli.fit
     import wirebayes.commands.fit  # noqa: F401
 
@@ -85,6 +83,7 @@ def whole(command: str, wire: str) -> float:
 
 def main() -> None:
     """Print a line for each phase of the fastest run."""
+    one_thread_each()  # as a command does before it loads numpy, which this file has loaded: for the runs it starts
     parser = study_options(__doc__)
     parser.add_argument("--wire", default="nylon-1.5m")
     parser.add_argument("--repeats", type=int, default=5)
