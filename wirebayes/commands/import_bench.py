@@ -83,7 +83,7 @@ def import_bench(
     specimens : {"several", "one"}, optional
         Whether columns of one quantity side by side are of several specimens, where the file leaves it open.
     drop_breaks : bool
-        Leave out the readings of breaks, of sensors at their limit, and of dropouts.
+        Leave out the readings of breaks, of sensors at their limit, and of dropouts, and rows without a number.
     output : path, optional
         Folder for ``NAME.toml``, ``NAME.csv`` and the picture ``NAME.svg``; a temporary one when left out.
     ask : function of an undecided question that returns one of its answers, optional
@@ -114,7 +114,7 @@ def import_bench(
     paths = [Path(raw)] if not isinstance(raw, Sequence) or isinstance(raw, str) else [Path(path) for path in raw]
     names = _names(paths, name)
     zero, area = (None if value is None else float(value) for value in (zero_mm, area_mm2))
-    choices = Choices(names_given(mapping), decimal, time_since, sheet, zero, control, specimens)
+    choices = Choices(names_given(mapping), decimal, time_since, sheet, zero, control, specimens, drop_breaks)
     samples = [About(own, material, float(length_mm), area, name_is_stated=name is not None) for own in names]
     tests, choices = _read_all(paths, samples, choices, ask)
     if drop_breaks:

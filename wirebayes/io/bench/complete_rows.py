@@ -14,29 +14,44 @@ from wirebayes.sentences import counted, listed
 
 _SHOWN = 3  # lines that a note names
 _WORD = re.compile(r"(?!nan|null|none)[^\W\d_]{3,}", re.IGNORECASE)  # and none that stands for a missing number
-WHERE_MISSING = "; where a reading is missing, delete its row"
+WHERE_MISSING = "; where a reading is missing, delete its row, or leave all such rows out by --drop-breaks"
 
 
-def complete_rows(table: RawTable, columns: dict[Role, Column]) -> tuple[RawTable, list[str]]:
-    """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows."""
+def complete_rows(
+    table: RawTable, columns: dict[Role, Column], drop_missing: bool = False
+) -> tuple[RawTable, list[str]]:
+    """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows.
+
+    Parameters
+    ----------
+    table : RawTable
+    columns : dict of Role to Column
+        Those that are read.
+    drop_missing : bool
+        Whether rows with a word such as ``NaN`` in place of a number are left out, too.
+    """
     indices = [column.index for column in columns.values()]
     rows, below = _without_what_is_below(table, indices)
     rows, words = _without_words(rows, indices, columns["time"].index)
     weights_once = _weights_are_written_once(rows, columns)
     written_once: tuple[Role, ...] = ("hold", "tension") if weights_once else ("hold", "displacement")
     filled = _filled(rows, table, [columns[role].index for role in written_once if role in columns])
-    kept = _without_repetitions(filled, table, columns["time"].index)
+    missing = [row for row in filled if drop_missing and _is_missing(row, columns)]
+    read = [row for row in filled if not (drop_missing and _is_missing(row, columns))]
+    kept = _without_repetitions(read, table, columns["time"].index)
     gaps = sum(a.cells[i] != b.cell(i) for a, b in zip(filled, rows, strict=True) for i in indices)
     notes = []
     if below:
         notes.append(f"{counted(below, 'line')} under the readings left out")
     if words:
         notes.append(f"{_lines_of(words)} left out: words or statistics in place of readings")
+    if missing:
+        notes.append(f"left out: {counted(len(missing), 'row')} without a reading, from line {missing[0].line} on")
     if gaps:
         of = "weight" if weights_once else "displacement"
         notes.append(f"{gaps} empty cells of hold or {of} filled with the value above them")
-    if len(kept) < len(filled):
-        notes.append(f"rows that repeat the row above left out: {len(filled) - len(kept)}")
+    if len(kept) < len(read):
+        notes.append(f"rows that repeat the row above left out: {len(read) - len(kept)}")
     _check_no_cell_is_empty(kept, table, columns)
     return replace(table, rows=tuple(kept)), notes
 
@@ -65,6 +80,12 @@ def _without_words(rows: list[SheetRow], indices: list[int], time: int) -> tuple
         of_words = not has_time and any(_WORD.search(cell) for cell in read)
         (words if of_words or not any(map(is_value, read)) else kept).append(row)
     return kept, [*words, *rows[end:]]
+
+
+def _is_missing(row: SheetRow, columns: dict[Role, Column]) -> bool:
+    """Whether nothing, a word or a dash stands where a time, a setting or a reading belongs."""
+    cells = [row.cell(column.index) for role, column in columns.items() if role != "hold"]
+    return not all(any(c.isdigit() for c in cell) for cell in cells)
 
 
 def _is_statistic(row: SheetRow) -> bool:
