@@ -32,7 +32,7 @@ def test_holds_of_one_setting_are_sampled_in_bounded_time(bench, setting_sd):
 
 def test_specimens_of_one_weight_each_are_sampled_in_bounded_time():
     benches = [Bench(name, weights_N=(20.0,), times_s=TIMES_S, resolution_mm=1e-4) for name in "abc"]
-    done = fit_problem(draw(benches, Truth(WIRE | {"sensor_sd": 0.005, "setting_sd": 0.0}), seed=4).problem)
+    done = fit_problem(draw(benches, Truth(WIRE | {"sensor_sd": 0.005, "setting_sd": 0.1}), seed=4).problem)
     assert done.converged
-    assert done.chains.evaluations < 200_000  # with the coordinates of several settings 5 million were not enough
+    assert done.chains.evaluations < 150_000  # 240,000 without what the errors have in common, 5 million without either
     print(done.chains.evaluations)

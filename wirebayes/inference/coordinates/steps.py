@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wirebayes.inference.coordinates import shares
+from wirebayes.inference.coordinates.common_error import CommonError
 from wirebayes.inference.coordinates.displacement_level import DisplacementLevel
 from wirebayes.inference.coordinates.ridge import Ridge
 from wirebayes.inference.coordinates.slack_edge import SlackEdge
@@ -152,6 +153,7 @@ class WeightLevel(Step):
 
     ridge: Ridge
     levels: tuple[DisplacementLevel, ...]
+    common: CommonError | None
     scale: Array
 
     @property
@@ -162,27 +164,34 @@ class WeightLevel(Step):
     def to_sampled(self, z: Array, theta: Array) -> None:
         B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
         log_B = self._log_B(theta, z[:, B])
-        for level in self.levels:
-            z[:, level.preload] = level.score(theta, U, level.log_total(theta, log_B))
-        z[:, B] += self._log_gain(theta, z)
+        errors = np.array([level.score(theta, U, level.log_total(theta, log_B)) for level in self.levels])
+        z[:, B] += self._log_gain(theta, errors)
+        z[:, self.preloads] = (self.common.coordinates(errors, theta) if self.common else errors).T
 
     def to_natural(self, theta: Array, z: Array) -> None:
         B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
-        z[:, B] -= self._log_gain(theta, z)  # for the steps before this one
+        errors = self._errors(theta, z)
+        z[:, B] -= self._log_gain(theta, errors)  # for the steps before this one
         log_B = self._log_B(theta, z[:, B])
-        for level in self.levels:
-            theta[:, level.preload] = level.value(z[:, level.preload], theta, U, level.log_total(theta, log_B))
+        for level, error in zip(self.levels, errors, strict=True):
+            theta[:, level.preload] = level.value(error, theta, U, level.log_total(theta, log_B))
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         B, U = self.ridge.where["B"], self.ridge.get(theta, "U")
-        log_B = self._log_B(theta, z[:, B] - self._log_gain(theta, z))
+        log_B = self._log_B(theta, z[:, B] - self._log_gain(theta, self._errors(theta, z)))
         slopes = [level.slope(theta, U, level.log_total(theta, log_B)) for level in self.levels]
-        return np.asarray(np.log(slopes).sum(axis=0) - np.log(self.scale[self.preloads]).sum())
+        of_preloads = np.log(slopes).sum(axis=0) - np.log(self.scale[self.preloads]).sum()
+        return of_preloads + (self.common.log_slope(theta) if self.common else 0.0)
 
-    def _log_gain(self, theta: Array, z: Array) -> Array:
+    def _errors(self, theta: Array, z: Array) -> Array:
+        """(m, n) errors of the weights, as shares of them."""
+        coordinates = z[:, self.preloads].T
+        return self.common.errors(coordinates, theta) if self.common else coordinates
+
+    def _log_gain(self, theta: Array, errors: Array) -> Array:
         """(n,) log of the creep under the true weights over that under the stated ones: the mean of the tests."""
         U = self.ridge.get(theta, "U")
-        gains = [level.log_gain(theta, U, z[:, level.preload]) for level in self.levels]
+        gains = [level.log_gain(theta, U, error) for level, error in zip(self.levels, errors, strict=True)]
         return np.asarray(np.mean(gains, axis=0))
 
     def _log_B(self, theta: Array, log_lost: Array) -> Array:

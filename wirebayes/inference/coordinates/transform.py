@@ -40,6 +40,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.inference.coordinates.columns import ColumnMap, columns_of
+from wirebayes.inference.coordinates.common_error import common_error
 from wirebayes.inference.coordinates.displacement_level import DisplacementLevel, displacement_levels
 from wirebayes.inference.coordinates.ridge import Ridge, ridges_of
 from wirebayes.inference.coordinates.slack_edge import SlackEdge, slack_edge
@@ -121,7 +122,7 @@ class Transformation:
                 ridges = [replace(ridge, log_step=np.inf)]  # the level says what k1 is beside the creep
                 levels = [Level(ridges[0], tension)]
             elif weights := displacement_levels(problem, ridge):
-                levels = [WeightLevel(ridge, tuple(weights), self.scale)]
+                levels = [WeightLevel(ridge, tuple(weights), common_error(problem), self.scale)]
         toes = _toes(problem, self.columns) if for_draws and not any(isinstance(s, WeightLevel) for s in levels) else []
         self.steps = [*_steps(ridges, levels, [Preload(edge, self.scale[edge.preload]) for edge in slack]), *toes]
         self.ridges = ridges
