@@ -46,7 +46,9 @@ def test_a_block_with_another_header_is_refused(tmp_path, old, new, named):
         in_blocks(tmp_path, above=(ABOVE + HEADER).replace(old, new))
 
 
-@pytest.mark.parametrize("line", ["n/a\tNaN\t115", "1\tNULL\t115", "NaN\tNaN\tNaN", "1\t0.01\tNaN"])
+@pytest.mark.parametrize(
+    "line", ["n/a\tNaN\t115", "1\tNULL\t115", "NaN\tNaN\tNaN", "1\t0.01\tNaN", "1\tnull\t", "1\tNone\tnull"]
+)
 def test_a_missing_number_is_no_word(tmp_path, line):
     path = tmp_path / "raw.dat"
     rows = [f"1\t{0.01 - i / 1e5}\t{10 * i}\n" for i in range(3)]
@@ -55,6 +57,26 @@ def test_a_missing_number_is_no_word(tmp_path, line):
         assert len(convert(path, ABOUT, Choices()).rows) == 4
     else:
         with pytest.raises(InputError, match="line 6, .* expected a number|line 6, column 1 .*n/a"):
+            convert(path, ABOUT, Choices())
+
+
+def test_a_reading_without_a_time_is_no_line_of_words(tmp_path):
+    path = tmp_path / "raw.csv"
+    rows = [f"load {1 + i // 3},{1 + i // 3},{10 * i if i != 4 else ''},{5 - i / 10}\n" for i in range(6)]
+    path.write_text("Step,x (mm),Time (s),Force (N)\n" + "".join(rows))
+    with pytest.raises(InputError, match="line 6, .*found an empty cell, expected a number"):
+        convert(path, ABOUT, Choices(time_since="test"))
+
+
+@pytest.mark.parametrize(("below", "read"), [("", True), ("2\t0.01\t400\n", False)])
+def test_words_under_all_readings_are_no_header(tmp_path, below, read):
+    path = tmp_path / "raw.dat"
+    rows = [f"1\t{0.01 - i / 1e5}\t{10 * i}\n" for i in range(3)]
+    path.write_text(HEADER + "".join(rows) + "Force sensor\tExtension sensor\n" + below)
+    if read:
+        assert len(convert(path, ABOUT, Choices()).rows) == 3
+    else:
+        with pytest.raises(InputError, match="line 6: found another header, Force sensor, Extension sensor"):
             convert(path, ABOUT, Choices())
 
 

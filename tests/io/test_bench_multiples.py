@@ -1,20 +1,22 @@
 """Readings counted in divisions of a gauge, steps of a motor or shares of a load."""
 
+import numpy as np
 import pytest
 
 from tests.io.bench_files import convert
 from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.multiples import unit_in_header
+from wirebayes.io.bench.quantities import quantity_unit
 from wirebayes.io.bench.undecided import Choices, Undecided
 
 ABOUT = About("wire", "line", 1000.0)
 
 
-def displacements(tmp_path, header, cells=("403", "413", "424"), mapping=()):
+def displacements(tmp_path, header, cells=("403", "413", "424"), **choices):
     path = tmp_path / "raw.csv"
     path.write_text(f"Weight (kg);Time (min);{header}\n" + "".join(f"2;{i};{cell}\n" for i, cell in enumerate(cells)))
-    return [row[1] for row in convert(path, ABOUT, Choices(mapping=mapping, control="force", zero_mm=0.0)).rows]
+    return [row[1] for row in convert(path, ABOUT, Choices(control="force", zero_mm=0.0, **choices)).rows]
 
 
 @pytest.mark.parametrize(
@@ -38,8 +40,13 @@ def test_numbers_that_are_no_counts_are_asked_about(tmp_path):
     with pytest.raises(Undecided, match="found '0.1' under '0.001 in', which may be the unit or the step") as found:
         displacements(tmp_path, header, cells)
     step, unit = (answer.removeprefix("--map ") for answer in found.value.answers)
-    assert displacements(tmp_path, header, cells, (step,)) == [2.54, 5.08, 7.62]
-    assert displacements(tmp_path, header, cells, (unit,)) == [0.00254, 0.00508, 0.00762]
+    assert displacements(tmp_path, header, cells, mapping=(step,)) == [2.54, 5.08, 7.62]
+    assert displacements(tmp_path, header, cells, mapping=(unit,)) == [0.00254, 0.00508, 0.00762]
+
+
+def test_words_between_counts_do_not_make_them_lengths(tmp_path):
+    cells = ("403", "NaN", "413", "424")
+    assert displacements(tmp_path, "Dial (0.01 mm)", cells, drop_missing=True) == [4.03, 4.13, 4.24]
 
 
 @pytest.mark.parametrize(
@@ -64,3 +71,10 @@ def test_a_share_of_the_breaking_load_asks_for_what_one_is(tmp_path):
         convert(path, ABOUT, Choices())
     made = convert(path, ABOUT, Choices(mapping=("Load (%MBL)=tension [0.5 N]",)))
     assert [row[3] for row in made.rows] == [10.0, 9.5, 9.0]
+
+
+@pytest.mark.parametrize(("unit", "value", "celsius"), [("°F", 38.3, 3.5), ("°F", 33.8, 1.0), ("K", 274.35, 1.2)])
+def test_temperatures_have_no_more_digits_than_were_written(unit, value, celsius):
+    known = quantity_unit(unit, "temperature")
+    assert known is not None
+    assert known.convert(np.array([value])).tolist() == [celsius]

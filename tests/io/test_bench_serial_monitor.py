@@ -19,13 +19,21 @@ def log(tmp_path, header, sent=SENT, before="tare done, offset kept"):
     return path
 
 
-@pytest.mark.parametrize("before", ["tare done", "tare done, offset kept", ""])
+@pytest.mark.parametrize(
+    "before", ["tare done", "tare done, offset kept", "Waiting time 5", "tare done, time out 5", ""]
+)
 def test_times_of_arrival_are_the_clock_where_nothing_else_is(tmp_path, before):
     made = convert(log(tmp_path, "pos_mm,load_g", before=before), ABOUT, Choices())
     assert "time from 'Time of arrival'" in made.notes[0]
     assert "the clock passes midnight 1 time" in made.notes
     assert [row[2] for row in made.rows] == [0.0, 10.0, 30.0, 120.0, 0.0, 10.0, 30.0]
     assert made.rows[0][3] == pytest.approx(0.5 * 9.80665)
+
+
+def test_a_message_between_readings_is_no_header(tmp_path):
+    sent = (*SENT[:3], "new position, tare kept", *SENT[4:])
+    made = convert(log(tmp_path, "pos_mm,load_g", sent), ABOUT, Choices())
+    assert "line 6 (new position) left out: words or statistics in place of readings" in made.notes
 
 
 def test_a_device_s_own_clock_stands_before_times_of_arrival(tmp_path):

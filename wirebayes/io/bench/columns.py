@@ -18,6 +18,7 @@ from wirebayes.io.bench.header import (
 )
 from wirebayes.io.bench.multiples import multiple_of_unit, unit_in_header
 from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, quantity_unit
+from wirebayes.io.bench.sheet import is_number
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
 from wirebayes.io.bench.undecided import Undecided
@@ -216,7 +217,8 @@ def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
 
 def _check_counts(table: RawTable, index: int, role: Role, unit: Unit) -> None:
     """Ask what a graduation in the header means where numbers are no counts of it: it may be the step of the gauge."""
-    row = next((row for row in table.rows if row.cell(index) and not row.cell(index).lstrip("+-−").isdigit()), None)
+    numbers = (row for row in table.rows if is_number(row.cell(index)))
+    row = next((row for row in numbers if not row.cell(index).lstrip("+-−").isdigit()), None)
     if row is None:
         return
     place = f"{table.sheet.path}, {table.place(row.line, index)}"

@@ -13,7 +13,8 @@ from wirebayes.io.bench.words import STATISTICS
 from wirebayes.sentences import counted, listed
 
 _SHOWN = 3  # lines that a note names
-_WORD = re.compile(r"(?!nan|null|none)[^\W\d_]{3,}", re.IGNORECASE)  # and none that stands for a missing number
+# from its first letter on, and none that stands for a missing number
+_WORD = re.compile(r"(?<![^\W\d_])(?!nan|null|none)[^\W\d_]{3,}", re.IGNORECASE)
 WHERE_MISSING = "; where a reading is missing, delete its row, or leave all such rows out by --drop-breaks"
 
 
@@ -32,7 +33,7 @@ def complete_rows(
     """
     indices = [column.index for column in columns.values()]
     rows, below = _without_what_is_below(table, indices)
-    rows, words = _without_words(rows, indices, columns["time"].index)
+    rows, words = _without_words(rows, columns)
     weights_once = _weights_are_written_once(rows, columns)
     written_once: tuple[Role, ...] = ("hold", "tension") if weights_once else ("hold", "displacement")
     filled = _filled(rows, table, [columns[role].index for role in written_once if role in columns])
@@ -65,19 +66,22 @@ def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Sh
     return [row for row in rows if any(row.cell(i) for i in indices)], below
 
 
-def _without_words(rows: list[SheetRow], indices: list[int], time: int) -> tuple[list[SheetRow], list[SheetRow]]:
+def _without_words(rows: list[SheetRow], columns: dict[Role, Column]) -> tuple[list[SheetRow], list[SheetRow]]:
     """Rows without those that name a part of the test, such as ``Cycle 2``, or a statistic below; and these.
 
-    Those are rows without a time, in which words stand where numbers are read: ``Points: | 9`` between blocks.
+    Those are rows without a time, in which words stand where numbers are read: ``Points: | 9`` between blocks. A
+    reading whose time is missing is none, whatever its hold is called.
     """
+    time, displacement, tension = (columns[role].index for role in ("time", "displacement", "tension"))
     end = len(rows)
     while end and _is_statistic(rows[end - 1]):
         end -= 1
     kept, words = list[SheetRow](), list[SheetRow]()
     for row in rows[:end]:
-        read = [row.cell(i) for i in indices]
+        read = [row.cell(column.index) for column in columns.values()]
         has_time = any(c.isdigit() for c in row.cell(time))
-        of_words = not has_time and any(_WORD.search(cell) for cell in read)
+        is_reading = is_value(row.cell(displacement)) and is_value(row.cell(tension))
+        of_words = not (has_time or is_reading) and any(_WORD.search(cell) for cell in read)
         (words if of_words or not any(map(is_value, read)) else kept).append(row)
     return kept, [*words, *rows[end:]]
 

@@ -78,10 +78,15 @@ class Unit:
     multiple: float = 1.0
 
     def convert(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values in our unit; to fifteen digits, as factors are binary and units decimal; clocks count from 1970."""
+        """Values in our unit; to fifteen digits, as factors are binary and units decimal; clocks count from 1970.
+
+        Units with a zero of their own to nine decimals: a difference of large numbers has fewer digits.
+        """
         if self.factor == 1.0 and self.offset == 0.0:
             return values
-        return np.array([float(f"{value * self.factor + self.offset:.15g}") for value in values])
+        if self.offset != 0.0:
+            return np.round(values * self.factor + self.offset, 9)
+        return np.array([float(f"{value * self.factor:.15g}") for value in values])
 
 
 def quantity_unit(text: str, role: Role) -> Unit | None:

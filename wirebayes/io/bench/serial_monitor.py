@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured
+from wirebayes.io.bench.table import find_table
 from wirebayes.io.bench.words import speaks_of
 
 ARRIVAL = "Time of arrival"  # the name of the column of stamps
@@ -33,16 +34,20 @@ def with_arrivals(sheet: Sheet, arrivals: Sequence[str]) -> Sheet:
     arrivals : sequence of str
         Of each line.
     """
-    names = [cell for row in sheet.rows if not is_measured(row.filled) for cell in row.filled]
-    if any(speaks_of(name, "time") for name in names):
+    table = find_table(sheet)
+    if any(speaks_of(name, "time") for name in table.header):
         return replace(sheet, described=f"{sheet.described}, times of arrival not read")
-    width = max(len(row.cells) for row in sheet.rows if is_measured(row.filled))
-    return replace(sheet, rows=tuple(_with_arrival(row, width, arrivals[row.line - 1]) for row in sheet.rows))
+    head = next(row.cells for row in sheet.rows if row.line == table.header_line)
+    width = len(table.header)
+    rows = [
+        _with_last(row, width, ARRIVAL if row.cells == head else arrivals[row.line - 1])
+        if row.cells == head or is_measured(row.filled)
+        else row
+        for row in sheet.rows
+    ]
+    return replace(sheet, rows=tuple(rows))
 
 
-def _with_arrival(row: SheetRow, width: int, arrival: str) -> SheetRow:
-    """A row with one more cell, which in a header names the column; other lines of words stay as they are."""
-    if not is_measured(row.filled) and not 1 < len(row.filled) <= width:
-        return row
-    last = arrival if is_measured(row.filled) else ARRIVAL
-    return replace(row, cells=(*row.cells, *[""] * (width - len(row.cells)), last))
+def _with_last(row: SheetRow, width: int, cell: str) -> SheetRow:
+    """A row with one more cell behind a number of columns."""
+    return replace(row, cells=(*row.cells, *[""] * (width - len(row.cells)), cell))

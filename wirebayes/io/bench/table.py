@@ -182,7 +182,8 @@ def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: 
 def _check_headers_repeat(sheet: Sheet, above: Sequence[SheetRow], head: SheetRow, body: Sequence[SheetRow]) -> None:
     """Refuse a header between readings, or its row of units, that is another than the one above the first of them."""
     known = {row.cells for row in above}
-    for row in body:
+    last = max(i for i, row in enumerate(body) if is_measured(row.filled))
+    for row in body[:last]:
         if len(row.filled) == 1 or any(map(is_value, row.filled)) or row.cells in known:
             continue
         if _are_units(row) or sum(map(speaks_of_a_quantity, row.filled)) > 1:
