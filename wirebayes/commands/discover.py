@@ -129,17 +129,43 @@ def discover(
         if opened.state == "done":
             return Findings(place, own, computed=False)
         settings = Settings(spec, kinds, simulations or SIMULATIONS)
-        report = progress or silent
-        sampled = partial(run, directory=place.path, seed=seed, policy=policy or DEFAULT)
-        plain = partial(sampled, plain_jobs(experiments, spec, own))
-        with computing(), prepared_copy(partial(_in_gaps, plain)) as in_copy:
-            with workers(prepare=partial(catalogue, own)) as parallel_map, loaded_meanwhile(_PICTURES):
-                found = investigate(experiments, settings, seed, report, parallel_map)
-                sampled(jobs_of(found, spec, own), report=report, parallel_map=parallel_map)
-            in_copy(plain)
+        found = _searched_and_sampled(
+            experiments, settings, own, place.path, seed, policy or DEFAULT, progress or silent
+        )
         write_findings(found, place.path, own)
         opened.finish()
     return Findings(place, own)
+
+
+def _searched_and_sampled(
+    experiments: Sequence[Experiment],
+    settings: Settings,
+    own: Path | None,
+    output: Path,
+    seed: int,
+    policy: Policy,
+    report: Progress,
+) -> Investigation:
+    """What was found, and the posteriors of it; the plain ones are begun beside the search."""
+    spec = settings.spec
+    sampled = partial(run, directory=output, seed=seed, policy=policy)
+    plain = partial(sampled, plain_jobs(experiments, spec, own))
+    with computing(), prepared_copy(partial(_in_gaps, plain)) as in_copy:
+        with workers(prepare=partial(catalogue, own)) as parallel_map, loaded_meanwhile(_PICTURES):
+            found = investigate(experiments, settings, seed, report, parallel_map)
+            sampled(jobs_of(found, spec, own), report=report, parallel_map=parallel_map)
+        in_copy(plain)
+        sampled(plain_jobs(_void(found, experiments, output), spec, own), report=report)
+    return found
+
+
+def _void(found: Investigation, given: Sequence[Experiment], output: Path) -> list[Experiment]:
+    """The experiments of which readings were struck out; their plain fits, begun before that, no longer count."""
+    hashes = {e.data_hash for e in given}
+    struck = [e for block in found.final for e in block.experiments if e.data_hash not in hashes]
+    for e in struck:
+        (output / e.name / "plain" / SUMMARY).unlink()
+    return struck
 
 
 def _in_gaps(work: Callable[[], object]) -> None:

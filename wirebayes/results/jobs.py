@@ -83,7 +83,7 @@ def run(
         Takes the place of processes that share the work.
     """
     todo = [job for job in jobs if not all((directory / f / "summary.json").exists() for f in job.folders)]
-    if len(todo) == 1 or cores() == 1:
+    if len(todo) <= 1 or cores() == 1:
         for job in todo:
             one(job, directory, seed, policy, lambda share, name=job.folder: report(name, share, 1.0))  # type: ignore[misc]
         return
