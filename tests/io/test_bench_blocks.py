@@ -68,7 +68,7 @@ def test_a_reading_without_a_time_is_no_line_of_words(tmp_path):
         convert(path, ABOUT, Choices(time_since="test"))
 
 
-@pytest.mark.parametrize(("below", "read"), [("", True), ("2\t0.01\t400\n", False)])
+@pytest.mark.parametrize(("below", "read"), [("", True), ("Mean\t0.01\t10\n", True), ("2\t0.01\t400\n", False)])
 def test_words_under_all_readings_are_no_header(tmp_path, below, read):
     path = tmp_path / "raw.dat"
     rows = [f"1\t{0.01 - i / 1e5}\t{10 * i}\n" for i in range(3)]

@@ -9,7 +9,7 @@ from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.sheet import SheetRow, is_value
 from wirebayes.io.bench.stamps import is_coarse
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.bench.words import STATISTICS
+from wirebayes.io.bench.words import are_a_statistic
 from wirebayes.sentences import counted, listed
 
 _SHOWN = 3  # lines that a note names
@@ -74,7 +74,7 @@ def _without_words(rows: list[SheetRow], columns: dict[Role, Column]) -> tuple[l
     """
     time, displacement, tension = (columns[role].index for role in ("time", "displacement", "tension"))
     end = len(rows)
-    while end and _is_statistic(rows[end - 1]):
+    while end and are_a_statistic(rows[end - 1].filled):
         end -= 1
     kept, words = list[SheetRow](), list[SheetRow]()
     for row in rows[:end]:
@@ -90,10 +90,6 @@ def _is_missing(row: SheetRow, columns: dict[Role, Column]) -> bool:
     """Whether nothing, a word or a dash stands where a time, a setting or a reading belongs."""
     cells = [row.cell(column.index) for role, column in columns.items() if role != "hold"]
     return not all(any(c.isdigit() for c in cell) for cell in cells)
-
-
-def _is_statistic(row: SheetRow) -> bool:
-    return any(cell.casefold().rstrip(":.") in STATISTICS for cell in row.filled)
 
 
 def _lines_of(rows: list[SheetRow]) -> str:

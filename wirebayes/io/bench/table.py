@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import ROLES, quantity_unit
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
-from wirebayes.io.bench.words import speaks_of_a_quantity
+from wirebayes.io.bench.words import are_a_statistic, speaks_of_a_quantity
 
 _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
 LONGEST_HEADER = 200  # characters: names and units take a few words, prose is no header
@@ -182,8 +182,8 @@ def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: 
 def _check_headers_repeat(sheet: Sheet, above: Sequence[SheetRow], head: SheetRow, body: Sequence[SheetRow]) -> None:
     """Refuse a header between readings, or its row of units, that is another than the one above the first of them."""
     known = {row.cells for row in above}
-    last = max(i for i, row in enumerate(body) if is_measured(row.filled))
-    for row in body[:last]:
+    readings = [i for i, row in enumerate(body) if is_measured(row.filled) and not are_a_statistic(row.filled)]
+    for row in body[: max(readings, default=0)]:
         if len(row.filled) == 1 or any(map(is_value, row.filled)) or row.cells in known:
             continue
         if _are_units(row) or sum(map(speaks_of_a_quantity, row.filled)) > 1:

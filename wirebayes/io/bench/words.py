@@ -2,6 +2,7 @@
 
 import re
 import unicodedata
+from collections.abc import Sequence
 
 from wirebayes.io.bench.quantities import ROLES, Role
 
@@ -79,6 +80,11 @@ def speaks_of_a_quantity(word: str) -> bool:
     letters = {letter for known in LETTERS.values() for letter in known}
     of_rig = {name for names in RIG_WORDS.values() for name in names}
     return plain_letters(word) in letters | of_rig or any(speaks_of(word, role) for role in ROLES)
+
+
+def are_a_statistic(cells: Sequence[str]) -> bool:
+    """Whether cells are those of a mean or the like below the readings."""
+    return any(cell.casefold().rstrip(":.") in STATISTICS for cell in cells)
 
 
 def known_words(text: str) -> int:
