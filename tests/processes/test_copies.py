@@ -174,3 +174,16 @@ def test_a_module_is_loaded_at_the_end_of_the_block(tmp_path, monkeypatch):
     with loaded_meanwhile("loaded_late"):
         assert not hasattr(sys.modules.get("loaded_late"), "ready")
     assert sys.modules.pop("loaded_late").ready
+
+
+@LINUX
+def test_a_copy_that_cannot_prepare_says_nothing():
+    found = run("""
+        from wirebayes.processes.copies import prepared_copy
+        os.dup2(1, 2)  # what is said of errors, too
+        def fails():
+            raise ValueError("no space left")
+        with prepared_copy(fails) as in_copy:
+            print(in_copy(abs, -3))
+    """)
+    assert found == "3"

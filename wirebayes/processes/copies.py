@@ -131,7 +131,10 @@ def _begin(here: "Connection[Any, Any]", function: Callable[..., None], argument
 
 def _prepare_and_serve(prepare: Callable[[], object], there: "Connection[Any, Any]") -> None:
     """In a copy: prepare, and then do what is asked for until the parent needs no more."""
-    prepare()
+    try:
+        prepare()
+    except Exception:
+        return  # the parent does it itself, and says what is wrong
     while True:
         try:
             function, arguments = there.recv()
