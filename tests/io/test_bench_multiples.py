@@ -46,7 +46,7 @@ def test_numbers_that_are_no_counts_are_asked_about(tmp_path):
 
 def test_words_between_counts_do_not_make_them_lengths(tmp_path):
     cells = ("403", "NaN", "413", "424")
-    assert displacements(tmp_path, "Dial (0.01 mm)", cells, drop_missing=True) == [4.03, 4.13, 4.24]
+    assert displacements(tmp_path, "Dial (0.01 mm)", cells, drop_breaks=True) == [4.03, 4.13, 4.24]
 
 
 @pytest.mark.parametrize(

@@ -260,11 +260,11 @@ def test_rows_without_a_reading_are_left_out_where_that_is_said(tmp_path, cell):
     raw.write_text(HEADER + BODY.replace("4.05", cell))
     notes = wb.import_bench(raw, length_mm=1000, drop_breaks=True).summary()["experiments"]["raw"]["notes"]
     assert "left out: 1 row without a reading, from line 6 on" in notes
-    kept = read(tmp_path, raw.read_text(), drop_missing=True).rows
+    kept = read(tmp_path, raw.read_text(), drop_breaks=True).rows
     assert kept == read(tmp_path, HEADER + BODY.replace("2,30,4.05\n", "")).rows
     misprint = HEADER + BODY.replace("4.05", "4.0S")
     with pytest.raises(wb.InputError, match="found '4.0S'"):
-        read(tmp_path, misprint, drop_missing=True)
+        read(tmp_path, misprint, drop_breaks=True)
 
 
 def test_a_displacement_downwards_is_turned_and_one_upwards_from_below_zero_is_read(tmp_path):

@@ -127,7 +127,6 @@ def import_bench(
         "length_mm": float(length_mm),
         "material": material,
         "area_mm2": area,
-        "drop_breaks": drop_breaks,
         **vars(choices),
     }
     place = ResultFolder.at(output)

@@ -115,7 +115,7 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     """
     columns = _of_sample(table, understand(table, choices.mapping), about)
     not_read = next((row.line for row in table.rows if not row.cell(columns["displacement"].index)), None)
-    table, notes = complete_rows(table, columns, choices.drop_missing)
+    table, notes = complete_rows(table, columns, choices.drop_breaks)
     not_read = not_read if not_read in {row.line for row in table.rows} else None  # below the readings
     numbers = {role: column for role, column in columns.items() if not _is_of_clocks(table, column)}
     decimal = decimal_sign(table, [column.index for column in numbers.values()], choices.decimal)

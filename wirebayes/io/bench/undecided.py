@@ -33,7 +33,7 @@ class Choices:
         What was set in each hold.
     specimens : {"several", "one"} or None
         Of which columns stand side by side.
-    drop_missing : bool
+    drop_breaks : bool
         Whether rows of readings that are missing are left out.
     """
 
@@ -44,7 +44,7 @@ class Choices:
     zero_mm: float | None = None
     control: Control | None = None
     specimens: Specimens | None = None
-    drop_missing: bool = False
+    drop_breaks: bool = False
 
     def with_option(self, option: str) -> "Choices":
         """These choices and one more, as the command line spells it: ``--decimal comma``."""
