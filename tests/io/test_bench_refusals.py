@@ -267,6 +267,12 @@ def test_rows_without_a_reading_are_left_out_where_that_is_said(tmp_path, cell):
         read(tmp_path, misprint, drop_breaks=True)
 
 
+def test_a_missing_temperature_loses_no_reading(tmp_path):
+    text = "Hold,Displacement (mm),Time (s),Force (N),Temperature (C)\n1,1,0,2.0,20\n1,1,30,1.9,\n1,1,60,1.8,20\n"
+    with pytest.raises(wb.InputError, match=r"line 3, column 5 \(Temperature \(C\)\): found an empty cell"):
+        read(tmp_path, text, drop_breaks=True)
+
+
 def test_a_displacement_downwards_is_turned_and_one_upwards_from_below_zero_is_read(tmp_path):
     turned = read(tmp_path, DOWN, mapping=("Weg [mm]=displacement [-mm]",))
     assert [row[1] for row in turned.rows[::2]] == [1.0, 2.0, 3.0]

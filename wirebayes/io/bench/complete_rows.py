@@ -88,7 +88,7 @@ def _without_words(rows: list[SheetRow], columns: dict[Role, Column]) -> tuple[l
 
 def _is_missing(row: SheetRow, columns: dict[Role, Column]) -> bool:
     """Whether nothing, a word or a dash stands where a time, a setting or a reading belongs."""
-    cells = [row.cell(column.index) for role, column in columns.items() if role != "hold"]
+    cells = [row.cell(columns[role].index) for role in ("time", "displacement", "tension")]
     return not all(any(c.isdigit() for c in cell) for cell in cells)
 
 
