@@ -35,6 +35,12 @@ def test_divisions_of_another_unit_and_in_the_row_of_units(tmp_path):
     assert [row[1] for row in convert(path, ABOUT, Choices(control="force")).rows] == [4.03, 4.13, 4.24]
 
 
+@pytest.mark.parametrize("step", ["0.01 mm", ".01 mm", ",01 mm", "1e-2 mm", "1.0E-02 mm", "1/100 mm"])
+def test_a_step_may_be_written_as_numbers_are(tmp_path, step):
+    mapping = (f"Steps=displacement [{step}]",)
+    assert displacements(tmp_path, "Steps", ("400", "410", "420"), mapping=mapping) == pytest.approx([4.0, 4.1, 4.2])
+
+
 def test_numbers_that_are_no_counts_are_asked_about(tmp_path):
     header, cells = "Dial (0.001 in)", ("0.1", "0.2", "0.3")
     with pytest.raises(Undecided, match="found '0.1' under '0.001 in', which may be the unit or the step") as found:

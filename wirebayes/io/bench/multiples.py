@@ -6,7 +6,8 @@ from dataclasses import replace
 from wirebayes.io.bench.quantities import Role, Unit, quantity_unit
 
 COARSEST = 0.1  # of the graduations of gauges; of larger numbers before a unit a name may end: Force 2 N
-_BEFORE = re.compile(r"([-−]?)\s*(\d+(?:[.,]\d+)?)(?:\s*/\s*(\d+))?\s*[·×*]?\s*(\D.*)")
+_NUMBER = r"(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?"
+_BEFORE = re.compile(rf"([-−]?)\s*({_NUMBER})(?:\s*/\s*(\d+))?\s*[·×*]?\s*(\D.*)")
 _AFTER = re.compile(r"(?P<unit>\D+?)\s*/\s*(?P<count>\d+)")
 
 
