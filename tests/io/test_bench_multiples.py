@@ -35,6 +35,14 @@ def test_divisions_of_another_unit_and_in_the_row_of_units(tmp_path):
     assert [row[1] for row in convert(path, ABOUT, Choices(control="force")).rows] == [4.03, 4.13, 4.24]
 
 
+def test_a_quantity_over_a_number_is_asked_about(tmp_path):
+    """It may be in tenths of a millimetre, or in millimetres of a tenth."""
+    with pytest.raises(Undecided, match="found no unit") as found:
+        displacements(tmp_path, "Weg/10 mm", ("40", "41", "42"))
+    assert any(answer.endswith("[mm]") for answer in found.value.answers)
+    assert displacements(tmp_path, "Weg 10 mm", ("40", "41", "42")) == [40.0, 41.0, 42.0]
+
+
 @pytest.mark.parametrize("step", ["0.01 mm", ".01 mm", ",01 mm", "1e-2 mm", "1.0E-02 mm", "1/100 mm"])
 def test_a_step_may_be_written_as_numbers_are(tmp_path, step):
     mapping = (f"Steps=displacement [{step}]",)

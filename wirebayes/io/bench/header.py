@@ -14,6 +14,7 @@ _UNIT_FIRST = re.compile(
     r"(millis|micros|seconds|minutes|hours|sekunden|minuten|stunden|secondes|heures|segundos|minutos)(?!\S)", re.I
 )
 _BEFORE_UNIT = re.compile(r"\s*/\s*|,\s*|\s+in\s+|[_\s]+")
+_DIVIDED = re.compile(r"/\s*\d+$")  # what stands before a unit that may be a share of it: Weg/10 mm
 # what a unit in brackets may begin with: durations in minutes
 _IN = re.compile(r"(?:.*\s)?(?:in|en|em)\s+", re.IGNORECASE)
 
@@ -56,7 +57,7 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
         return bracket[1], in_brackets
     for sign in _BEFORE_UNIT.finditer(header):
         unit = unit_in_header(header[sign.end() :], role)
-        if unit and sign.start():
+        if unit and sign.start() and not _DIVIDED.search(header[: sign.start()]):
             return header[: sign.start()], unit
     whole = announced(header) if role == "time" else None
     if whole:
