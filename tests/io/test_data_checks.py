@@ -178,3 +178,16 @@ def test_one_hold_leaves_k1_and_preload_open_unless_one_is_stated():
     assert [(n.kind, n.text) for n in data_checks.of_experiment(one)] == [("prior", data_checks.ONE_HOLD)]
     known = replace(one, priors={"preload": {"fixed": 0.0}})
     assert data_checks.of_experiment(known) == []
+
+
+@pytest.mark.parametrize(("second", "said"), [(2.0, True), (1.981, True), (1.979, False)])
+@pytest.mark.parametrize(
+    ("control", "which"), [("displacement", "holds at one displacement do"), ("force", "holds of one weight do")]
+)
+def test_holds_of_one_setting_leave_them_open_too(control, which, second, said):
+    settings, read = [2.0] * 3 + [second] * 3, [1.5, 1.55, 1.57, 1.58, 1.59, 1.595]
+    columns = (settings, read) if control == "displacement" else (read, settings)
+    options = {"length_mm": 1000.0, "name": "two", "material": "line", "control": control}
+    two = from_arrays([1] * 3 + [2] * 3, columns[0], [0.0, 10.0, 20.0] * 2, columns[1], **options)
+    texts = [notice.text for notice in data_checks.one_setting(two.protocol(), set())]
+    assert [text.startswith(f"{which} not tell k1 and the preload apart") for text in texts] == [True] * said

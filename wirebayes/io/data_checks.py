@@ -31,10 +31,12 @@ FASTER = 5.0  # times the speed of the changes before and after it, which neithe
 COPIED = 3  # different readings that agree one by one at two displacements: not by chance
 OFF_GRID = 0.5  # share of the changes between readings that are smaller than half the resolution
 
-ONE_HOLD = (
-    "one hold does not tell k1 and the preload apart: the priors decide both; state what is known, as preload_mm (0 "
-    "where displacements count from the zero-tension length), [prior.preload] or [prior.k1]"
+ONE_SETTING = 0.01  # of the setting: with .3 % between holds k1 is as open as with none
+_OPEN = (
+    "not tell k1 and the preload apart: the priors decide both; state what is known, as preload_mm (0 where "
+    "displacements count from the zero-tension length), [prior.preload] or [prior.k1]"
 )
+ONE_HOLD = f"one hold does {_OPEN}"
 
 
 def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Notice]:
@@ -65,20 +67,24 @@ def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Noti
 def of_experiment(experiment: Experiment) -> list[Notice]:
     """The warnings of one test."""
     found = warnings(experiment.protocol(), experiment.readings(), experiment.resolution)
-    return [*found, *one_hold(experiment.protocol(), set(experiment.priors))]
+    return [*found, *one_setting(experiment.protocol(), set(experiment.priors))]
 
 
-def one_hold(protocol: Protocol, stated: Set[str]) -> list[Notice]:
-    """What a single hold leaves open: the stiffness or the preload, unless one of them is stated.
+def one_setting(protocol: Protocol, stated: Set[str]) -> list[Notice]:
+    """What holds of one setting leave open: the stiffness or the preload, unless one of them is stated.
 
     Parameters
     ----------
     stated : set of str
         Parameters with a prior of the user's own.
     """
-    if int(protocol.recorded.sum()) != 1 or stated & {"k1", "preload"}:
+    settings = protocol.setting[protocol.recorded]
+    if not settings.size or np.ptp(settings) > ONE_SETTING * settings.max() or stated & {"k1", "preload"}:
         return []
-    return [Notice("prior", ONE_HOLD)]
+    if settings.size == 1:
+        return [Notice("prior", ONE_HOLD)]
+    which = "holds of one weight" if protocol.control == "force" else "holds at one displacement"
+    return [Notice("prior", f"{which} do {_OPEN}")]
 
 
 def run_on_times(readings: CheckedTest) -> str:

@@ -49,7 +49,7 @@ def posterior_warnings(fit: Fit, sample: Sample) -> list[Notice]:
     of_readings = data_checks.warnings(sample.protocol, readings, sample.resolution)
     if fit.problem.likelihood == "chain":
         stated = {name for name in ("k1", "preload") if fit.problem.column(name, sample) in fit.problem.stated}
-        of_readings += data_checks.one_hold(sample.protocol, stated)
+        of_readings += data_checks.one_setting(sample.protocol, stated)
     samples, control = fit.problem.samples, sample.protocol.control
     first = sample is samples[0]
     first_read_so = sample is next(s for s in samples if s.protocol.control == control)

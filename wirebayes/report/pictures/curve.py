@@ -14,7 +14,9 @@ from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Protocol
 
 DRAWS = 300  # a 5 % quantile is then one between 3 and 7 %, which no picture shows
-_POINTS = 25  # of the curve within a hold
+_POINTS = 33  # of the curve within a hold
+# of a hold, at which the curve is evaluated: dense where creep is fast, as the readings may be
+_SHARES = np.linspace(0.0, 1.0, _POINTS) ** 3
 _MARGIN = 0.1  # of a hold's place, left free at either side
 _MOST_TICKS = 24  # hold numbers that an axis has room for
 READ = {"displacement": "tension", "force": "displacement"}
@@ -57,7 +59,7 @@ def curve(stored: Stored) -> Curve:
         holds = len(dense.setting)
         request = PredictionRequest(dense, holds, np.zeros(holds, bool), np.full(holds, np.nan))
         courses.append(chain_course(own, sample, request, np.random.default_rng(0)))
-    inside = np.linspace(_MARGIN, 1.0 - _MARGIN, _POINTS)
+    inside = _MARGIN + (1.0 - 2.0 * _MARGIN) * _SHARES
     recorded = np.cumsum(protocol.recorded) - 1.0
     quantiles = np.quantile(courses[0], [0.05, 0.5, 0.95], axis=2)[..., :_POINTS]
     noise = float(np.median(np.hypot(own["sensor_sd"], sample.resolution / np.sqrt(12.0))))
@@ -66,7 +68,7 @@ def curve(stored: Stored) -> Curve:
 
 def _dense(protocol: Protocol) -> Protocol:
     """The same holds, read so often that the curve is smooth; all of them recorded."""
-    time = np.linspace(0.0, 1.0, _POINTS) * protocol.duration_s[:, None]
+    time = _SHARES * protocol.duration_s[:, None]
     warming = None
     if protocol.warming_K is not None:
         each = zip(time, protocol.time_s, protocol.warming_K, protocol.mask, strict=True)
