@@ -22,6 +22,7 @@ from wirebayes.report.blocks import (
     Table,
     Text,
     View,
+    as_sentence,
     drawn,
     number,
     span,
@@ -535,3 +536,15 @@ def test_a_long_name_stays_within_its_cell(name: str, lines: list[str]) -> None:
 
     found = _narrow(name)
     assert found.split("\n") == lines and found.replace("\n", "") == name
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("kite-1.5m: its readings end early", "kite-1.5m: its readings end early."),
+        ("the final model: k1 is open.", "The final model: k1 is open."),
+        ("", "."),
+    ],
+)
+def test_a_sentence_begins_with_a_large_letter_unless_it_begins_with_a_name(text, sentence):
+    assert as_sentence(text) == sentence

@@ -343,8 +343,10 @@ def seed_of_page(configuration: Mapping[str, Any]) -> str:
 
 
 def as_sentence(text: str) -> str:
-    """A text as a sentence: its first letter large, a full stop at its end."""
-    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+    """A text as a sentence: its first letter large, unless a name and a colon begin it, and a full stop at its end."""
+    begins_with_name = text.partition(" ")[0].endswith(":")
+    first = text[:1] if begins_with_name else text[:1].upper()
+    return f"{first}{text[1:].rstrip('.')}."
 
 
 def words(name: str) -> str:
