@@ -124,6 +124,9 @@ def reproduce(out: Path) -> tuple[list[str], Callable[[int], bool]]:
     return ["reproduce", "--output", str(out)], working(2)
 
 
+LONG = (fits, discover, compare, reproduce)
+
+
 @pytest.mark.parametrize("whole_group", [True, False])
 @pytest.mark.parametrize("what", [fit, discover])
 def test_ctrl_c(what: Callable, whole_group: bool, tmp_path: Path) -> None:
@@ -136,8 +139,11 @@ def test_ctrl_c(what: Callable, whole_group: bool, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "whole_group"), [(INT, True), (INT, False), (TERM, False)])
-@pytest.mark.parametrize("what", [fit, fits, discover, compare, reproduce])
-@pytest.mark.parametrize("wait_s", [0.3, 2.0])
+@pytest.mark.parametrize(
+    ("what", "wait_s"),
+    # a fit of one test is done within two seconds
+    [*((what, 0.3) for what in LONG), (fit, 0.3), (fit, 0.8), *((what, 2.0) for what in LONG)],
+)
 def test_signals_later_on(what: Callable, number: int, whole_group: bool, wait_s: float, tmp_path: Path) -> None:
     out = tmp_path / "out"
     arguments, begun = what(out)
