@@ -166,6 +166,29 @@ def test_workers_leave_when_their_parent_is_killed(tmp_path: Path) -> None:
     assert interrupted(arguments, ready, signal.SIGKILL, False)[0] == -signal.SIGKILL
 
 
+def test_a_copy_that_is_ended_while_it_begins_says_nothing(tmp_path: Path) -> None:
+    code = (
+        "import os, signal, sys\n"
+        "from wirebayes.processes.interrupt import held_back, watch, watch_silently\n"
+        "watch([])\n"
+        "with held_back():\n"
+        "    child = os.fork()\n"
+        "    if child == 0:\n"
+        "        change = signal.signal\n"
+        "        def ended_meanwhile(which, handler):\n"
+        "            signal.signal = change\n"
+        "            os.kill(os.getpid(), signal.SIGTERM)\n"
+        "            return change(which, handler)\n"
+        "        signal.signal = ended_meanwhile\n"
+        "        watch_silently()\n"
+        "        os._exit(0)\n"
+        "sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+    assert done.returncode == 128 + TERM
+
+
 @pytest.mark.slow
 def test_an_interrupted_fit_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     out, whole = tmp_path / "out", tmp_path / "whole"

@@ -46,10 +46,10 @@ def watch_silently() -> None:
     A copy of its parent forgets what that one was doing when it was made: holding signals back, and writing files.
     """
     global _held_back
-    _held_back = False
     _unfinished.clear()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _handle(signal.SIGTERM, lambda number: "")
+    _held_back = False  # not before: until then it would speak as its parent does
     for number in _arrived:
         signal.raise_signal(number)
 
