@@ -19,7 +19,7 @@ WHERE_MISSING = "; where a reading is missing, delete its row, or leave all such
 
 
 def complete_rows(
-    table: RawTable, columns: dict[Role, Column], drop_missing: bool = False
+    table: RawTable, columns: dict[Role, Column], drop_breaks: bool = False
 ) -> tuple[RawTable, list[str]]:
     """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows.
 
@@ -28,8 +28,9 @@ def complete_rows(
     table : RawTable
     columns : dict of Role to Column
         Those that are read.
-    drop_missing : bool
-        Whether rows with a word such as ``NaN`` in place of a number are left out, too.
+    drop_breaks : bool
+        Whether rows with a word such as ``NaN``, a dash or nothing in place of a time, a setting or a reading are left
+        out, too.
     """
     indices = [column.index for column in columns.values()]
     rows, below = _without_what_is_below(table, indices)
@@ -37,8 +38,8 @@ def complete_rows(
     weights_once = _weights_are_written_once(rows, columns)
     written_once: tuple[Role, ...] = ("hold", "tension") if weights_once else ("hold", "displacement")
     filled = _filled(rows, table, [columns[role].index for role in written_once if role in columns])
-    missing = [row for row in filled if drop_missing and _is_missing(row, columns)]
-    read = [row for row in filled if not (drop_missing and _is_missing(row, columns))]
+    missing = {row.line for row in filled if drop_breaks and _is_missing(row, columns)}
+    read = [row for row in filled if row.line not in missing]
     kept = _without_repetitions(read, table, columns["time"].index)
     gaps = sum(a.cells[i] != b.cell(i) for a, b in zip(filled, rows, strict=True) for i in indices)
     notes = []
@@ -47,7 +48,7 @@ def complete_rows(
     if words:
         notes.append(f"{_lines_of(words)} left out: words or statistics in place of readings")
     if missing:
-        notes.append(f"left out: {counted(len(missing), 'row')} without a reading, from line {missing[0].line} on")
+        notes.append(f"left out: {counted(len(missing), 'row')} without a reading, from line {min(missing)} on")
     if gaps:
         of = "weight" if weights_once else "displacement"
         notes.append(f"{gaps} empty cells of hold or {of} filled with the value above them")
