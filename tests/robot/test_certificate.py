@@ -153,7 +153,7 @@ class Image:
         self.boxes, self.factors = [], list(factors)
         system = SimpleNamespace(middle_slope=lambda: np.eye(3))
         monkeypatch.setattr(certificate, "Balance", lambda *given: system)
-        monkeypatch.setattr(certificate, "_krawczyk", self)
+        monkeypatch.setattr(certificate, "_image", self)
 
     def __call__(self, system, C, radius):
         self.boxes.append(radius.copy())

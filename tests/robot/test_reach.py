@@ -148,7 +148,7 @@ def test_strains_along_the_linear_answer_are_enclosed_and_what_cancels_does(name
     middle = Balance(robot, "hooke", (k1, k1), (zero, zero), offset, x, R)
     wide = Balance(robot, "hooke", (k1, k1), (zero - longer, zero + longer), offset, x, R)
     line = module._linear_answer(middle, np.linalg.inv(middle.middle_slope()), generators)
-    balls = module._balls(middle, np.abs(line[:, 0]) * (1 + 1e-12)), module._balls(middle, 0 * line[:, 0])
+    balls = module.balls(np.abs(line[:, 0]) * (1 + 1e-12)), module.balls(0 * line[:, 0])
     box = module._Box(*balls, arb_mat(line.tolist()))
 
     p = np.linspace(-1, 1, 101)
@@ -297,7 +297,7 @@ def test_the_box_beside_the_line_grows_until_its_image_lies_within(monkeypatch):
     np.testing.assert_allclose(got.radius_m, most + got.beside_m, rtol=1e-11)
 
 
-@pytest.mark.parametrize(("factor", "images"), [(1.0, 30), (1e5, 2), (np.array([0.5, 0.5, 1.0]), 30), (np.inf, 1)])
+@pytest.mark.parametrize(("factor", "images"), [(1.0, 40), (1e5, 2), (np.array([0.5, 0.5, 1.0]), 40), (np.inf, 1)])
 def test_a_box_that_does_not_hold_its_image_is_given_up(factor, images, monkeypatch):
     """After thirty images, or once it is as wide as the robot."""
     _, _, seen, got = asked(monkeypatch, factor)
@@ -313,15 +313,15 @@ def test_all_poses_of_a_box_are_those_on_the_line_and_beside_it(monkeypatch):
     C = np.linalg.inv(middle.middle_slope())
     Y = module._linear_answer(middle, C, generators)
     along, beside = np.abs(Y).sum(1), np.array([1e-7, 2e-7, 3e-7])
-    seen, balls = [], module._balls
+    seen, balls = [], module.balls
 
-    def watched(balance, radii):
+    def watched(radii):
         seen.append(np.array(radii))
-        return balls(balance, radii)
+        return balls(radii)
 
-    monkeypatch.setattr(module, "_balls", watched)
+    monkeypatch.setattr(module, "balls", watched)
     image = module._image(middle, wide, C, Y, generators, along, beside)
     assert (seen[0] > along + beside).all() and (image < beside).all() and (image > 0).all()
-    np.testing.assert_allclose(seen, [along + beside, beside], rtol=1e-11)
+    np.testing.assert_allclose(seen[:2], [along + beside, beside], rtol=1e-11)
     wider = module._image(middle, wide, C, Y, generators, along, 100.0 * beside)
     assert (wider > image).all()  # a wider box bends more

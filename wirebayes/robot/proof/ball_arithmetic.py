@@ -47,8 +47,9 @@ class Balance:
         self.offset = [flint.arb(float(v)) for v in offset]
         self.x = [flint.arb(float(v)) for v in x]
         # The turn starts from the given matrix as it is; that it is orthogonal only to rounding is part of the robot.
-        self.R = flint.arb_mat(R.tolist())
+        self.R = ball_matrix(R)
         self.size = flint.arb(robot.size_m)
+        self.weight = [flint.arb(0), flint.arb(0), -flint.arb(robot.mass_kg) * flint.arb(GRAVITY)]
 
     def _hull(self, low: float, high: float) -> Any:
         return self.arb(float(low)).union(self.arb(float(high)))
@@ -66,25 +67,25 @@ class Balance:
         """
         from flint import arb_mat
 
-        arb, d = self.arb, self.robot.degrees
+        d = self.robot.degrees
         turn, by_turn = self._turn(y[3:]) if d == 6 else (self.R, None)
-        weight = [arb(0), arb(0), -arb(self.robot.mass_kg) * arb(GRAVITY)]
-        force, slope = list(weight), arb_mat(d, d)
-        c = _times(turn, self.robot.centre_of_mass_m, arb)
-        moment = _cross(c, weight)
+        centre_of_mass = _times(turn, self.robot.centre_of_mass_m)
+        force, moment = self.weight, _cross(centre_of_mass, self.weight)
+        slope = arb_mat(d, d)
         if d == 6:
-            slope += _block(arb_mat(3, 3), None, _skew(weight, arb) * _skew(c, arb) * by_turn, self.size)
+            by_arm = _skew(self.weight) * _skew(centre_of_mass) * by_turn
+            slope += _block(arb_mat(3, 3), None, by_arm, self.size)
         for i in range(self.robot.legs):
             r, line = self._line(i, y, turn)
             pull, by_place = self._pulled(i, self._span(i, line), pulls[i] if pulls else None)
-            force = [p + q for p, q in zip(force, pull, strict=True)]
+            force = _sum(force, pull)
             if d == 3:
                 slope += by_place
                 continue
-            moment = [p + q for p, q in zip(moment, _cross(r, pull), strict=True)]
-            lever = _skew(r, arb)
+            moment = _sum(moment, _cross(r, pull))
+            lever = _skew(r)
             by_arm = -(lever * by_turn)
-            by_both = lever * by_place * by_arm - _skew(pull, arb) * by_arm
+            by_both = lever * by_place * by_arm - _skew(pull) * by_arm
             slope += _block(by_place, by_place * by_arm, by_both, self.size, lever * by_place)
         return (force if d == 3 else force + [v / self.size for v in moment]), slope
 
@@ -103,19 +104,16 @@ class Balance:
 
     def at_centre(self) -> tuple[Any, list[tuple[Any, Any]]]:
         """Balance at the centre in parts: the weight's, and each wire's wrench of 1 N with its tension."""
-        from flint import arb_mat
-
-        arb, robot = self.arb, self.robot
-        still = [arb(0)] * robot.degrees
-        weight = [arb(0), arb(0), -arb(robot.mass_kg) * arb(GRAVITY)]
-        arm = _cross(_times(self.R, robot.centre_of_mass_m, arb), weight)
+        robot = self.robot
+        still = [self.arb(0)] * robot.degrees
+        arm = _cross(_times(self.R, robot.centre_of_mass_m), self.weight)
         moment = [v / self.size for v in arm][: robot.degrees - 3]
         pulls = []
         for i in range(robot.legs):
             strand = self.strand(i, still)
             tau, _ = self.pull(i, self.strain(i, strand.length), strand.length)
-            pulls.append((arb_mat([[v] for v in strand.wrench]), tau))
-        return arb_mat([[v] for v in [*weight, *moment]]), pulls
+            pulls.append((column(strand.wrench), tau))
+        return column([*self.weight, *moment]), pulls
 
     def strand(self, i: int, y: list[Any]) -> "Strand":
         """One wire's geometry over a box of poses."""
@@ -123,19 +121,19 @@ class Balance:
         turn, by_turn = self._turn(y[3:]) if robot.degrees == 6 else (self.R, None)
         r, line = self._line(i, y, turn)
         span = self._span(i, line)
+        stretched = m * span.length + self.offset[i]
         u = [m * a for a in span.direction]
+        pull = [-a for a in u]
         if by_turn is None:
-            return Strand(m * span.length + self.offset[i], u, [-a for a in u])
+            return Strand(stretched, u, pull)
         # u . (s x r) = s . (r x u): the stretch by a turn is the moment
         moment = _cross(r, u)
-        slope = [sum((moment[k] * by_turn[k, j] for k in range(3)), self.arb(0)) for j in range(3)]
-        return Strand(
-            m * span.length + self.offset[i], [*u, *slope], [-a for a in u] + [-v / self.size for v in moment]
-        )
+        by_turning = (row(moment) * by_turn).entries()
+        return Strand(stretched, u + by_turning, pull + [-v / self.size for v in moment])
 
     def _line(self, i: int, y: list[Any], turn: Any) -> tuple[list[Any], list[Any]]:
         """Platform point from the reference point, and from the exit point."""
-        r = _times(turn, self.robot.platform_m[i], self.arb)
+        r = _times(turn, self.robot.platform_m[i])
         return r, [self.x[k] + y[k] + r[k] - self.arb(float(self.robot.exit_m[i, k])) for k in range(3)]
 
     def _span(self, i: int, line: list[Any]) -> Span:
@@ -187,11 +185,8 @@ class Balance:
             N and N/m.
         """
         slope = self.k1[i] * self.law.by_stretched(S, self.zero[i])
-        if strain > 0:
-            return self.k1[i] * strain, slope
-        if strain < 0:
-            return self.arb(0), self.arb(0)
-        return self.k1[i] * strain.max(self.arb(0)), slope.union(self.arb(0))
+        taut, slope = self._taut(strain, slope)
+        return self.k1[i] * taut, slope
 
     def by_wire(self, i: int, S: Any, strain: Any) -> tuple[Any, Any]:
         """Derivatives of the tension by the wire's own parameters, slackness treated as in `pull`.
@@ -209,21 +204,23 @@ class Balance:
             The first is the strain, the second in N/m.
         """
         by_zero = self.k1[i] * self.law.by_zero(S, self.zero[i])
+        return self._taut(strain, by_zero)
+
+    def _taut(self, strain: Any, slope: Any) -> tuple[Any, Any]:
+        """Strain and slope of a wire that cannot push; the hull of taut and slack where both are possible."""
         if strain > 0:
-            return strain, by_zero
+            return strain, slope
+        none = self.arb(0)
         if strain < 0:
-            return self.arb(0), self.arb(0)
-        return strain.max(self.arb(0)), by_zero.union(self.arb(0))
+            return none, none
+        return strain.max(none), slope.union(none)
 
     def _turn(self, y: list[Any]) -> tuple[Any, Any]:
         """Rotation by Cayley's numbers s = y / (2 size), and the turn's slope by y."""
-        from flint import arb_mat
-
-        arb = self.arb
         s = [v / (2 * self.size) for v in y]
         norm = 1 + _square(s)
-        K = _skew(s, arb)
-        eye = arb_mat([[int(i == j) for j in range(3)] for i in range(3)])
+        K = _skew(s)
+        eye = identity(3)
         by = (eye + K) * (1 / (norm * self.size))
         return (eye + (K + K * K) * (2 / norm)) * self.R, by
 
@@ -236,8 +233,12 @@ def _straight(line: list[Any]) -> Span:
     return Span(length, u, bends)
 
 
-def _times(matrix: Any, vector: Floats, arb: Any) -> list[Any]:
-    return [sum((matrix[i, j] * arb(float(vector[j])) for j in range(3)), arb(0)) for i in range(3)]
+def _times(turn: Any, vector: Floats) -> list[Any]:
+    return (turn * column(vector.tolist())).entries()
+
+
+def _sum(a: list[Any], b: list[Any]) -> list[Any]:
+    return [p + q for p, q in zip(a, b, strict=True)]
 
 
 def _square(v: list[Any]) -> Any:
@@ -253,11 +254,10 @@ def _cross(a: list[Any], b: list[Any]) -> list[Any]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def _skew(v: list[Any], arb: Any) -> Any:
+def _skew(v: list[Any]) -> Any:
     from flint import arb_mat
 
-    z = arb(0)
-    return arb_mat([[z, -v[2], v[1]], [v[2], z, -v[0]], [-v[1], v[0], z]])
+    return arb_mat([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
 def _block(corner: Any, right: Any, below_right: Any, size: Any, below: Any = None) -> Any:
@@ -276,6 +276,36 @@ def _block(corner: Any, right: Any, below_right: Any, size: Any, below: Any = No
     return out
 
 
-def above(balls: Sequence[Any]) -> Floats:
-    """The next number above each; infinite where a ball is."""
-    return np.array([np.nextafter(float(ball), np.inf) if ball.is_finite() else np.inf for ball in balls])
+def balls(radii: Floats) -> list[Any]:
+    """Balls about zero."""
+    from flint import arb
+
+    return [arb(0, float(radius)) for radius in radii]
+
+
+def ball_matrix(values: Floats) -> Any:
+    from flint import arb_mat
+
+    return arb_mat(values.tolist())
+
+
+def column(values: Sequence[Any]) -> Any:
+    from flint import arb_mat
+
+    return arb_mat([[value] for value in values])
+
+
+def row(values: Sequence[Any]) -> Any:
+    from flint import arb_mat
+
+    return arb_mat([list(values)])
+
+
+def identity(size: int) -> Any:
+    return ball_matrix(np.eye(size))
+
+
+def upper_bounds(image: Any) -> Floats:
+    """Numbers above the absolute values in a column of balls; infinite where a ball is."""
+    largest = [value.abs_upper() for value in image.entries()]
+    return np.array([np.nextafter(float(ball), np.inf) if ball.is_finite() else np.inf for ball in largest])

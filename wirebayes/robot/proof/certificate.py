@@ -3,13 +3,16 @@
 Krawczyk's operator on the balance of forces and moments (`balance`). For parameters that vary much, see `reach`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.proof.ball_arithmetic import Balance, Bounds, above
+from wirebayes.robot.proof.ball_arithmetic import Balance, Bounds, ball_matrix, balls, column, identity, upper_bounds
+from wirebayes.robot.proof.krawczyk import box_around_image, image_of_centre, preconditioner
 from wirebayes.wire.laws import ElasticLaw
 
 
@@ -71,49 +74,37 @@ def certify(
         python-flint is not installed.
     """
     system = Balance(robot, law, k1_N, zero_m, offset_m, position_m, rotation)
-    d = robot.degrees
-    nothing = Certificate(False, position_m, rotation, np.full(d, np.nan), 0.0)
-    try:
-        C = np.asarray(np.linalg.inv(system.middle_slope()), np.float64)
-    except np.linalg.LinAlgError:  # the platform is free to move: no isolated equilibrium
+    nothing = Certificate(False, position_m, rotation, np.full(robot.degrees, np.nan), 0.0)
+    C = preconditioner(system)
+    if C is None:
         return nothing
-    span = robot.span_m
-    radius = np.full(d, 1e-10 * span)
-    for _ in range(40):
-        image = _krawczyk(system, C, radius)
-        if np.all(image < radius):
-            break
-        radius = 1.2 * image
-        if not np.all(radius < span):  # all of the robot: it grows and will not come back
-            return nothing
-    else:
+    image = partial(_image, system, C)
+    radius = box_around_image(image, robot.degrees, robot.span_m)
+    if radius is None:
         return nothing
     # Inside, further images only shrink the enclosure.
     for _ in range(3):
-        radius = np.minimum(radius, _krawczyk(system, C, radius))
-    unique, width = float(radius.min()), 1e-7 * span
-    while how_alone and width < span:
-        box = np.maximum(radius, width)
-        if not np.all(_krawczyk(system, C, box) < box):
-            break
-        unique, width = max(unique, width), 1.5 * width
+        radius = np.minimum(radius, image(radius))
+    unique = _alone_within(image, radius, robot.span_m) if how_alone else float(radius.min())
     return Certificate(True, position_m, rotation, radius, unique)
 
 
-def _krawczyk(system: Balance, C: Floats, radius: Floats) -> Floats:
-    """Largest distance from the centre of Krawczyk's image of the box of half widths `radius`."""
-    import flint
+def _alone_within(image: Callable[[Floats], Floats], radius: Floats, span_m: float) -> float:
+    """Half width of the largest of ever wider boxes that hold their images, at least the proved box."""
+    unique, width = float(radius.min()), 1e-7 * span_m
+    while width < span_m:
+        box = np.maximum(radius, width)
+        if not np.all(image(box) < box):
+            break
+        unique = max(unique, width)
+        width *= 1.5
+    return unique
 
-    d = len(radius)
-    box = [flint.arb(0, float(r)) for r in radius]
+
+def _image(system: Balance, C: Floats, radius: Floats) -> Floats:
+    """Largest distance from the centre of Krawczyk's image of the box of half widths `radius`."""
+    box = balls(radius)
     _, slope = system.evaluate(box)
-    precondition = flint.arb_mat(C.tolist())
-    eye = flint.arb_mat([[int(i == j) for j in range(d)] for i in range(d)])
-    image = (eye - precondition * slope) * flint.arb_mat([[b] for b in box])
-    # Wire by wire: an uncertain tension moves all balances together, so it is multiplied in last.
-    weight, pulls = system.at_centre()
-    image -= precondition * weight
-    for wrench, tau in pulls:
-        image -= (precondition * wrench) * tau
-    out = [image[i, 0].abs_upper() for i in range(d)]
-    return above(out)
+    precondition = ball_matrix(C)
+    remainder = (identity(len(box)) - precondition * slope) * column(box)
+    return upper_bounds(remainder + image_of_centre(system, precondition))

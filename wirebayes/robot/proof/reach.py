@@ -5,6 +5,7 @@ linear map: tensions then stay apart from slackness where a plain box of poses a
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,17 @@ import numpy as np
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import vector
-from wirebayes.robot.proof.ball_arithmetic import Balance, Strand, above
+from wirebayes.robot.proof.ball_arithmetic import (
+    Balance,
+    Strand,
+    ball_matrix,
+    balls,
+    column,
+    identity,
+    row,
+    upper_bounds,
+)
+from wirebayes.robot.proof.krawczyk import box_around_image, image_of_centre, preconditioner
 from wirebayes.wire.laws import ElasticLaw
 
 _UP = 1.0 + 1e-12  # more than the few roundings of a sum
@@ -104,21 +115,16 @@ def reach(
         return nothing
     middle = Balance(robot, law, (k1_N, k1_N), (zero_m, zero_m), offset_m, position_m, rotation)
     wide = Balance(robot, law, k1_bounds, zero_bounds, offset_m, position_m, rotation)
-    try:
-        C = np.asarray(np.linalg.inv(middle.middle_slope()), np.float64)
-    except np.linalg.LinAlgError:
+    C = preconditioner(middle)
+    if C is None:
         return nothing
     Y = _linear_answer(middle, C, generators)
     along = np.abs(Y).sum(1) * _UP
-    beside = np.full(d, 1e-10 * robot.span_m)
-    for _ in range(30):
-        image = _image(middle, wide, C, Y, generators, along, beside)
-        if np.all(image < beside):
-            return Reach(True, position_m, rotation, (along + beside) * _UP, beside, Y)
-        beside = 1.2 * image
-        if not np.all(beside < robot.span_m):
-            break
-    return nothing
+    image = partial(_image, middle, wide, C, Y, generators, along)
+    beside = box_around_image(image, d, robot.span_m)
+    if beside is None:
+        return nothing
+    return Reach(True, position_m, rotation, (along + beside) * _UP, beside, Y)
 
 
 def _bounds(middle: Floats, generators: Floats) -> tuple[Floats, Floats]:
@@ -165,24 +171,18 @@ def _image(
     beside: Floats,
 ) -> Floats:
     """Largest distance of Krawczyk's image from the linear answer, (d,)."""
-    from flint import arb_mat
-
     d, q = Y.shape
-    box = _Box(_balls(middle, (along + beside) * _UP), _balls(middle, beside), arb_mat(Y.tolist()))
+    box = _Box(balls((along + beside) * _UP), balls(beside), ball_matrix(Y))
     wires = [_wire_in_box(middle, wide, i, box, *own) for i, own in enumerate(zip(*generators, strict=True))]
     _, slope = wide.evaluate(box.whole, [wire.pull for wire in wires])
-    precondition = arb_mat(C.tolist())
+    precondition = ball_matrix(C)
     turned = precondition * slope
-    weight, forces = middle.at_centre()
-    image = (_identity(d) - turned) * _column(box.beside) - precondition * weight
-    for wrench, tau in forces:
-        image -= (precondition * wrench) * tau
+    remainder = (identity(d) - turned) * column(box.beside)
     change = turned * box.line
     for wire in wires:
-        change += (precondition * wire.wrench) * arb_mat([wire.by_parameter])
-    image -= change * _column([middle.arb(0, 1)] * q)
-    out = [image[k, 0].abs_upper() for k in range(d)]
-    return above(out)
+        change += (precondition * wire.wrench) * row(wire.by_parameter)
+    by_parameters = change * column(balls(np.ones(q)))
+    return upper_bounds(remainder + image_of_centre(middle, precondition) - by_parameters)
 
 
 def _wire_in_box(middle: Balance, wide: Balance, i: int, box: _Box, G: Floats, H: Floats) -> _WireInBox:
@@ -191,7 +191,7 @@ def _wire_in_box(middle: Balance, wide: Balance, i: int, box: _Box, G: Floats, H
     strain = _strain(middle, wide, i, strand, box, H)
     by_k1, by_zero = wide.by_wire(i, strand.length, strain)
     by_parameter = [by_k1 * wide.arb(float(g)) + by_zero * wide.arb(float(h)) for g, h in zip(G, H, strict=True)]
-    return _WireInBox(wide.pull(i, strain, strand.length), _column(strand.wrench), by_parameter)
+    return _WireInBox(wide.pull(i, strain, strand.length), column(strand.wrench), by_parameter)
 
 
 def _strain(middle: Balance, wide: Balance, i: int, strand: Strand, box: _Box, H: Floats) -> Any:
@@ -204,19 +204,3 @@ def _strain(middle: Balance, wide: Balance, i: int, strand: Strand, box: _Box, H
         stretch = sum((slope * box.line[k, j] for k, slope in enumerate(strand.slope)), arb(0))
         strain += (by_strain * stretch + by_own * arb(float(h))) * arb(0, 1)
     return strain + by_strain * sum((a * b for a, b in zip(strand.slope, box.beside, strict=True)), arb(0))
-
-
-def _balls(balance: Balance, radii: Floats) -> list[Any]:
-    return [balance.arb(0, float(r)) for r in radii]
-
-
-def _column(balls: list[Any]) -> Any:
-    from flint import arb_mat
-
-    return arb_mat([[v] for v in balls])
-
-
-def _identity(d: int) -> Any:
-    from flint import arb_mat
-
-    return arb_mat([[int(i == j) for j in range(d)] for i in range(d)])
