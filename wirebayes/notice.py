@@ -52,6 +52,11 @@ KINDS = {
     "data": Kind("Readings are not what a bench gives: their order, units, signs or noise.", True),
     "prior": Kind("The prior decides the answer, or contradicts the readings.", True),
     "few-holds": Kind("There are fewer than three holds: no effect can be established.", True),
+    "hold-ends": Kind(
+        "When holds ended is not known, or a rest is taken for a part of its hold, and it matters: a parameter would "
+        "be another by more than its standard deviation.",
+        False,
+    ),
     "extrapolation": Kind("The answer goes beyond the tensions, times or lengths that were tested.", False),
     "left-out": Kind("Something that is known of wire or robot has no place in the answer.", False),
     "geometry": Kind(

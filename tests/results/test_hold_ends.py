@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import wirebayes as wb
 from wirebayes.effects import effect_named
 from wirebayes.model.build import build
+from wirebayes.notice import Notice
 from wirebayes.results import hold_ends
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 from wirebayes.wire.effect import Effect
@@ -65,3 +67,41 @@ def test_the_last_hold_of_a_test_may_end_with_its_last_reading():
 )
 def test_a_small_shift_is_said_to_be_small(share, words):
     assert words in hold_ends.hold_ends_sentence({"k2": {"shift": -0.003, "sd_share": share, "unit": "s^-N"}})
+
+
+@pytest.mark.parametrize(("share", "warned"), [(0.99, False), (1.01, True)])
+def test_a_shift_of_a_standard_deviation_is_warned_of(share, warned):
+    told = {"covered": 0.9, "moved": {"k2": {"shift": 0.1, "sd_share": share, "unit": "s^-N"}}, "sentence": "as it is"}
+    assert hold_ends.hold_ends_notice(told) == [Notice("hold-ends", "as it is")] * warned
+    assert hold_ends.hold_ends_notice(None) == []
+
+
+def with_rests(*, until_s):
+    """A slowly creeping wire, read for 90 s in each hold, which is said to go on until then."""
+    places = (*range(1, 8), *range(6, 2, -1))
+    bench = Bench(resolution_N=0.0, displacements_mm=places, times_s=(*READ_S, until_s))
+    made = draw([bench], Truth(WIRE | {"k2": 0.004}), 3)
+    (sample,) = made.problem.samples
+    holds = [
+        replace(hold, time_s=np.array(READ_S), readings=y[:-1], duration_s=until_s)
+        for hold, y in zip(bench.experiment().holds, sample.readings[..., 0], strict=True)
+    ]
+    return replace(bench.experiment(), holds=tuple(holds))
+
+
+def test_a_long_rest_is_a_part_of_its_hold_only_where_it_stayed_as_set():
+    checked = wb.check(with_rests(until_s=1290.0)).summary()
+    (warning,) = checked["warnings"]
+    assert warning["kind"] == "hold-ends"
+    assert "8, 9 and 10 (up to 20 min) went on long after the last reading" in warning["text"]
+    assert "had nothing followed that reading, k2 would be higher by" in warning["text"]
+    assert wb.check(with_rests(until_s=130.0)).summary()["warnings"] == []
+
+
+def test_a_fit_warns_of_it_as_a_check_does(tmp_path):
+    few = wb.Policy(walkers=32, ess=100, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
+    posterior = wb.fit(with_rests(until_s=1290.0), policy=few, check=False, output=tmp_path / "fit")
+    assert "hold-ends" in [notice["kind"] for notice in posterior.summary()["warnings"]]
+    assert "went on long after the last reading" in "".join(posterior.messages)
+    page = wb.write_report(tmp_path / "fit").read_text(encoding="utf-8")
+    assert page.count("(up to 20 min) went on") == 1

@@ -149,7 +149,7 @@ def of_check(name: str, test: CheckedExperiment) -> list[str]:
     for shows, words in _SHOWS.items():
         effects = [(e, found) for e, found in test["effects"].items() if found["shows"] == shows]
         lines += _wrapped(words, [_size(e, found) for e, found in effects])
-    if test["hold_ends"]:
+    if test["hold_ends"] and "hold-ends" not in [notice["kind"] for notice in test["warnings"]]:
         lines += wrap(test["hold_ends"]["sentence"], 110, initial_indent="  ", subsequent_indent="    ")
     count = len(test["warnings"])
     lines.append(f"  {counted(count, 'warning')}, on standard error" if count else "  nothing suspicious")

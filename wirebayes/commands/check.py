@@ -16,6 +16,7 @@ from wirebayes.json_files.read_units import in_unit
 from wirebayes.notice import notices_by_part, to_json
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
+from wirebayes.results.hold_ends import hold_ends_notice
 from wirebayes.strict.files import PathLike
 from wirebayes.views.check import CHECKED, Check
 from wirebayes.views.result import ResultFolder
@@ -95,7 +96,8 @@ def check(
                 report("check", done, len(experiments))
                 with computing():
                     previewed = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
-                warnings = to_json([*data_checks.of_experiment(e), *previewed.warnings])
+                ends = hold_ends_notice(previewed.hold_ends)
+                warnings = to_json([*data_checks.of_experiment(e), *previewed.warnings, *ends])
                 found[e.name] = {
                     **_understood(e),
                     "warnings": warnings,

@@ -1,27 +1,35 @@
-"""What it costs to take the last reading of a hold for its end, where a test does not say when its holds ended.
+"""What it costs not to know when holds ended: to take a last reading for the end, or a long rest for part of a hold.
 
-A hold ends when the next move begins. Where that was not recorded, the wire may have crept on unseen: the posterior's
-mode is climbed to once more with longer holds, and how far it moves is what the assumption may cost.
+A hold ends when the next move begins. Where that was not recorded, the wire may have crept on unseen; where nothing was
+read for long before it, the wire may have been let go. The posterior's mode is climbed to once more with longer holds,
+or with holds that end where nothing more was read, and how far it moves is what the assumption may cost.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.io.unread_ends import unread_s
 from wirebayes.json_files.hold_ends import HoldEnds, MovedByHoldEnds
 from wirebayes.json_files.values import UNITS
 from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
+from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
-from wirebayes.sentences import listed, number, unit_text
+from wirebayes.sentences import lasting, listed, number, unit_text
 from wirebayes.wire.protocol import Protocol
 
 COVERED = 0.9  # of each hold, by its readings: a tenth is a rest of 13 s after two minutes, as moving by hand takes
 SHIFTED = 0.5  # standard deviations from which a shift is worth a word: 90 % intervals then hold the truth in 86 %
+MATTERS = 1.0  # standard deviations from which it is worth a warning: they then hold it in 74 %
+_LONGER = "each hold is taken to end with its last reading: had a tenth of each passed after it,"
+_RECORD = "a row without a reading says when a hold ended"
+_LET_GO = "if it did not stay so, say what it did with unrecorded_holds"
 
 
 def are_recorded(protocol: Protocol) -> bool:
@@ -48,10 +56,17 @@ def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
     dict or None
         None where the ends of holds are recorded, or do not matter.
     """
-    open_ = [not are_recorded(sample.protocol) for sample in problem.samples]
-    if problem.likelihood != "chain" or not any(open_):
+    if problem.likelihood != "chain":
         return None
-    samples = [_longer(sample) if is_open else sample for sample, is_open in zip(problem.samples, open_, strict=True)]
+    protocols = [sample.protocol for sample in problem.samples]
+    if not all(map(are_recorded, protocols)):
+        samples = [sample if are_recorded(sample.protocol) else _longer(sample) for sample in problem.samples]
+        covered, supposed, advice = COVERED, _LONGER, _RECORD
+    elif any(unread_after_s(protocol).any() for protocol in protocols):
+        samples = [_shorter(sample) for sample in problem.samples]
+        covered, supposed, advice = 1.0, _rests(problem.samples), _LET_GO
+    else:
+        return None
     before, after = _modes(problem, replace(problem, samples=tuple(samples)), best)
     moved: dict[str, MovedByHoldEnds] = {}
     for i, name in enumerate(problem.names):
@@ -60,7 +75,41 @@ def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
         shift = float(after[i] - before[i])
         share = abs(shift) / max(float(spread[i]), np.finfo(float).tiny)
         moved[name] = {"shift": shift, "sd_share": share, "unit": _unit(name, problem)}
-    return {"covered": COVERED, "moved": moved, "sentence": hold_ends_sentence(moved)}
+    return {"covered": covered, "moved": moved, "sentence": hold_ends_sentence(moved, supposed, advice)}
+
+
+def hold_ends_notice(ends: HoldEnds | None) -> list[Notice]:
+    """A warning where something would move far."""
+    matters = ends is not None and any(move["sd_share"] >= MATTERS for move in ends["moved"].values())
+    return [Notice("hold-ends", ends["sentence"])] if ends is not None and matters else []
+
+
+def unread_after_s(protocol: Protocol) -> Array:
+    """(H,) s for which each hold went on unread, as a rest would; 0 where it did not, and of the last one.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    """
+    rows = zip(protocol.time_s, protocol.mask, protocol.duration_s, strict=True)
+    each = [unread_s(time[mask], float(end)) if mask.any() else 0.0 for time, mask, end in rows]
+    return np.array([*each[:-1], 0.0])
+
+
+def _rests(samples: Sequence[Sample]) -> str:
+    """What is supposed of holds that went on unread."""
+    each = []
+    for sample in samples:
+        unread = unread_after_s(sample.protocol)
+        which = [str(number) for number in sample.protocol.number[unread > 0.0]]
+        if which:
+            plural = "s" * (len(which) > 1)
+            of = f" of {sample.name}" if len(samples) > 1 else ""
+            each.append(f"hold{plural} {listed(which)}{of} (up to {lasting(float(unread.max()))})")
+    return (
+        f"{listed(each)} went on long after the last reading, and what was set is taken to have stayed until the next "
+        "move: had nothing followed that reading,"
+    )
 
 
 def _is_told(column: str) -> bool:
@@ -72,24 +121,25 @@ def _unit(column: str, problem: Problem) -> str:
     return UNITS.get(column.split("[")[0]) or unit_of_column(column, problem.samples)
 
 
-def hold_ends_sentence(moved: dict[str, MovedByHoldEnds]) -> str:
+def hold_ends_sentence(moved: dict[str, MovedByHoldEnds], supposed: str = _LONGER, advice: str = _RECORD) -> str:
     """What the assumption may cost, in words.
 
     Parameters
     ----------
     moved : dict
         Of each parameter: its shift, and that in standard deviations.
+    supposed, advice : str
+        What is taken for granted and what else may have been, and what to write where it was otherwise.
     """
-    begin = "each hold is taken to end with its last reading: had a tenth of each passed after it,"
     far = {name: move for name, move in moved.items() if move["sd_share"] >= SHIFTED}
     if not far:
-        return f"{begin} {listed(list(moved), 'or')} would move by less than {SHIFTED:g} standard deviations"
+        return f"{supposed} {listed(list(moved), 'or')} would move by less than {SHIFTED:g} standard deviations"
     each = []
     for name, move in far.items():
         way = "lower" if move["shift"] < 0 else "higher"
         size = f"{number(abs(move['shift']))} {unit_text(move['unit'])}".strip()
         each.append(f"{name} would be {way} by {size} ({move['sd_share']:.1f} of its standard deviation)")
-    return f"{begin} {listed(each)}; a row without a reading says when a hold ended"
+    return f"{supposed} {listed(each)}; {advice}"
 
 
 def _longer(sample: Sample) -> Sample:
@@ -98,6 +148,14 @@ def _longer(sample: Sample) -> Sample:
     protocol = replace(sample.protocol, duration_s=sample.protocol.duration_s * times)
     more = protocol.mask.shape[1] - sample.protocol.mask.shape[1]  # a column for the ends, where there was none
     return replace(sample, protocol=protocol, readings=np.pad(sample.readings, [(0, 0), (0, more), (0, 0)]))
+
+
+def _shorter(sample: Sample) -> Sample:
+    """The same readings in holds that end with their last readings where they went on unread."""
+    p = sample.protocol
+    last_s = p.time_s[np.arange(len(p.duration_s)), p.last_reading]
+    ended = np.where(unread_after_s(p) > 0.0, last_s, p.duration_s)
+    return replace(sample, protocol=replace(p, duration_s=ended))
 
 
 def _modes(problem: Problem, longer: Problem, best: Array) -> tuple[Array, Array]:

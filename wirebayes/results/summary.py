@@ -57,7 +57,7 @@ def statistics(values: Array) -> Mixed:
         }
 
 
-def _warnings(fit: Fit, sample: Sample | None) -> list[NoticeJson]:
+def _warnings(fit: Fit, sample: Sample | None, ends: HoldEnds | None) -> list[NoticeJson]:
     """That the fit has not converged, and what is suspicious, with the experiment's name where there are several."""
     found = [] if fit.chains.converged else [Notice("not-converged", fit.chains.why)]
     if sample is not None:
@@ -66,7 +66,7 @@ def _warnings(fit: Fit, sample: Sample | None) -> list[NoticeJson]:
         found += [
             notice.of(s.name) for s in fit.problem.samples for notice in posterior_checks.posterior_warnings(fit, s)
         ]
-    return to_json(found)
+    return to_json([*found, *hold_ends.hold_ends_notice(ends)])
 
 
 def _hold_ends(fit: Fit) -> HoldEnds | None:
@@ -89,6 +89,7 @@ def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
     tension = first.tested_tension_N
     wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
     chains = fit.chains
+    ends = _hold_ends(fit)
     return {
         "experiment": sample.name if sample else first.material.replace(" ", "-"),
         "likelihood": fit.problem.likelihood,
@@ -97,12 +98,12 @@ def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
         "effects": [e.key for e in first.model.effects],
         "converged": chains.converged,
         "convergence": chains.why,
-        "warnings": _warnings(fit, sample),
+        "warnings": _warnings(fit, sample, ends),
         "parameters": parameters,
         "derived": derived(wire, tension),
         "identifiability": identifiability(fit),
         "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).to_dict(),
-        "hold_ends": _hold_ends(fit),
+        "hold_ends": ends,
         "likelihood_evaluations": chains.evaluations,
         "kept_evaluations": chains.kept_evaluations,
         "autocorrelation_steps": float(chains.autocorrelation_steps.max()),

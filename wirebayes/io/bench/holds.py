@@ -30,13 +30,17 @@ from wirebayes.io.bench.recorded import (
 from wirebayes.io.bench.resets import joined_at_resets
 from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
+from wirebayes.io.unread_ends import unread_s
 from wirebayes.numeric.typing import Floats
 from wirebayes.sentences import counted, lasting, listed
 
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
-UNREAD, LONGER = 0.5, 1.5  # of the time that was read, and times its longest pause: beyond, it may be a rest
 LATE = 3.0  # times the least time between readings: nobody who counts from the beginning of a hold begins so late
+ENDS_UNKNOWN = (
+    "times count from each hold, so how long it lasted after its last reading is not known: if the wire rested before "
+    "the next move, write a row without a reading at the moment of that move"
+)
 BACKWARDS = 0.5  # of the steps in time: holds of two readings or more whose times start again fall at fewer
 
 
@@ -147,6 +151,8 @@ def _ingroups_between(
             )
         times = [of_hold - zero for of_hold, zero in zip(times, zeros, strict=True)]
         notes += _unread_ends(times, ends, readings.role)
+    elif len(groups) > 1:
+        notes.append(ENDS_UNKNOWN)
     levels = [float(x[rows[0]]) for rows in groups]
     if any(np.ptp(x[rows]) > 0 for rows in groups):
         levels = [level_of(x[rows]) for rows in groups]
@@ -210,8 +216,8 @@ def _unread_ends(times: list[Floats], ends: Sequence[float | None], role: str) -
     """That holds go on long after their last readings, as rests do whose rows are not in the file."""
     unread: dict[int, float] = {}
     for j, (of_hold, end) in enumerate(zip(times, ends, strict=True)):
-        after = 0.0 if end is None else end - of_hold[-1]
-        if after > max(UNREAD * of_hold[-1], LONGER * np.diff(of_hold).max(initial=0.0)):
+        after = 0.0 if end is None else unread_s(of_hold, end)
+        if after:
             unread[j + 1] = after
     if not unread:
         return []

@@ -95,7 +95,8 @@ def _about(e: CheckedExperiment) -> list[str]:
         f"{holds}, {e['unrecorded_holds']} unrecorded, {readings}.",
         f"{number(e['duration_s'] / 60.0)} min in all.",
     ]
-    if ends := e.get("hold_ends"):
+    ends = e.get("hold_ends")
+    if ends and "hold-ends" not in [notice["kind"] for notice in e["warnings"]]:
         about.append(as_sentence(ends["sentence"]))
     return about
 

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 
 from wirebayes.answers.headline import fit_in_a_sentence
 from wirebayes.io.run_folder import read_json
-from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
@@ -103,7 +102,7 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
         blocks.append(Pictures([pictures["curve"]]))
     blocks.append(Text(_next(summary)))
     blocks.append(_parameters(draws, shrunk, sample))
-    blocks.append(Columns([_measured(stored, summary.get("hold_ends")), *_known(draws, shrunk, sample, trusted)]))
+    blocks.append(Columns([_measured(stored, summary), *_known(draws, shrunk, sample, trusted)]))
     blocks.append(Pictures([pictures["measured"], pictures["residuals"]]))
     if "pairs" in pictures:
         blocks.append(Pictures([pictures["pairs"]]))
@@ -215,7 +214,9 @@ def _sampled(summary: SummaryJson) -> str:
     )
 
 
-def _measured(stored: Stored, ends: HoldEnds | None) -> Points:
+def _measured(stored: Stored, summary: SummaryJson) -> Points:
+    ends = summary.get("hold_ends")
+    warned = "hold-ends" in [notice["kind"] for notice in summary["warnings"]]
     protocol, read = stored.sample.protocol, stored.sample.readings[..., 0][stored.sample.protocol.mask]
     weights = protocol.control == "force"
     tension = protocol.setting[protocol.recorded] if weights else read
@@ -227,7 +228,7 @@ def _measured(stored: Stored, ends: HoldEnds | None) -> Points:
         f"{counted(len(read), 'reading')}.",
         f"{'Weights' if weights else 'Tensions'} from {number(tension.min())} to {number(tension.max())} N.",
         f"The longest hold lasted {protocol.duration_s.max():g} s.",
-        *([as_sentence(ends["sentence"])] if ends else []),
+        *([as_sentence(ends["sentence"])] if ends and not warned else []),
     ]
     return Points("What was measured", points)
 
