@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from analyses.options import study_options
 from tests.robot import cases
-from wirebayes.robot.mechanics import rotation, schema, statics
+from wirebayes.robot.mechanics import rotation, schema
 from wirebayes.robot.motion import forward, outcome
 
 
@@ -32,20 +32,13 @@ def nearby(robot, found, rng):
     return x, rotation.matrix(turn) @ found.rotation
 
 
-def softest(robot, c, found):
-    R = np.moveaxis(found.rotation, 0, -1)
-    K = statics.stiffness(robot, c.wires, found.position_m.T, R, c.zero_m.T, c.offset_m.T)
-    scale = np.array([1.0] * 3 + [1 / robot.size_m] * (robot.degrees - 3))
-    return np.linalg.eigvalsh(K * np.outer(scale, scale))[:, 0]
-
-
 def compare(robot, make, law, count, rng):
     c = make(robot, law, count, rng)
     start, turn = c.position_m + 0.02 * rng.normal(size=c.position_m.shape), np.eye(3)
     blind = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, turn)
     found = cases.solved(robot, c)
     begin, begin_R = nearby(robot, found, rng)
-    soft = softest(robot, c, found)
+    soft = cases.softest(robot, c, found)
     errors, rested = [], []
     for i in np.flatnonzero(found.found):
         k1 = c.wires.theta["k1"][0, i]

@@ -47,42 +47,50 @@ def test_metrics_are_equally_likely():
     assert log_evidence([one, other], sets, 5) == pytest.approx(np.logaddexp(*single) - np.log(2.0))
 
 
-def test_each_metric_is_that_of_the_dense_covariance():
+def _rig_and_rows():
+    """One test with two effects, and three directions of its readings."""
     geo = build(Spec("two", "paper", ("toe", "superposition"), 10.0, 6)).geo
-    rows = np.random.default_rng(0).normal(size=(3, len(geo.plain)))
+    return geo, np.random.default_rng(0).normal(size=(3, len(geo.plain)))
+
+
+def _dense(geo, rows):
+    """In newtons: covariance, its part from setting errors, basis of the plain model and rows."""
     (bench,), by_eta = geo.rig.benches, derivatives(geo.rig)[2]
-    true = geo.chol @ geo.chol.T
     errors = (by_eta * bench.setting_sd**2) @ by_eta.T
-    basis, raw = geo.chol @ geo.basis, rows @ geo.chol.T  # in newtons
+    return geo.chol @ geo.chol.T, errors, geo.chol @ geo.basis, rows @ geo.chol.T
+
+
+def _generalised(noise, basis, raw):
+    """Inner products of rows beside the basis under a noise, and those of the basis."""
+    inner = basis.T @ np.linalg.solve(noise, basis)
+    side = basis.T @ np.linalg.solve(noise, raw.T)
+    return raw @ np.linalg.solve(noise, raw.T) - side.T @ np.linalg.solve(inner, side), inner
+
+
+def test_each_metric_is_that_of_the_dense_covariance():
+    geo, rows = _rig_and_rows()
+    true, errors, basis, raw = _dense(geo, rows)
     for metric, factor in zip(metrics(geo, rows, rows), SETTING, strict=True):
         noise = true + (factor - 1.0) * errors
-        inner = basis.T @ np.linalg.solve(noise, basis)
+        left, inner = _generalised(noise, basis, raw)
         volume = np.linalg.slogdet(noise)[1] - np.linalg.slogdet(true)[1] + np.linalg.slogdet(inner)[1]
         assert metric.log_volume == pytest.approx(-0.5 * volume, abs=1e-6)
-        side = basis.T @ np.linalg.solve(noise, raw.T)
-        left = raw @ np.linalg.solve(noise, raw.T) - side.T @ np.linalg.solve(inner, side)
         assert pytest.approx(left, rel=1e-6) == metric.along.T
         assert metric.gram == pytest.approx(left, rel=1e-6) and metric.square == pytest.approx(np.diag(left), rel=1e-6)
 
 
 def test_each_metric_with_a_smooth_remainder_is_that_of_the_dense_covariance():
     """Of the first process, the smallest setting error and the smallest and largest remainder."""
-    geo = build(Spec("two", "paper", ("toe", "superposition"), 10.0, 6)).geo
-    rows = np.random.default_rng(0).normal(size=(3, len(geo.plain)))
-    (bench,), by_eta = geo.rig.benches, derivatives(geo.rig)[2]
-    true = geo.chol @ geo.chol.T
-    errors = (by_eta * bench.setting_sd**2) @ by_eta.T
+    geo, rows = _rig_and_rows()
+    true, errors, basis, raw = _dense(geo, rows)
     kernel = next(iter(gaussian_process(geo.rig, np.ones(len(geo.plain), bool))))
     absorbed = np.eye(len(true)) - geo.basis @ geo.basis.T
     white = np.linalg.inv(geo.chol)
     kernel = kernel / np.trace(absorbed @ white @ kernel @ white.T @ absorbed)
-    basis, raw = geo.chol @ geo.basis, rows @ geo.chol.T
     found = list(islice(metrics(geo, rows, rows, remainder=True), REMAINDER_SIZES))
     for metric, delta in zip((found[0], found[-1]), DELTA_RANGE, strict=True):
         noise = true + (SETTING[0] - 1.0) * errors + delta**2 * kernel
-        side = basis.T @ np.linalg.solve(noise, raw.T)
-        inner = basis.T @ np.linalg.solve(noise, basis)
-        left = raw @ np.linalg.solve(noise, raw.T) - side.T @ np.linalg.solve(inner, side)
+        left, _ = _generalised(noise, basis, raw)
         assert pytest.approx(left, rel=1e-4, abs=1e-4) == metric.along.T
 
 

@@ -1,6 +1,7 @@
 """Leaving holds out where the densities are written down: when to refit, which draws, and what an error is."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import arviz_base
 import arviz_stats
@@ -24,6 +25,11 @@ from wirebayes.prediction.leave_one_hold_out import (
     standard_error,
 )
 from wirebayes.prediction.left_out_density import without_hold
+
+
+def _zeros(problem: Problem, draws: int = 500) -> Any:
+    """A posterior of which only the number of its draws matters."""
+    return SimpleNamespace(problem=problem, flat=np.zeros((draws, len(problem.names))))
 
 
 @pytest.mark.parametrize(("converging", "shared"), [(True, 10.1), (False, 10.1), (True, 9.9)])
@@ -54,9 +60,9 @@ def test_a_heavy_tail_of_the_importance_ratios_asks_for_sampling(
     monkeypatch.setattr(module, "fit_problem", fit_without)
     monkeypatch.setattr(module, "log_mean", lambda low, high: (7.0, shared))
     monkeypatch.setattr(module, "log_densities", ratios)
-    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    stub = _zeros(problem)
     shares: list[float] = []
-    found = smoothed_leave_one_hold_out(stub, progress=shares.append)  # type: ignore[arg-type]
+    found = smoothed_leave_one_hold_out(stub, progress=shares.append)
     assert list(found.refitted) == [sampled] * 4 and found.converged is (converging and shared > 10.0 or not sampled)
     assert fitted == [2] * sampled and shares == [0.0] * sampled + [1.0]
     assert found.elpd == pytest.approx([1.0, 2.0, 7.0 if shared > 10.0 else 3.0, 4.0] if sampled else known)
@@ -74,8 +80,7 @@ def test_where_one_hold_s_tail_is_heavy_all_are_sampled_together(monkeypatch: py
         return np.arange(4.0), np.array([True, True, True, False])
 
     monkeypatch.setattr(module, "log_densities", together)
-    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
-    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    found = smoothed_leave_one_hold_out(_zeros(problem))
     assert asked == [[False, True, False, False]] and found.elpd[:3].tolist() == [0.0, 1.0, 2.0]
     # weights of a light tail stand where the common proposal says nothing
     assert found.elpd[3] != 3.0 and found.refitted.tolist() == [True, True, True, False] and found.converged
@@ -87,8 +92,7 @@ def test_weights_that_are_no_numbers_ask_for_sampling(monkeypatch: pytest.Monkey
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
     monkeypatch.setattr(module, "pareto_smoothed", lambda log_ratio: (np.nan * log_ratio, 0.1))
     monkeypatch.setattr(module, "log_densities", lambda *given: (np.arange(4.0), np.ones(4, bool)))
-    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
-    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    found = smoothed_leave_one_hold_out(_zeros(problem))
     assert found.refitted.all() and found.elpd.tolist() == [0.0, 1.0, 2.0, 3.0]
 
 
@@ -105,9 +109,9 @@ def test_with_exact_every_hold_is_fitted_without(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(module, "fit_problem", fit_without)
     monkeypatch.setattr(module, "log_mean", lambda low, high: (2.0, 1e3))
-    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    stub = _zeros(problem)
     shares: list[float] = []
-    found = smoothed_leave_one_hold_out(stub, exact=True, progress=shares.append)  # type: ignore[arg-type]
+    found = smoothed_leave_one_hold_out(stub, exact=True, progress=shares.append)
     assert asked == [0, 1, 2, 3] and shares == [0.0, 0.25, 0.5, 0.75, 1.0]
     assert found.elpd.tolist() == [2.0] * 4 and found.refitted.all() and not found.converged
 
@@ -115,8 +119,7 @@ def test_with_exact_every_hold_is_fitted_without(monkeypatch: pytest.MonkeyPatch
 def test_a_hold_of_one_reading_that_is_given_has_nothing_to_predict(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [np.zeros((4, 500))])
-    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
-    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    found = smoothed_leave_one_hold_out(_zeros(problem))
     assert found.elpd.tolist() == [0.0] * 4 and found.pareto_k.tolist() == [0.0] * 4 and not found.refitted.any()
 
 
@@ -153,8 +156,7 @@ def test_importance_weights_are_smoothed_as_arviz_smooths_them(monkeypatch: pyte
     log_p = -0.5 * (np.array([0.5, 1.0, 2.0, 2.5])[:, None] + rng.normal(scale=0.35, size=(4, 4000))) ** 2
     problem = build([experiments()[1].train(4)])
     monkeypatch.setattr(Problem, "leave_one_hold_out", lambda self, theta: [log_p])
-    stub = SimpleNamespace(problem=problem, flat=np.zeros((4000, len(problem.names))))
-    found = smoothed_leave_one_hold_out(stub)  # type: ignore[arg-type]
+    found = smoothed_leave_one_hold_out(_zeros(problem, 4000))
     assert not found.refitted.any()
     one = {"posterior": {"x": np.zeros((1, 4000))}, "log_likelihood": {"y": log_p.T[None]}}
     reference = arviz_stats.loo(arviz_base.from_dict(one), pointwise=True, reff=1.0)
@@ -242,14 +244,14 @@ def test_what_is_sampled_without_holds_has_seeds_of_its_own(monkeypatch: pytest.
 
     monkeypatch.setattr(module, "log_densities", together)
     monkeypatch.setattr(module, "fit_problem", alone)
-    stub = SimpleNamespace(problem=problem, flat=np.zeros((500, len(problem.names))))
+    stub = _zeros(problem)
     for given in ({}, {"seed": 0}, {"seed": 1}):
-        smoothed_leave_one_hold_out(stub, **given)  # type: ignore[arg-type]
+        smoothed_leave_one_hold_out(stub, **given)
     seeds = [seed for seed, _ in asked]
     assert seeds[0] == seeds[1] != seeds[2]
     asked.clear()
     for given in ({}, {"seed": 0}):
-        smoothed_leave_one_hold_out(stub, exact=True, **given)  # type: ignore[arg-type]
+        smoothed_leave_one_hold_out(stub, exact=True, **given)
     assert asked[:4] == asked[4:] and len({seed for seed, _ in asked}) == 4
     # a quarter of a fit's draws, from fewer walkers
     assert all(policy is REFIT for _, policy in asked) and REFIT.ess == Policy().ess / 4.0

@@ -59,6 +59,18 @@ def solved(robot, cases):
     return forward.solve_equilibrium(robot, cases.wires, cases.zero_m, cases.offset_m, cases.position_m, cases.rotation)
 
 
+def tensions_at_home(robot):
+    """(1, w) tensions that hold the robot upright at its home."""
+    return inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+
+
+def softest(robot, cases, found):
+    """(n,) smallest stiffness of solved poses, N/m; rotations count in metres at the platform's edge."""
+    R = np.moveaxis(found.rotation, 0, -1)
+    K = statics.stiffness(robot, cases.wires, found.position_m.T, R, cases.zero_m.T, cases.offset_m.T)
+    return np.linalg.eigvalsh(K * np.outer(robot.edge_scale, robot.edge_scale))[:, 0]
+
+
 def energy_minimum(robot, law, k1, zero_m, offset_m, start_m, start_rotation):
     """Pose of least energy by a general minimiser on an energy written anew, its gradient by a complex step."""
     from scipy.optimize import minimize

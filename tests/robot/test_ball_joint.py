@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from tests.robot.cases import ball_joint
+from tests.robot.cases import ball_joint, tensions_at_home
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.errors import InputError
@@ -63,7 +63,7 @@ def test_the_equilibrium_is_that_of_an_energy_in_three_angles(seed):
 
 def test_tensions_balance_the_moments_about_the_joint_alone():
     robot = ball_joint(np.random.default_rng(2))
-    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])[0]
+    tau = tensions_at_home(robot)[0]
     line = robot.exit_m - robot.home_m - robot.platform_m
     pull = tau[:, None] * line / np.linalg.norm(line, axis=1)[:, None]
     moment = np.cross(robot.platform_m, pull).sum(0)
@@ -74,7 +74,7 @@ def test_tensions_balance_the_moments_about_the_joint_alone():
 
 def test_turns_are_as_stiff_as_the_energy_is_curved():
     robot = ball_joint(np.random.default_rng(3))
-    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+    tau = tensions_at_home(robot)
     wires = Wires("hooke", "saturating", {"k1": np.array([[K1]])}, np.full((robot.legs, 1), 1000.0))
     commands = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
     K = statics.stiffness(

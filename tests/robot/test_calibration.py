@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analyses.robots.calibration import stand_in
 from tests.robot import cases
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.motion import forward, inverse
@@ -13,18 +14,8 @@ from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.start import starting_references
 
 
-def _line(n=300, seed=1):
-    rng = np.random.default_rng(seed)
-    return draws.WireDraws(
-        {
-            "k1": 803 * np.exp(0.01 * rng.normal(size=n)),
-            "B": 0.31 * np.exp(0.1 * rng.normal(size=n)),
-            "U": rng.normal(1, 0.05, n),
-            "k2": 0.03 * np.exp(0.05 * rng.normal(size=n)),
-            "N": rng.normal(0.64, 0.02, n),
-        },
-        1000.0,
-    )
+def _line():
+    return stand_in(np.random.default_rng(1), 300)
 
 
 def _session(robot, line, poses, rng, tilt_sd=None):

@@ -21,12 +21,16 @@ def _case(name, law, make=cases.commanded, seed=0):
     return robot, c.wires.theta["k1"][0, 0], c.zero_m[0], c.offset_m[0], found.position_m[0], found.rotation[0]
 
 
+def _of_known_wires(robot, k1, zero, offset, x, R, law="hooke", **how):
+    """The proof for one stiffness of all wires and one set of lengths."""
+    known = np.full(robot.legs, k1)
+    return certify(robot, law, (known, known), (zero, zero), offset, x, R, **how)
+
+
 @pytest.mark.parametrize("name", HANGING)
 @pytest.mark.parametrize("law", ["hooke", "modified"])
 def test_every_shipped_robot_can_be_certified(name, law):
-    robot, k1, zero, offset, x, R = _case(name, law)
-    known = np.full(robot.legs, k1)
-    proof = certify(robot, law, (known, known), (zero, zero), offset, x, R)
+    proof = _of_known_wires(*_case(name, law), law)
     assert proof.proved
     assert proof.radius_m.max() < 1e-11
     assert proof.unique_m > 1e-5
@@ -66,33 +70,29 @@ def test_every_sampled_pose_lies_in_the_guaranteed_enclosure(name):
 def test_a_proof_grows_with_the_robot(many):
     """Lengths times a power of two, which rounds nothing: so are both boxes."""
     robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
-    known = np.full(robot.legs, k1)
-    small = certify(robot, "hooke", (known, known), (zero, zero), offset, x, R)
+    small = _of_known_wires(robot, k1, zero, offset, x, R)
     big = claim.scaled_robot(robot, many, robot.mass_kg)
-    large = certify(big, "hooke", (known, known), (many * zero, many * zero), many * offset, many * x, R)
+    large = _of_known_wires(big, k1, many * zero, many * offset, many * x, R)
     assert large.proved and large.unique_m == pytest.approx(many * small.unique_m, rel=1e-6)
     np.testing.assert_allclose(large.radius_m, many * small.radius_m, rtol=1e-6)
 
 
 def test_a_direction_that_is_balanced_to_the_last_bit_is_proved_too():
     """A weight on wires in a plane swings out of it like a pendulum: no force there, and none that rounding adds."""
-    robot, k1, zero, offset, x, R = cases.in_a_plane()
-    proof = certify(robot, "hooke", (k1, k1), (zero, zero), offset, x, R)
+    proof = _of_known_wires(*cases.in_a_plane())
     assert proof.proved and proof.radius_m.max() < 1e-14
 
 
 def test_a_wrong_pose_is_not_certified():
     robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
-    known = np.full(robot.legs, k1)
-    proof = certify(robot, "hooke", (known, known), (zero, zero), offset, x - [0.0, 0.0, 0.002], R)
+    proof = _of_known_wires(robot, k1, zero, offset, x - [0.0, 0.0, 0.002], R)
     # the enclosure must hold the true pose, or nothing may be said
     assert not proof.proved or np.all(np.abs(x - proof.centre_m) <= proof.radius_m[:3])
 
 
 def test_a_platform_free_to_move_is_not_certified():
     robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
-    known = np.full(robot.legs, k1)
-    assert not certify(robot, "hooke", (known, known), (zero + 1, zero + 1), offset, x, R).proved
+    assert not _of_known_wires(robot, k1, zero + 1, offset, x, R).proved
 
 
 def test_bounds_too_wide_are_not_certified():
@@ -104,10 +104,7 @@ def test_bounds_too_wide_are_not_certified():
 
 
 def test_wires_on_the_edge_of_slackness_are_handled():
-    robot, k1, zero, offset, x, R = _case("cogiro-desk", "hooke", cases.disturbed, seed=2)
-    known = np.full(robot.legs, k1)
-    proof = certify(robot, "hooke", (known, known), (zero, zero), offset, x, R)
-    assert proof.proved
+    assert _of_known_wires(*_case("cogiro-desk", "hooke", cases.disturbed, seed=2)).proved
 
 
 @pytest.mark.parametrize("name", ["linear-7", "hangprinter-4"])
@@ -127,10 +124,8 @@ def test_lengths_that_change_together_are_enclosed_piece_by_piece(name):
 
 
 def test_the_box_without_a_second_equilibrium_is_the_enclosure_itself_where_nobody_asks():
-    robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
-    known = np.full(robot.legs, k1)
-    given = robot, "hooke", (known, known), (zero, zero), offset, x, R
-    quick, whole = certify(*given, how_alone=False), certify(*given)
+    case = robot, _, _, _, x, R = _case("linear-7", "hooke")
+    quick, whole = _of_known_wires(*case, how_alone=False), _of_known_wires(*case)
     assert quick.proved and quick.unique_m == quick.radius_m.min() and quick.centre_m is x and quick.rotation is R
     np.testing.assert_array_equal(quick.radius_m, whole.radius_m)
     # boxes are tried from a ten-millionth of the robot's size on, each half as wide again
@@ -140,10 +135,12 @@ def test_the_box_without_a_second_equilibrium_is_the_enclosure_itself_where_nobo
 
 def test_what_was_not_proved_has_no_size():
     robot, k1, zero, offset, x, R = _case("linear-7", "hooke")
-    known = np.full(robot.legs, k1)
-    proof = certify(robot, "hooke", (known, known), (zero + 1, zero + 1), offset, x, R)
+    proof = _of_known_wires(robot, k1, zero + 1, offset, x, R)
     assert (proof.proved, proof.unique_m) == (False, 0.0) and proof.centre_m is x and proof.rotation is R
     assert proof.radius_m.shape == (robot.degrees,) and np.isnan(proof.radius_m).all()
+
+
+NOWHERE = None, None, None, "x", "R"  # bounds and pose, which written images do not look at
 
 
 class Image:
@@ -165,7 +162,7 @@ def test_a_box_grows_until_its_image_lies_within_and_then_shrinks(monkeypatch):
     robot = schema.read_robot_file("hangprinter-4")
     first = 1e-10 * robot.span_m
     images = Image(monkeypatch, 10.0, 2.0, 0.9, 0.8, 1.5, 0.5)
-    proof = certify(robot, "hooke", None, None, None, "x", "R", how_alone=False)
+    proof = certify(robot, "hooke", *NOWHERE, how_alone=False)
     grown = first * 1.2 * 10.0 * 1.2 * 2.0
     sizes = [first, first * 12.0, grown, grown, 0.8 * grown, 0.8 * grown]
     np.testing.assert_allclose([box[0] for box in images.boxes], sizes)
@@ -176,7 +173,7 @@ def test_a_box_must_hold_its_image_in_every_direction(monkeypatch):
     robot = schema.read_robot_file("hangprinter-4")
     narrow = lambda radius: radius * np.array([0.5, 0.5, 1.01])  # noqa: E731
     images = Image(monkeypatch, narrow, narrow, 0.5)
-    assert certify(robot, "hooke", None, None, None, "x", "R", how_alone=False).proved
+    assert certify(robot, "hooke", *NOWHERE, how_alone=False).proved
     first = 1e-10 * robot.span_m
     np.testing.assert_allclose(images.boxes[1], 1.2 * first * np.array([0.5, 0.5, 1.01]))
     assert len(images.boxes) == 3 + 3
@@ -186,12 +183,12 @@ def test_a_box_that_keeps_growing_is_given_up(monkeypatch):
     """After forty images, or once it is as wide as the robot in any direction."""
     robot = schema.read_robot_file("hangprinter-4")
     images = Image(monkeypatch, 1.0)
-    assert not certify(robot, "hooke", None, None, None, "x", "R").proved and len(images.boxes) == 40
+    assert not certify(robot, "hooke", *NOWHERE).proved and len(images.boxes) == 40
     images = Image(monkeypatch, 1e5)
-    assert not certify(robot, "hooke", None, None, None, "x", "R").proved and len(images.boxes) == 2
+    assert not certify(robot, "hooke", *NOWHERE).proved and len(images.boxes) == 2
     sideways = lambda radius: radius * np.array([0.5, 0.5, 1e12])  # noqa: E731
     images = Image(monkeypatch, sideways)
-    assert not certify(robot, "hooke", None, None, None, "x", "R").proved and len(images.boxes) == 1
+    assert not certify(robot, "hooke", *NOWHERE).proved and len(images.boxes) == 1
 
 
 def test_a_box_holds_no_second_equilibrium_only_if_its_image_lies_within(monkeypatch):
@@ -199,14 +196,14 @@ def test_a_box_holds_no_second_equilibrium_only_if_its_image_lies_within(monkeyp
     robot = schema.read_robot_file("hangprinter-4")
     for edge in (1.0, 1.5):
         images = Image(monkeypatch, 0.9, 0.5, 0.5, 0.5, 0.5, 0.5, edge)
-        proof = certify(robot, "hooke", None, None, None, "x", "R")
+        proof = certify(robot, "hooke", *NOWHERE)
         np.testing.assert_allclose([box[0] for box in images.boxes[4:]], 1e-7 * robot.span_m * 1.5 ** np.arange(3))
         assert proof.unique_m == pytest.approx(1.5e-7 * robot.span_m)
     none = Image(monkeypatch, 0.9, 0.5, 0.5, 0.5, 1.0)
-    assert certify(robot, "hooke", None, None, None, "x", "R").unique_m < 1e-7 * robot.span_m and len(none.boxes) == 5
+    assert certify(robot, "hooke", *NOWHERE).unique_m < 1e-7 * robot.span_m and len(none.boxes) == 5
     one_way = lambda radius: radius * np.array([0.5, 0.5, 1.0])  # noqa: E731
     Image(monkeypatch, 0.9, 0.5, 0.5, 0.5, one_way)
-    assert certify(robot, "hooke", None, None, None, "x", "R").unique_m < 1e-7 * robot.span_m
+    assert certify(robot, "hooke", *NOWHERE).unique_m < 1e-7 * robot.span_m
     whole = Image(monkeypatch, 0.5)
-    assert 0.6 * robot.span_m < certify(robot, "hooke", None, None, None, "x", "R").unique_m < robot.span_m
+    assert 0.6 * robot.span_m < certify(robot, "hooke", *NOWHERE).unique_m < robot.span_m
     assert max(box[0] for box in whole.boxes) < robot.span_m

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.robot import cases
 from tests.robot.lines import STRONGER, line_about
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.motion import claim, control, inverse
@@ -89,7 +90,7 @@ def test_poses_out_of_reach_are_left_out_of_the_workspace():
 def test_a_smaller_and_lighter_robot_is_the_same_robot():
     robot = schema.read_robot_file("linear-6")
     half = claim.scaled_robot(robot, 0.5, 0.6)
-    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+    tau = cases.tensions_at_home(robot)
     small = inverse.tensions(half, half.home_m[None], np.eye(3)[None])
     np.testing.assert_allclose(small, 0.5 * tau, rtol=1e-9)
 

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.robot import cases
 from tests.robot.lines import CORE, line_about
 from tests.wire.test_fresh import Shrinking, Waking
 from wirebayes.effects import effect_named
@@ -115,7 +116,7 @@ def test_drift_is_the_forward_solution_of_the_crept_lengths(name):
     course = drift.from_command(robot, wires, robot.home_m, np.eye(3), np.array([0.0, 60.0]))
     assert course.found.all()
     np.testing.assert_allclose(course.position_m[:, 0], np.tile(robot.home_m, (3, 1)), atol=1e-11)
-    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+    tau = cases.tensions_at_home(robot)
     commands = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
     bare, offset = inverse.lengths(robot, commands.joint_m)
     crept = bare * (1 + course.end.strain(wires).T)
@@ -152,7 +153,7 @@ def test_smaller_errors_allowed_a_step_change_little():
     wires = draws.for_robot(robot, _line())
     ends = []
     for allowed in (2e-4, 1e-8):
-        tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+        tau = cases.tensions_at_home(robot)
         joint = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau).joint_m
         course = drift.hold(robot, wires, joint, np.array([600.0]), robot.home_m, np.eye(3), tolerance=allowed)
         ends.append(course)
@@ -180,7 +181,7 @@ def test_a_hold_after_one_in_which_all_creep_was_over_ends_where_it_began(name, 
     # What is left to creep is rounding in the tensions: no step makes its error small against it.
     robot = schema.read_robot_file(name)
     wires = draws.for_robot(robot, _line(40, sd=0.05, k2=0.5))
-    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+    tau = cases.tensions_at_home(robot)
     joint = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau).joint_m
     first = drift.hold(robot, wires, joint, np.array([3600.0]), robot.home_m, np.eye(3))
     pose = first.position_m[:, 0], first.rotation[:, 0]

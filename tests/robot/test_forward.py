@@ -43,7 +43,7 @@ def test_mujoco_settles_where_we_solve(name):
         c = make(robot, "hooke", 3, rng)
         found = cases.solved(robot, c)
         assert found.found.all()
-        soft = _softest(robot, c, found)
+        soft = cases.softest(robot, c, found)
         for i in range(len(found.status)):
             x, R, rested = cases.rest_in_mujoco(
                 robot,
@@ -57,13 +57,6 @@ def test_mujoco_settles_where_we_solve(name):
             assert rested
             assert np.abs(x - found.position_m[i]).max() < 1e-6
             assert robot.size_m * np.abs(R - found.rotation[i]).max() < 1e-6
-
-
-def _softest(robot, c, found):
-    R = np.moveaxis(found.rotation, 0, -1)
-    K = statics.stiffness(robot, c.wires, found.position_m.T, R, c.zero_m.T, c.offset_m.T)
-    scale = np.array([1.0] * 3 + [1 / robot.size_m] * (robot.degrees - 3))
-    return np.linalg.eigvalsh(K * np.outer(scale, scale))[:, 0]
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -125,7 +118,7 @@ def test_a_platform_on_two_points_in_line_with_its_weight_is_not_held():
     # Wires to two opposite corners only: nothing keeps the plate from turning about the line between them.
     robot = schema.read_robot_file("ipanema-1")
     wires = Wires("hooke", "saturating", {"k1": np.array([[50000.0]])}, np.full((8, 1), 1000.0))
-    tau = inverse.tensions(robot, robot.home_m[None], np.eye(3)[None])
+    tau = cases.tensions_at_home(robot)
     commands = inverse.commands(robot, wires, robot.home_m[None], np.eye(3)[None], tau)
     held = forward.solve_equilibrium(robot, wires, commands.zero_m, commands.offset_m, robot.home_m, np.eye(3))
     assert held.found.all()

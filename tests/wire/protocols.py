@@ -1,6 +1,7 @@
 """Random protocols and parameters, and the saturating chain in a few lines of plain Python as independent truth."""
 
 import math
+from functools import partial
 
 import numpy as np
 from hypothesis import strategies as st
@@ -28,6 +29,11 @@ def columns(**values):
 PLAIN = {"k1": 900.0, "B": 0.25, "U": 0.6, "k2": 0.05, "N": 0.7, "preload": 0.4}
 
 
+def _crept(theta, carried, amount, t):
+    """Creep at a time of a hold that began with what was carried in."""
+    return carried + amount * (1.0 - math.exp(-theta["k2"] * t ** theta["N"]))
+
+
 def by_hand(p, theta, *, law="hooke", history="saturating", setting=None):
     """Eqs (1)-(6) hold after hold; a list of lists of tensions, nothing for an unrecorded hold."""
     carried, out = 0.0, []
@@ -42,11 +48,7 @@ def by_hand(p, theta, *, law="hooke", history="saturating", setting=None):
         first = tension(carried)
         goal = theta["B"] * first ** theta["U"] if first > 0 else 0.0
         amount = goal - carried if history == "saturating" else goal
-        start = carried
-
-        def creep(t, start=start, amount=amount):
-            return start + amount * (1.0 - math.exp(-theta["k2"] * t ** theta["N"]))
-
+        creep = partial(_crept, theta, carried, amount)
         times = p.time_s[j][p.mask[j]]
         out.append([tension(creep(t)) for t in times])
         carried = creep(p.duration_s[j])
@@ -60,11 +62,7 @@ def weights_by_hand(p, theta, *, law="hooke", history="saturating", setting=None
         tension = weight + (0.0 if setting is None else setting[j])
         goal = theta["B"] * tension ** theta["U"]
         amount = goal - carried if history == "saturating" else goal
-        start = carried
-
-        def creep(t, start=start, amount=amount):
-            return start + amount * (1.0 - math.exp(-theta["k2"] * t ** theta["N"]))
-
+        creep = partial(_crept, theta, carried, amount)
         strain = tension / theta["k1"]
         longer = 1.0 + strain if law == "hooke" else 1.0 / (1.0 - strain)
         times = p.time_s[j][p.mask[j]]
