@@ -1,6 +1,5 @@
 """The worked examples of CONTRIBUTING do what is said of them, as they stand there."""
 
-import json
 import re
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from wirebayes.io.bench.about import About
 from wirebayes.io.bench.convert import Choices, convert
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.paper import FOLDER
+from wirebayes.io.run_folder import read_json
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
 
@@ -54,7 +54,7 @@ def test_a_command_writes_its_folder_once_and_prints(tmp_path):
     said = [CliRunner().invoke(app, [str(PAPER), "--output", str(tmp_path / "out")]) for _ in range(2)]
     assert [one.exit_code for one in said] == [0, 0]
     assert said[0].output == said[1].output
-    written = json.loads((tmp_path / "out" / "durations.json").read_text())
+    written = read_json(tmp_path / "out" / "durations.json")
     assert f"{next(iter(written))}: {next(iter(written.values())):g} s" in said[0].output
     assert len(written) == 4
 

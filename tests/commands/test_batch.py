@@ -1,7 +1,6 @@
 """Many experiments: the same bytes whoever computes them, no experiment lost to another or to a killed process."""
 
 import csv
-import json
 import os
 import signal
 import subprocess
@@ -19,6 +18,7 @@ import wirebayes as wb
 from wirebayes.cli import main
 from wirebayes.commands import batch as module
 from wirebayes.commands import one_experiment
+from wirebayes.io.run_folder import read_json
 
 ROOT = Path(__file__).parents[2]
 FEW = wb.Policy(walkers=32, ess=1, rounds=2, most_rounds=2, tail=99, round_draws=512, block=8, most_steps=8, r_hat=99)
@@ -76,7 +76,7 @@ def test_a_row_and_a_folder_for_each_experiment(reference, tests):
     rows = rows_of(reference)
     assert [row["name"] for row in rows] == [test.name for test in tests]
     for row in rows:
-        summary = json.loads((reference / row["name"] / "summary.json").read_text())
+        summary = read_json(reference / row["name"] / "summary.json")
         for name, values in summary["parameters"].items():
             for quantity in ("mean", "sd", "q05", "q50", "q95"):
                 assert float(row[f"{name}_{quantity}"]) == values[quantity]
@@ -219,7 +219,7 @@ def test_one_name_in_two_files_takes_the_files_name_with_it(experiment_file, tmp
 def test_a_discovered_experiment_has_both_posteriors_and_a_verdict(tests, tmp_path, here):
     many = wb.batch(tests[0], policy=FEW, simulations=99, without=_all_but("toe"), output=tmp_path / "out")
     (row,) = rows_of(tmp_path / "out")
-    report = json.loads((tmp_path / "out" / "spool-0" / "discovery.json").read_text())["experiments"]["spool-0"]
+    report = read_json(tmp_path / "out" / "spool-0" / "discovery.json")["experiments"]["spool-0"]
     assert row["verdict"] == report["verdict"]
     assert float(row["p_global"]) == report["p_global"]
     assert row["check"] == ("passed" if report["p_global"] > 0.04 else "failed")
@@ -265,7 +265,7 @@ def cluster(folder):
 
 def _address(file):
     try:
-        return json.loads(file.read_text())["address"]
+        return read_json(file)["address"]
     except ValueError:
         return None
 

@@ -1,6 +1,5 @@
 """`wirebayes plan`: from a plan file, from readings, from a fit and from findings that could not decide."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +13,7 @@ from wirebayes.commands import plan as module
 from wirebayes.commands import plan_content
 from wirebayes.commands.wires import robot_of
 from wirebayes.effects import CATALOGUE
-from wirebayes.io.run_folder import write_json
+from wirebayes.io.run_folder import read_json, write_json
 from wirebayes.model.spec import ModelSpec
 from wirebayes.robot.mechanics import schema
 
@@ -84,7 +83,7 @@ def test_a_robot_on_wires_of_its_own_is_said_to_be_changed_by_no_test(plan_file,
     robot.write_text(text)
     plan_file.write_text(PLAN.replace('"linear-7"', f'"{robot}"'))
     assert main(["plan", str(plan_file), "--output", str(out)]) == 0
-    found = json.loads((out / "plan.json").read_text())
+    found = read_json(out / "plan.json")
     assert [row["robot"] for row in found["protocols"]] == [None, None]
     assert [one["kind"] for one in found["warnings"]] == ["left-out"]
     printed = capsys.readouterr()
@@ -114,7 +113,7 @@ def test_a_robot_that_nothing_holds_at_home_has_no_drift():
 def test_a_plan_file_is_ranked_within_its_budget(plan_file, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["plan", str(plan_file), "--output", str(out)]) == 0
-    found = json.loads((out / "plan.json").read_text())
+    found = read_json(out / "plan.json")
     short, long = found["protocols"]
     assert [(p["name"], p["within_budget"]) for p in (short, long)] == [("short", True), ("long", False)]
     assert (short["duration_min"], short["readings"]) == (pytest.approx(200 / 60), 15)

@@ -1,6 +1,5 @@
 """The table of a comparison and what is judged, from scores that are written down."""
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,6 +17,7 @@ from wirebayes.comparison.compare import Task, judge, side_by_side, stacking
 from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import experiments
+from wirebayes.io.run_folder import read_json
 from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction.held_out import HeldOutPrediction, Scores
@@ -363,9 +363,7 @@ def test_only_what_is_missing_is_judged_and_every_model_has_a_file(
     compare.judge_all(tasks, tmp_path, 5, report=lambda *about: told.append(about))
     assert judged == [("grip_slip@3", 5, compare.POLICY), ("superposition", 5, compare.POLICY)]
     assert told == [("models", 1, 2), ("models", 2, 2)]
-    assert done.read_text() == "known" and json.loads((tmp_path / tasks[2].file).read_text()) == {
-        "name": "superposition"
-    }
+    assert done.read_text() == "known" and read_json(tmp_path / tasks[2].file) == {"name": "superposition"}
     # half the draws of a fit, from half the walkers
     assert (compare.POLICY.ess, compare.POLICY.walkers, compare.POLICY.round_draws) == (
         Policy().ess / 2,

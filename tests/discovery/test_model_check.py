@@ -20,6 +20,7 @@ from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.io.run_folder import read_json
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.results.jobs import Job
 from wirebayes.simulation.synthetic import Bench, Truth, write_tests
@@ -122,7 +123,7 @@ def test_fit_puts_a_failed_check_first(
     out = tmp_path / "fit"
     command = ["fit", str(tmp_path / "wire" / "experiments.toml"), "--output", str(out)]
     assert cli.main(command) == 0
-    summary = json.loads((out / "simulated" / "summary.json").read_text())
+    summary = read_json(out / "simulated" / "summary.json")
     assert next(iter(summary)) == "model_check" and summary["model_check"]["passed"] is False
     shown = capsys.readouterr()
     captured = shown.err.strip()
@@ -157,7 +158,7 @@ def test_a_single_fit_is_checked_while_it_is_sampled(tmp_path: Path, monkeypatch
     with model_check.checked_meanwhile(job, tmp_path, 5):
         assert begun.wait(10.0)  # before there is a fit
         summary.write_text('{"experiment": "a", "warnings": []}')
-    assert list(json.loads(summary.read_text()).items()) == [
+    assert list(read_json(summary).items()) == [
         ("model_check", found.to_dict()),
         ("experiment", "a"),
         ("warnings", []),

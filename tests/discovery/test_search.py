@@ -20,6 +20,7 @@ from wirebayes.errors import InputError
 from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.io.run_folder import read_json
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.processes import workers
 from wirebayes.simulation.synthetic import Bench, Truth, write_tests
@@ -245,11 +246,11 @@ class ScrewWobble(Effect):
     out = tmp_path / "out"
     arguments = ["discover", str(tmp_path / "experiments.toml"), "--output", str(out), "--own-effects", str(own)]
     assert cli.main(arguments) == 0
-    found = json.loads((out / "discovery.json").read_text())
+    found = read_json(out / "discovery.json")
     assert found["version"] == 3 and found["experiments"]["simulated"]["best"] == "screw_wobble"
     for model in ("plain", "final"):
-        assert json.loads((out / "simulated" / model / "summary.json").read_text())["converged"]
-    assert "screw_wobble.a" in json.loads((out / "simulated" / "final" / "summary.json").read_text())["parameters"]
+        assert read_json(out / "simulated" / model / "summary.json")["converged"]
+    assert "screw_wobble.a" in read_json(out / "simulated" / "final" / "summary.json")["parameters"]
     # one picture a finding, and none of what shows no pattern
     seen = {w["covariate"].replace(" ", "-") for w in found["experiments"]["simulated"]["where"] if w["p"] <= 0.05}
     drawn = {path.stem.removeprefix("where-") for path in (out / "simulated").glob("where-*.svg")}

@@ -1,6 +1,5 @@
 """The paper reproduced: verdicts, forecasts, and the whole run at a small size."""
 
-import json
 import os
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import pytest
 from tests import light
 from wirebayes.cli import main
 from wirebayes.io import paper
+from wirebayes.io.run_folder import read_json
 from wirebayes.model.spec import ModelSpec
 from wirebayes.paper import verdicts
 from wirebayes.paper.held_out import Forecast, published_course
@@ -108,15 +108,15 @@ def results(directory: Path) -> dict[str, bytes]:
 def test_a_run_leaves_fits_tables_pictures_and_a_page(whole):
     for kind in ("chain", "hold", "chain-first-5", "hold-first-5"):
         assert (whole / "kite-1.5m" / kind / "posterior.nc").is_file()
-        summary = json.loads((whole / "kite-1.5m" / kind / "summary.json").read_text())
+        summary = read_json(whole / "kite-1.5m" / kind / "summary.json")
         assert summary["likelihood"] == kind.split("-")[0]
         assert not (whole / "kite-1.5m" / kind / ".checkpoint").exists()
     for name in NAMES:
-        rows = json.loads((whole / f"{name}.json").read_text())
+        rows = read_json(whole / f"{name}.json")
         lines = (whole / f"{name}.csv").read_text().splitlines()
         assert lines[0].split(",") == list(rows[0])
         assert len(lines) == 1 + len(rows)
-    index = json.loads((whole / "figures" / "index.json").read_text())
+    index = read_json(whole / "figures" / "index.json")
     assert {entry["section"] for entry in index} >= {
         "measured",
         "known",
@@ -130,15 +130,15 @@ def test_a_run_leaves_fits_tables_pictures_and_a_page(whole):
 
 
 def test_the_tables_say_what_the_fits_say(whole):
-    rows = json.loads((whole / "posterior.json").read_text())
+    rows = read_json(whole / "posterior.json")
     for likelihood in ("chain", "hold"):
-        summary = json.loads((whole / "kite-1.5m" / likelihood / "summary.json").read_text())
+        summary = read_json(whole / "kite-1.5m" / likelihood / "summary.json")
         for row in rows:
             if row["likelihood"] == likelihood and row["parameter"] in summary["parameters"]:
                 assert row["q50"] == pytest.approx(summary["parameters"][row["parameter"]]["q50"], rel=1e-12)
     k1 = {row["likelihood"]: row["verdict"] for row in rows if row["parameter"] == "k1"}
     assert k1 == {"chain": "outside", "hold": "not determined"}
-    fitted = json.loads((whole / "least_squares.json").read_text())
+    fitted = read_json(whole / "least_squares.json")
     published = next(r for r in fitted if (r["likelihood"], r["elastic_law"]) == ("hold", "hooke"))
     assert published["parameters"] == "published"
     assert published["rms_all_N"] == pytest.approx(0.157, abs=0.002)
@@ -180,7 +180,7 @@ def test_a_finished_run_is_left_alone(whole, monkeypatch):
 @pytest.mark.slow
 def test_all_four_wires_converge_under_both_likelihoods(tmp_path):
     assert main(["reproduce", "--output", str(tmp_path / "out")]) == 0
-    rows = json.loads((tmp_path / "out" / "sampling.json").read_text())
+    rows = read_json(tmp_path / "out" / "sampling.json")
     assert len(rows) == 16
     for row in rows:
         assert row["converged"], row

@@ -1,6 +1,5 @@
 """Warnings of posteriors that no sound test gives."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +8,7 @@ import pytest
 from tests.simulated import SOFTER
 from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
+from wirebayes.io.run_folder import read_json
 from wirebayes.model.build import FINEST, build
 from wirebayes.model.problem import with_readings
 from wirebayes.report.pages.fit import _cautions
@@ -29,7 +29,7 @@ def test_a_sound_test_gets_no_warning_and_a_gross_one_is_first_in_summary_and_pa
     assert [notice for notice in sound["warnings"] if notice["kind"] != "not-converged"] == []
     mixed = problem.samples[0].readings[np.random.default_rng(0).permutation(12)]
     store.save_posterior(fit_problem(with_readings(problem, [mixed]), 1, policy=HASTY), tmp_path, {})
-    summary = json.loads((tmp_path / "summary.json").read_text())
+    summary = read_json(tmp_path / "summary.json")
     texts = [notice["text"] for notice in summary["warnings"] if notice["kind"] == "data"]
     assert any("setting_sd is at least" in text and "steps by 1 mm" in text for text in texts)
     assert "data" in [notice.kind for notice in _cautions(summary)[0].notices]

@@ -1,6 +1,5 @@
 """Platforms on a ball joint: three turns alone are free, the joint carries what the wires do not."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +11,7 @@ from tests.robot.cases import ball_joint, tensions_at_home
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.errors import InputError
+from wirebayes.io.run_folder import read_json
 from wirebayes.robot.exchange.imported import ImportedRobot, robot_file
 from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
@@ -95,7 +95,7 @@ def test_a_mast_is_posed_and_drifts_about_its_joint(fitted, tmp_path, capsys):  
     (tmp_path / "mast.toml").write_text(_text(robot))
     arguments = ["pose", str(tmp_path / "mast.toml"), "--wires", str(fitted), "--draws", "8", "--times", "0,60"]
     assert main([*arguments, "--rotation", "0.02,-0.03,0.01", "--output", str(tmp_path / "out")]) == 0
-    found = json.loads((tmp_path / "out" / "pose.json").read_text())
+    found = read_json(tmp_path / "out" / "pose.json")
     assert found["feasible"] and found["forward"]["solved"] == 1.0 and found["workspace"] is None
     assert found["certificate"]["proved"] is None
     assert max(found["drift"][0]["distance_mm"]["q95"]) == 0.0  # the joint does not move

@@ -16,6 +16,7 @@ from tests.robot.test_commands import fitted, session_csv  # noqa: F401 - fixtur
 from tests.robot.test_history import _joint_values_for, _line, _simulated, _theta
 from wirebayes.cli import main
 from wirebayes.errors import InputError
+from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.plain import plain
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history import commanded, corrections
@@ -173,19 +174,19 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     log.write_text("\n".join(",".join(map(str, line)) for line in lines) + "\n")
     begin, joint = ["pose", "linear-7", *wires], ["--joints", str(log), "--draws", "4"]
     assert main([*begin, *joint, "--calibration", str(done), "--output", str(out)]) == 0
-    content = json.loads((out / "pose.json").read_text())
+    content = read_json(out / "pose.json")
     assert content["clock"]["largest_mm"] == 0  # one hold: nothing restarts
     known = content["history"]["calibration"]
     assert known["holds"] == 5
     assert known["duration_s"] == 150
-    calibrated = json.loads((done / "calibration.json").read_text())["with_creep_model"]["reference_error_mm"]
+    calibrated = read_json(done / "calibration.json")["with_creep_model"]["reference_error_mm"]
     np.testing.assert_allclose(known["reference_error_mm"]["mean"], calibrated["mean"])
     np.testing.assert_allclose(known["reference_error_mm"]["sd"], calibrated["sd"])
     assert "goes on where a calibration of 5 holds and 150 s ended" in (out / "report.html").read_text()
     capsys.readouterr()
     astray = tmp_path / "astray"
     shutil.copytree(done, astray)
-    found = json.loads((done / "calibration.json").read_text())
+    found = read_json(done / "calibration.json")
     found["with_creep_model"]["converged"] = False
     (astray / "calibration.json").write_text(json.dumps(found))
     unusable = tmp_path / "unusable"

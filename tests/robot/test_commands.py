@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from wirebayes.cli import main
+from wirebayes.io.run_folder import read_json
 from wirebayes.model.sample import Sample
 from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics import schema
@@ -88,7 +89,7 @@ def test_pose_answers_and_repeats_to_the_byte(fitted, tmp_path, capsys):
     assert f"is the last of the requested times that is ({times} s)" in page
     assert "is the last of eight times a decade, from 1 s on" in page
     assert (out[0] / "robot.svg").stat().st_size > 1000
-    scene = json.loads((out[0] / "scene.json").read_text())
+    scene = read_json(out[0] / "scene.json")
     assert np.shape(scene["drifted"]) == (len(scene["times"]), len(scene["exits"]), 3)
     assert np.shape(scene["tensions_N"]) == (len(scene["times"]), len(scene["exits"]))
     moved = 1e3 * np.abs(np.subtract(scene["drifted"], scene["platform"])).max(axis=(1, 2))
@@ -100,7 +101,7 @@ def test_a_pose_that_cannot_be_held_is_an_answer(fitted, tmp_path, capsys):
     out = tmp_path / "far"
     arguments = ["pose", "linear-6", "--wires", str(fitted), "--output", str(out), "--position", "5,0,0.6"]
     assert main(arguments) == 0
-    pose = json.loads((out / "pose.json").read_text())
+    pose = read_json(out / "pose.json")
     assert not pose["feasible"]
     (warning,) = pose["warnings"]
     assert warning["kind"] == "unheld" and warning["text"] in capsys.readouterr().err
@@ -141,7 +142,7 @@ def test_a_platform_point_on_an_exit_point_is_no_pose(leg, fitted, tmp_path, cap
     shown = capsys.readouterr()
     assert "A platform point lies on an exit point" in shown.out
     assert "Next: another pose or payload" in shown.out and "calibrate" not in shown.out
-    assert json.loads((tmp_path / "out" / "pose.json").read_text())["feasible"] is False
+    assert read_json(tmp_path / "out" / "pose.json")["feasible"] is False
 
 
 def test_a_folder_without_a_posterior_is_refused(tmp_path, capsys):
@@ -203,7 +204,7 @@ def test_a_robot_in_a_vertical_plane_is_a_robot(fitted, tmp_path, legs):
     file, out = tmp_path / "plotter.toml", tmp_path / "out"
     file.write_text(text)
     assert main(["pose", str(file), "--wires", str(fitted), "--output", str(out), "--times", "0,60"]) == 0
-    content = json.loads((out / "pose.json").read_text())
+    content = read_json(out / "pose.json")
     assert content["forward"]["solved"] == 1.0
     assert [p["commanded"] for p in content["equilibria"]["poses"]] == [True]
     assert content["workspace"]["feasible"] == 1.0
@@ -249,7 +250,7 @@ def test_calibrate_finds_the_lengths(fitted, session_csv, tmp_path):
     file, truth = session_csv
     out = tmp_path / "out"
     assert main(["calibrate", "linear-7", str(file), "--wires", str(fitted), "--output", str(out)]) == 0
-    content = json.loads((out / "calibration.json").read_text())
+    content = read_json(out / "calibration.json")
     found = content["with_creep_model"]
     assert found["converged"]
     assert found["misfit"] < 1
@@ -279,7 +280,7 @@ def test_a_calibration_that_does_not_converge_says_so_and_gives_no_joint_values(
         assert main(arguments) == 0
         (line,) = capsys.readouterr().err.splitlines()  # at one hold no sensor is blamed
         assert line.startswith("warning: not converged with the creep model")
-    content = json.loads((out / "calibration.json").read_text())
+    content = read_json(out / "calibration.json")
     assert not content["with_creep_model"]["converged"]
     assert content["joint_values_for_home_m"] is None and content["pose_now"] is None
     assert main(["report", str(out)]) == 0
@@ -329,7 +330,7 @@ def test_a_requested_pose_far_from_where_the_joint_values_lead_causes_a_warning(
     arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--draws", "20", "--output"]
     assert main([*arguments, str(tmp_path / "good")]) == 0
     assert "warning" not in capsys.readouterr().err
-    assert json.loads((tmp_path / "good" / "calibration.json").read_text())["warnings"] == []
+    assert read_json(tmp_path / "good" / "calibration.json")["warnings"] == []
     lines = [line.split(",") for line in file.read_text().splitlines()]
     for k, cells in enumerate(lines[1:]):
         cells[0] = str(10 * (k + 1))
@@ -342,7 +343,7 @@ def test_a_requested_pose_far_from_where_the_joint_values_lead_causes_a_warning(
     assert [line.split(":")[1] for line in warned] == [" hold 20", " hold 40"]
     assert "the requested pose is 19.9 m and 0.0" in warned[0]
     assert " m and 2.5 rad from the one that its joint values lead to" in warned[1]
-    found = json.loads((tmp_path / "odd" / "calibration.json").read_text())
+    found = read_json(tmp_path / "odd" / "calibration.json")
     assert found["with_creep_model"]["converged"]
     np.testing.assert_allclose(found["with_creep_model"]["length_m"]["mean"], truth, atol=1e-2)
     assert "Hold 20: the requested pose is 19.9 m" in (tmp_path / "odd" / "report.html").read_text()
@@ -365,13 +366,13 @@ def test_a_bias_is_estimated_on_request_and_its_sign_may_follow_the_motion(fitte
     assert main([*arguments, "--tension-bias", "-1", "--output", str(tmp_path / "o")]) == 2
     out = tmp_path / "out"
     assert main([*arguments, "--tension-bias", "0.2", "--output", str(out)]) == 0
-    content = json.loads((out / "calibration.json").read_text())
+    content = read_json(out / "calibration.json")
     assert content["prior"]["tension_bias_sd_N"] == 0.2 and content["prior"]["tension_bias_sign"] == "motion"
     bias = content["with_creep_model"]["tension_bias_N"]
     assert abs(bias["mean"][0] - 0.3) < 2 * bias["sd"][0] < 0.4
     assert main(["report", str(out)]) == 0
     assert "By how much each tension sensor reads too high." in (out / "report.html").read_text()
-    assert np.shape(json.loads((out / "scene.json").read_text())["platform"]) == (7, 3)
+    assert np.shape(read_json(out / "scene.json")["platform"]) == (7, 3)
     lines[2][-1] = "2"
     file.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
     assert main([*arguments, "--tension-bias", "0.2", "--output", str(tmp_path / "o")]) == 2
@@ -468,7 +469,7 @@ def test_the_command_maps_the_requested_slices(fitted, tmp_path):
         rows = list(csv.DictReader(file))
     assert len(rows) == 2 * 49
     assert {"workspace-drift.svg", "workspace-2-drift.svg", "workspace-2-tilt.svg"} <= {p.name for p in out.iterdir()}
-    assert json.loads((out / "pose.json").read_text())["workspace"]["slices"] == slices
+    assert read_json(out / "pose.json")["workspace"]["slices"] == slices
     wb.write_report(out)
     page = (out / "report.html").read_text()
     assert "turned by the rotation vector that the title names" in page and "(0, 0.1, 0) rad" in page

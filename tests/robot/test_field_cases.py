@@ -3,7 +3,6 @@
 Expected numbers are those of least squares, energy minimisers and laboratories that are not part of this project.
 """
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ import pytest
 
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
+from wirebayes.io.run_folder import read_json
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.motion import hanging, inverse
@@ -29,7 +29,7 @@ def run(fitted, tmp_path, capsys):  # noqa: F811
         code = main([*map(str, arguments), "--wires", str(fitted), "--output", str(out)])
         said = capsys.readouterr()
         found = {
-            name: json.loads((out / f"{name}.json").read_text())
+            name: read_json(out / f"{name}.json")
             for name in ("pose", "calibration")
             if (out / f"{name}.json").is_file()
         }

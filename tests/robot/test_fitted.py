@@ -1,6 +1,5 @@
 """The commands on real, if short, fits whose wires have effects: from the catalogue and from a user's file."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from wirebayes.cli import main
 from wirebayes.effects import catalogue
 from wirebayes.inference.fit import fit_problem
 from wirebayes.io import paper
+from wirebayes.io.run_folder import read_json
 from wirebayes.model.build import build
 from wirebayes.results import read_back, store
 from wirebayes.robot.mechanics import rotation, schema
@@ -50,7 +50,7 @@ def test_pose_bends_the_wires_as_the_fitted_effect_does(fitted, tmp_path, effect
     arguments = ["pose", "cogiro-desk", "--wires", str(fitted[effect]), "--other-fit", str(fitted["plain"])]
     arguments += ["--output", str(out), "--times", "0,60", "--draws", "50"]
     assert main([*arguments, *(["--own-effects", str(own)] if own else [])]) == 0
-    message = json.loads((out / "pose.json").read_text())
+    message = read_json(out / "pose.json")
     assert message["wires"]["effects"] == [effect]
     robot = schema.read_robot_file("cogiro-desk")
     points = robot.platform_m @ rotation.matrix(robot.home_rotation_rad).T

@@ -1,7 +1,6 @@
 """Poses from measured joint values, against a simulation of its own: Euler angles, a stiff integrator."""
 
 import csv
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from tests.robot.lines import CORE, line_about
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.errors import InputError
+from wirebayes.io.run_folder import read_json
 from wirebayes.robot.history import commanded, conditioning, corrections, table
 from wirebayes.robot.history.answer import history_report
 from wirebayes.robot.history.conditioning import LogReadings, predicted_readings
@@ -370,7 +370,7 @@ def test_few_draws_that_agree_with_the_readings_are_said(fitted, tmp_path, capsy
     (tmp_path / "log.csv").write_text("\n".join(",".join(map(str, row)) for row in table_of) + "\n")
     arguments = ["pose", "hangprinter-4", "--wires", str(fitted), "--joints", str(tmp_path / "log.csv")]
     assert main([*arguments, "--draws", "20", "--output", str(tmp_path / "out")]) == 0
-    content = json.loads((tmp_path / "out" / "pose.json").read_text())
+    content = read_json(tmp_path / "out" / "pose.json")
     assert 0 < content["readings"]["effective_draws"] <= 20
     assert any("of 20 draws agree with the readings" in notice["text"] for notice in content["warnings"])
     assert "independent ones" in (tmp_path / "out" / "report.html").read_text()
@@ -547,7 +547,7 @@ def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  
         assert "after" in shown.out
         for name in ("pose.json", "poses.csv", "corrections.csv", "motion.svg"):
             assert (outs[0] / name).read_bytes() == (outs[1] / name).read_bytes()
-        content = json.loads((outs[0] / "pose.json").read_text())
+        content = read_json(outs[0] / "pose.json")
         rows = list(csv.DictReader((outs[0] / "poses.csv").read_text().splitlines()))
         assert len(rows) == content["history"]["rows"]
         assert float(rows[-1]["distance_q05_mm"]) < float(rows[-1]["distance_q95_mm"])

@@ -1,6 +1,5 @@
 """Legs cut from different lines, each with its own posterior; what their own weight does."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from wirebayes.cli import main
 from wirebayes.commands.wires import draws_of, named_lines
 from wirebayes.effects import effect_named
 from wirebayes.errors import InputError
+from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.plain import plain
 from wirebayes.model.prior import wire_defaults
 from wirebayes.model.scales import Scales
@@ -132,7 +132,7 @@ def test_commands_take_a_posterior_for_each_name(fitted, tmp_path, capsys):  # n
     assert "\n" not in line
     assert not out.exists()
     assert main([*arguments, "--wires", f"default={fitted}", "--wires", f"thick={fitted}"]) == 0
-    message = json.loads((out / "pose.json").read_text())
+    message = read_json(out / "pose.json")
     assert message["wires"]["lines"] == ["default", "thick"]
     assert any(notice["kind"] == "sag" and "wire 1 weighs" in notice["text"] for notice in message["warnings"])
     assert main([*arguments, *(f"--wires={name}={fitted}" for name in ("default", "thick", "thin"))]) == 2
@@ -207,7 +207,7 @@ def test_commands_take_several_tests_of_one_line(fitted, tmp_path, capsys, monke
     way.write_text("time_s,x_m,y_m,z_m\n0,0,0,.6\n60,0,0,.6\n")
     arguments = ["pose", "linear-6", "--trajectory", str(way), "--draws", "10", "--output", str(tmp_path / "out")]
     assert main([*arguments, "--wires", f"{fitted},{fitted}"]) == 0
-    message = json.loads((tmp_path / "out" / "pose.json").read_text())["wires"]["specimens"]["default"]
+    message = read_json(tmp_path / "out" / "pose.json")["wires"]["specimens"]["default"]
     assert message["tests"] == 2
     assert 0 < message["spread"]["B"]["q05"] < message["spread"]["B"]["q95"]
     assert "Specimens of default differ as estimated from 2 tests: k1 by" in capsys.readouterr().err

@@ -1,6 +1,5 @@
 """Calibration of whole robots from the command line: anchors unknown, poses unknown, lengths alone."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +8,7 @@ from scipy.stats import norm, t
 
 from tests.robot.test_commands import fitted, session_csv  # noqa: F401
 from wirebayes.cli import main
+from wirebayes.io.run_folder import read_json
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.self_calibration import descent, summary
 
@@ -16,18 +16,12 @@ from wirebayes.robot.self_calibration import descent, summary
 def test_rows_without_a_pose_and_unknown_anchors_are_estimated(fitted, session_csv, tmp_path):  # noqa: F811
     file, truth = session_csv
     _without_poses(file)
-    out = tmp_path / "out"
-    arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--draws", "40", "--anchor-sd", "0.5"]
-    assert main([*arguments, "--next-poses", "2", "--output", str(out)]) == 0
-    found = json.loads((out / "calibration.json").read_text())
-    assert found["usable"]
-    length = found["zero_tension_lengths_m"]
-    assert (np.abs(np.array(length["mean"]) - truth) < 4 * np.array(length["sd"])).all()
+    found = _calibrated(file, fitted, tmp_path / "out", "--next-poses", "2")
+    assert _near(found["zero_tension_lengths_m"], truth)
     exits = found["exit_points_m"]
-    robot = schema.read_robot_file("linear-7")
-    assert (np.abs(np.array(exits["mean"]) - robot.exit_m) < 4 * np.array(exits["sd"])).all()
+    assert _near(exits, schema.read_robot_file("linear-7").exit_m)
     assert len(found["next_positions_m"]) == 2
-    np.testing.assert_allclose(schema.read_robot_file(out / "robot.toml").exit_m, exits["mean"], atol=1e-6)
+    np.testing.assert_allclose(schema.read_robot_file(tmp_path / "out/robot.toml").exit_m, exits["mean"], atol=1e-6)
 
 
 def test_intervals_rest_on_as_many_degrees_of_freedom_as_follow_the_joint_error():
@@ -50,13 +44,22 @@ def test_equations_that_are_singular_without_damping_are_damped(fitted, session_
         return replace(normal, matrix=np.full_like(normal.matrix, np.nan)) if len(asked) == 1 else normal
 
     monkeypatch.setattr(descent, "eliminated", singular)
-    arguments = ["calibrate", "linear-7", str(file), "--wires", str(fitted), "--draws", "40", "--anchor-sd", "0.5"]
-    assert main([*arguments, "--output", str(tmp_path / "out")]) == 0
+    found = _calibrated(file, fitted, tmp_path / "out")
     assert asked[:2] == pytest.approx([1e-6, 1e-5])
-    found = json.loads((tmp_path / "out" / "calibration.json").read_text())
+    assert _near(found["zero_tension_lengths_m"], truth)
+
+
+def _calibrated(session, wires, out, *options):
+    """What is found of linear-7 with unknown anchors; it is usable."""
+    arguments = ["calibrate", "linear-7", str(session), "--wires", str(wires), "--draws", "40", "--anchor-sd", "0.5"]
+    assert main([*arguments, *options, "--output", str(out)]) == 0
+    found = read_json(out / "calibration.json")
     assert found["usable"]
-    length = found["zero_tension_lengths_m"]
-    assert (np.abs(np.array(length["mean"]) - truth) < 4 * np.array(length["sd"])).all()
+    return found
+
+
+def _near(found, truth):
+    return (np.abs(np.array(found["mean"]) - truth) < 4 * np.array(found["sd"])).all()
 
 
 def _without_poses(session):

@@ -1,6 +1,5 @@
 """Winches that drive several lines: commands against an energy minimiser, tables, firmware, calibration."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +13,7 @@ from tests.robot.test_history import CORE, _joint_values_for, _simulated
 from wirebayes.cli import main
 from wirebayes.commands.import_robot import import_robot
 from wirebayes.errors import InputError
+from wirebayes.io.run_folder import read_json
 from wirebayes.robot.export import files
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.live import LiveEstimator
@@ -234,7 +234,7 @@ def test_pose_and_its_log_know_winches(fitted, tmp_path):  # noqa: F811
     file, out = printer(tmp_path), tmp_path / "out"
     given = ["pose", str(file), "--wires", str(fitted), "--draws", "8"]
     assert main([*given, "--times", "0,60", "--output", str(out)]) == 0
-    found = json.loads((out / "pose.json").read_text())
+    found = read_json(out / "pose.json")
     assert len(found["inverse"]["joint_value_m"]["mean"]) == 4 == len(found["inverse"]["motor_angle_rad"]["mean"])
     assert len(found["inverse"]["zero_tension_length_m"]["mean"]) == 7
     assert "4 winches with 7 lines command 4 of 6" in found["orientation"]["sentence"]
@@ -242,7 +242,7 @@ def test_pose_and_its_log_know_winches(fitted, tmp_path):  # noqa: F811
     log = tmp_path / "log.csv"
     log.write_text(f"time_s,{','.join(f'joint_{i}_m' for i in range(1, 5))}\n0,{joint}\n60,{joint}\n")
     assert main([*given, "--joints", str(log), "--reference-sd", "0", "--output", str(tmp_path / "log")]) == 0
-    seen = json.loads((tmp_path / "log" / "pose.json").read_text())
+    seen = read_json(tmp_path / "log" / "pose.json")
     np.testing.assert_allclose(seen["position_m"]["mean"][0], [0.0, 0.0, 0.3], atol=1e-4)
     drift = [one["displacement_mm"]["mean"][-1] for one in found["drift"] if one["specimen_spread"] == 0]
     moved = 1e3 * (np.array(seen["position_m"]["mean"][-1]) - [0.0, 0.0, 0.3])

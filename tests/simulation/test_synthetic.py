@@ -1,6 +1,5 @@
 """Synthetic tests: what is written is what was asked, and the truth written beside it explains the readings."""
 
-import json
 import tomllib
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import pytest
 from wirebayes.cli import main
 from wirebayes.effects import effect_named
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.io.run_folder import read_json
 from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, write_tests
 
 TRUE = {"k1": 700.0, "B": 0.2, "U": 0.4, "k2": 0.02, "N": 1.0, "preload": 0.3, "sensor_sd": 0.005, "setting_sd": 0.01}
@@ -32,7 +32,7 @@ def test_the_files_hold_what_was_asked_and_the_truth_explains_them(tmp_path):
     path, times = [1.0, 2.5, 4.0, 2.0], [0.0, 20.0, 200.0]
     write_tests(tmp_path, [Bench("a", "line", 1000.0, 0.01, path, times, frozenset({2}))], Truth(TRUE), seed=5)
     (experiment,) = read_experiments(tmp_path / "experiments.toml")
-    truth = json.loads((tmp_path / "truth.json").read_text())["experiments"]["a"]
+    truth = read_json(tmp_path / "truth.json")["experiments"]["a"]
     expected = by_hand(truth, path, times)
     assert [hold.displacement_mm for hold in experiment.holds] == path
     assert [hold.recorded for hold in experiment.holds] == [True, False, True, True]
