@@ -379,20 +379,6 @@ def test_clocks_that_count_from_1970_keep_their_milliseconds(tmp_path):
     assert [row[2] for row in found.rows] == pytest.approx([0.0, 0.007, 1.008, 30.009], abs=1e-6)
 
 
-def test_one_hold_in_each_of_several_files_is_said_to_be_a_sample_each(tmp_path):
-    said = "each is taken for a fresh sample; holds of one sample belong in one file"
-    one = "x (mm),Time (s),Force (N)\n" + "".join(f"2,{t},{5 - t / 100}\n" for t in (0, 30, 60))
-    for name, text in (("a", one), ("b", one), ("two", HEADER + BODY)):
-        (tmp_path / f"{name}.csv").write_text(text)
-
-    def is_said(*names):
-        paths = [tmp_path / f"{name}.csv" for name in names]
-        tests = wb.import_bench(paths, length_mm=1000).summary()["experiments"].values()
-        return [any(said in note for note in test["notes"]) for test in tests]
-
-    assert (is_said("a", "b"), is_said("a"), is_said("a", "two")) == ([True, True], [False], [False, False])
-
-
 def test_a_record_of_tension_over_time_needs_a_column_of_its_displacement(tmp_path):
     rows = "\n".join(f"{t},{10 - t / 10}" for t in range(1, 6))
     with pytest.raises(Undecided, match="to a hold at one displacement add a column with it, the same in every row$"):

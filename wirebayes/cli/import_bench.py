@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def import_command(
     raw: Annotated[
         list[Path],
-        typer.Argument(metavar="RAW…", help="Files of a bench: text with columns or xlsx; one experiment each."),
+        typer.Argument(metavar="RAW…", help="Files of a bench or folders of them, text or xlsx; one experiment each."),
     ],
     length_mm: Annotated[
         float, typer.Option("--length-mm", metavar="L", help="Zero-tension length of the sample before the test.")
@@ -27,7 +27,7 @@ def import_command(
     ] = None,
     name: Annotated[
         str | None,
-        typer.Option("--name", metavar="N", help="With one file only; else each file gives its own name."),
+        typer.Option("--name", metavar="N", help="Of the only experiment; else each file gives its own name."),
     ] = None,
     mapping: Annotated[
         list[str] | None,
@@ -64,6 +64,14 @@ def import_command(
         Literal["several", "one"] | None,
         typer.Option("--specimens", help="Whose columns of one quantity stand side by side, where it is not evident."),
     ] = None,
+    each_file: Annotated[
+        str | None,
+        typer.Option(
+            "--each-file",
+            metavar="WHAT",
+            help="What each of several files is: test, a hold of one test, or what was set in each: '1 mm, 2 mm'.",
+        ),
+    ] = None,
     drop_breaks: DropBreaks = False,
     seed: Seed = 0,
     as_json: AsJson = False,
@@ -72,9 +80,10 @@ def import_command(
     """Turn files of test benches into experiment files: DIR/N.toml, DIR/N.csv, and DIR/N.svg to look at.
 
     Each file is one experiment, named N after it, or one for each of the specimens that stand side by side in it;
-    several also stand together in DIR/experiments.toml. Delimiter,
-    decimal comma, encoding, preamble, units and columns are recognised, times of the whole test and continuous
-    recordings are divided into holds. Ambiguous input leads to a question on a terminal and to an error elsewhere.
+    several also stand together in DIR/experiments.toml. With --each-file hold they are holds of one test.
+    Delimiter, decimal comma, encoding, preamble, units and columns are recognised, times of the whole test and
+    continuous recordings are divided into holds. Ambiguous input leads to a question on a terminal and to an error
+    elsewhere.
     """
     from wirebayes.cli.answer import print_answer
     from wirebayes.commands.import_bench import import_bench as run
@@ -92,6 +101,7 @@ def import_command(
         area_mm2=area_mm2,
         control=control,
         specimens=specimens,
+        each_file=each_file,
         drop_breaks=drop_breaks,
         output=Path(raw[0].stem) if output is None else output,
         ask=_ask if sys.stdin.isatty() and sys.stderr.isatty() else None,

@@ -3,30 +3,31 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import get_args
+from typing import TypeVar, get_args
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import above_zero, check_choice, names_given, without_breaks
 from wirebayes.errors import InputError
 from wirebayes.io import data_checks, gross_events
-from wirebayes.io.bench.about import About, default_name
+from wirebayes.io.bench.about import About, common_name, default_name
 from wirebayes.io.bench.as_experiment import toml_of
-from wirebayes.io.bench.convert import Converted, convert
+from wirebayes.io.bench.convert import Converted, convert, convert_joined, lacks_a_setting
+from wirebayes.io.bench.joined import HOLD, TEST, in_natural_order, name_settings, path_of_all
 from wirebayes.io.bench.undecided import Choices, Decimal, Specimens, TimeSince, Undecided
 from wirebayes.io.readings import READ
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportJson
 from wirebayes.notice import notices_by_part, to_json
+from wirebayes.sentences import listed
 from wirebayes.strict.files import PathLike, read_bytes
 from wirebayes.views.imported_tests import IMPORTED, ImportedTests
 from wirebayes.views.result import ResultFolder
 from wirebayes.wire.protocol import Control
 
+Read = TypeVar("Read")
 TOGETHER = "experiments"  # the file of all, where there are several
-
-# where each of several files has one hold, as some loggers write the steps of a test
-OWN_SAMPLE = "one hold in each file: each is taken for a fresh sample; holds of one sample belong in one file, in order"
 
 
 def import_bench(
@@ -43,6 +44,7 @@ def import_bench(
     area_mm2: float | None = None,
     control: Control | None = None,
     specimens: Specimens | None = None,
+    each_file: str | None = None,
     drop_breaks: bool = False,
     output: PathLike | None = None,
     ask: Callable[[Undecided], str] | None = None,
@@ -55,8 +57,8 @@ def import_bench(
     Parameters
     ----------
     raw : path, or sequence of paths
-        Text with columns (CSV and its kin) or xlsx workbooks: one experiment each, or one for each of the specimens
-        that stand side by side in it.
+        Text with columns (CSV and its kin) or xlsx workbooks, or folders of such: one experiment each, or one for each
+        of the specimens that stand side by side in it.
     length_mm : float
         Zero-tension length of the samples before the test.
     material : str, optional
@@ -82,6 +84,9 @@ def import_bench(
         What was set in each hold, where the readings leave it open.
     specimens : {"several", "one"}, optional
         Whether columns of one quantity side by side are of several specimens, where the file leaves it open.
+    each_file : str, optional
+        What each of several files is: ``test``, or a ``hold`` of one test; or what was set in each of these holds:
+        ``1 mm, 2 mm, 3 mm``.
     drop_breaks : bool
         Leave out the readings of breaks, of sensors at their limit, and of dropouts, and rows without a number.
     output : path, optional
@@ -111,10 +116,12 @@ def import_bench(
     """
     _check_options(decimal, time_since, control, specimens)
     above_zero(("--length-mm", length_mm), *([] if area_mm2 is None else [("--area-mm2", area_mm2)]))
-    paths = [Path(raw)] if not isinstance(raw, Sequence) or isinstance(raw, str) else [Path(path) for path in raw]
-    names = _names(paths, name)
+    given = [Path(raw)] if not isinstance(raw, Sequence) or isinstance(raw, str) else [Path(path) for path in raw]
+    paths = raw_files(given)
+    names = _names(paths, name, each_file)
     zero, area = (None if value is None else float(value) for value in (zero_mm, area_mm2))
-    choices = Choices(names_given(mapping), decimal, time_since, sheet, zero, control, specimens, drop_breaks)
+    said = names_given(mapping)
+    choices = Choices(said, decimal, time_since, sheet, zero, control, specimens, each_file, drop_breaks)
     samples = [About(own, material, float(length_mm), area, name_is_stated=name is not None) for own in names]
     tests, choices = _read_all(paths, samples, choices, ask)
     if drop_breaks:
@@ -151,13 +158,33 @@ def _check_options(
             check_choice(option, value, get_args(choices))
 
 
-def _names(paths: Sequence[Path], name: str | None) -> list[str]:
+def raw_files(given: Sequence[Path]) -> list[Path]:
+    """The files that are given, and those of the folders among them; several by their names, numbers as numbers.
+
+    Parameters
+    ----------
+    given : sequence of Path
+    """
+    found: list[Path] = []
+    for path in given:
+        inside = [p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")] if path.is_dir() else [path]
+        if not inside:
+            raise InputError(f"{path}: found an empty folder, expected files of a bench")
+        found += inside
+    return in_natural_order(found) if found != list(given) else found
+
+
+def _names(paths: Sequence[Path], name: str | None, each_file: str | None) -> list[str]:
     if not paths:
         raise InputError("raw: found nothing, expected at least one file")
+    of_one_test = each_file not in (None, TEST)
+    if of_one_test and len(paths) == 1:
+        raise InputError(f"--each-file: found {each_file!r} for one file, expected several files")
     if name is not None:
-        if len(paths) > 1:
-            raise InputError(f"--name: found {name!r} for {len(paths)} files, expected it with one file only")
-        return [name]
+        if len(paths) > 1 and not of_one_test:
+            expected = f"it with one file only, or with --each-file {HOLD}"
+            raise InputError(f"--name: found {name!r} for {len(paths)} files, expected {expected}")
+        return [name] * len(paths)
     return [default_name(path) for path in paths]
 
 
@@ -174,25 +201,62 @@ def _check_names(named: Sequence[tuple[Path, str]]) -> None:
 
 def _read_all(
     paths: Sequence[Path], samples: Sequence[About], choices: Choices, ask: Callable[[Undecided], str] | None
-) -> tuple[list[tuple[Path, Converted]], Choices]:
-    """The tests of all files, each with its file, and the choices made for them."""
+) -> tuple[list[tuple[str, Converted]], Choices]:
+    """The tests of all files, each with the names of its files, and the choices made for them."""
     tests: list[tuple[Path, Converted]] = []
     for path, about in zip(paths, samples, strict=True):
-        found, choices = _decided(path, about, choices, ask)
+        found, choices = _decided(partial(_of_file, path, paths, about), choices, ask)
         tests += [(path, test) for test in found]
-    _check_names([(path, test.experiment.name) for path, test in tests])
     if len(paths) > 1 and all(len(test.experiment.holds) == 1 for _, test in tests):
-        tests = [(path, replace(test, notes=[*test.notes, OWN_SAMPLE])) for path, test in tests]
-    return tests, choices
+        _, choices = _decided(partial(_check_what_files_are, paths), choices, ask)
+    if choices.each_file not in (None, TEST):
+        about = samples[0] if samples[0].name_is_stated else replace(samples[0], name=common_name(paths))
+        in_order = in_natural_order(paths)
+        joined, choices = _decided(partial(convert_joined, in_order, about), choices, ask)
+        return [(", ".join(path.name for path in in_order), joined)], choices
+    _check_names([(path, test.experiment.name) for path, test in tests])
+    return [(path.name, test) for path, test in tests], choices
+
+
+def _of_file(path: Path, paths: Sequence[Path], about: About, choices: Choices) -> list[Converted]:
+    """The tests of a file; none where it is a hold of the test of all files.
+
+    What no column says of a test may stand in the names of the files: then each may be a hold.
+    """
+    if choices.each_file not in (None, TEST):
+        return []
+    try:
+        return convert(path, about, choices)
+    except Undecided:
+        settings = name_settings(paths) if len(paths) > 1 and choices.each_file is None else []
+        if not settings or not lacks_a_setting(path, choices):
+            raise
+        measures = listed([" ".join(measure) for measure in settings])
+        raise _hold_or_test(paths, f"no column of what was set, and {measures} in the names of the files") from None
+
+
+def _check_what_files_are(paths: Sequence[Path], choices: Choices) -> None:
+    """Ask what files of one hold each are, where it is not said."""
+    if choices.each_file is None:
+        raise _hold_or_test(paths, f"one hold in each of {len(paths)} files")
+
+
+def _hold_or_test(paths: Sequence[Path], found: str) -> Undecided:
+    """The question what each of several files is."""
+    answers = {
+        f"--each-file {HOLD}": "a hold of one test, in the order of dates, or else of names",
+        f"--each-file {TEST}": "a test of a fresh sample",
+    }
+    return Undecided(f"{path_of_all(in_natural_order(paths))}: found {found}", "what each file is", answers)
 
 
 def _decided(
-    path: Path, about: About, choices: Choices, ask: Callable[[Undecided], str] | None
-) -> tuple[list[Converted], Choices]:
-    """A file read, and the choices made for it, which hold for the files after it too."""
+    read: Callable[[Choices], Read], choices: Choices, ask: Callable[[Undecided], str] | None
+) -> tuple[Read, Choices]:
+    """What was read, and the choices made for it, which hold for what is read after it too."""
     while True:
         try:
-            return convert(path, about, choices), choices
+            return read(choices), choices
         except Undecided as question:
             if ask is None:
                 raise
@@ -215,20 +279,20 @@ def _without_breaks(test: Converted) -> Converted:
     return replace(test, experiment=kept, rows=rows, notes=[*test.notes, *(f"left out: {e.text}" for e in events)])
 
 
-def _write(folder: Path, tests: Sequence[tuple[Path, Converted]]) -> None:
+def _write(folder: Path, tests: Sequence[tuple[str, Converted]]) -> None:
     from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
 
     tables: list[str] = []
     content: ImportJson = {"experiments": {}, "warnings": []}
-    for path, test in tests:
+    for raw, test in tests:
         experiment = test.experiment
         write_csv(folder / f"{experiment.name}.csv", test.header, test.rows)
-        sentences = [f"{note[:1].upper()}{note[1:]}." for note in (f"from {path.name}", *test.notes)]
+        sentences = [f"{note[:1].upper()}{note[1:]}." for note in (f"from {raw}", *test.notes)]
         tables.append(toml_of(experiment, sentences))
         understood(experiment, folder / f"{experiment.name}.svg", test.recording)
         steps = experiment.control == "displacement"
         content["experiments"][experiment.name] = {
-            "raw": path.name,
+            "raw": raw,
             "length_mm": experiment.length_mm,
             "material": experiment.material,
             "control": experiment.control,

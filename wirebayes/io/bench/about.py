@@ -1,6 +1,8 @@
 """What a user says of a sample, and the name that its experiment gets."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from os.path import commonprefix
 from pathlib import Path
 
 
@@ -35,3 +37,9 @@ def default_name(path: Path) -> str:
 def name_from(text: str) -> str:
     """The letters, digits, points and dashes of a text, with dashes for what is between them; perhaps none."""
     return "".join(c if c.isascii() and (c.isalnum() or c in "._-") else "-" for c in text).strip("-.")
+
+
+def common_name(paths: Sequence[Path]) -> str:
+    """The name of a test whose holds stand in several files: what their names begin with, or the first of them."""
+    stems = [path.stem for path in paths]
+    return name_from(commonprefix(stems).rstrip("0123456789")) or default_name(paths[0])

@@ -92,6 +92,12 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[Floats, bo
     return values + _DAY * midnights, of_day, int(midnights[-1])
 
 
+def first_moment_s(table: RawTable, column: int) -> float:
+    """Seconds from the beginning of the calendar to the first reading, in a column of dates with times."""
+    moments = _moments(table, column, None)
+    return float(_days(table, column, moments)[0]) + _value(moments[0], _HOUR)
+
+
 def _check_hours_go_beyond_twelve(table: RawTable, column: int, values: Floats) -> None:
     """Refuse clocks (r,) in s that may go round twice a day: they fall by half a round or more, and know no hour 13."""
     steps = np.diff(values, prepend=values[0])

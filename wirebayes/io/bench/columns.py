@@ -128,7 +128,12 @@ def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
     for clock in clocks[1:]:
         row = parting(clocks[0], clock)
         if row is not None:
-            raise _several(table, likely, "time", f", which tell different times from line {table.rows[row].line} on")
+            raise _several(
+                table,
+                likely,
+                "time",
+                f", which tell different times from line {table.line_text(table.rows[row].line)} on",
+            )
     return columns[best_clock(clocks)]
 
 

@@ -46,9 +46,11 @@ def complete_rows(
     if below:
         notes.append(f"{counted(below, 'line')} under the readings left out")
     if words:
-        notes.append(f"{_lines_of(words)} left out: words or statistics in place of readings")
+        notes.append(f"{_lines_of(words, table)} left out: words or statistics in place of readings")
     if missing:
-        notes.append(f"left out: {counted(len(missing), 'row')} without a reading, from line {min(missing)} on")
+        notes.append(
+            f"left out: {counted(len(missing), 'row')} without a reading, from line {table.line_text(min(missing))} on"
+        )
     if gaps:
         of = "weight" if weights_once else "displacement"
         notes.append(f"{gaps} empty cells of hold or {of} filled with the value above them")
@@ -93,9 +95,9 @@ def _is_missing(row: SheetRow, columns: dict[Role, Column]) -> bool:
     return not all(any(c.isdigit() for c in cell) for cell in cells)
 
 
-def _lines_of(rows: list[SheetRow]) -> str:
+def _lines_of(rows: list[SheetRow], table: RawTable) -> str:
     """Lines as a sentence names them, with what begins each."""
-    shown = [f"{row.line} ({row.filled[0]})" for row in rows[:_SHOWN]]
+    shown = [f"{table.line_text(row.line)} ({row.filled[0]})" for row in rows[:_SHOWN]]
     more = [] if len(rows) <= _SHOWN else [f"{len(rows) - _SHOWN} more"]
     return f"line{'s' * (len(rows) > 1)} {listed([*shown, *more])}"
 

@@ -17,6 +17,7 @@ from wirebayes.io.bench.control import recognised
 from wirebayes.io.bench.decode import decode, read_raw
 from wirebayes.io.bench.delimited import sheet_of_text
 from wirebayes.io.bench.holds import cut, stretches
+from wirebayes.io.bench.joined import HOLD, lacking, one_table
 from wirebayes.io.bench.quantities import UNITS
 from wirebayes.io.bench.recorded import Cut
 from wirebayes.io.bench.resolution import evident_step
@@ -100,7 +101,42 @@ def convert(path: Path, about: About, choices: Choices) -> list[Converted]:
     InputError
         With file, line and column; `Undecided` where the file can be read in several ways.
     """
-    table = row_for_each_reading(find_table(_sheet(path, choices)))
+    return _of_table(row_for_each_reading(find_table(_sheet(path, choices))), about, choices)
+
+
+def convert_joined(paths: Sequence[Path], about: About, choices: Choices) -> Converted:
+    """Read raw files that are the holds of one test.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        In the order of their names.
+    about : About
+    choices : Choices
+        `each_file` says what was set, or that the columns or the names of the files do.
+
+    Raises
+    ------
+    InputError
+        As `convert`, and where the files cannot be joined.
+    """
+    tables = [find_table(_sheet(path, choices)) for path in paths]
+    table, notes = one_table(tables, choices.each_file or HOLD, choices.mapping)
+    made = _of_table(table, about, choices)
+    if len(made) > 1:
+        raise InputError(
+            f"{table.sheet.path}: found {len(made)} specimens side by side, expected one whose holds these are"
+        )
+    return replace(made[0], notes=[*notes, *made[0].notes])
+
+
+def lacks_a_setting(path: Path, choices: Choices) -> bool:
+    """Whether a file has a column of displacement or of tension, and not both."""
+    return len(lacking(find_table(_sheet(path, choices)), choices.mapping)) == 1
+
+
+def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted]:
+    """The experiments of the specimens of a table."""
     tables = specimen_tables(table, choices.mapping, choices.specimens)
     if len(tables) == 1:
         return [_convert(each, about, replace(choices, mapping=said)) for each, said in tables]

@@ -34,6 +34,8 @@ class RawTable:
         Whose readings these are, where the file holds several side by side.
     turned : bool
         Whether the file has a column for each hold or time: then its columns are not those of the table.
+    pieces : tuple of (int, str)
+        Of several files that were joined: the line after which each begins, and its name.
     """
 
     sheet: Sheet
@@ -44,6 +46,7 @@ class RawTable:
     above: tuple[str, ...] = ()
     specimen: str = ""
     turned: bool = False
+    pieces: tuple[tuple[int, str], ...] = ()
 
     @property
     def whose(self) -> str:
@@ -53,9 +56,13 @@ class RawTable:
     def place(self, line: int, column: int) -> str:
         """Where a cell stands."""
         name = f"{self.header[column]} of {self.whose}" if self.specimen else self.header[column]
-        return (
-            f"line {line} ({name})" if self.turned else f"line {line}, column {self.sheet.column_name(column)} ({name})"
-        )
+        in_line = f"line {self.line_text(line)}"
+        return f"{in_line} ({name})" if self.turned else f"{in_line}, column {self.sheet.column_name(column)} ({name})"
+
+    def line_text(self, line: int) -> str:
+        """A line as people find it: in its file, where several were joined."""
+        begins = [(begin, name) for begin, name in self.pieces if begin < line]
+        return f"{line - begins[-1][0]} of {begins[-1][1]}" if begins else str(line)
 
     def complain(self, line: int, column: int, found: str, expected: str) -> InputError:
         """The error for one cell.

@@ -33,6 +33,8 @@ class Choices:
         What was set in each hold.
     specimens : {"several", "one"} or None
         Of which columns stand side by side.
+    each_file : str or None
+        What each of several files is: hold or test, or the setting of the hold in each.
     drop_breaks : bool
         Whether rows of readings that are missing are left out.
     """
@@ -44,6 +46,7 @@ class Choices:
     zero_mm: float | None = None
     control: Control | None = None
     specimens: Specimens | None = None
+    each_file: str | None = None
     drop_breaks: bool = False
 
     def with_option(self, option: str) -> "Choices":

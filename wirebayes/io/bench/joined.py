@@ -1,0 +1,190 @@
+"""Files that are holds of one test, as loggers write one after each start: joined as the rows of one table.
+
+They follow each other in the order of their dates where they have dates, else of their names as people count: hold 2
+before hold 10. Where no column holds what was set, it is what the names of the files say (``2mm.csv``), or the user.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import reduce
+from operator import and_
+from pathlib import Path
+
+import numpy as np
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench import clock
+from wirebayes.io.bench.header import is_called_of_sample, is_of
+from wirebayes.io.bench.quantities import Role, quantity_unit
+from wirebayes.io.bench.sheet import SheetRow, moment
+from wirebayes.io.bench.table import RawTable
+from wirebayes.sentences import listed
+
+HOLD = "hold"  # what says that each file is one, and the name of the column that numbers them
+TEST = "test"
+_SETTINGS: tuple[Role, ...] = ("displacement", "tension")
+_DIGITS = re.compile(r"(\d+)")
+_MEASURE = re.compile(r"(?<![\d.,])(\d+(?:[.,]\d+)?)[ _]?([^\W\d_]+)(?![^\W\d_])")
+
+
+def in_natural_order(paths: Sequence[Path]) -> list[Path]:
+    """Files by their names, numbers in these as numbers.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+    """
+    return sorted(paths, key=lambda path: [(s.isdigit(), int(s) if s.isdigit() else s) for s in _parts(path)])
+
+
+def _parts(path: Path) -> list[str]:
+    return [part for part in _DIGITS.split(str(path).casefold()) if part]
+
+
+def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]) -> tuple[RawTable, list[str]]:
+    """The table of a test, and what was understood of its files, in sentences.
+
+    Parameters
+    ----------
+    tables : sequence of RawTable
+        Of each file, in the order of their names.
+    each_file : str
+        `HOLD`, or what was set in each, with units: ``1 mm, 2 mm``.
+    mapping : sequence of str
+        What the user says of columns.
+
+    Raises
+    ------
+    InputError
+        Files differ in their columns, or do not say what was set.
+    """
+    _check_alike(tables)
+    moments = [_first_moment(table) for table in tables]
+    dated = None not in moments
+    if dated:
+        tables = [tables[i] for i in np.argsort(moments, kind="stable")]
+    names = [table.sheet.path.name for table in tables]
+    notes = [f"holds of one test in the order of their {'dates' if dated else 'names'}: {listed(names)}"]
+    settings, role, source = _settings(tables, each_file, mapping)
+    first = tables[0]
+    header, units = (*_without_numbers(first), HOLD), (*first.units, "")
+    if role:
+        header, units = (*header, role), (*units, settings[0][1])
+        notes.append(f"the {role} of each hold from {source}: {listed([' '.join(each) for each in settings])}")
+    of_files = [(str(i + 1), settings[i][0]) if role else (str(i + 1),) for i in range(len(tables))]
+    rows, pieces = _rows(tables, of_files)
+    sheet = replace(first.sheet, path=path_of_all([table.sheet.path for table in tables]))
+    return RawTable(sheet, header, units, rows, first.header_line, pieces=pieces), notes
+
+
+def _rows(
+    tables: Sequence[RawTable], of_files: Sequence[tuple[str, ...]]
+) -> tuple[tuple[SheetRow, ...], tuple[tuple[int, str], ...]]:
+    """The rows of all files with more cells, those of their file, and the line after which each file begins."""
+    rows: list[SheetRow] = []
+    pieces: list[tuple[int, str]] = []
+    for table, of_file in zip(tables, of_files, strict=True):
+        begin = rows[-1].line if rows else 0
+        pieces.append((begin, table.sheet.path.name))
+        for row in table.rows:
+            cells = tuple(row.cell(i) for i in range(len(table.header)))
+            rows.append(replace(row, line=begin + row.line, cells=(*cells, *of_file)))
+    return tuple(rows), tuple(pieces)
+
+
+def path_of_all(paths: Sequence[Path]) -> Path:
+    """What messages call several files."""
+    return paths[0].with_name(f"{paths[0].name} to {paths[-1].name}")
+
+
+def name_settings(paths: Sequence[Path]) -> list[tuple[str, str]]:
+    """What was set in each file by its name, number and unit; empty where names do not say it.
+
+    The only measure that is not the same in all of them, in one unit: ``rope 6 mm, hold at 2 mm`` is at 2 mm.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+    """
+    found = [_MEASURE.findall(path.stem) for path in paths]
+    known = [Counter((n, u) for n, u in each if any(quantity_unit(u, role) for role in _SETTINGS)) for each in found]
+    shared = reduce(and_, known)
+    own = [[*(each - shared).elements()] for each in known]
+    if any(len(each) != 1 for each in own) or len({each[0][1] for each in own}) > 1:
+        return []
+    return [each[0] for each in own]
+
+
+def lacking(table: RawTable, mapping: Sequence[str]) -> list[Role]:
+    """Displacement or tension, where no column is one by its name or by what the user says.
+
+    Parameters
+    ----------
+    table : RawTable
+    mapping : sequence of str
+    """
+    said = {text.rpartition("=")[2].split(" ")[0] for text in mapping}
+    columns = range(len(table.header))
+    return [
+        role
+        for role in _SETTINGS
+        if role not in said and not any(is_of(table, i, role) or is_called_of_sample(table, i, role) for i in columns)
+    ]
+
+
+def _settings(
+    tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
+) -> tuple[list[tuple[str, str]], Role | None, str]:
+    """What was set in each file, where no column says it: number and unit; the quantity; and who says so."""
+    missing = lacking(tables[0], mapping)
+    stated = [] if each_file == HOLD else _stated(each_file, len(tables))
+    if not missing and stated:
+        found = f"{each_file!r} and columns of displacement and tension in {tables[0].sheet.path.name}"
+        raise InputError(f"--each-file: found {found}, expected {HOLD}")
+    if len(missing) != 1:
+        return [], None, ""
+    (role,) = missing
+    settings = stated or name_settings([table.sheet.path for table in tables])
+    if not settings or not quantity_unit(settings[0][1], role):
+        example = "1 mm, 2 mm, …" if role == "displacement" else "5 kg, 10 kg, …"
+        paths = [table.sheet.path for table in tables]
+        found = f"found no {role} in the columns or in the names of the files"
+        expected = f'--each-file "{example}", one for each of {listed([path.name for path in paths])}'
+        raise InputError(f"{path_of_all(paths)}: {found}, expected {expected}")
+    return settings, role, "--each-file" if stated else "the names of the files"
+
+
+def _stated(each_file: str, count: int) -> list[tuple[str, str]]:
+    """Settings that a user lists."""
+    found = [re.fullmatch(r"\s*([-+]?\d+(?:\.\d+)?)\s*(\S+)\s*", each) for each in each_file.split(",")]
+    settings = [(match[1], match[2]) for match in found if match]
+    if len(settings) < len(found) or len(settings) != count or len({unit for _, unit in settings}) > 1:
+        expected = f"{HOLD}, {TEST} or what was set in each of the {count} files, in one unit, as 1 mm, 2 mm"
+        raise InputError(f"--each-file: found {each_file!r}, expected {expected}")
+    return settings
+
+
+def _check_alike(tables: Sequence[RawTable]) -> None:
+    first = tables[0]
+    for table in tables[1:]:
+        if (table.header, table.units) != (first.header, first.units):
+            raise InputError(
+                f"{table.sheet.path}, line {table.header_line}: found the columns {', '.join(table.header)}, expected "
+                f"those of {first.sheet.path.name}, {', '.join(first.header)}: holds of one test are written alike"
+            )
+
+
+def _without_numbers(table: RawTable) -> tuple[str, ...]:
+    """The header without a column that numbers holds, since each file is one."""
+    return tuple("" if is_of(table, i, "hold") else name for i, name in enumerate(table.header))
+
+
+def _first_moment(table: RawTable) -> float | None:
+    """When the first reading of a file was taken, where a column has dates with times."""
+    for column in range(len(table.header)):
+        found = [moment(cell) for cell in table.column(column)]
+        if all(m is not None and m["date"] and m["first"] for m in found):
+            return clock.first_moment_s(table, column)
+    return None
