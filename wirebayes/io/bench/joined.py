@@ -61,8 +61,8 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
         Files differ in their columns, or do not say what was set.
     """
     _check_alike(tables)
-    moments = [_first_moment(table) for table in tables]
-    dated = None not in moments
+    moments = [begun for table in tables if (begun := _first_moment(table)) is not None]
+    dated = len(moments) == len(tables)
     if dated:
         tables = [tables[i] for i in np.argsort(moments, kind="stable")]
     names = [table.sheet.path.name for table in tables]
