@@ -12,7 +12,7 @@ from wirebayes.views.calibration import Calibration
 from wirebayes.views.comparison import Comparison
 from wirebayes.views.findings import Findings
 from wirebayes.views.pose import Pose
-from wirebayes.views.result import ResultFolder
+from wirebayes.views.result import Given, ResultFolder
 
 HELD_OUT = {"plain": {"rmse_N": 0.25}, "final": {"rmse_N": 0.05}}
 SLIP = {
@@ -55,20 +55,24 @@ def test_an_effect_is_spoken_of_in_words_with_its_hold() -> None:
 
 
 def test_an_error_on_held_out_holds_that_grows_is_said_to_be_no_better(tmp_path: Path) -> None:
-    for after, said in ((0.25, "rmse 0.25 -> 0.25 N"), (0.26, "rmse 0.25 -> 0.26 N: no better")):
+    for after, said in ((0.25, "0.25 -> 0.25 N rms"), (0.26, "0.25 -> 0.26 N rms: no better")):
         held_out = {"plain": {"rmse_N": 0.25}, "final": {"rmse_N": after}}
         content = {"version": 2, "experiments": {"a": SLIP | {"held_out": held_out}}}
-        assert f"  held-out holds: {said}" in stored(Findings, tmp_path, "discovery.json", content).lines()
+        assert (
+            f"  error on holds kept out of the fit: {said}"
+            in stored(Findings, tmp_path, "discovery.json", content).lines()
+        )
 
 
 def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": SLIP, "b": CLEAN}})
     assert found.lines() == [
-        "a: ambiguous: grip slip (62 %), nothing known (17 %) or toe (14 %) (p < 0.001)",
-        "  grip slip at hold 4 0.31 [0.25, 0.38] mm",
+        "a: something is missing; these readings do not tell what: grip slip (62 %), nothing known (17 %) or "
+        "toe (14 %) (p < 0.001)",
+        "  grip slip at hold 4 0.31 [0.25, 0.38] mm (the wire slipped in its grip once)",
         "  hard to distinguish on this protocol: ageing",
-        "  held-out holds: rmse 0.25 -> 0.05 N",
-        "b: nothing is missing (p = 0.4)",
+        "  error on holds kept out of the fit: 0.25 -> 0.05 N rms",
+        "b: nothing is missing that these readings can show (p = 0.4)",
     ]
     assert found.next_step() == "a: Unload. b: Hold longer."
     few = {"warnings": [{"kind": "few-holds", "text": "2 holds: no effect can be established"}]}
@@ -118,6 +122,26 @@ def test_a_comparison_leaves_out_models_that_failed(tmp_path: Path) -> None:
     assert found.lines() == ["a: toe predicts left-out holds best, then plain"]
 
 
+def test_a_comparison_says_errors_with_units_and_the_command_of_the_best_model(tmp_path: Path) -> None:
+    law = {"elastic_law": "hooke", "history": "saturating", "likelihood": "chain", "failed": None, "effects": []}
+    scored = [
+        (name, law | {"name": name, "held_out": {"free": {"rmse_mm": e}}}) for name, e in (("a", 0.341), ("plain", 1.7))
+    ]
+    (_, best), (_, plain) = scored
+    for changed, next_ in (
+        ({"effects": ["grip_slip@3"]}, "wirebayes fit w.toml --effect grip_slip@3, or wirebayes discover w.toml"),
+        ({"history": "additive"}, "wirebayes fit w.toml --history additive, or wirebayes discover w.toml"),
+        ({}, "wirebayes discover w.toml"),  # a law of time that fit has no option for
+    ):
+        table = {"base": "plain", "models": [best | changed, plain]}
+        found = stored(Comparison, tmp_path, "comparison.json", {"experiments": {"w": table}})
+        assert found.next_step(Given("w.toml")) == next_
+        assert found.lines() == ["w: a (0.34 mm rms) predicts left-out holds best, then plain (1.7 mm rms)"]
+    table = {"base": "plain", "models": [plain]}
+    found = stored(Comparison, tmp_path, "comparison.json", {"experiments": {"w": table}})
+    assert found.next_step(Given("w.toml")) == "wirebayes fit w.toml, or wirebayes discover w.toml"
+
+
 def test_a_pose_that_cannot_be_held_says_why(tmp_path: Path) -> None:
     found = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": False, "sentence": "Too heavy."})
     assert found.lines() == ["r: Too heavy."]
@@ -128,7 +152,7 @@ def test_a_pose_says_its_drift_for_each_spread(tmp_path: Path) -> None:
     drift = [{"specimen_spread": 0.05, "times_s": [0.0, 600.0], "distance_mm": far}]
     found = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": True, "drift": drift})
     (line,) = found.lines()
-    assert line == "r: after 600 s the platform has drifted by 1 mm [0.5, 2] (specimen spread 5 %)"
+    assert line == "r: after 600 s the platform has drifted by 1 mm [0.5, 2] if wires cut from one line differ by 5 %"
 
 
 NAMED = {"usable": True, "exit_points_m": {"sd": [[0.0]]}, "identified": {"not_determined": []}}

@@ -14,6 +14,12 @@ def listed(words: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(words[:-1])} {last} {words[-1]}"
 
 
+def some_of(names: Sequence[str], most: int = 6) -> str:
+    """Names as a sentence lists them, the first of many."""
+    more = [f"{len(names) - most} more"] if len(names) > most else []
+    return listed([*names[:most], *more])
+
+
 def counted(count: int, what: str) -> str:
     """How many there are of something, in words: 1 hold, 2 holds."""
     return f"{count} {what}{'s' * (count != 1)}"
@@ -26,6 +32,11 @@ def lasting(seconds: float) -> str:
 
 
 _TIMES = (("h", 3600.0), ("min", 60.0), ("s", 1.0))  # s, the longest first
+
+
+def specimens_are(spread: float) -> str:
+    """How much the wires of a robot are taken to differ: the share is a standard deviation."""
+    return f"wires cut from one line differ by {100 * spread:g} %" if spread else "all wires are alike"
 
 
 def spoken(effect: str) -> str:
@@ -115,7 +126,7 @@ def quantity(middle: float, low: float, high: float, unit: str = "") -> str:
         As in files; 1 and - are none.
     """
     shown = unit_text(unit)
-    return f"{number(middle)}{' ' if shown else ''}{shown} ({span(low, high)})"
+    return f"{number_within(middle, low, high)}{' ' if shown else ''}{shown} ({span(low, high)})"
 
 
 def unit_text(unit: str) -> str:
@@ -159,16 +170,31 @@ def _order(value: float, digits: int) -> int:
     return int(f"{abs(value):.{digits - 1}e}".split("e")[1])
 
 
-def span(low: Any, high: Any, digits: int = 3) -> str:
+def span(low: Any, high: Any, digits: int | None = None) -> str:
     """An interval for people.
 
     Parameters
     ----------
     low, high : float
-    digits : int
-        Significant ones.
+    digits : int, optional
+        Significant ones; as many as `number_within` shows when left out.
     """
-    return f"{number(low, digits)} … {number(high, digits)}"
+    ends = [number_within(end, low, high) if digits is None else number(end, digits) for end in (low, high)]
+    return " … ".join(ends)
 
 
+def number_within(value: float | None, low: float | None, high: float | None) -> str:
+    """A number for people beside its interval: three digits, or as many as show a fifth of the interval's width.
+
+    Parameters
+    ----------
+    value, low, high : float
+    """
+    if not value or low is None or high is None or not 0 < high - low < math.inf:
+        return number(value)
+    shown = math.floor(math.log10(abs(value))) - math.floor(math.log10((high - low) / 5.0)) + 1
+    return number(value, min(max(_DIGITS[0], shown), _DIGITS[1]))
+
+
+_DIGITS = (3, 8)  # few enough to read; enough for 1e-6 of a number, finer than any bench reads
 _RAISED = dict(zip("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻", strict=True))

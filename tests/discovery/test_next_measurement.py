@@ -89,7 +89,7 @@ def test_another_length_is_twice_the_longest_with_steps_scaled_alike() -> None:
         (1100.0, True, "at present they do not"),
         (np.inf, True, "at present they do not"),
         (1.05, False, "reveal a smaller"),
-        (2.04, False, "Its signature would be 2.0 times as large as now"),
+        (2.04, False, "Its trace in the readings would be 2.0 times as large as now"),
         (1100.0, False, "To detect toe, which this test does not show: load it twice."),
         (np.inf, False, "To detect toe, which this test does not show: load it twice."),
     ],

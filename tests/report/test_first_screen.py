@@ -40,7 +40,7 @@ def test_a_comparison_is_a_ranking_in_words() -> None:
     ]
     table = {"base": "plain", "models": rows}
     assert headline.comparison_in_words("a", table) == (  # type: ignore[arg-type]
-        "a: toe predicts left-out holds best, by 12 ± 3.2 in elpd against plain; then comes plain."
+        "a: toe predicts left-out holds best, by 12 ± 3.2 in log probability (elpd) against plain; then comes plain."
     )
     for elpd, se, chance in ((4.0, 2.0, False), (3.99, 0.1, True), (12.3, 6.2, True)):
         rows[0]["difference"] = {"elpd": elpd, "se": se}
@@ -59,7 +59,7 @@ def test_a_batch_says_a_sentence_a_finding_and_no_plural_of_one() -> None:
     found = {"experiments": rows, "outliers": []}
     assert headline.batch_in_sentences(found) == [  # type: ignore[arg-type]
         "2 tests of one material, 2 converged; median k1 of m 915 N (900 … 930, least to largest specimen).",
-        "Nothing is missing in one test.",
+        "Nothing is missing that the readings can show in one test (a).",
         "Toe: in one test (b).",
     ]
     rows.append(row | {"name": "c", "parameters": stiff[2], "material": "other"})

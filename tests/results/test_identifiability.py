@@ -293,8 +293,8 @@ def test_a_ridge_names_all_who_are_on_it_but_itself() -> None:
         },
     )
     assert words == (
-        "k1: the data determine it; its 90 % range is 1.5, the prior's 20; it is correlated with B (r = -0.95) and "
-        "U (r = +0.99), and their combination is known better."
+        "k1: the data determine it; its 90 % range is 1.50, the prior's 20.0; it is correlated with B (r = −0.95) and "
+        "U (r = 0.99), and their combination is known better."
     )
 
 

@@ -1,12 +1,11 @@
 """The answer of every result in a sentence, which its page says first."""
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
-from wirebayes.answers.terminal import MOST_OUTLIERS
-from wirebayes.answers.verdict import verdict_in_words
+from wirebayes.answers.terminal import MOST_OUTLIERS, missing_in
+from wirebayes.answers.verdict import verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckedExperiment
@@ -25,7 +24,9 @@ from wirebayes.sentences import (
     p_in_words,
     quantity,
     short,
+    some_of,
     span,
+    specimens_are,
     spoken,
     undecided,
 )
@@ -87,7 +88,7 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     are = "are" if effects[1:] else "is"
     candidates = likely(report)
     what = {
-        "nothing-missing": f"{verdict_in_words(report)}: the plain model and its noise explain these readings",
+        "nothing-missing": f"{verdict_in_words(report)}: the plain model and its noise explain them",
         "unknown": f"{verdict_in_words(report)}"
         + (f"; beside it most likely {candidates}, none of them established" if candidates else ""),
         "ambiguous": undecided(report),
@@ -104,7 +105,9 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
         goes = f"; but {with_it} grows" if error_grows(held) else f"; {with_it} goes"
         gain = f"{goes} from {number(before)} to {number(after)} {unit_read(held['plain'])}"
     sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
-    return f"{name}: {what}{size}{gain}{sure}."
+    known = [words for words in map(what_it_is, report["effects"]) if words] if report["verdict"] != "ambiguous" else []
+    meaning = "".join(f" {words[:1].upper()}{words[1:]}." for words in known)
+    return f"{name}: {what}{size}{gain}{sure}.{meaning}"
 
 
 def comparison_in_words(name: str, table: ComparedModels) -> str:
@@ -126,8 +129,8 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
     if gain is not None and best["name"] != table["base"]:
         from wirebayes.comparison.compare import meaningful  # loaded by now, and by no other command
 
-        against = f", by {number(gain['elpd'], 2)} ± {number(gain['se'], 2)} in elpd against {table['base']}"
-        against += "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
+        against = f", by {number(gain['elpd'], 2)} ± {number(gain['se'], 2)} in log probability (elpd) against "
+        against += table["base"] + ("" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance")
     come = "come" if others[1:] else "comes"
     then = f"; then {come} {listed([row['name'] for row in others[:3]])}" if others else ""
     rest = f" and {len(others) - 3} more" if len(others) > 3 else ""
@@ -148,17 +151,10 @@ def batch_in_sentences(found: BatchJson) -> list[str]:
     many = _count(len(rows), "test")
     converged = sum(bool(row["converged"]) for row in rows)
     out = [f"{many[:1].upper()}{many[1:]} of {kinds}, {converged} converged{_stiffnesses(rows)}."]
-    out += [f"Not fitted: {_some(failed)}."] if failed else []
-    clean = [row["name"] for row in rows if row["verdict"] == "nothing-missing"]
-    out += [f"Nothing is missing in {_count(len(clean), 'test')}."] if clean else []
-    effects = Counter(effect for row in rows for effect in row["effects"])
-    for effect, count in effects.most_common():
-        where = [row["name"] for row in rows if effect in row["effects"]]
-        out.append(f"{spoken(effect).capitalize()}: in {_count(count, 'test')} ({_some(where)}).")
-    unknown = [row["name"] for row in rows if row["verdict"] in ("unknown", "partial")]
-    out += [f"Something without a name: in {_some(unknown)}."] if unknown else []
+    out += [f"Not fitted: {some_of(failed)}."] if failed else []
+    out += missing_in(rows)
     refused = [row["name"] for row in rows if row["check"] == "failed" and row["verdict"] is None]
-    out += [f"The model does not describe the readings of {_some(refused)}."] if refused else []
+    out += [f"The model does not describe the readings of {some_of(refused)}."] if refused else []
     out += [outlier["sentence"].rstrip(".") + "." for outlier in found["outliers"][:MOST_OUTLIERS]]
     return out
 
@@ -183,17 +179,11 @@ def _stiffness(material: str, each: Sequence[Statistics]) -> str:
     return f"median k1 of {material} {middle} N ({span(min(medians), max(medians))}, {among})"
 
 
-_MOST_MATERIALS = 2  # whose stiffness a first sentence has room for
+_MOST_MATERIALS = 3  # whose stiffness a first sentence has room for
 
 
 def _count(number_of: int, what: str) -> str:
     return f"one {what}" if number_of == 1 else f"{number_of} {what}s"
-
-
-def _some(names: list[str], most: int = 6) -> str:
-    """Names as a sentence lists them, the first of many."""
-    more = [f"{len(names) - most} more"] if len(names) > most else []
-    return listed([*names[:most], *more])
 
 
 def pose_in_a_sentence(found: PoseJson) -> str:
@@ -211,11 +201,9 @@ def pose_in_a_sentence(found: PoseJson) -> str:
     drift = known[-1]
     far, tilt, time = drift["distance_mm"], drift["tilt_deg"], drift["times_s"][-1]
     moved, turned = (quantity(q["q50"][-1], q["q05"][-1], q["q95"][-1], unit) for q, unit in ((far, "mm"), (tilt, "")))
-    spread = drift["specimen_spread"]
-    alike = f"if wires cut from one line differ by {100 * spread:g} %" if spread else "if all wires are alike"
     return (
         f"The platform of {found['robot']} moves by {moved} and tilts by {turned} degrees within {number(time)} s of "
-        f"standing still, {alike}; intervals hold 90 %."
+        f"standing still, if {specimens_are(drift['specimen_spread'])}; intervals hold 90 %."
     )
 
 

@@ -1,17 +1,18 @@
 """The answer of every result in a few lines, with units: on a terminal, and in Python with `print`."""
 
 from collections import Counter
+from collections.abc import Sequence
 from textwrap import wrap
-from typing import cast
+from typing import Literal, cast
 
 import numpy as np
 
-from wirebayes.answers.verdict import verdict_in_words
-from wirebayes.json_files.batch import BatchJson
+from wirebayes.answers.verdict import verdict_in_words, what_it_is
+from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckedExperiment, EffectSize, ParameterRange
-from wirebayes.json_files.comparison import ComparedModels
-from wirebayes.json_files.discovery import ExperimentFindings
+from wirebayes.json_files.comparison import ComparedModel, ComparedModels
+from wirebayes.json_files.discovery import AmplitudeEstimate, ExperimentFindings
 from wirebayes.json_files.imported import ImportedExperiment
 from wirebayes.json_files.plan import JudgedProtocol
 from wirebayes.json_files.pose import PoseJson, known_at_the_end
@@ -22,12 +23,13 @@ from wirebayes.json_files.values import Quantiles
 from wirebayes.sentences import (
     coordinates,
     counted,
-    families_said,
     likely,
     listed,
     p_in_words,
     said_beside,
     short,
+    some_of,
+    specimens_are,
     spoken,
     undecided,
     unit_text,
@@ -55,31 +57,52 @@ def _effects(summary: SummaryJson) -> list[str]:
 
 def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     """Of one experiment that something may be missing in: what, how large, and what it is worth."""
-    verdict, effects = report["verdict"], listed([spoken(effect) for effect in report["effects"]])
-    finding = verdict_in_words(report) or f"{verdict}: {effects}"
-    if verdict == "ambiguous":
-        finding = f"ambiguous: {undecided(report) if families_said(report) else likely(report)}"
-    if verdict == "partial":
-        are = "are" if report["effects"][1:] else "is"
-        finding = f"{effects} {are} missing, and something that is not in the catalogue"
-    lines = [f"{name}: {finding} ({p_in_words(report['p_global'], report['p_simulations'])})"]
+    verdict = report["verdict"]
+    lines = [f"{name}: {_verdict(report)} ({p_in_words(report['p_global'], report['p_simulations'])})"]
     if verdict == "unknown" and likely(report):
         lines.append(f"  beside it most likely {likely(report)}; none of these is established")
     lines += [f"  {sentence}" for sentence in said_beside(report)]
-    for effect, size in report["amplitudes"].items():
-        at = "" if size["hold"] is None else f" at hold {size['hold']}"
-        unit = "" if size["unit"] == "-" else f" {size['unit']}"
-        lines.append(f"  {spoken(effect)}{at} {size['mean']:.3g} [{size['q05']:.3g}, {size['q95']:.3g}]{unit}")
+    lines += [f"  {_effect_size(effect, size)}" for effect, size in report["amplitudes"].items()]
     lines += [f"  {elsewhere}" for elsewhere in in_other_tests(report)]
     like = [other for other in report["group"] if other not in (*report["effects"], "unknown")]
     if like and verdict in ("named", "ambiguous"):
         lines.append(f"  hard to distinguish on this protocol: {', '.join(map(spoken, like))}")
-    gain = report["held_out"]
-    before, after = (read_value(gain[model], "rmse") for model in ("plain", "final"))
-    if report["effects"] and None not in (before, after):
-        worse = ": no better" if error_grows(gain) else ""
-        lines.append(f"  held-out holds: rmse {before:.3g} -> {after:.3g} {unit_read(gain['plain'])}{worse}")
-    return lines
+    return lines + ([f"  {_gain(report)}"] if report["effects"] and _gain(report) else [])
+
+
+def _verdict(report: ExperimentFindings) -> str:
+    """What is missing, in words."""
+    if report["verdict"] == "ambiguous":
+        return undecided(report)
+    are = "are" if report["effects"][1:] else "is"
+    named = f"{listed([spoken(effect) for effect in report['effects']])} {are} missing"
+    beyond = ", and something that is not in the catalogue" if report["verdict"] == "partial" else ""
+    return verdict_in_words(report) or named + beyond
+
+
+def _effect_size(effect: str, size: AmplitudeEstimate) -> str:
+    """How large an effect is, and what it is."""
+    at = "" if size["hold"] is None else f" at hold {size['hold']}"
+    middle, low, high = (short(size[q], 3) for q in ("mean", "q05", "q95"))
+    return f"{spoken(effect)}{at} {middle} [{low}, {high}]{_unit_and_meaning(effect, size['unit'])}"
+
+
+def _gain(report: ExperimentFindings) -> str:
+    """What the effects take away of the error on holds that were kept out; empty where none was."""
+    held = report["held_out"]
+    before, after = (read_value(held[model], "rmse") for model in ("plain", "final"))
+    if before is None or after is None:
+        return ""
+    worse = ": no better" if error_grows(held) else ""
+    return f"error on holds kept out of the fit: {before:.3g} -> {after:.3g} {unit_read(held['plain'])} rms{worse}"
+
+
+def _unit_and_meaning(effect: str, unit: str) -> str:
+    """What stands behind the size of an effect."""
+    known = what_it_is(effect)
+    if unit != "-":
+        return f" {unit} ({known})" if known else f" {unit}"
+    return f" (a pure number; {known})" if known else " (a pure number)"
 
 
 def in_other_tests(report: ExperimentFindings) -> list[str]:
@@ -103,11 +126,24 @@ def of_batch(found: BatchJson) -> list[str]:
     failed = sum(row["error"] is not None for row in rows)
     converged = sum(bool(row["converged"]) for row in rows)
     lines = [f"{counted(len(rows), 'experiment')}: {converged} converged, {failed} failed"]
-    verdicts = Counter(row["verdict"] for row in rows if row["verdict"])
-    if verdicts:
-        lines.append("  " + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()))
+    lines += [f"  {sentence}" for sentence in missing_in(rows)]
     lines += [f"  apart: {outlier['sentence']}" for outlier in far[:MOST_OUTLIERS]]
     return lines + ([f"  and {len(far) - MOST_OUTLIERS} more outliers"] if len(far) > MOST_OUTLIERS else [])
+
+
+def missing_in(rows: Sequence[Row]) -> list[str]:
+    """What is missing in which experiments of a batch, a sentence a finding."""
+    clean = [row["name"] for row in rows if row["verdict"] == "nothing-missing"]
+    out = [f"Nothing is missing that the readings can show in {_tests(clean)}."] if clean else []
+    for effect, _ in Counter(effect for row in rows for effect in row["effects"]).most_common():
+        out.append(f"{spoken(effect).capitalize()}: in {_tests([r['name'] for r in rows if effect in r['effects']])}.")
+    nameless = [row["name"] for row in rows if row["verdict"] in ("unknown", "partial")]
+    return out + ([f"Something without a name: in {_tests(nameless)}."] if nameless else [])
+
+
+def _tests(names: list[str]) -> str:
+    """How many tests, and the names of the first."""
+    return f"{'one test' if len(names) == 1 else f'{len(names)} tests'} ({some_of(names)})"
 
 
 def of_plan(row: JudgedProtocol) -> list[str]:
@@ -182,7 +218,7 @@ _SHOWS = {
 def _size(effect: str, found: EffectSize) -> str:
     if found["amplitude_80"] is None:
         return f"{spoken(effect)} ({found['reason']})"
-    return f"{spoken(effect)} {found['amplitude_80']:.2g}" + (f" {found['unit']}" if found["unit"] != "-" else "")
+    return f"{spoken(effect)} {short(found['amplitude_80'], 2)}" + (f" {found['unit']}" if found["unit"] != "-" else "")
 
 
 def _wrapped(title: str, items: list[str]) -> list[str]:
@@ -195,9 +231,35 @@ def _wrapped(title: str, items: list[str]) -> list[str]:
 
 
 def of_comparison(name: str, table: ComparedModels) -> str:
-    """Of one experiment: which models predict what they have not seen best."""
-    best, *others = [row["name"] for row in table["models"] if row["failed"] is None] or ["none"]
-    return f"{name}: {best} predicts left-out holds best" + (f", then {', '.join(others[:2])}" if others else "")
+    """Of one experiment: which models predict what they have not seen best, and with which error."""
+    rows = [row for row in table["models"] if row["failed"] is None]
+    if not rows:
+        return f"{name}: no model could be judged"
+    best, *others = [f"{row['name']}{_error_ahead(row)}" for row in rows]
+    base = next((f"; {row['name']}{_error_ahead(row)}" for row in rows[3:] if row["name"] == table["base"]), "")
+    then = f", then {', '.join(others[:2])}" if others else ""
+    return f"{name}: {best} predicts left-out holds best{then}{base}"
+
+
+def _error_ahead(row: ComparedModel) -> str:
+    """The rms error of a model on the last holds, in brackets; nothing where it was not scored on them."""
+    held = row.get("held_out")
+    free = held["free"] if held else None
+    return f" ({short(error, 2)} {unit_read(free)} rms)" if free and (error := read_value(free, "rmse")) else ""
+
+
+def options_of_best(table: ComparedModels) -> str | None:
+    """What `wirebayes fit` needs for the model that predicts best; None for one that it has no options for."""
+    rows = {row["name"]: row for row in table["models"] if row["failed"] is None}
+    best, base = next(iter(rows.values()), None), rows.get(table["base"])
+    if best is None or base is None:
+        return None
+    choices = {f"--{key.replace('_', '-')} {best[key]}": best[key] != base[key] for key in _CHOICES}
+    options = [*(f"--effect {effect}" for effect in best.get("effects", [])), *(o for o, new in choices.items() if new)]
+    return " ".join(options) if options or best is base else None
+
+
+_CHOICES: tuple[Literal["elastic_law", "history", "likelihood"], ...] = ("elastic_law", "history", "likelihood")
 
 
 def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
@@ -216,7 +278,7 @@ def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
             middle, low, high = (short(far[q][-1], 3) for q in ("q50", "q05", "q95"))
             drifts.append(
                 f"{found['robot']}: after {time:g} s the platform {moved} by {middle} mm [{low}, {high}] "
-                f"(specimen spread {100 * drift['specimen_spread']:g} %)"
+                f"if {specimens_are(drift['specimen_spread'])}"
             )
     return lines + (drifts or [f"{found['robot']}: no draw of the wires could be solved"])
 
@@ -254,4 +316,7 @@ def _with_unit(quantity: Parameter | ParameterRange) -> str:
 
 
 def _band(quantity: Quantiles | ParameterRange | None) -> str:
-    return "-" if quantity is None else f"{quantity['q50']:.4g} [{quantity['q05']:.4g}, {quantity['q95']:.4g}]"
+    if quantity is None:
+        return "-"
+    middle, low, high = (short(quantity[q]) for q in ("q50", "q05", "q95"))
+    return f"{middle} [{low}, {high}]"

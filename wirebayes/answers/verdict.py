@@ -1,9 +1,10 @@
-"""A verdict without the names of effects, in words."""
+"""A verdict in words, and what an effect is."""
 
+from wirebayes.effects import CATALOGUE
 from wirebayes.json_files.discovery import ExperimentFindings
 
 _NAMED = {
-    "nothing-missing": "nothing is missing",
+    "nothing-missing": "nothing is missing that these readings can show",
     "unknown": "something is missing that no effect in the catalogue explains",
 }
 # with fewer than three holds, where no effect of the catalogue can be established or ruled out
@@ -14,3 +15,10 @@ def verdict_in_words(report: ExperimentFindings) -> str | None:
     """Of a verdict without names; None for the others."""
     few = any(warning["kind"] == "few-holds" for warning in report.get("warnings", []))
     return (_FEW_HOLDS if few else _NAMED).get(report["verdict"])
+
+
+def what_it_is(effect: str) -> str:
+    """An effect of the catalogue as the part of a sentence; empty for a user's own."""
+    kind = CATALOGUE.get(effect.partition("@")[0])
+    first = kind.sentence.split(". ")[0].rstrip(".") if kind else ""
+    return first[:1].lower() + first[1:]

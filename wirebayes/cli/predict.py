@@ -54,7 +54,7 @@ def predict_command(
     from wirebayes.commands.predict import as_json as json_of
     from wirebayes.commands.predict import predict as run
     from wirebayes.json_files.plain import plain
-    from wirebayes.report.pages.predict import write_beside
+    from wirebayes.report.pages.predict import in_a_sentence, write_beside
 
     table = protocol.with_name(f"{protocol.stem}-predicted.csv") if output is None else output
     predicted = run(
@@ -74,4 +74,5 @@ def predict_command(
     if as_json:
         typer.echo(json.dumps(plain(json_of(predicted)), indent=2, ensure_ascii=False, allow_nan=False))
     elif not quiet:
+        typer.echo(in_a_sentence(predicted))
         typer.echo(f"Results: {table} (open {page})")

@@ -29,7 +29,7 @@ from wirebayes.notice import Notice, from_json, to_json
 from wirebayes.processes.workers import ParallelMap, give_way, workers
 from wirebayes.progress import Progress
 from wirebayes.results.jobs import Job
-from wirebayes.sentences import spoken
+from wirebayes.sentences import p_in_words, spoken
 
 _BESIDE = 3  # steps of niceness, half the weight: two workers of the check leave one of two cores to the sampler
 _SHOWN = 3  # most surprising effects that are listed
@@ -91,10 +91,14 @@ class ModelCheck:
             for g in self.gross_errors
         ]
 
+    @property
+    def _p_in_words(self) -> str:
+        return "no p" if self.p is None else p_in_words(self.p, self.simulations)
+
     def _passed_in_words(self) -> str:
         return (
-            f"The model describes the readings: p = {self.p:.2g} in a test against {self.simulations} refitted "
-            f"simulations (level {self.alpha:.2g})."
+            f"The model describes the readings: {self._p_in_words} in a test against {self.simulations} refitted "
+            f"simulations (it fails below {self.alpha:.2g})."
         )
 
     def _failed_in_words(self) -> str:
@@ -102,9 +106,9 @@ class ModelCheck:
         other = "other effects of the catalogue" if self.with_effects else "what is missing"
         directions = ", ".join(map(spoken, self.surprising))
         return (
-            f"{model} does not describe the readings (p = {self.p:.2g}, level {self.alpha:.2g}): its parameters, "
-            "intervals and predictions can be wrong by more than they say. Run wirebayes discover to look for "
-            f"{other}; the readings deviate most in the direction of {directions}"
+            f"{model} does not describe the readings ({self._p_in_words}; it fails below {self.alpha:.2g}): its "
+            "parameters, intervals and predictions can be wrong by more than they say. Run wirebayes discover to look "
+            f"for {other}; the readings deviate most in the direction of {directions}"
         )
 
     def to_dict(self) -> ModelCheckResult:

@@ -163,10 +163,12 @@ def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakes
     known = ratio < _RATIO_LIMIT
     if pair:
         gain = f" {ratio:.1f} times as much as now" if known else "; at present they do not"
-        return f"To distinguish {names}: {words}. Their signatures would then differ{gain}."
+        return f"To distinguish {names}: {words}. Their traces in the readings would then differ{gain}."
     if not known:
         return f"To detect {names}, which this test does not show: {words}."
-    return f"To detect a smaller {names}: {words}. Its signature would be {ratio:.1f} times as large as now."
+    return (
+        f"To detect a smaller {names}: {words}. Its trace in the readings would be {ratio:.1f} times as large as now."
+    )
 
 
 def next_for_remainder(block: LaplaceFit) -> str:

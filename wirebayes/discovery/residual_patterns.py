@@ -13,6 +13,7 @@ from wirebayes.numeric.typing import Array
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Control
 
+_SMALLEST = 0.001  # of p in a sentence
 _PARAMETERS = {"k1": "the stiffness k1", "B": "the creep amount B", "k2": "the creep rate k2"}
 
 
@@ -163,7 +164,7 @@ def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names
 
 
 def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
-    chance = f"p = {p:.3f}"
+    chance = f"p = {p:.3f}" if p >= _SMALLEST else f"p < {_SMALLEST:g}"
     if p > 0.05:
         return f"{names}: the residuals show no dependence on {pattern.covariate} ({chance})."
     if pattern.hold is not None:
@@ -179,4 +180,4 @@ def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
             f"{names}: the residuals suggest that {_PARAMETERS[pattern.moves]} {way} with {pattern.covariate}, "
             f"by {size} over two standard deviations of {pattern.covariate} ({chance})."
         )
-    return f"{names}: the residuals of the plain model depend on {pattern.covariate} ({chance})."
+    return f"{names}: what the plain model leaves over depends on {pattern.covariate} ({chance})."

@@ -17,7 +17,7 @@ from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifia
 from wirebayes.numeric.distributions import log_density_of
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import contraction, source
-from wirebayes.sentences import short
+from wirebayes.sentences import number, short
 from wirebayes.wire.fresh import FreshSample
 
 SENSITIVE = 0.05  # the threshold that the authors of the method propose
@@ -79,7 +79,7 @@ def parameter_in_words(name: str, figures: IdentifiabilityFigures) -> str:
     """A sentence about one parameter."""
     sign = "×" if figures["range_is_factor"] else ""
     after, before = figures["posterior_range_90"], figures["prior_range_90"]
-    ranges = f"its 90 % range is {sign}{after:.3g}, the prior's {sign}{before:.3g}"
+    ranges = f"its 90 % range is {sign}{number(after)}, the prior's {sign}{number(before)}"
     determined_by = source(figures["contraction"])
     if determined_by == "prior":
         verdict = "the data say next to nothing about it, the interval is the prior's"
@@ -87,7 +87,7 @@ def parameter_in_words(name: str, figures: IdentifiabilityFigures) -> str:
         verdict = f"data and prior both determine it (sensitivity to the prior {figures['prior_sensitivity']:.2f})"
     else:
         verdict = "the data determine it"
-    with_whom = " and ".join(f"{other} (r = {r:+.2f})" for other, r in figures["ridges"].items())
+    with_whom = " and ".join(f"{other} (r = {number(r, 2)})" for other, r in figures["ridges"].items())
     along = f"; it is correlated with {with_whom}, and their combination is known better" if with_whom else ""
     return f"{name}: {verdict}; {ranges}{along}."
 

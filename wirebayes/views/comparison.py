@@ -29,7 +29,10 @@ class Comparison(Result[ComparisonJson]):
         return [terminal.of_comparison(name, table) for name, table in found.items()]
 
     def next_step(self, given: Given = NOTHING) -> str:
-        return f"wirebayes fit {given.file} with the options of the best model, or wirebayes discover {given.file}"
+        tables = list(self.summary()["experiments"].values())
+        options = terminal.options_of_best(tables[0]) if len(tables) == 1 else None
+        discover = f"wirebayes discover {given.file}"
+        return discover if options is None else f"{f'wirebayes fit {given.file} {options}'.rstrip()}, or {discover}"
 
     def _short_form(self) -> list[str]:
         return [

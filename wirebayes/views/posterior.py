@@ -241,4 +241,5 @@ def _after_fit(kinds: frozenset[str], place: ResultFolder, folder: Path, given: 
     """What to do with posteriors of a command's folder, of which one lies in `folder`."""
     if "model-check" in kinds:
         return f"wirebayes discover {given.file}, to find out what the model is missing"
-    return f"wirebayes predict {place.path} PROTOCOL.csv, or wirebayes pose ROBOT.toml --wires {folder}"
+    protocol = "PROTOCOL.csv (columns as in your readings, without what was read)"
+    return f"wirebayes predict {place.path} {protocol}, or wirebayes pose ROBOT.toml --wires {folder}"

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.answers.headline import comparison_in_words
+from wirebayes.answers.terminal import options_of_best
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.comparison import ComparedModels, ComparisonJson
 from wirebayes.json_files.read_units import read_value, unit_read
@@ -62,8 +63,9 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     pictures = pictures_in(folder / name, _CAPTIONS) if (folder / name).is_dir() else []
     blocks += [Pictures(pictures[:_FIRST])] if pictures else []
     if good:
-        advised = "" if good[0]["name"] == table["base"] else f" with the options of {good[0]['name']}"
-        blocks.append(Text(f"Next: wirebayes fit{advised}, or wirebayes discover, which names what is missing."))
+        options = options_of_best(table)
+        again = "" if options is None else f"{f'wirebayes fit FILE.toml {options}'.rstrip()}, or "
+        blocks.append(Text(f"Next: {again}wirebayes discover FILE.toml, which names what is missing."))
     blocks += beside_the_answer(table)
     scored = [r["held_out"]["given_first"] for r in good if r["held_out"]]
     unit = unit_read(scored[0] or {}) if scored else "N"

@@ -88,10 +88,10 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         blocks.append(_candidates(v))
     if v.get("power"):
         lines = [[spoken(e), number(p["amplitude_80"]), unit_text(p["unit"]) or "–"] for e, p in v["power"].items()]
-        caption = "The smallest amplitude of each effect that this test detects with 80 % power; a dash: none."
-        blocks.append(Table(["effect", "amplitude", "unit"], lines, caption))
+        caption = "The smallest size of each effect that four of five such tests would show; a dash: none, or no unit."
+        blocks.append(Table(["effect", "size", "unit"], lines, caption))
     if hidden:
-        caption = "Not identifiable here: the readings would be nearly the same with or without it."
+        caption = "What this test cannot show: the readings would be nearly the same with or without it."
         blocks.append(Table(["what", "why"], [[spoken(what), why] for what, why in hidden], caption))
     return Section(name, blocks)
 
@@ -108,7 +108,7 @@ def _within_a_minute(v: ExperimentFindings, hidden: list[str]) -> Columns:
     """Where model and measurement disagree, what is known, and what is not."""
     beside = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
     known = [point for point in (*beside, _held_out(v), *_sizes(v)) if point]
-    unknown = [f"Not identifiable here: {listed([spoken(what) for what in hidden])}."] if hidden else []
+    unknown = [f"This test cannot show {listed([spoken(what) for what in hidden])}."] if hidden else []
     return Columns(
         [
             Points("Where model and measurement disagree", _disagreements(v)),
@@ -136,7 +136,7 @@ def _steps(v: ExperimentFindings) -> list[Block]:
         "what is left above the noise."
     )
     names = [spoken(steps[0]["model"]), *(f"+ {spoken(step['model'])}" for step in steps[1:])]
-    scores = [[number(k) for k in (read_value(s, "rmse"), s["elpd"], s["coverage_90"])] for s in steps]
+    scores = [[number(read_value(s, "rmse")), number(s["elpd"]), _percent(s["coverage_90"])] for s in steps]
     header = ["model", f"rms error ({unit_read(steps[0])})", "elpd", "readings in 90 % bands"]
     lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
     caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
@@ -153,17 +153,21 @@ def _candidates(v: ExperimentFindings) -> Table:
             included = _probability(inclusion[effect]) if effect in inclusion else "–"
             lines.append([spoken(effect), _probability(p), included])
     caption = (
-        "First column: probability of having the largest share of the gap, given that something is missing. "
+        "First column: probability of having the largest share of the misfit, given that something is missing. "
         "Second: probability of being missing at all, alone or beside others."
     )
     rest = v.get("remainder", {}).get("probability")
     if rest is not None:
-        caption += f" Something without a name remains beside them with probability {_probability(rest)}."
+        caption += f" Something without a name remains beside them with a probability of {_probability(rest)}."
     return Table(["candidate", "largest share", "missing at all"], lines, caption)
 
 
 def _probability(p: float) -> str:
-    return number(round(p, 4), 2)
+    return f"{100 * p:.0f} %"
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.0f} %"
 
 
 def _p(v: ExperimentFindings) -> str:
@@ -228,7 +232,7 @@ def _spoken(v: ExperimentFindings) -> str:
 
 _BEFORE_AND_AFTER = (
     "Above: every reading with the curve of each model. Below: measured minus predicted readings. Shaded holds were "
-    "kept apart to test the models; all holds are fitted here."
+    "kept out of a first fit to test the models; all holds are fitted here."
 )
 
 

@@ -102,13 +102,10 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
         blocks.append(Pictures([pictures["curve"]]))
     blocks.append(Text(_next(summary)))
     blocks.append(_parameters(draws, shrunk, sample))
-    blocks.append(Columns([_measured(stored, summary), *_known(draws, shrunk, sample, trusted)]))
+    blocks.append(Columns([_measured(stored, summary), *_known(summary, shrunk, trusted)]))
     blocks.append(Pictures([pictures["measured"], pictures["residuals"]]))
     if "pairs" in pictures:
         blocks.append(Pictures([pictures["pairs"]]))
-    determined = "What the data determine" if trusted else "What the data would determine if the model were right"
-    sentences = [each["sentence"] for each in summary["identifiability"].values()]
-    blocks.append(Columns([Points(determined, sentences)]))
     blocks.append(_derived(summary))
     blocks.append(Pictures([pictures["ahead"]]))
     blocks.append(Text(_sampled(summary)))
@@ -158,7 +155,7 @@ def _continued(summary: SummaryJson, trusted: bool) -> str:
     """What the picture of the creep that goes on says; how far that is stands with the numbers above it."""
     if trusted:
         return summary["extrapolation"]["sentence"]
-    return "The model that this band continues does not describe the readings."
+    return "The model does not describe the readings, so that its creep later on may be another."
 
 
 def _next(summary: SummaryJson) -> str:
@@ -206,10 +203,11 @@ def _cautions(summary: SummaryJson) -> list[Block]:
 
 
 def _sampled(summary: SummaryJson) -> str:
+    effects = listed(summary["effects"]) if summary["effects"] else "none"
     state = "Converged" if summary["converged"] else "Not converged"
     return (
         f"{state} {summary['convergence'].removeprefix('not converged ')}. Likelihood {summary['likelihood']}, history "
-        f"{summary['history']}, law {summary['elastic_law']}, effects {listed(summary['effects'])}; "
+        f"{summary['history']}, law {summary['elastic_law']}, effects {effects}; "
         f"{number(summary['likelihood_evaluations'])} likelihood evaluations."
     )
 
@@ -233,19 +231,17 @@ def _measured(stored: Stored, summary: SummaryJson) -> Points:
     return Points("What was measured", points)
 
 
-def _known(draws: dict[str, Array], shrunk: dict[str, float], sample: Sample, trusted: bool) -> list[Points]:
+def _known(summary: SummaryJson, shrunk: dict[str, float], trusted: bool) -> list[Points]:
     """What the readings determine and what they do not; only the model's own words where it is not to be trusted."""
     known: list[str] = []
     undetermined: list[str] = []
-    for name, share in shrunk.items():
-        unit = _unit(name, sample)
-        interval = f"{name}: {span(*np.quantile(draws[name], [0.05, 0.95]))}{' ' + unit if unit else ''}"
-        (known if share >= MOST else undetermined).append(interval)
+    for name, each in summary["identifiability"].items():
+        (known if shrunk.get(name, 0.0) >= MOST else undetermined).append(each["sentence"])
     if not trusted:
-        return [Points("90 % intervals, if the model were right", known + undetermined)]
+        return [Points("What the readings would determine if the model were right", known + undetermined)]
     nothing = ["No parameter."]
     return [
-        Points("What the readings determine (90 % intervals)", known or nothing),
+        Points("What the readings determine", known or nothing),
         Points("What the prior still decides", undetermined or nothing),
     ]
 

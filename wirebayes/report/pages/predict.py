@@ -22,10 +22,9 @@ from wirebayes.report.blocks import (
     beside_the_answer,
     drawn,
     files_beside,
-    number,
     span,
 )
-from wirebayes.sentences import counted, quantity
+from wirebayes.sentences import counted, number_within, quantity
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control
 
@@ -109,7 +108,7 @@ def _rows(predicted: Prediction) -> Table:
     names = ("hold", SET[control], "time_s", f"q50_{unit}", f"q05_{unit}", f"q95_{unit}")
     columns = [predicted[name].values[:_MOST_ROWS].tolist() for name in names]
     rows = [
-        [str(hold), f"{setting:g}", f"{time:g}", number(middle), span(low, high)]
+        [str(hold), f"{setting:g}", f"{time:g}", number_within(middle, low, high), span(low, high)]
         for hold, setting, time, middle, low, high in zip(*columns, strict=True)
     ]
     read = READ[control].split("_")[0]

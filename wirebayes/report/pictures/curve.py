@@ -177,10 +177,9 @@ def draw_readings(axes: Any, stored: Stored, found: Curve) -> None:
 def _left_over(axes: Any, stored: Stored, found: Curve) -> None:
     x, (j, r) = _places(stored, found)
     width = HALF_90 * found.noise
-    axes.axhspan(-width, width, color=CHAIN, alpha=0.15, lw=0, label="90 % of the readings' own error")
+    axes.axhspan(-width, width, color=CHAIN, alpha=0.15, lw=0)
     axes.axhline(0.0, color=QUIET, lw=0.8)
     axes.plot(x, stored.sample.readings[j, r, 0] - found.at_readings[j, r], "o", color=HOLD, ms=3)
-    axes.legend(frameon=False, fontsize=8.5, loc="best")
 
 
 def _places(stored: Stored, found: Curve) -> tuple[Floats, tuple[Any, Any]]:

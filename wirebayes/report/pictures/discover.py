@@ -153,6 +153,9 @@ def _along(sample: Sample, left: Floats, finding: Disagreement, x: Floats) -> Fi
     axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
     axis.axhline(0.0, color="0.5", lw=0.6)
     axis.set_xlabel(_LABELS[finding["covariate"]])
+    if finding["covariate"] == "direction":
+        axis.set_xticks([-1, 1], ["unloading", "loading"])
+        axis.set_xlim(-2, 2)
     unit = READ_UNIT[sample.protocol.control]
     axis.set_ylabel(f"measured − plain model ({unit})" + (",\nless its hold's mean" if within else ""))
     axis.set_title(sample.name, loc="left", fontsize=9)
@@ -202,7 +205,7 @@ def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
         x = k + 0.1 + 0.8 * time / max(float(sample.protocol.duration_s[j]), 1e-9)
         number = int(sample.protocol.number[j])
         if number in held:
-            axis.axvspan(k, k + 1, color=_HELD, zorder=0, label="held out for the gap" if number == held[0] else None)
+            axis.axvspan(k, k + 1, color=_HELD, zorder=0, label="kept out to test it" if number == held[0] else None)
         first = k == 0
         axis.fill_between(
             x,
@@ -236,7 +239,7 @@ _LABELS = {
     "time in hold": "time in hold (s)",
     "elapsed time": "elapsed time (s)",
     "tension": "tension (N)",
-    "direction": "direction of the last step",
+    "direction": "direction of the last move",
     "temperature": "warming (K)",
     "length": "length (mm)",
 }
