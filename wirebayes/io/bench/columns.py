@@ -276,8 +276,14 @@ def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missin
     if encoding not in ("utf-8", "utf-8-sig") and not " ".join(names).isascii():
         hint = f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"
     place = f"{table.sheet.path}, line {table.header_line}: found no column of"
+    if table.nameless:
+        place = f"{table.sheet.path}, line {table.header_line}: found numbers without a header, and no column of"
+        names = [f"{name} ({cell})" for name, cell in zip(names, table.rows[0].cells, strict=False)]
     options = [_option(table, unread, missed) for missed in missing]
     about_units = " (a unit only where the header has no unit)" if any("HEADER=" in text for text in options) else ""
+    if table.nameless:
+        options = [option.replace("HEADER=", "N=") for option in options]
+        about_units = ", N the number of the column"
     how = f"; say which with {' '.join(options)}{about_units}"
     if not unread and missing == ["displacement"]:  # a record of tension over time
         how = "; to a hold at one displacement add a column with it, the same in every row"

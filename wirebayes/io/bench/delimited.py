@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench import labview, serial_monitor
+from wirebayes.io.bench import keyed_lines, labview, serial_monitor
 from wirebayes.io.bench.decode import UNICODE
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
 
@@ -40,6 +40,8 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     if serial_monitor.is_log(lines):
         sent, arrivals = serial_monitor.without_stamps(lines)
         return serial_monitor.with_arrivals(sheet_of_text(path, "\n".join(sent), encoding), arrivals)
+    if keyed_lines.are_keyed(lines):
+        return keyed_lines.sheet_of_keyed(path, lines, encoding)
     longest = max(range(len(lines)), key=lambda i: len(lines[i]))
     if len(lines[longest]) > LONGEST_LINE:
         found = f"a line of {len(lines[longest])} characters"
@@ -53,16 +55,20 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     best = max(scores, key=lambda sign: scores[sign])
     if not stated and scores[best][0] <= 0.0:
         line = next((i for i, content in enumerate(lines, start=1) if content.strip()), 1)
-        expected = "cells between commas, semicolons, tabs or spaces"
-        cells = [cell for sign in candidates if sign != " " for line in sample for cell in _cells(line, sign)]
-        with_unit = next((cell for cell in cells if _WITH_UNIT.fullmatch(cell)), None)
-        if with_unit is not None:
-            expected = f"numbers alone in the cells, not {with_unit!r}, and their units in the header"
-        raise InputError(f"{path}, line {line}: found no columns of numbers, expected {expected}")
+        raise InputError(f"{path}, line {line}: found no columns of numbers, expected {_wanted(sample)}")
     described = f"{_NAMES.get(best, best)} between cells"
     if encoding in UNICODE:
         return Sheet(path, _rows(lines, best), described=described)
     return Sheet(path, _rows(lines, best), described=f"{described}, {encoding.upper()}", encoding=encoding)
+
+
+def _wanted(lines: list[str]) -> str:
+    """What lines should be that no sign splits into columns of numbers."""
+    cells = [cell for sign in _NAMES if sign != " " for line in lines for cell in _cells(line, sign)]
+    with_unit = next((cell for cell in cells if _WITH_UNIT.fullmatch(cell)), None)
+    if with_unit is None:
+        return "cells between commas, semicolons, tabs or spaces"
+    return f"numbers alone in the cells, not {with_unit!r}, and their units in the header"
 
 
 def _score(lines: list[str], sign: str) -> tuple[float, int, int]:

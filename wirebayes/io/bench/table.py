@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import ROLES, quantity_unit
@@ -34,6 +34,8 @@ class RawTable:
         Whose readings these are, where the file holds several side by side.
     turned : bool
         Whether the file has a column for each hold or time: then its columns are not those of the table.
+    nameless : bool
+        Whether there is no header: then columns are called by their numbers.
     pieces : tuple of (int, str)
         Of several files that were joined: the line after which each begins, and its name.
     """
@@ -46,6 +48,7 @@ class RawTable:
     above: tuple[str, ...] = ()
     specimen: str = ""
     turned: bool = False
+    nameless: bool = False
     pieces: tuple[tuple[int, str], ...] = ()
 
     @property
@@ -122,11 +125,8 @@ def find_table(sheet: Sheet) -> RawTable:
     units: tuple[str, ...] = ()
     if len(above) > 1 and _are_units(above[-1]) and len(above[-2].filled) >= max(2, len(above[-1].filled)):
         units = tuple(cell.strip("[]() ") for cell in above.pop().cells)
-    if not above or not _is_header(above[-1]):
-        raise InputError(
-            f"{sheet.path}, line {rows[first].line}: found numbers without a header above them, expected a line of "
-            "names and units such as displacement [mm], time [s], force [N]"
-        )
+    if not above or not _is_header(above[-1]) or _is_title(above[-1], rows[first : first + _SHOWN]):
+        return _without_header(sheet, first)
     head = above[-1]
     _check_names_are_short(sheet, head)
     width = max(len(head.cells), *(len(row.cells) for row in rows[first : first + _SHOWN]))
@@ -138,6 +138,22 @@ def find_table(sheet: Sheet) -> RawTable:
     _check_width(sheet, head, body, width)
     _check_headers_repeat(sheet, rows[:first], head, body)
     return RawTable(sheet, header, padded, body, head.line, names)
+
+
+def _without_header(sheet: Sheet, first: int) -> RawTable:
+    """Readings without a header: their columns are called by their numbers."""
+    body = tuple(row for row in sheet.rows[first:] if not row.comment)
+    width = max(len(row.cells) for row in body[:_SHOWN])
+    names = tuple(str(column + 1) for column in range(width))
+    unnamed = replace(sheet, described=f"{sheet.described}, no header")
+    return RawTable(unnamed, names, ("",) * width, body, body[0].line, nameless=True)
+
+
+def _is_title(row: SheetRow, readings: Sequence[SheetRow]) -> bool:
+    """Whether a row of words above readings names nothing of them: no quantity, and fewer cells, or a comment's."""
+    widths = [len(reading.cells) for reading in readings]
+    other = len(row.cells) < min(widths) or (row.comment and len(row.cells) > max(widths))
+    return other and not any(map(speaks_of_a_quantity, row.filled))
 
 
 def _is_subheading(row: SheetRow) -> bool:

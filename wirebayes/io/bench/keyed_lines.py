@@ -1,0 +1,76 @@
+"""Lines that name each value, as a microcontroller prints them: ``t=1.2 F=3.4`` or ``Time: 1.2 s, Force: 3.4 N``."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from wirebayes.errors import InputError
+from wirebayes.io.bench.quantities import ROLES, quantity_unit
+from wirebayes.io.bench.sheet import Sheet, SheetRow
+
+FEWEST = 3  # such lines; a preamble of two keys in a line is rarer
+SHARE = 0.5  # of the lines that hold something
+_PAIR = re.compile(
+    r"[\s,;|]*(?P<key>[^\W\d](?:[\w. /-]*[\w)])?)\s*[=:]\s*(?P<value>\d{1,2}:\d\d:\d\d(?:[.,]\d+)?"
+    r"|[+\-\u2212]?\d(?:[\d.,]*\d)?(?:[eE][+-]?\d+)?)(?:\s*(?P<unit>[^\s\d,;|=:]+)(?!\s*[=:]))?(?=[\s,;|]|$)"
+)
+
+
+def _pairs(line: str) -> list[tuple[str, str, str]]:
+    """Key, value and unit of each pair of a line; none where the line is anything else."""
+    found, at = [], 0
+    while line[at:].strip(" \t,;|"):
+        match = _PAIR.match(line, at)
+        if match is None:
+            return []
+        unit, at = match["unit"] or "", match.end()
+        if unit and not any(quantity_unit(unit, role) for role in ROLES):
+            unit, at = "", match.start("unit")  # the next key begins there
+        found.append((match["key"], match["value"], unit))
+    return found if len({key for key, _, _ in found}) == len(found) > 1 else []
+
+
+def are_keyed(lines: Sequence[str]) -> bool:
+    """Whether most lines that hold something are pairs of keys and values, with the same keys."""
+    filled = [line for line in lines if line.strip()]
+    keyed = [pairs for line in filled if (pairs := _pairs(line))]
+    if len(keyed) < max(FEWEST, SHARE * len(filled)):
+        return False
+    shared = set.intersection(*({key for key, _, _ in pairs} for pairs in keyed))
+    return len(shared) > 1
+
+
+def sheet_of_keyed(path: Path, lines: Sequence[str], encoding: str) -> Sheet:
+    """Keys as a header, values as cells under it; other lines as they stand.
+
+    Parameters
+    ----------
+    path : Path
+        Named in messages.
+    lines : sequence of str
+    encoding : str
+        In which it was written.
+
+    Raises
+    ------
+    InputError
+        A key has two units.
+    """
+    units: dict[str, str] = {}
+    read = [_pairs(line) for line in lines]
+    for number, pairs in enumerate(read, start=1):
+        for key, _, unit in pairs:
+            if units.setdefault(key, unit) != unit:
+                found = f"{key} in {unit or 'no unit'}"
+                raise InputError(f"{path}, line {number}: found {found}, expected {units[key] or 'none'} as before")
+    header = tuple(f"{key} [{unit}]" if unit else key for key, unit in units.items())
+    rows = []
+    first = next(number for number, pairs in enumerate(read, start=1) if pairs)
+    for number, (line, pairs) in enumerate(zip(lines, read, strict=True), start=1):
+        if number == first:
+            rows.append(SheetRow(number, header))
+        values = {key: value for key, value, _ in pairs}
+        cells = tuple(values.get(key, "") for key in units) if pairs else (line.strip(),)
+        if any(cells):
+            rows.append(SheetRow(number, cells))
+    return Sheet(path, tuple(rows), described="a name before each value", encoding=encoding)
