@@ -72,3 +72,29 @@ def test_a_batch_says_a_sentence_a_finding_and_no_plural_of_one() -> None:
 def test_times_are_said_in_the_unit_that_people_use() -> None:
     said = [sentences.lasting(seconds) for seconds in (0.5, 59.0, 60.0, 3599.0, 3600.0, 86400.0)]
     assert said == ["0.5 s", "59 s", "1 min", "60 min", "1 h", "24 h"]
+
+
+def test_a_platform_that_cannot_tilt_is_not_said_to_tilt() -> None:
+    def course(last: float) -> dict[str, list[float]]:
+        return {"q05": [0.0, 0.9 * last], "q50": [0.0, last], "q95": [0.0, 1.1 * last]}
+
+    drift = {"times_s": [0.0, 3600.0], "distance_mm": course(4.0), "specimen_spread": 0.05}
+    for tilt, said in (
+        (0.0, "moves by 4.00 mm (3.60 … 4.40) within 1 h of"),
+        (2.0, " and tilts by 2.00 (1.80 … 2.20) deg"),
+    ):
+        pose = {"robot": "r", "feasible": True, "drift": [drift | {"tilt_deg": course(tilt)}]}
+        assert said in headline.pose_in_a_sentence(pose)  # type: ignore[arg-type]
+
+
+def test_a_calibration_says_first_what_became_of_the_exit_points() -> None:
+    known = {"converged": True, "length_m": {"sd": [0.0048, 0.005]}}
+    points = {"sd": [[0.002, 0.003, 0.001], [0.002, 0.002, 0.002]]}
+    found = {"robot": "r", "with_creep_model": known, "read": 30, "holds": 30, "exit_points_m": points}
+    found |= {"prior": {"anchor_sd_mm": 10.0}}
+    assert headline.calibration_in_a_sentence(found) == (  # type: ignore[arg-type]
+        "The exit points of r's 2 wires are known to 1.0 … 3.0 mm (before: 10.0 mm), their zero-tension lengths to "
+        "4.8 … 5.0 mm (standard errors), from 30 of 30 holds."
+    )
+    exact = found | {"exit_points_m": {"sd": [[0.0] * 3] * 2}}
+    assert headline.calibration_in_a_sentence(exact).startswith("The zero-tension lengths of r's 2 wires")  # type: ignore[arg-type]

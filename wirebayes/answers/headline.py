@@ -18,6 +18,7 @@ from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.sentences import (
     counted,
+    lasting,
     likely,
     listed,
     number,
@@ -201,9 +202,10 @@ def pose_in_a_sentence(found: PoseJson) -> str:
     drift = known[-1]
     far, tilt, time = drift["distance_mm"], drift["tilt_deg"], drift["times_s"][-1]
     moved, turned = (quantity(q["q50"][-1], q["q05"][-1], q["q95"][-1], unit) for q, unit in ((far, "mm"), (tilt, "")))
+    tilts = f" and tilts by {turned} degrees" if tilt["q95"][-1] else ""
     return (
-        f"The platform of {found['robot']} moves by {moved} and tilts by {turned} degrees within {number(time)} s of "
-        f"standing still, if {specimens_are(drift['specimen_spread'])}; intervals hold 90 %."
+        f"The platform of {found['robot']} moves by {moved}{tilts} within {lasting(time)} of standing still, "
+        f"if {specimens_are(drift['specimen_spread'])}; intervals hold 90 %."
     )
 
 
@@ -235,7 +237,13 @@ def calibration_in_a_sentence(found: CalibrateJson) -> str:
     if not known["converged"]:
         return "Not converged: there are no lengths to use."
     sd = [1e3 * value for value in known["length_m"]["sd"]]
+    lengths = f"{span(min(sd), max(sd), 2)} mm (standard errors), from {found['read']} of "
+    lengths += f"{counted(found['holds'], 'hold')}."
+    points = 1e3 * np.array(found["exit_points_m"]["sd"], float)
+    if not np.any(points > 0):
+        return f"The zero-tension lengths of {found['robot']}'s {len(sd)} wires are known to {lengths}"
+    before = found["prior"].get("anchor_sd_mm", 0.0)
     return (
-        f"The zero-tension lengths of {found['robot']}'s {len(sd)} wires are known to {span(min(sd), max(sd), 2)} mm "
-        f"(standard errors), from {found['read']} of {counted(found['holds'], 'hold')}."
+        f"The exit points of {found['robot']}'s {len(sd)} wires are known to {span(points.min(), points.max(), 2)} mm "
+        f"(before: {number(before)} mm), their zero-tension lengths to {lengths}"
     )

@@ -32,6 +32,7 @@ from wirebayes.report.pages import pose_history
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pictures.robot import CONTROLLERS
 from wirebayes.robot.mechanics.draws import specimens_in_words
+from wirebayes.sentences import lasting, quantity, specimens_are
 
 _FIRST = 2  # pictures that prove the answer: how far it moves, and how far it turns
 _CAPTIONS = {
@@ -127,25 +128,31 @@ def _answers(pose: PoseJson) -> list[Points]:
         last = entry["times_s"][-1]
         if entry["distance_mm"]["q50"]:
             low, middle, high = (entry["distance_mm"][q][-1] for q in INTERVAL)
-            spread = f"{100 * entry['specimen_spread']:g} %"
-            moved = f"{number(middle)} mm ({span(low, high)})"
-            known.append(f"After {last:g} s the platform has moved {moved}; specimens of one line differ by {spread}.")
+            alike = specimens_are(entry["specimen_spread"])
+            moved = quantity(middle, low, high, "mm")
+            known.append(f"After {lasting(last)} the platform has moved by {moved}, if {alike}.")
     claim = pose.get("claim")
     if claim:
         limits = f"less than {claim['distance_mm']:g} mm and tilts less than {claim['tilt_deg']:g}°"
         for held in claim["holds"]:
-            spread, chance = f"{100 * held['specimen_spread']:g} %", number(held["probability"], 2)
-            known.append(f"It moves {limits} within {claim['time_s']:g} s: probability {chance} (spread {spread}).")
+            chance, alike = _percent(held["probability"]), specimens_are(held["specimen_spread"])
+            known.append(
+                f"It moves {limits} within {lasting(claim['time_s'])} with a probability of {chance}, if {alike}."
+            )
     space = pose.get("workspace")
     if space and claim:
-        moved = f"{number(space['q50_drift_mm'])} mm ({span(space['q05_drift_mm'], space['q95_drift_mm'])})"
+        moved = quantity(space["q50_drift_mm"], space["q05_drift_mm"], space["q95_drift_mm"], "mm")
         known.append(
-            f"Anywhere in the workspace it moves {moved} within {claim['time_s']:g} s, and with probability "
-            f"{number(space['probability'], 2)} stays within both limits."
+            f"Anywhere in the workspace it moves by {moved} within {lasting(claim['time_s'])}, and stays within both "
+            f"limits with a probability of {_percent(space['probability'])}."
         )
     unknown = ["How much specimens of one line differ is assumed, not measured, unless three or more were tested."]
     known = known or ["Nothing: the pose cannot be held."]
     return [Points("What is known", known), Points("What is not known", unknown)]
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.0f} %"
 
 
 def _slices(pose: PoseJson) -> list[Block]:
@@ -171,17 +178,20 @@ def _slices(pose: PoseJson) -> list[Block]:
 
 def _drift(pose: PoseJson) -> list[Block]:
     lines = []
-    for entry in pose.get("drift", []):
+    entries = pose.get("drift", [])
+    turns = any(any(entry["tilt_deg"]["q95"]) or any(entry["from_vertical_deg"]["q95"]) for entry in entries)
+    for entry in entries:
+        bands = [entry["distance_mm"], *([entry["tilt_deg"], entry["from_vertical_deg"]] if turns else [])]
         for i, time in enumerate(entry["times_s"]):
             if entry["distance_mm"]["q50"] and time > 0:
                 cells = []
-                for band in (entry["distance_mm"], entry["tilt_deg"], entry["from_vertical_deg"]):
+                for band in bands:
                     low, middle, high = (band[q][i] for q in INTERVAL)
                     cells += [number(middle), span(low, high)]
                 lines.append([f"{100 * entry['specimen_spread']:g} %", f"{time:g}", *cells])
-    header = ["specimen spread", "after, s", "moved, mm", "90 %", "tilt, degrees", "90 %"]
-    header += ["from vertical, degrees", "90 %"]
-    caption = "Tilt: angle of the platform's normal to the commanded one; beside it, to the vertical. "
+    header = ["specimen spread", "after, s", "moved, mm", "90 %"]
+    header += ["tilt, degrees", "90 %", "from vertical, degrees", "90 %"] if turns else []
+    caption = "Tilt: angle of the platform's normal to the commanded one; beside it, to the vertical. " if turns else ""
     return [Table(header, lines, caption + "Draws whose platform falls are left out.")] if lines else []
 
 
