@@ -7,6 +7,7 @@ import numpy as np
 
 from wirebayes.discovery.settings import HOLD_LENGTHS, TIME_LENGTHS
 from wirebayes.numeric.evenly import evenly
+from wirebayes.numeric.rows import rows_of
 from wirebayes.numeric.typing import Array, Ints
 from wirebayes.wire.protocol import Protocol
 
@@ -35,7 +36,7 @@ class _Readings:
 
     def rows(self, which: Ints) -> "_Readings":
         """Some of them."""
-        return _Readings(self.hold[which], self.place[which], self.time[which])
+        return rows_of(self, which)
 
 
 _Covariance = Callable[[_Readings, _Readings], Array]

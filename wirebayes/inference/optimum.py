@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from wirebayes.numeric.rows import rows_of
 from wirebayes.numeric.typing import Array, Bools, Ints
 
 LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
@@ -34,7 +35,7 @@ class Optimum:
 
     def rows(self, which: Any) -> "Optimum":
         """Some of them, by number or mask."""
-        return Optimum(self.z[which], self.log_density[which], self.curvature[which], self.converged[which])
+        return rows_of(self, which)
 
     @property
     def covariance(self) -> Array:

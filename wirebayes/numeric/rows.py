@@ -1,8 +1,16 @@
 """Rows of arrays, picked."""
 
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
 import numpy as np
 
 from wirebayes.numeric.typing import Array, Bools
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Record = TypeVar("Record", bound="DataclassInstance")
 
 
 def chosen_rows(first: Bools, one: Array, other: Array) -> Array:
@@ -15,3 +23,15 @@ def chosen_rows(first: Bools, one: Array, other: Array) -> Array:
     one, other : (n, ...) arrays
     """
     return np.where(first.reshape(-1, *[1] * (one.ndim - 1)), one, other)
+
+
+def rows_of(record: Record, rows: Any) -> Record:
+    """A dataclass of arrays ``(n, ...)`` with some rows of each, by number or mask."""
+    return replace(record, **{f.name: getattr(record, f.name)[rows] for f in fields(record)})
+
+
+def columns_of(record: Record, columns: Any) -> Record:
+    """A dataclass of arrays ``(..., n)`` with some columns of each, by number or mask; what has a `part` is asked."""
+    values = {f.name: getattr(record, f.name) for f in fields(record)}
+    parts = {name: v[..., columns] if isinstance(v, np.ndarray) else v.part(columns) for name, v in values.items()}
+    return replace(record, **parts)

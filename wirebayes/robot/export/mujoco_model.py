@@ -13,6 +13,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from wirebayes.numeric.typing import Floats
+from wirebayes.robot.export.robot_models import spaced
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 
@@ -52,19 +53,19 @@ def mjcf(
     if towards_m is None:
         towards_m = robot.home_m + robot.platform_m @ turn.T
     radius, axis = wheels(robot)
-    exits = "".join(f'<site name="exit{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.exit_m - radius * axis))
+    exits = "".join(f'<site name="exit{i}" pos="{spaced(p)}"/>' for i, p in enumerate(robot.exit_m - radius * axis))
     pulleys = "".join(
         _rim(int(i), robot.exit_m[i], float(radius[i, 0]), axis[i], towards_m[i]) for i in np.flatnonzero(radius[:, 0])
     )
-    points = "".join(f'<site name="point{i}" pos="{_row(p)}"/>' for i, p in enumerate(robot.platform_m))
+    points = "".join(f'<site name="point{i}" pos="{spaced(p)}"/>' for i, p in enumerate(robot.platform_m))
     tendons = _tendons(robot, k1_N, zero_m, offset_m, radius[:, 0])
     comment = "".join(f"<!-- {text.replace('--', '- -')} -->" for text in (remark, _STILL if pulleys else "") if text)
-    inertia = _row(np.full(3, m * arm2))
+    inertia = spaced(np.full(3, m * arm2))
     return (
         f'<mujoco model={quoteattr(robot.name)}>{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
         f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}'
-        f'<body pos="{_row(robot.home_m)}" quat="{_row(_quaternion(robot.home_rotation_rad))}">{joints}'
-        f'<inertial pos="{_row(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
+        f'<body pos="{spaced(robot.home_m)}" quat="{spaced(_quaternion(robot.home_rotation_rad))}">{joints}'
+        f'<inertial pos="{spaced(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
         f"</body>{pulleys}</worldbody><tendon>{tendons}</tendon></mujoco>\n"
     )
 
@@ -89,9 +90,9 @@ def _joints(robot: Robot, turn: Floats, damping_N_s_m: float) -> str:
         axes = np.linalg.svd(np.eye(3) - np.outer(normal, normal))[2][:2]
         if np.abs(normal).max() == 1.0:  # along an axis: the others are the plane's
             axes = np.eye(3)[normal == 0]
-        about = f'<joint type="hinge" axis="{_row(normal @ turn)}" damping="{damping_N_s_m * robot.size_m**2!r}"/>'
+        about = f'<joint type="hinge" axis="{spaced(normal @ turn)}" damping="{damping_N_s_m * robot.size_m**2!r}"/>'
     slides = "".join(
-        f'<joint type="slide" axis="{_row(axis @ turn)}" ref="{float(axis @ robot.home_m)!r}" '
+        f'<joint type="slide" axis="{spaced(axis @ turn)}" ref="{float(axis @ robot.home_m)!r}" '
         f'damping="{damping_N_s_m!r}"/>'
         for axis in axes
     )
@@ -112,9 +113,9 @@ def _rim(i: int, exit_m: Floats, radius: float, axis: Floats, towards_m: Floats)
     line = towards_m - exit_m
     outward = line - (line @ axis) * axis
     outward = outward / np.linalg.norm(outward)
-    frame = _row(np.concatenate([outward, np.cross(axis, outward)]))
+    frame = spaced(np.concatenate([outward, np.cross(axis, outward)]))
     return (
-        f'<body name="pulley{i}" pos="{_row(exit_m)}" xyaxes="{frame}">'
+        f'<body name="pulley{i}" pos="{spaced(exit_m)}" xyaxes="{frame}">'
         f'<geom name="rim{i}" type="cylinder" size="{radius!r} {0.2 * radius!r}" pos="{radius!r} 0 0" '
         f'zaxis="0 1 0" contype="0" conaffinity="0"/><site name="side{i}" pos="{radius!r} 0 {2 * radius!r}"/></body>'
     )
@@ -128,7 +129,3 @@ def _quaternion(rotation_vector_rad: Floats) -> Floats:
 
 def _wrapped(i: int) -> str:
     return f'<geom geom="rim{i}" sidesite="side{i}"/>'
-
-
-def _row(values: Floats) -> str:
-    return " ".join(repr(float(v)) for v in values)

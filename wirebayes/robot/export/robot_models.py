@@ -36,14 +36,14 @@ def urdf(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> str:
             '  <link name="world"/>',
             '  <link name="platform">',
             "    <inertial>",
-            f'      <origin xyz="{_row(robot.centre_of_mass_m)}" rpy="0 0 0"/>',
+            f'      <origin xyz="{spaced(robot.centre_of_mass_m)}" rpy="0 0 0"/>',
             f'      <mass value="{robot.mass_kg!r}"/>',
             f"      <inertia {moments}/>",
             "    </inertial>",
             "  </link>",
             '  <joint name="floating" type="floating">',
             '    <parent link="world"/><child link="platform"/>',
-            f'    <origin xyz="{_row(robot.home_m)}" rpy="{_row(_roll_pitch_yaw(robot))}"/>',
+            f'    <origin xyz="{spaced(robot.home_m)}" rpy="{spaced(_roll_pitch_yaw(robot))}"/>',
             "  </joint>",
             *links,
             *joints,
@@ -72,9 +72,9 @@ def sdf(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> str:
             *(f"  <!-- {line} -->" for line in _left_out(robot, stiffness_N, zero_m)),
             f"  <model name={quoteattr(robot.name)}>",
             '    <link name="platform">',
-            f"      <pose>{_row(robot.home_m)} {_row(_roll_pitch_yaw(robot))}</pose>",
+            f"      <pose>{spaced(robot.home_m)} {spaced(_roll_pitch_yaw(robot))}</pose>",
             "      <inertial>",
-            f"        <pose>{_row(robot.centre_of_mass_m)} 0 0 0</pose>",
+            f"        <pose>{spaced(robot.centre_of_mass_m)} 0 0 0</pose>",
             f"        <mass>{robot.mass_kg!r}</mass>",
             f"        <inertia>{moments}</inertia>",
             "      </inertial>",
@@ -129,12 +129,12 @@ def _left_out(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> list[str]:
 def _fixed(parent: str, child: str, origin_m: Floats) -> str:
     return (
         f'  <joint name="{child}_fixed" type="fixed"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{_row(origin_m)}" rpy="0 0 0"/></joint>'
+        f'<origin xyz="{spaced(origin_m)}" rpy="0 0 0"/></joint>'
     )
 
 
 def _frame(attached_to: str, name: str, origin_m: Floats) -> str:
-    return f'    <frame name="{name}" attached_to="{attached_to}"><pose>{_row(origin_m)} 0 0 0</pose></frame>'
+    return f'    <frame name="{name}" attached_to="{attached_to}"><pose>{spaced(origin_m)} 0 0 0</pose></frame>'
 
 
 def _roll_pitch_yaw(robot: Robot) -> Floats:
@@ -148,5 +148,6 @@ def _legs(robot: Robot) -> range:
     return range(1, robot.legs + 1)
 
 
-def _row(values: Floats) -> str:
+def spaced(values: Floats) -> str:
+    """Numbers to the last digit, as XML wants them."""
     return " ".join(repr(float(v)) for v in values)

@@ -60,14 +60,11 @@ def tilt(rotation: Floats, commanded: Floats | None = None) -> Floats:
 
 def compose(increment_rad: Floats, rotation: Floats) -> Floats:
     """Batch-last: ``exp(increment)`` times the rotation, ``(3, n)`` and ``(3, 3, n)`` arrays."""
-    x, y, z = increment_rad
-    angle2 = x * x + y * y + z * z
+    angle2 = (increment_rad**2).sum(0)
     angle = np.sqrt(angle2)
-    a = np.sinc(angle / np.pi)
-    b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    turn = np.empty((3, 3, *x.shape))
-    turn[0, 0], turn[1, 1], turn[2, 2] = 1 - b * (y * y + z * z), 1 - b * (x * x + z * z), 1 - b * (x * x + y * y)
-    turn[0, 1], turn[1, 0] = b * x * y - a * z, b * x * y + a * z
-    turn[0, 2], turn[2, 0] = b * x * z + a * y, b * x * z - a * y
-    turn[1, 2], turn[2, 1] = b * y * z - a * x, b * y * z + a * x
-    return np.asarray((turn[:, :, None] * rotation[None]).sum(1))
+    sine = np.sinc(angle / np.pi)
+    cosine = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    crossed = np.moveaxis(cross_matrix(increment_rad.T), 0, -1)
+    along = increment_rad[:, None] * increment_rad
+    turn = np.eye(3)[..., None] * (1 - cosine * angle2) + sine * crossed + cosine * along
+    return np.einsum("ikn,kjn->ijn", turn, rotation)

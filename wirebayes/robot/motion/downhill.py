@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from wirebayes.numeric import cholesky
+from wirebayes.numeric.rows import columns_of
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
@@ -144,19 +145,7 @@ class _Cases:
     span: Floats
 
     def part(self, keep: Indices) -> "_Cases":
-        return _Cases(
-            number=self.number[keep],
-            wires=self.wires.part(keep),
-            zero=self.zero[:, keep],
-            offset=self.offset[:, keep],
-            x=self.x[:, keep],
-            R=self.R[..., keep],
-            at=self.at.part(keep),
-            damping=self.damping[keep],
-            level=self.level[keep],
-            floor=self.floor[keep],
-            span=self.span[keep],
-        )
+        return columns_of(self, keep)
 
     def moved(self, accept: Bools, x: Floats, R: Floats, new: "_Point") -> "_Cases":
         """The cases at new places where these are accepted."""
@@ -315,7 +304,7 @@ class _Point:
         return _Point(*(np.where(accept, getattr(other, f.name), getattr(self, f.name)) for f in fields(_Point)))
 
     def part(self, keep: Indices) -> "_Point":
-        return _Point(*(getattr(self, f.name)[..., keep] for f in fields(_Point)))
+        return columns_of(self, keep)
 
 
 def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, scale: Floats) -> _Point:

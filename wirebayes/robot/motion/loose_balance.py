@@ -79,8 +79,9 @@ def null_space(matrix: Floats) -> Floats:
 def vector_by_turn(vector: Floats) -> Floats:
     """(n, 3, 3) Change of rotation vectors (n, 3) by small turns in the world: the inverse left Jacobian of SO(3)."""
     angle = np.linalg.norm(vector, axis=-1)[:, None, None]
-    half = 0.5 * angle
-    safe = np.where(angle > 1e-4, angle, 1.0)
-    share = np.where(angle > 1e-4, (1.0 - half / np.tan(np.where(angle > 1e-4, half, 1.0))) / safe**2, 1.0 / 12.0)
+    turned = angle > 1e-4
+    safe = np.where(turned, angle, 1.0)
+    half = 0.5 * safe
+    share = np.where(turned, (1.0 - half / np.tan(half)) / safe**2, 1.0 / 12.0)
     k = turning.cross_matrix(vector)
     return np.asarray(np.eye(3) - 0.5 * k + share * (k @ k))

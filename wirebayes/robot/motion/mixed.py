@@ -6,11 +6,12 @@ finite elements. Which wires are taut is found with each step: about a pose the 
 displacement, whose minimum Newton's method finds in as many steps as sets of taut wires are passed.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from wirebayes.numeric import cholesky
+from wirebayes.numeric.rows import columns_of
 from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
@@ -86,7 +87,7 @@ class _Quadratic:
     slope: Floats
 
     def part(self, rows: Indices) -> "_Quadratic":
-        return _Quadratic(*(getattr(self, f.name)[..., rows] for f in fields(_Quadratic)))
+        return columns_of(self, rows)
 
     def tensions(self, move: Floats) -> Floats:
         """(w, n) below zero where a wire is slack."""

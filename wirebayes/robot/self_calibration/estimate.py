@@ -10,8 +10,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from wirebayes.numeric.linear_algebra import inv, solve
-from wirebayes.numeric.rows import chosen_rows
-from wirebayes.numeric.typing import Bools, Floats, Indices
+from wirebayes.numeric.rows import chosen_rows, rows_of
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.progress import ShareDone
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Poses, Robot
@@ -187,7 +187,7 @@ def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mo
         target.progress(taken / iterations)
         open_ = np.flatnonzero(~ended & moved)  # where a step failed, the derivatives stay: they are the work
         if len(open_):
-            J[open_] = target.derivatives(white[open_], _part(here, open_))[0]
+            J[open_] = target.derivatives(white[open_], rows_of(here, open_))[0]
         normal = np.swapaxes(J, 1, 2) @ J + np.eye(d)
         slope = np.einsum("mrd,mr->md", J, target.readings - here.readings) - white
         # What a whole step could still gain in twice the log posterior: below a thousandth, the mode is reached.
@@ -292,7 +292,3 @@ def derivatives(
 def _pick(first: Bools, a: PredictedSession, b: PredictedSession) -> PredictedSession:
     both = {f.name: chosen_rows(first, getattr(a, f.name), getattr(b, f.name)) for f in fields(PredictedSession)}
     return PredictedSession(**both)
-
-
-def _part(p: PredictedSession, rows: Indices) -> PredictedSession:
-    return PredictedSession(**{f.name: getattr(p, f.name)[rows] for f in fields(PredictedSession)})
