@@ -117,7 +117,8 @@ def _understood(e: Experiment) -> Understood:
     """What the files say, as plain values."""
     holds = [_hold(hold) for hold in e.holds]
     recorded = e.recorded_holds
-    temperatures = [hold.temperature_C for hold in recorded if hold.temperature_C is not None]
+    measured = [hold.temperature_C for hold in recorded if hold.temperature_C is not None]
+    temperatures = np.concatenate([[], *measured])
     found: Understood = {
         "material": e.material,
         "length_mm": e.length_mm,
@@ -128,9 +129,7 @@ def _understood(e: Experiment) -> Understood:
         "unrecorded_holds": len(e.holds) - len(recorded),
         "readings": sum(hold.time_s.size for hold in recorded),
         "duration_s": sum(hold.duration_s for hold in e.holds),
-        "temperature_C": [float(min(map(np.min, temperatures))), float(max(map(np.max, temperatures)))]
-        if temperatures
-        else None,
+        "temperature_C": [float(temperatures.min()), float(temperatures.max())] if temperatures.size else None,
     }
     return in_unit(found, READ_UNIT[e.control])
 

@@ -5,7 +5,7 @@ other parameters, with the amplitudes integrated out, and each of its draws is c
 together, a draw of the whole posterior.
 """
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.random import Generator
 
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
+from wirebayes.model.sample import Sample
 from wirebayes.numeric import linear_algebra
 from wirebayes.numeric.distributions import Normal, ours
 from wirebayes.numeric.typing import Array
@@ -138,18 +139,16 @@ def integrated(problem: Problem) -> Problem:
     That are those of effects that only add to the reading, if no other effect comes after them and their priors are
     normal.
     """
-    last = {e.key: e for s in problem.samples for e in s.model.at("reading")[-1:] if e.adds}
-    gone = [c for e in last.values() for c in e.columns() if c in problem.names]
-    priors = [ours(problem.prior.distributions[c]) for c in gone]
+    last = {effect.key: effect for sample in problem.samples for effect in sample.model.at("reading")[-1:]}
+    additive = {key: effect for key, effect in last.items() if effect.adds}
+    gone = [column for effect in additive.values() for column in effect.columns() if column in problem.names]
+    priors = [ours(problem.prior.distributions[column]) for column in gone]
     if not gone or problem.likelihood != "chain" or not all(isinstance(p, Normal) for p in priors):
         return problem
     shapes = [_shapes(problem, i, gone) for i in range(len(problem.samples))]
     shows = np.any([(s != 0).any(axis=(0, 1)) for s in shapes], axis=0)
     left = {name: d for name, d in problem.prior.distributions.items() if name not in gone}
-    samples = tuple(
-        replace(s, model=replace(s.model, effects=tuple(e for e in s.model.effects if e.key not in last)))
-        for s in problem.samples
-    )
+    samples = tuple(_without(sample, additive) for sample in problem.samples)
     return MarginalisedProblem(
         samples,
         replace(problem.prior, distributions=left),
@@ -163,6 +162,11 @@ def integrated(problem: Problem) -> Problem:
         mean=np.array([p.mean() for p in priors])[shows],
         sd=np.array([p.std() for p in priors])[shows],
     )
+
+
+def _without(sample: Sample, effects: Container[str]) -> Sample:
+    kept = tuple(effect for effect in sample.model.effects if effect.key not in effects)
+    return replace(sample, model=replace(sample.model, effects=kept))
 
 
 def completed(problem: Problem, theta: Array, rng: Generator) -> tuple[Problem, Array, Array]:

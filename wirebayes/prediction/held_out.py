@@ -65,15 +65,12 @@ class Scores:
     def coverage(self) -> dict[float, float]:
         """Share of readings inside each central interval."""
         ends = dict(zip(QUANTILES, self.quantiles_N, strict=True))
-        return {
-            level: float(
-                np.mean(
-                    (self.observed_N >= ends[round(0.5 - level / 2, 4)])
-                    & (self.observed_N <= ends[round(0.5 + level / 2, 4)])
-                )
-            )
-            for level in LEVELS
-        }
+        shares = {}
+        for level in LEVELS:
+            low, high = (ends[round(0.5 + sign * level / 2, 4)] for sign in (-1, 1))
+            inside = (low <= self.observed_N) & (self.observed_N <= high)
+            shares[level] = float(inside.mean())
+        return shares
 
 
 @dataclass(frozen=True)
@@ -118,26 +115,29 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
     if not requested.any():
         raise ValueError(f"{experiment.name}: all {trained} holds were trained on")
     tension = experiment.readings()
-    nothing = np.full(len(requested), np.nan)
     past = int(here.protocol.recorded.sum())
-    free = None
-    if problem.likelihood == "chain":
-        drawn = draw_predictive(problem, theta, here, PredictionRequest(whole, trained, requested, nothing), rng)
-        elpd, elpd_given, together = _chain_scores(fitted, experiment, sample, requested)
-        free = _scores(drawn, whole.mask & requested[:, None], whole.number, whole.time_s, tension, elpd, together)
-        # Each hold given its own first reading alone, as the paper's figures were made.
-        for j in np.flatnonzero(requested):
-            only = np.arange(len(requested)) == j
-            request = PredictionRequest(whole, trained, only, np.where(only, tension[:, 0], np.nan))
-            drawn = given_first(drawn, request)
-    else:
-        drawn = draw_predictive(problem, theta, here, PredictionRequest(whole, trained, requested, tension[:, 0]), rng)
-        elpd_given = _hold_scores(fitted, experiment, sample, requested)
-    later = whole.mask & requested[:, None]
+    unseen = whole.mask & requested[:, None]
+    later = unseen.copy()
     later[:, 0] = False
-    return HeldOutPrediction(
-        experiment.name, past, free, _scores(drawn, later, whole.number, whole.time_s, tension, elpd_given, np.nan)
-    )
+
+    def predicted(given_N: Array) -> Array:
+        return draw_predictive(problem, theta, here, PredictionRequest(whole, trained, requested, given_N), rng)
+
+    def scored(drawn: Array, rows: Bools, elpd: Array, together: float = np.nan) -> Scores:
+        return _scores(drawn, rows, whole.number, whole.time_s, tension, elpd, together)
+
+    if problem.likelihood == "hold":
+        elpd = _hold_scores(fitted, experiment, sample, requested)
+        return HeldOutPrediction(experiment.name, past, None, scored(predicted(tension[:, 0]), later, elpd))
+    drawn = predicted(np.full(len(requested), np.nan))
+    elpd, elpd_given, together = _chain_scores(fitted, experiment, sample, requested)
+    free = scored(drawn, unseen, elpd, together)
+    # Each hold given its own first reading alone, as the paper's figures were made.
+    for j in np.flatnonzero(requested):
+        only = np.arange(len(requested)) == j
+        request = PredictionRequest(whole, trained, only, np.where(only, tension[:, 0], np.nan))
+        drawn = given_first(drawn, request)
+    return HeldOutPrediction(experiment.name, past, free, scored(drawn, later, elpd_given))
 
 
 def _scores(

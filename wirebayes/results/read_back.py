@@ -61,24 +61,10 @@ class Stored:
     @property
     def problem(self) -> Problem:
         """A problem whose columns are the stored draws (its prior is not known any more)."""
-        model = Model(
-            self.sample.model.law, self.sample.model.history, self.sample.model.effects, self.sample.model.tension_ref_N
-        )
+        own_length = replace(self.sample.model, length_ref_mm=0.0)
+        sample = replace(self.sample, model=own_length)
         names: dict[str, Any] = dict.fromkeys(self.draws)
-        return Problem(
-            (
-                Sample(
-                    self.sample.name,
-                    self.sample.material,
-                    self.sample.protocol,
-                    self.sample.readings,
-                    self.sample.resolution,
-                    model,
-                ),
-            ),
-            Prior(names, {}, frozenset()),
-            self.likelihood,  # type: ignore[arg-type]
-        )
+        return Problem((sample,), Prior(names, {}, frozenset()), self.likelihood)  # type: ignore[arg-type]
 
     @property
     def theta(self) -> Array:

@@ -86,10 +86,8 @@ class Ridge:
 
     def log_creep(self, theta: Array) -> Array:
         """(n,) log G: root mean square of the elongation gained in a hold, for B = 1, at natural parameters (n, d)."""
-        U, k2, N = (self.get(theta, name) for name in ("U", "k2", "N"))
-        reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
-        mean, apart = self._tensions
-        drive = np.exp(U * apart)
+        mean = self._tensions[0]
+        drive, reached = self._drive(theta), self._reached(theta)
         if compiled.kernel is not None and not self.effects:
             # of parameters that are fixed there is one column
             every, share = (
@@ -99,16 +97,22 @@ class Ridge:
         else:
             square = (self._gained(drive, reached, theta) ** 2).sum(axis=0)
         # the floor keeps the logarithm finite
-        return np.asarray(U * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
+        return np.asarray(self.get(theta, "U") * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
 
     def log_total(self, theta: Array, holds: int) -> Array:
         """(n,) log of the elongation gained in the first holds together over the root mean square of all holds."""
-        U, k2, N = (self.get(theta, name) for name in ("U", "k2", "N"))
-        reached = -np.expm1(-k2 * self.times_s[:, None] ** N)
-        gained = self._gained(np.exp(U * self._tensions[1]), reached, theta)
+        gained = self._gained(self._drive(theta), self._reached(theta), theta)
         total = gained[:holds].sum(axis=0)
         square = (gained**2).mean(axis=0)
         return np.asarray(np.log(np.maximum(total, 1e-150)) - 0.5 * np.log(np.maximum(square, 1e-300)))
+
+    def _drive(self, theta: Array) -> Array:
+        """What the creep of each hold aims at beside that at the mean tension."""
+        return np.exp(self.get(theta, "U") * self._tensions[1])
+
+    def _reached(self, theta: Array) -> Array:
+        """The share of it that is reached at each of the times."""
+        return -np.expm1(-self.get(theta, "k2") * self.times_s[:, None] ** self.get(theta, "N"))
 
     def _gained(self, drive: Array, reached: Array, theta: Array) -> Array:
         """(H, n) elongation gained in each hold, whose squares `compiled.kernel.square_gained` sums.

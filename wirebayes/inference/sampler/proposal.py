@@ -164,14 +164,11 @@ def fit_proposal(
     straight = transport_map.fit_map(hot if along_tails and not elsewhere else cold, order)
     near, far = (replace(each, z=straight.forward(each.z)[0]) for each in (cold, hot))
     far, plain = far.thinned(points // 2, rng), hot.thinned(points // 2, rng)
-    return Proposal(
-        shares,
-        straight,
-        mixture.fit_mixture(near, rng, most=most, degrees=LIGHT_DEGREES, before=before.close if before else None),
-        mixture.fit_mixture(far, rng, most=most // 2, before=before.wide if before else None),
-        mixture.fit_mixture(plain, rng, most=most // 2, before=before.plain if before else None),
-        start,
-    )
+    old_close, old_wide, old_plain = (before.close, before.wide, before.plain) if before else (None, None, None)
+    close = mixture.fit_mixture(near, rng, most=most, degrees=LIGHT_DEGREES, before=old_close)
+    wide = mixture.fit_mixture(far, rng, most=most // 2, before=old_wide)
+    as_it_is = mixture.fit_mixture(plain, rng, most=most // 2, before=old_plain)
+    return Proposal(shares, straight, close, wide, as_it_is, start)
 
 
 def with_excess(of: Proposal, drawn: WeightedPoints, value: Array, rng: Generator) -> Proposal:

@@ -109,9 +109,9 @@ def worth_a_new_start(state: Sampling) -> bool:
     """
     assert state.diagnostics is not None
     known, least = state.learned, state.diagnostics.ess.min()
-    return bool(
-        known.lost and known.again < MOST_AGAIN or known.again < FOR_MORE and least < POOR * state.all_kept.evaluations
-    )
+    lost = known.lost and known.again < MOST_AGAIN
+    poor = known.again < FOR_MORE and least < POOR * state.all_kept.evaluations
+    return bool(lost or poor)
 
 
 def worth_refining(state: Sampling, policy: Policy) -> bool:
@@ -123,9 +123,9 @@ def worth_refining(state: Sampling, policy: Policy) -> bool:
     known, least = state.learned, state.diagnostics.ess.min()
     going_on = state.all_kept.evaluations * (policy.ess / least - 1.0)
     wanted = policy.ess - (0.0 if slow_at_first(state, policy) else least)
-    promising = going_on > wanted / USUAL + policy.round_draws
     needed = known.again < MOST_AGAIN and known.overlooked > 0.0
-    return bool(known.trusted and (needed or known.again < FOR_MORE and promising))
+    promising = known.again < FOR_MORE and going_on > wanted / USUAL + policy.round_draws
+    return bool(known.trusted and (needed or promising))
 
 
 def slow_at_first(state: Sampling, policy: Policy) -> bool:

@@ -296,34 +296,28 @@ def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: Gener
     near_m = 1e-6 * robot.span_m
     stable = bool(here.found[0]) and bool(np.abs(here.position_m[0] - x).max() < near_m)
     found = equilibria.equilibria(robot, mean, *lengths, rng, known=(x, R))
-    own = (
-        np.maximum(np.abs(found.position_m - x).max(1), robot.size_m * np.abs(found.rotation - R).max((1, 2))) < near_m
-    )
-    poses: list[EquilibriumPose] = [
-        {
-            "position_m": p,
-            "rotation_vector_rad": v,
-            "slack_wires": int((t <= 0).sum()),
-            "commanded": bool(c),
-            "stable": True,
-        }
-        for p, v, t, c in zip(found.position_m, turning.vector(found.rotation), found.tension_N, own, strict=True)
-    ]
+    moved = np.abs(found.position_m - x).max(1)
+    turned = robot.size_m * np.abs(found.rotation - R).max((1, 2))
+    own = np.maximum(moved, turned) < near_m
+    each = zip(found.position_m, found.rotation, found.tension_N, own, strict=True)
+    poses = [_equilibrium(*one, stable=True) for one in each]
     if not own.any():
-        poses.append(
-            {
-                "position_m": x,
-                "rotation_vector_rad": turning.vector(R[None])[0],
-                "slack_wires": int((tau[0] <= 0).sum()),
-                "commanded": True,
-                "stable": False,
-            }
-        )
+        poses.append(_equilibrium(x, R, tau[0], True, stable=False))
     return {
         "stable_found": len(found.position_m),
         "starts": 65,
         "commanded_stable": stable,
         "poses": poses,
+    }
+
+
+def _equilibrium(x: Floats, R: Floats, tension_N: Floats, commanded: bool, *, stable: bool) -> EquilibriumPose:
+    return {
+        "position_m": x,
+        "rotation_vector_rad": turning.vector(R[None])[0],
+        "slack_wires": int((tension_N <= 0).sum()),
+        "commanded": bool(commanded),
+        "stable": stable,
     }
 
 

@@ -71,31 +71,34 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
     home = robot.home_rotation_rad
     asked = np.full(3, np.nan) if asked_rad is None else asked_rad
     near = turning.matrix(np.where(np.isfinite(asked), asked, home))
-    whole = asked_rad is None or bool(np.isfinite(asked).all())
     clear = _clear(robot, position_m, near)
-    if robot.freedom == "position" and clear and robot.plane is None and not _held(robot, position_m, near):
-        return _nowhere(robot, position_m, near)
-    given = robot.freedom == "position" or not clear
-    if given or (whole and not robot.is_underactuated and (np.isfinite(asked).all() or _held(robot, position_m, near))):
+    if robot.freedom == "position":
+        in_space = clear and robot.plane is None
+        nowhere = in_space and not _held(robot, position_m, near)
+        return _nowhere(robot, position_m, near) if nowhere else Orientation(position_m, near)
+    fully_asked = bool(np.isfinite(asked).all())
+    commanded = not robot.is_underactuated and (fully_asked or (asked_rad is None and _held(robot, position_m, near)))
+    if commanded or not clear:
         return Orientation(position_m, near)
+    had = np.isfinite(asked)
     found = hanging.hang(robot, position_m[None], near, asked)
     if not found.held[0]:
         position_m = _cleared(robot, position_m, near)
-    x = position_m[None]
-    had = np.isfinite(asked)
-    if not found.held[0]:
-        found = hanging.hang(robot, x, near)
+        found = hanging.hang(robot, position_m[None], near)
         if not found.held[0]:
             return _nowhere(robot, position_m, near)
-        had = _to_be_had(hanging.chosen(robot, position_m, found.rotation[0], found.tension_N[0]), had)
+        choice = hanging.chosen(robot, position_m, found.rotation[0], found.tension_N[0])
+        had = _to_be_had(choice, had)
         if had.any():
-            part = hanging.hang(robot, x, near, np.where(had, asked, np.nan))
+            part = hanging.hang(robot, position_m[None], near, np.where(had, asked, np.nan))
             if not part.held[0]:
                 return Orientation(position_m, near, None, _out_of_reach(asked, had, found))
             found = part
     there = _described(robot, position_m, found, asked, had)
-    meant = asked_rad is None and not (robot.is_underactuated and np.any(position_m != robot.home_m))
-    return replace(there, turned_away=tuple(turned_away(robot, there.rotation))) if meant else there
+    balance_decides = robot.is_underactuated and np.any(position_m != robot.home_m)
+    if asked_rad is not None or balance_decides:
+        return there
+    return replace(there, turned_away=tuple(turned_away(robot, there.rotation)))
 
 
 def by_lines(robot: Robot, rotation: Floats) -> OrientationFound:

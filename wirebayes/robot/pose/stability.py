@@ -20,20 +20,24 @@ def summary(course: Course) -> FallsReport:
     began = np.isfinite(falls.stiffness_share) if falls is not None else np.zeros(0, bool)
     if falls is None or not began.any():
         return {"began": 0.0}
-    fell, slack = falls.fell[began], np.isfinite(falls.slack_s[began])
-    drop = falls.drop_m[began][fell]
+    fell, fell_at_s = falls.fell[began], falls.time_s[began]
+    slack_s = falls.slack_s[began]
+    slack = np.isfinite(slack_s)
+    drop_m = falls.drop_m[began][fell]
+    caught = np.isfinite(drop_m)
     holds = began & ~falls.fell  # margins mean something where there is a hold to lose
-    lowest = np.where(np.isfinite(falls.tension_share), falls.tension_share, np.inf)[holds].min(axis=1, initial=np.inf)
+    tension_share = falls.tension_share[holds]
+    lowest = np.where(np.isfinite(tension_share), tension_share, np.inf).min(axis=1, initial=np.inf)
     return {
         "began": float(began.mean()),
         "fall_probability": float(fell.mean()),
-        "fall_probability_at": (falls.time_s[began][:, None] <= course.times_s).mean(0),
-        "fall_time_s": _spread(falls.time_s[began][fell]),
+        "fall_probability_at": (fell_at_s[:, None] <= course.times_s).mean(0),
+        "fall_time_s": _spread(fell_at_s[fell]),
         "fall_wires": _by_wire(falls.wire[began][fell], course.tension_N.shape[-1], len(fell)),
-        "fall_distance_mm": _spread(1e3 * drop[np.isfinite(drop)]),
-        "caught_probability": float(np.isfinite(drop).mean()) if fell.any() else None,
+        "fall_distance_mm": _spread(1e3 * drop_m[caught]),
+        "caught_probability": float(caught.mean()) if fell.any() else None,
         "slack_probability": slack.mean(0),
-        "slack_time_s": [_spread(t[s]) for t, s in zip(falls.slack_s[began].T, slack.T, strict=True)],
+        "slack_time_s": [_spread(times[np.isfinite(times)]) for times in slack_s.T],
         "least_tension_wire": int(_nearest(falls, began)) + 1,
         "least_tension_share": band_over_draws(lowest),
         "stiffness_share": band_over_draws(falls.stiffness_share[holds]),
