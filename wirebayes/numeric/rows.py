@@ -30,7 +30,7 @@ def rows_of(record: Record, rows: Any) -> Record:
     return replace(record, **{f.name: getattr(record, f.name)[rows] for f in fields(record)})
 
 
-def columns_of(record: Record, columns: Any) -> Record:
+def last_axis_of(record: Record, columns: Any) -> Record:
     """A dataclass of arrays ``(..., n)`` with some columns of each, by number or mask; what has a `part` is asked."""
     values = {f.name: getattr(record, f.name) for f in fields(record)}
     parts = {name: v[..., columns] if isinstance(v, np.ndarray) else v.part(columns) for name, v in values.items()}

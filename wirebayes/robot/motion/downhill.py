@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from wirebayes.numeric import cholesky
-from wirebayes.numeric.rows import columns_of
+from wirebayes.numeric.rows import last_axis_of
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
@@ -145,7 +145,7 @@ class _Cases:
     span: Floats
 
     def part(self, keep: Indices) -> "_Cases":
-        return columns_of(self, keep)
+        return last_axis_of(self, keep)
 
     def moved(self, accept: Bools, x: Floats, R: Floats, new: "_Point") -> "_Cases":
         """The cases at new places where these are accepted."""
@@ -304,7 +304,7 @@ class _Point:
         return _Point(*(np.where(accept, getattr(other, f.name), getattr(self, f.name)) for f in fields(_Point)))
 
     def part(self, keep: Indices) -> "_Point":
-        return columns_of(self, keep)
+        return last_axis_of(self, keep)
 
 
 def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, scale: Floats) -> _Point:

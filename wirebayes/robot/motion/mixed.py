@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wirebayes.numeric import cholesky
-from wirebayes.numeric.rows import columns_of
+from wirebayes.numeric.rows import last_axis_of
 from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
@@ -87,7 +87,7 @@ class _Quadratic:
     slope: Floats
 
     def part(self, rows: Indices) -> "_Quadratic":
-        return columns_of(self, rows)
+        return last_axis_of(self, rows)
 
     def tensions(self, move: Floats) -> Floats:
         """(w, n) below zero where a wire is slack."""
