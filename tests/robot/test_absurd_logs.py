@@ -12,7 +12,7 @@ from tests.robot.test_commands import fitted, session_csv  # noqa: F401
 from wirebayes.commands.calibrate import calibrate
 from wirebayes.commands.wires import robot_of
 from wirebayes.robot.mechanics.draws import WireDraws
-from wirebayes.robot.self_calibration import descent, residuals, session_file, whole
+from wirebayes.robot.self_calibration import descent, open_where, residuals, session_file, whole
 from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.unknowns import StatedErrors
 from wirebayes.robot.self_calibration.whole_answer import calibration_report
@@ -32,9 +32,9 @@ def _turned_log(holds):
     return log | {name: log[other] for name, other in zip(joints, joints[1:] + joints[:1], strict=True)}
 
 
-def _calibrated(holds=None, errors=ROUGH, **options):
+def _calibrated(holds=None, errors=ROUGH, changed=lambda log: log, **options):
     robot = robot_of(FIELD / "hp4-rough.toml")
-    table = columns_table(_turned_log(holds), Path("log"), session_file.may_be_empty)
+    table = columns_table(changed(_turned_log(holds)), Path("log"), session_file.may_be_empty)
     read = session_file.parse_session(table, robot, 5.0, 1e-3)
     with np.errstate(all="ignore"):  # as the command has it
         return calibration_report(
@@ -91,6 +91,86 @@ def test_a_search_is_given_up_where_loops_are_further_open_than_the_robot_or_its
     errors = replace(ROUGH, joint_m=stated and stated * whole_wire)
     _calibrated(6, errors, progress=lambda name, done, total: shares.append(done) if name == "start 1" else None)
     assert shares == [*(k / 8 for k in range(rounds)), 1.0]
+
+
+@pytest.mark.parametrize(
+    ("open_m", "given_up"),
+    [
+        ([0.1] * 10, False),
+        ([0.1] * 11, True),
+        ([0.1] * 10 + [0.0901], True),
+        ([0.1] * 10 + [0.0899], False),
+        ([0.0251] * 11, True),
+        ([0.0249] * 11, False),
+        ([0.02] + [0.1] * 20, False),
+        ([0.2] * 4 + [0.251], True),
+        ([0.2] * 4 + [0.249], False),
+    ],
+)
+def test_a_search_whose_loops_come_no_tenth_nearer_in_ten_rounds_is_given_up(open_m, given_up):
+    assert whole._given_up(open_m, 0.25, 0.025) is given_up
+
+
+def test_a_column_of_other_holds_ends_early_and_is_named(monkeypatch):
+    """Each search took all 60 rounds; the joint values of wire 3 stand in the rows of other holds."""
+    said = []
+
+    def mixed_up(log):
+        joints = [log[f"joint_{i}_m"] for i in (4, 1, 2, 3)]  # back from where `_turned_log` has them
+        return log | {f"joint_{i}_m": values[::-1] if i == 3 else values for i, values in enumerate(joints, 1)}
+
+    found = _calibrated(changed=mixed_up, progress=lambda name, done, total: said.append((name, done)))
+    for name in ("start 1", "start 2", "start 3"):
+        assert len([1 for one, _ in said if one == name]) <= 13  # eleven rounds, the end
+    (notice,) = found.content["warnings"]
+    assert ", mostly in joint value 3 (" in notice["text"]
+
+
+@pytest.mark.parametrize(
+    ("size", "noise_m", "stated_m", "said"),
+    [(3.8, 1e-3, None, False), (4.0, 1e-3, None, True), (4.0, 1e-5, None, False), (4.0, 1e-3, 1e-3, False)],
+)
+def test_a_hold_that_stands_out_where_the_error_was_estimated_with_it_is_named(
+    monkeypatch, size, noise_m, stated_m, said
+):
+    """24 holds of 8 wires and 6 degrees of freedom; in one of them its share has a chance of 1.9e-4, or of 7.7e-5."""
+    monkeypatch.setattr(open_where, "leverage", lambda found, rows: np.full((24, 8), 0.75))
+    residual = np.ones((24, 8))
+    residual[5, 1] = size * np.sqrt(8)
+    found = SimpleNamespace(
+        equations=SimpleNamespace(residual=residual, rows={"loop": slice(0, 8)}),
+        noise=SimpleNamespace(joint_m=noise_m),
+        unknowns=SimpleNamespace(
+            robot=SimpleNamespace(lines=np.ones(8), span_m=3.0), errors=SimpleNamespace(joint_m=stated_m)
+        ),
+    )
+    notices = open_where.odd_hold(found, SimpleNamespace(numbers=np.arange(11, 35)))
+    assert [notice.text.startswith("hold 16 contradicts the others") for notice in notices] == [True] * said
+    assert all("most of it joint value 2;" in notice.text for notice in notices)
+
+
+@pytest.mark.parametrize(
+    ("shape", "large", "size", "said"),
+    [
+        ((6, 4), (slice(None), 2), 2.15, ", mostly in joint value 3 (61 % of the sum of squares)"),
+        ((6, 4), (slice(None), 2), 2.1, ""),
+        ((6, 3), (slice(None), 2), 9.0, ""),
+        ((6, 8), (slice(None), [1, 5]), 3.1, ", mostly in joint values 2 and 6 (76 % of the sum of squares)"),
+        ((6, 8), (slice(None), [1, 5]), 2.9, ""),
+        ((6, 4), (4, slice(None)), 2.3, ", mostly in hold 5 (51 %)"),
+        ((6, 4), (4, slice(None)), 2.2, ""),
+        ((3, 4), (1, slice(None)), 9.0, ""),
+    ],
+)
+def test_what_is_open_is_placed_only_where_it_stands_out(shape, large, size, said):
+    """Shares of the sum of squares on both sides of three fifths, three quarters and a half."""
+    residual = np.ones(shape)
+    residual[large] = size
+    equations = SimpleNamespace(residual=residual, rows={"loop": slice(0, shape[1])})
+    robot = SimpleNamespace(lines=np.ones(shape[1]))
+    found = SimpleNamespace(equations=equations, unknowns=SimpleNamespace(robot=robot))
+    session = SimpleNamespace(numbers=np.arange(1, shape[0] + 1))
+    assert open_where.most_open(found, session) == said
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest
 
 FIELD = sorted((Path(__file__).parent / "field").rglob("*.toml"))
+AT_NO_PLACE = "hp4-high.toml"  # its home position is above its anchors, and so outside its workspace
 LINE = WireDraws({k: np.full(2, v) for k, v in {"k1": 8e3, "B": 0.3, "U": 1.0, "k2": 0.03, "N": 0.7}.items()}, 1000.0)
 
 
@@ -24,7 +25,9 @@ def _warned(robot):
 
 @pytest.mark.parametrize("name", [*schema.shipped(), *map(str, FIELD)])
 def test_no_robot_that_was_built_or_drawn_up_is_suspected(name):
-    assert _warned(schema.read_robot_file(name)) == []
+    said = _warned(schema.read_robot_file(name))
+    assert [text for text in said if "outside the workspace" not in text] == []
+    assert bool(said) == name.endswith(AT_NO_PLACE)
 
 
 def _scaled(factor, robot=None):
@@ -149,9 +152,9 @@ def test_a_mass_far_outside_its_platform_is_suspected(share):
 def test_a_home_far_from_its_exit_points_is_suspected(share):
     robot = replace(six_wires(), platform_m=np.zeros((6, 3)))
     exits = np.array([[-1.0, 0, 0], [1.0, 0, 0]] * 3) + 1e-9 * np.arange(6)[:, None]  # none is a copy
-    said = _warned(replace(robot, exit_m=exits, home_m=np.array([0.0, 0.0, -np.sqrt((share * 20.0) ** 2 - 1.0)])))
-    assert bool(said) == (share > 1)
-    assert all(text.startswith("pose.position_m") for text in said)
+    home = np.array([0.0, 0.0, -np.sqrt((share * 20.0) ** 2 - 1.0)])
+    (said,) = _warned(replace(robot, exit_m=exits, home_m=home))
+    assert said.startswith("pose.position_m") and ("from an exit point" in said) == (share > 1)
 
 
 @pytest.mark.parametrize("share", [0.999, 1.001])

@@ -12,10 +12,12 @@ from wirebayes.commands import export
 from wirebayes.commands.asked_pose import asked_place
 from wirebayes.commands.wires import folder_of, robot_of
 from wirebayes.errors import InputError
+from wirebayes.robot.history.balanced import balanced, turned_rows
+from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import sag, schema
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.motion import hanging, home
+from wirebayes.robot.motion import hanging, home, plausible
 from wirebayes.robot.pose import orientation
 from wirebayes.robot.pose.orientation import balanced_orientation
 from wirebayes.sentences import coordinates
@@ -139,6 +141,53 @@ def test_an_export_gives_the_metres_to_the_nearest_balance_with_and_without_simu
     robot = replace(two_wires(), home_m=np.array([0.2, 0.05, -0.6]))
     said = export._warnings(robot, _line("hooke", None, {}), files)
     assert [notice for notice in said if "is 0.05 m away" in notice.text] == home.home_notices(robot)
+
+
+def test_an_export_says_once_that_nothing_holds_the_home_pose():
+    robot = replace(two_wires(), home_m=np.array([0.2, 0.05, -0.6]))
+    said = export._warnings(robot, _line("hooke", None, {}), {"klipper.cfg": ""})
+    assert [notice.kind for notice in said if "home pose" in notice.text] == ["unheld", "left-out"]
+    assert sum("no tensions" in notice.text for notice in said) == 1
+
+
+@pytest.mark.parametrize(("beyond_m", "said"), [(-0.01, False), (0.0, False), (1e-7, False), (1e-4, True)])
+def test_a_home_position_outside_the_workspace_is_said(beyond_m, said):
+    robot = six_wires()
+    low = replace(robot, lower_m=robot.home_m - [1, -beyond_m, 1], upper_m=robot.home_m + 1)
+    high = replace(robot, lower_m=robot.home_m - 1, upper_m=robot.home_m + [1, 1, -beyond_m])
+    for one, axis in ((low, "y = −0.100 m"), (high, "z = 1.20 m")):
+        texts = [notice.text for notice in plausible.robot_notices(one)]
+        assert [f"outside the workspace, {axis}" in text for text in texts] == [True] * said
+
+
+def _on_its_way(robot, turn_rad=None):
+    x = np.repeat(robot.home_m[None], 2, 0) + [[0.0, 0.0, 0.0], [0.0, 0.0, -0.1]]
+    vector = robot.home_rotation_rad if turn_rad is None else np.array(turn_rad)
+    R = np.repeat(turning.matrix(vector)[None], 2, 0)
+    times, nothing = np.array([0.0, 7.0]), np.zeros(2)
+    asked = History(times, None, x, R, nothing, np.zeros((2, 3)), rotation_is_stated=turn_rad is not None)
+    return turned_rows(robot, asked, balanced(robot, asked))
+
+
+def test_rotations_that_balance_replaces_on_a_trajectory_are_said():
+    (of_file,) = _on_its_way(four_wires())
+    assert of_file == home.home_notices(four_wires())[0]
+    (of_table,) = _on_its_way(four_wires(), (0.0, 0.0, 0.0))
+    assert "rotations that are commanded" in of_table.text and of_table.text.count("degrees away") == 1
+    assert "up to 19.4 degrees away from them, at 7 s" in of_table.text
+    assert _on_its_way(six_wires(), (0.0, 0.0, 0.1)) == []
+    assert _on_its_way(robot_of(FIELD / "balanced-home" / "wall.toml")) == []
+
+
+@pytest.mark.parametrize(("degrees", "said"), [(0.99, False), (1.01, True)])
+def test_what_balance_changes_on_a_trajectory_by_less_than_an_eye_sees_is_no_warning(degrees, said):
+    robot = four_wires()
+    times, x = np.array([0.0, 7.0]), np.repeat(robot.home_m[None], 2, 0)
+    hung = np.repeat(turning.matrix(robot.home_rotation_rad)[None], 2, 0)
+    tilted = hung.copy()
+    tilted[1] = turning.matrix(np.array([0.0, np.radians(degrees), 0.0])) @ hung[1]
+    asked = History(times, None, x, tilted, np.zeros(2), np.zeros((2, 3)), rotation_is_stated=True)
+    assert bool(turned_rows(robot, asked, replace(asked, rotation=hung))) == said
 
 
 def test_a_wire_at_its_bound_is_let_go_where_that_leads_nearer():

@@ -109,6 +109,5 @@ def _warnings(robot: Robot, line: WireDraws, contents: Mapping[str, str]) -> lis
         text = "no firmware settings: they exist for four or five drums with a position-only platform"
         out.append(Notice("left-out", text))
     if "robot.xml" not in contents:
-        text = "no robot.xml, robot.urdf and robot.sdf: no tensions within the bounds hold the home pose"
-        out.append(Notice("unheld", text))
+        out.append(Notice("left-out", "no robot.xml, robot.urdf and robot.sdf, which would start at the home pose"))
     return out

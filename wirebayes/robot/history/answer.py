@@ -15,7 +15,7 @@ from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.progress import Progress, silent
 from wirebayes.robot.history import commanded, corrections
-from wirebayes.robot.history.balanced import balanced
+from wirebayes.robot.history.balanced import balanced, turned_rows
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.doubts import history_warnings, unreached
 from wirebayes.robot.history.estimate import Estimate, estimate_poses
@@ -86,7 +86,7 @@ def history_report(
     seed : int
     progress : function of name, done and total
     """
-    history = balanced(robot, history)
+    asked_rotations, history = history, balanced(robot, history)
     rows = evenly(len(history.times_s), _SHOWN)
     content = _requested(robot, line, history, errors)
     asked = _Asked(robot, history, start, errors, seed)
@@ -113,7 +113,7 @@ def history_report(
     }
     if history.read:
         content["readings"] = _with_agreement(content["readings"], found)
-    missed = [] if history.position_m is None else unreached(history.times_s, found, to, change)
+    missed = [*unreached(history, found, to, change), *turned_rows(robot, asked_rotations, history)]
     content["warnings"] = to_json([*missed, *history_warnings(robot, line, history, found, joint, content)])
     tables = {
         "poses.csv": pose_table(robot, history, found, to),

@@ -20,17 +20,20 @@ _INERTIA = 0.05  # of the weight: a force above it changes tensions by as much a
 _MISFIT = 2.0  # mean squared residual from which on the readings contradict the model
 
 
-def unreached(times_s: Floats, found: Estimate, to: Target, change_m: Floats) -> list[Notice]:
+def unreached(history: History, found: Estimate, to: Target, change_m: Floats) -> list[Notice]:
     """Which commanded poses no corrections ``(n, t, w)`` lead to, though the platform still hangs then.
 
     Parameters
     ----------
-    times_s : (t,) array
+    history : History
+        Without commanded poses all are reached.
     found : Estimate
     to : Target
     change_m : (n, t, w) array
         Corrections, NaN where there are none.
     """
+    if history.position_m is None:
+        return []
     never = found.track.held.any(0) & ~np.isfinite(change_m).all(-1).any(0)
     unheld = ~np.isfinite(to.tension_N).all(-1)
     reasons = {
@@ -41,7 +44,7 @@ def unreached(times_s: Floats, found: Estimate, to: Target, change_m: Floats) ->
     for reason, why in reasons.items():
         rows = np.flatnonzero(never & why)
         if rows.size:
-            times = ", ".join(f"{times_s[k]:.10g}" for k in rows[:_NAMED])
+            times = ", ".join(f"{history.times_s[k]:.10g}" for k in rows[:_NAMED])
             more = f" s and {rows.size - _NAMED} times more" if rows.size > _NAMED else " s"
             out.append(Notice("unheld", f"{reason} commanded at {times}{more}: no corrections lead there"))
     return out

@@ -31,6 +31,8 @@ class History:
         Measured; NaN where a sensor was not read.
     tilt_rad : (t, 2) array or None
         Roll and pitch of an inclinometer on the platform; NaN where it was not read.
+    rotation_is_stated : bool
+        Whether the rotations were given; else they are the home orientation.
     """
 
     times_s: Floats
@@ -42,6 +44,7 @@ class History:
     hold: Ints | None = None
     tension_N: Floats | None = None
     tilt_rad: Floats | None = None
+    rotation_is_stated: bool = False
 
     @property
     def read(self) -> bool:

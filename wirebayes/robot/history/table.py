@@ -138,4 +138,5 @@ def _history(robot: Robot, joints: Sequence[str], names: Sequence[str], cells: F
         None if hold is None else hold[:, 0].astype(np.int64),
         some(_tensions(robot)),
         None if tilt is None else np.radians(tilt),
+        turn is not None,
     )

@@ -9,7 +9,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
 from wirebayes.sentences import coordinates
 
-_TURNED_AWAY = 1.0  # degrees from the home orientation: nobody levels a platform by eye to much better
+TURNED_AWAY = 1.0  # degrees from the home orientation: nobody levels a platform by eye to much better
 
 
 def turned_away(robot: Robot, rotation: Floats) -> list[Notice]:
@@ -25,7 +25,7 @@ def turned_away(robot: Robot, rotation: Floats) -> list[Notice]:
         return []
     stated = robot.home_rotation_rad if robot.rotation_of_file_rad is None else robot.rotation_of_file_rad
     away = float(np.degrees(np.linalg.norm(turning.vector((rotation @ turning.matrix(stated).T)[None])[0])))
-    if away < _TURNED_AWAY:
+    if away < TURNED_AWAY:
         return []
     why, accepted = "no tensions within the bounds hold", ""
     if robot.is_underactuated:

@@ -32,6 +32,7 @@ _WIDE_M, _ROPE_KG_M = 50.0, 0.01
 _BROAD_M, _FRAME_KG_M = 5.0, 1.0  # a platform so broad is a frame, which weighs more than this for each metre
 _WHEEL_M = 5.0  # no winch or ropeway has a drum or pulley of a larger radius
 _OUTSIDE = 5.0  # times the platform's radius: a mass so far out hangs on a pole, not in a platform
+_ROUNDED = 1e-6  # of the span: so far outside its workspace a home position is rounded
 _STARTS = 8  # anywhere in the workspace, where the home pose leads to no pose that the lengths allow
 
 
@@ -126,7 +127,23 @@ def robot_notices(robot: Robot) -> list[Notice]:
         _exit_points(robot), _platform_points(robot), _centre_of_mass(robot), _home(robot), *_lengths_of_legs(robot)
     ]  # fmt: skip
     out = [Notice("geometry", f"{text}; is the unit of the robot's file metres?") for text in found if text]
-    return out + _copies(robot)
+    return out + _outside(robot) + _copies(robot)
+
+
+def _outside(robot: Robot) -> list[Notice]:
+    """That the home position is not in the workspace of the same file; one that is far from all has been said."""
+    if _home(robot):
+        return []
+    beyond = np.maximum(robot.lower_m - robot.home_m, robot.home_m - robot.upper_m)
+    axis = int(beyond.argmax())
+    if not beyond[axis] > _ROUNDED * robot.span_m:
+        return []
+    low, high, here = (number(v[axis]) for v in (robot.lower_m, robot.upper_m, robot.home_m))
+    text = (
+        f"pose.position_m: the home position is {number(beyond[axis])} m outside the workspace, {'xyz'[axis]} = {here} "
+        f"m, where workspace.lower_m and upper_m say {low} to {high} m"
+    )
+    return [Notice("geometry", text)]
 
 
 def _copies(robot: Robot) -> list[Notice]:

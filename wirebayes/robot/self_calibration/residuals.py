@@ -15,7 +15,7 @@ _FLOOR = 1e-6  # of the span: no encoder with drum and wire does better
 _LEAST_DEGREES = 1.0  # weight of `_FLOOR` beside the readings, in degrees of freedom
 # Where nobody read tensions, their scatter explains what errors of lengths would: half a millimetre of five metres is
 # then thought of these, as drums that wind layers have them, unless ten readings or more say otherwise.
-_BLIND, _BLIND_DEGREES = 1e-4, 10.0
+USUAL, _BLIND_DEGREES = 1e-4, 10.0
 # Of the span: loops that stay so far open belong to another robot, in another unit or another order. Layers on a drum
 # and a printer's anchors that are off by a decimetre leave less.
 _LOST = 0.01
@@ -61,7 +61,12 @@ def length_rms_m(found: Whole) -> float:
 
 def lost(found: Whole) -> bool:
     """Whether nothing near the robot, however it errs, has these joint values."""
-    return not length_rms_m(found) <= most_open_m(found, _LOST)
+    return not length_rms_m(found) <= lost_m(found)
+
+
+def lost_m(found: Whole) -> float:
+    """How far loops are open, m, from where on they are those of another robot."""
+    return most_open_m(found, _LOST)
 
 
 def most_open_m(found: Whole, share: float) -> float:
@@ -81,7 +86,7 @@ def usual_joint(robot: Robot, holds: Holds) -> tuple[float, float]:
     """Error of a joint value before anything was read, m, and its weight in degrees of freedom."""
     if np.isfinite(holds.tension_N).any():
         return _FLOOR * robot.span_m, _LEAST_DEGREES
-    return _BLIND * robot.span_m, _BLIND_DEGREES
+    return USUAL * robot.span_m, _BLIND_DEGREES
 
 
 def joint_error(unknowns: Unknowns, holds: Holds) -> float:
@@ -131,7 +136,7 @@ def _usual_noise(found: Whole) -> float:
     """Probability of an error of the loops as large as found, where what is usual is all that was known of it."""
     if not np.isfinite(found.degrees) or found.equations.known[:, found.equations.rows["tension"]].any():
         return 1.0
-    usual, worth = _BLIND * found.unknowns.robot.span_m, _BLIND_DEGREES
+    usual, worth = USUAL * found.unknowns.robot.span_m, _BLIND_DEGREES
     free = max(found.degrees - worth, 1e-9)
     shown = (found.degrees * found.noise.joint_m**2 - worth * usual**2) / free
     return float(fdtrc(free, worth, max(shown, 0.0) / usual**2))

@@ -21,6 +21,7 @@ from wirebayes.robot.self_calibration.residuals import (
     joint_error,
     length_rms_m,
     lost,
+    lost_m,
     most_open_m,
     noise_shown,
     usual_joint,
@@ -33,6 +34,9 @@ _ROUNDS = 60  # of noise and creep: most end in ten
 # explain: they close no more. Of sessions that fit, however rough, they are open by a twentieth at most then; some go
 # astray later and come back.
 _PATIENT, _HOPELESS = 5, 0.1
+# Rounds in which loops that are another robot's (`residuals.lost`) come no tenth nearer, after which a search is given
+# up: of sessions that fit, none had any such round among 194 searches.
+_STALLED, _NEARER = 10, 0.9
 _SOFT = 0.03  # of what is known best of tensions
 _WHOLE_ROUNDS = 3  # before creep goes half the way only
 _STILL = 0.05  # of every unknown's standard deviation
@@ -95,6 +99,7 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State, progress: ShareDone
 def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, progress: ShareDone) -> Whole:
     """State, noise and creep in turns, each from the others, until none of them moves on."""
     rounds: list[tuple[Floats, Floats]] = []
+    opened_m: list[float] = []
     passed, roughly, cost = [state], ROUGHLY, np.inf
     last = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])[0]
     usual = usual_joint(unknowns.robot, holds)
@@ -114,13 +119,32 @@ def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep
         level = np.abs(shown - rounds[-1][0]).max() < _SETTLED and abs(cost - found.cost) < _LEVEL_FIT
         if level and moved_on < _STILL:
             return found
-        if taken + 1 == _PATIENT and length_rms_m(found) > most_open_m(found, _HOPELESS):
+        opened_m.append(length_rms_m(found))
+        if _given_up(opened_m, most_open_m(found, _HOPELESS), lost_m(found)):
             break
         cost = found.cost
         roughly = max(_FINEST, min(_STEADY * moved_on, ROUGHLY * _FINER ** len(rounds)))
         passed = onward(passed, state, sd, unit_N) if len(rounds) > _WHOLE_ROUNDS else [state]
         noise = _next_noise(noise, rounds)
     return replace(found, converged=False)
+
+
+def _given_up(opened_m: list[float], hopeless_m: float, lost_m: float) -> bool:
+    """Whether the loops of the last rounds are so far open, and close so slowly, that they never will.
+
+    Parameters
+    ----------
+    opened_m : list of float
+        How far loops were open after each round.
+    hopeless_m, lost_m : float
+        How far they are open where they close no more, and where they are those of another robot.
+    """
+    if len(opened_m) == _PATIENT and opened_m[-1] > hopeless_m:
+        return True
+    if len(opened_m) <= _STALLED:
+        return False
+    before, since = min(opened_m[:-_STALLED]), min(opened_m[-_STALLED:])
+    return min(before, since) > lost_m and since > _NEARER * before
 
 
 def _before_reading(unknowns: Unknowns, holds: Holds) -> Noise:

@@ -26,6 +26,7 @@ from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
 from wirebayes.robot.self_calibration.identified import Identified, identified
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
+from wirebayes.robot.self_calibration.open_where import most_open, odd_hold
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, misfit, trust
 from wirebayes.robot.self_calibration.search import Searched, searched
@@ -252,8 +253,10 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
     robot = found.unknowns.robot
     out = [*plausible.robot_notices(robot), *home.home_notices(robot)]
     if not found.converged:
-        text = f"not converged: do not use these values; {_not_converged(found)}"
+        text = f"not converged: do not use these values; {_not_converged(found, search.holds.session)}"
         out.append(Notice("not-converged", text))
+    else:
+        out += odd_hold(found, search.holds.session)
     if search.requested:
         text = (
             "the stated poses are those that the joint values were computed for, or contradict the readings: they are "
@@ -279,12 +282,14 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
     return out
 
 
-def _not_converged(found: Whole) -> str:
+def _not_converged(found: Whole, session: Session) -> str:
     """What to do about a search that found no mode."""
     if not lost(found):
         return "read more poses, or check the readings and the stated errors"
+    off_m = length_rms_m(found)
+    off = f"{off_m:.2g} m (root mean square) from" if off_m < found.unknowns.robot.span_m else "not at all near"
     return (
-        f"the joint values are {length_rms_m(found):.2g} m (root mean square) from what robot and stated errors allow; "
+        f"the joint values are {off} what robot and stated errors allow{most_open(found, session)}; "
         "check their units and signs, the order of the columns, and the robot's file"
     )
 
