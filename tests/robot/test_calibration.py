@@ -14,8 +14,8 @@ from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.start import starting_references
 
 
-def _line():
-    return stand_in(np.random.default_rng(1), 300)
+def _line(count=300):
+    return stand_in(np.random.default_rng(1), count)
 
 
 def _session(robot, line, poses, rng, tilt_sd=None):
