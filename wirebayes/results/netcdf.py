@@ -134,16 +134,16 @@ def _describe(node: Any, attributes: Mapping[str, Any]) -> None:
 
 def _read(node: Any) -> Group:
     stored = {name: dataset for name, dataset in node.items() if not _is_bare(dataset)}
-    both = {name: Variable(_dims(dataset), _values(dataset)) for name, dataset in stored.items()}
+    variables = {name: Variable(_dims(dataset), _values(dataset)) for name, dataset in stored.items()}
     units = {name: _entry(d.attrs["units"]) for name, d in stored.items() if "units" in d.attrs}
     auxiliary = [_entry(d.attrs["coordinates"]) for d in stored.values() if "coordinates" in d.attrs]
-    labels = {dim for v in both.values() for dim in v.dims} | {name for names in auxiliary for name in names.split()}
-    return Group(
-        {name: v for name, v in both.items() if name not in labels},
-        {name: v for name, v in both.items() if name in labels},
-        units,
-        {name: _entry(value) for name, value in node.attrs.items()},
-    )
+    labels = {name for names in auxiliary for name in names.split()}
+    for variable in variables.values():
+        labels.update(variable.dims)
+    values = {name: variable for name, variable in variables.items() if name not in labels}
+    coordinates = {name: variable for name, variable in variables.items() if name in labels}
+    attributes = {name: _entry(value) for name, value in node.attrs.items()}
+    return Group(values, coordinates, units, attributes)
 
 
 def _is_bare(dataset: Any) -> bool:

@@ -1,7 +1,8 @@
 """The page of ``wirebayes plan``: tests that could be done, best first, with what each would teach and show."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from wirebayes.answers.headline import plan_in_a_sentence
 from wirebayes.io.run_folder import read_json
@@ -34,6 +35,7 @@ _AIMS = {
     "parameters": "how much they say about the material",
     "creep": "how well the creep after an hour would be known",
 }
+_CREEP: tuple[Literal["creep_longest_hold_mm"], Literal["creep_1h_mm"]] = ("creep_longest_hold_mm", "creep_1h_mm")
 
 
 def plan_page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -99,72 +101,83 @@ def _reliability(rows: list[JudgedProtocol]) -> Points:
 
 
 def _ranking(found: PlanJson) -> Table:
-    names = [n for n in ("k1", "B", "U", "k2", "N") if n in found["protocols"][0]["parameters"]]
-    robot = found["protocols"][0]["robot"] is not None
-    lines = [
-        [
-            str(row["rank"]),
-            row["name"],
-            number(row["duration_min"]),
-            number(row["information_bits"]),
-            *(number(row["parameters"][n]["sd"], 2) for n in names),
-            number(row["creep"]["creep_1h_mm"]["sd"], 2),
-            *([number(row["robot"] and row["robot"]["drift_sd_mm"], 2)] if robot else []),
-            "yes" if row["within_budget"] else "too long",
-        ]
-        for row in found["protocols"]
-    ]
+    rows = found["protocols"]
+    first = rows[0]["parameters"]
+    names = [name for name in ("k1", "B", "U", "k2", "N") if name in first]
+    units = {name: unit_text(first[name]["unit"]) for name in names}
     header = ["rank", "test", "minutes", "bits"]
-    units = {n: unit_text(found["protocols"][0]["parameters"][n]["unit"]) for n in names}
-    header += [f"sd of {n}, {units[n]}" if units[n] else f"sd of {n}" for n in names]
+    header += [f"sd of {name}, {unit}" if unit else f"sd of {name}" for name, unit in units.items()]
     header.append("sd of creep in 1 h, mm")
-    header += ["sd of the robot's drift in 1 h, mm"] if robot else []
-    return Table(
-        [*header, "within budget"], lines, "Standard deviations of the posterior, median over the simulated tests."
-    )
+    if rows[0]["robot"] is not None:
+        header.append("sd of the robot's drift in 1 h, mm")
+    header.append("within budget")
+    caption = "Standard deviations of the posterior, median over the simulated tests."
+    return Table(header, [_ranked(row, names) for row in rows], caption)
+
+
+def _ranked(row: JudgedProtocol, names: Sequence[str]) -> list[str]:
+    """A row of the ranking."""
+    widths = [row["parameters"][name]["sd"] for name in names] + [row["creep"]["creep_1h_mm"]["sd"]]
+    if row["robot"] is not None:
+        widths.append(row["robot"]["drift_sd_mm"])
+    return [
+        str(row["rank"]),
+        row["name"],
+        number(row["duration_min"]),
+        number(row["information_bits"]),
+        *(number(width, 2) for width in widths),
+        "yes" if row["within_budget"] else "too long",
+    ]
 
 
 def _protocol(row: JudgedProtocol) -> list[Block]:
-    blocks: list[Block] = [
-        Text(
-            f"{counted(row['holds'], 'hold')} with {counted(row['readings'], 'reading')}, "
-            f"{number(row['duration_min'])} min" + (f": {row['words']}." if row["words"] else ".")
-        )
-    ]
-    quantities = row["parameters"] | {
-        "creep_longest_hold_mm": row["creep"]["creep_longest_hold_mm"],
-        "creep_1h_mm": row["creep"]["creep_1h_mm"],
-    }
-    lines = [
-        [
-            f"{_words(n)}, {unit}" if (unit := unit_text(q["unit"])) else _words(n),
-            *(number(value, 2) for value in (q["sd"], q["width_90"])),
-            span(q["width_90_low"], q["width_90_high"], 2),
-            "given" if is_given(q) else number(q["guess_sd"], 2),
-        ]
-        for n, q in quantities.items()
-    ]
-    header = ["quantity", "sd", "90 % width", "in 90 % of tests", "sd of the guess"]
-    creep = row["creep"]
-    caption = f"Creep of {number(creep['length_mm'])} mm at {number(creep['tension_N'])} N; the longest hold lasts "
-    blocks.append(Table(header, lines, caption + f"{number(creep['longest_hold_s'])} s."))
+    size = f"{counted(row['holds'], 'hold')} with {counted(row['readings'], 'reading')}"
+    words = f": {row['words']}" if row["words"] else ""
+    blocks: list[Block] = [Text(f"{size}, {number(row['duration_min'])} min{words}."), _widths(row)]
     if row["effects"]:
-        shown = [
-            [
-                _words(n),
-                number(e["amplitude_80"], 2),
-                unit_text(e["unit"]) or "–",
-                number(e["delta_80"], 2),
-                ", ".join(map(_words, e["confused_with"])) or "–",
-            ]
-            for n, e in row["effects"].items()
-        ]
-        caption = "Smallest amplitude seen in 80 % of tests, its size δ in standard deviations, and what it looks like."
-        blocks.append(Table(["effect", "amplitude", "unit", "δ", "hard to distinguish from"], shown, caption))
+        blocks.append(_effects(row))
     if row["not_identifiable"]:
         parts = [sentence.partition(": ")[::2] for sentence in row["not_identifiable"]]
         blocks.append(Table(["what", "why not"], [[_words(a), b] for a, b in parts], "What it would not show."))
     return blocks
+
+
+def _widths(row: JudgedProtocol) -> Table:
+    """How well parameters and creep would be known."""
+    creep = row["creep"]
+    quantities = row["parameters"] | {name: creep[name] for name in _CREEP}
+    lines = []
+    for name, width in quantities.items():
+        unit = unit_text(width["unit"])
+        lines.append(
+            [
+                f"{_words(name)}, {unit}" if unit else _words(name),
+                number(width["sd"], 2),
+                number(width["width_90"], 2),
+                span(width["width_90_low"], width["width_90_high"], 2),
+                "given" if is_given(width) else number(width["guess_sd"], 2),
+            ]
+        )
+    header = ["quantity", "sd", "90 % width", "in 90 % of tests", "sd of the guess"]
+    wire = f"Creep of {number(creep['length_mm'])} mm at {number(creep['tension_N'])} N"
+    return Table(header, lines, f"{wire}; the longest hold lasts {number(creep['longest_hold_s'])} s.")
+
+
+def _effects(row: JudgedProtocol) -> Table:
+    """What sizes of effects would be seen."""
+    lines = [
+        [
+            _words(name),
+            number(seen["amplitude_80"], 2),
+            unit_text(seen["unit"]) or "–",
+            number(seen["delta_80"], 2),
+            ", ".join(map(_words, seen["confused_with"])) or "–",
+        ]
+        for name, seen in row["effects"].items()
+    ]
+    header = ["effect", "amplitude", "unit", "δ", "hard to distinguish from"]
+    caption = "Smallest amplitude seen in 80 % of tests, its size δ in standard deviations, and what it looks like."
+    return Table(header, lines, caption)
 
 
 def _words(name: str) -> str:

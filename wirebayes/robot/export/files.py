@@ -69,15 +69,14 @@ def reprapfirmware(robot: Robot, line: WireDraws) -> str:
         rows.append(
             (f"M666 O{_joined(on_spool, '.0f')}", "lines on each spool; anchors are the middle of their points")
         )
-    if robot.drums is not None and robot.drums.radius_m.all():
-        radius, growth = _spools(robot, robot.drums)
-        gear = of_each_winch(robot, robot.drums.gear)
+    drums = _measured_drums(robot)
+    if drums is not None:
+        radius, growth = _spools(robot, drums)
+        growth_mm = 1e3 * growth / on_spool
+        gear = of_each_winch(robot, drums.gear)
         rows += [
             (f"M666 R{_joined(1e3 * radius, '.3f')}", "spool radii at the origin, mm"),
-            (
-                f"M666 Q{1e3 * (growth / on_spool).mean():.5f}",
-                f"buildup of one line, mm: {_joined(1e3 * growth / on_spool, '.5f', ', ')}",
-            ),
+            (f"M666 Q{growth_mm.mean():.5f}", f"buildup of one line, mm: {_joined(growth_mm, '.5f', ', ')}"),
             ("", f"M666 L and H, teeth of motor and spool: their ratio is {_joined(gear, 'g', ', ')}"),
         ]
     return _head(robot, line, spring, ";") + "".join(f"{code} ; {comment}\n".lstrip() for code, comment in rows)
@@ -97,16 +96,24 @@ def klipper(robot: Robot, line: WireDraws) -> str:
         f"winch_min_force: {_joined(np.full(robot.joints, robot.rule.lowest_N), 'g', ', ')}  # N\n"
         f"winch_max_force: {_joined(np.full(robot.joints, robot.rule.highest_N), 'g', ', ')}  # N\n"
     )
-    if robot.drums is not None and robot.drums.radius_m.all():
-        growth = 1e3 * _spools(robot, robot.drums)[1]
+    drums = _measured_drums(robot)
+    if drums is not None:
+        radius, growth = (1e3 * values for values in _spools(robot, drums))
+        turns = 2 * np.pi * radius / parts
+        gear = of_each_winch(robot, drums.gear)
         text += f"winch_buildup_factor: {growth.mean():.5f}  # mm: {_joined(growth, '.5f', ', ')}\n"
     for winch, (letter, (x, y, z)) in enumerate(zip(STEPPERS, 1e3 * _anchors(robot), strict=False)):
         text += f"\n[stepper_{letter}]\nanchor_x: {x:.2f}\nanchor_y: {y:.2f}\nanchor_z: {z:.2f}\n"
-        if robot.drums is not None and robot.drums.radius_m.all():
-            turn = 2e3 * np.pi * _spools(robot, robot.drums)[0][winch] / parts[winch]
-            text += f"rotation_distance: {turn:.4f}  # straight mm a turn of the spool, at the origin\n"
-            text += f"gear_ratio: {of_each_winch(robot, robot.drums.gear)[winch]:g}:1\n"
+        if drums is not None:
+            text += f"rotation_distance: {turns[winch]:.4f}  # straight mm a turn of the spool, at the origin\n"
+            text += f"gear_ratio: {gear[winch]:g}:1\n"
     return text
+
+
+def _measured_drums(robot: Robot) -> Drums | None:
+    """The drums, where the radius of each is known."""
+    drums = robot.drums
+    return drums if drums is not None and drums.radius_m.all() else None
 
 
 def _spools(robot: Robot, drums: Drums) -> tuple[Floats, Floats]:
@@ -259,11 +266,17 @@ def simulators(robot: Robot, line: WireDraws) -> dict[str, str]:
     model = mujoco(robot, line)
     if model is None:
         return {}
-    wires = for_robot(robot, line.centre())
-    x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
-    zero = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R)).zero_m[0]
+    wires, commands = _at_home(robot, line)
+    zero = commands.zero_m[0]
     k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, 1))[:, 0]
     return {"robot.xml": model, "robot.urdf": urdf(robot, k1, zero), "robot.sdf": sdf(robot, k1, zero)}
+
+
+def _at_home(robot: Robot, line: WireDraws) -> tuple[Wires, inverse.Commands]:
+    """The mean line, and its lengths and tensions at the home pose."""
+    wires = for_robot(robot, line.centre())
+    x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
+    return wires, inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
 
 
 def mujoco(robot: Robot, line: WireDraws) -> str | None:
@@ -272,9 +285,7 @@ def mujoco(robot: Robot, line: WireDraws) -> str | None:
     Each tendon is a linear spring with the tension and the tangent stiffness that the line has there: under law (1)
     without effects on the strain that is the line itself.
     """
-    wires = for_robot(robot, line.centre())
-    x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
-    commands = inverse.commands(robot, wires, x, R, inverse.tensions(robot, x, R))
+    wires, commands = _at_home(robot, line)
     if not commands.feasible.all():
         return None
     zero, tau = commands.zero_m.T, commands.tension_N.T

@@ -47,27 +47,30 @@ def mjcf(
     towards_m : (w, 3) array, optional
         Where the pulleys look; default: to the platform points at the home pose.
     """
-    m, arm2 = float(robot.mass_kg), robot.size_m**2
+    mass = float(robot.mass_kg)
     turn = matrix(robot.home_rotation_rad)
     joints = _joints(robot, turn, damping_N_s_m)
     if towards_m is None:
         towards_m = robot.home_m + robot.platform_m @ turn.T
     radius, axis = wheels(robot)
-    exits = "".join(f'<site name="exit{i}" pos="{spaced(p)}"/>' for i, p in enumerate(robot.exit_m - radius * axis))
-    pulleys = "".join(
-        _rim(int(i), robot.exit_m[i], float(radius[i, 0]), axis[i], towards_m[i]) for i in np.flatnonzero(radius[:, 0])
-    )
-    points = "".join(f'<site name="point{i}" pos="{spaced(p)}"/>' for i, p in enumerate(robot.platform_m))
+    exits, points = _sites("exit", robot.exit_m - radius * axis), _sites("point", robot.platform_m)
+    wheeled = np.flatnonzero(radius[:, 0])
+    pulleys = "".join(_rim(int(i), robot.exit_m[i], float(radius[i, 0]), axis[i], towards_m[i]) for i in wheeled)
     tendons = _tendons(robot, k1_N, zero_m, offset_m, radius[:, 0])
-    comment = "".join(f"<!-- {text.replace('--', '- -')} -->" for text in (remark, _STILL if pulleys else "") if text)
-    inertia = spaced(np.full(3, m * arm2))
+    remarks = [text for text in (remark, _STILL if pulleys else "") if text]
+    comment = "".join(f"<!-- {text.replace('--', '- -')} -->" for text in remarks)
+    inertia = spaced(np.full(3, mass * robot.size_m**2))
     return (
         f'<mujoco model={quoteattr(robot.name)}>{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
         f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}'
         f'<body pos="{spaced(robot.home_m)}" quat="{spaced(_quaternion(robot.home_rotation_rad))}">{joints}'
-        f'<inertial pos="{spaced(robot.centre_of_mass_m)}" mass="{m!r}" diaginertia="{inertia}"/>{points}'
+        f'<inertial pos="{spaced(robot.centre_of_mass_m)}" mass="{mass!r}" diaginertia="{inertia}"/>{points}'
         f"</body>{pulleys}</worldbody><tendon>{tendons}</tendon></mujoco>\n"
     )
+
+
+def _sites(kind: str, points_m: Floats) -> str:
+    return "".join(f'<site name="{kind}{i}" pos="{spaced(point)}"/>' for i, point in enumerate(points_m))
 
 
 def _tendons(robot: Robot, k1_N: Floats, zero_m: Floats, offset_m: Floats, radius_m: Floats) -> str:

@@ -130,19 +130,24 @@ class _PoseSearch:
         shape = statics.geometry(robot, x, R)
         gap = self.gap(shape)
         J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0).swapaxes(1, 2) * robot.edge_scale
-        reach = 10 * self.half
-        toward, pull = np.zeros((len(gap), robot.degrees)), np.zeros(robot.degrees)
-        toward[:, :3] = (x.T - self.middle) * (robot.span_m / reach)
-        pull[:3] = robot.span_m / reach
+        toward, pull = self._toward_home(x, R)
+        normal = J.swapaxes(1, 2) @ J + _WEAK**2 * np.diag(pull**2)
+        slope = (J.swapaxes(1, 2) @ gap[..., None])[..., 0] + _WEAK**2 * pull * toward
+        step = -solve(normal, slope[..., None])[..., 0]
+        size = np.linalg.norm(step, axis=1, keepdims=True)
+        share = np.minimum(1.0, 0.2 * robot.span_m / np.maximum(size, 1e-300))
+        return step * share * robot.edge_scale
+
+    def _toward_home(self, x: Floats, R: Floats) -> tuple[Floats, Floats]:
+        """(n, d) how far poses are from workspace and home, and (d,) the slopes of that."""
+        robot = self.robot
+        toward, pull = np.zeros((x.shape[1], robot.degrees)), np.ones(robot.degrees)
+        pull[:3] = robot.span_m / (10 * self.half)
+        toward[:, :3] = (x.T - self.middle) * pull[:3]
         if robot.degrees == 6:
             home = turns.matrix(robot.home_rotation_rad)
             toward[:, 3:] = turns.vector(np.moveaxis(R, -1, 0) @ home.T) * robot.size_m
-            pull[3:] = 1.0
-        A = J.swapaxes(1, 2) @ J + _WEAK**2 * np.diag(pull**2)
-        b = (J.swapaxes(1, 2) @ gap[..., None])[..., 0] + _WEAK**2 * pull * toward
-        step = -solve(A, b[..., None])[..., 0]
-        size = np.linalg.norm(step, axis=1, keepdims=True)
-        return step * np.minimum(1.0, 0.2 * robot.span_m / np.maximum(size, 1e-300)) * robot.edge_scale
+        return toward, pull
 
     def misfit(self, x: Floats, R: Floats) -> Floats:
         """(n,) how badly poses close the loops, and how far outside the workspace they are."""
