@@ -18,6 +18,7 @@ from wirebayes.io.bench.decode import decode, read_raw
 from wirebayes.io.bench.delimited import sheet_of_text
 from wirebayes.io.bench.holds import cut, stretches
 from wirebayes.io.bench.joined import HOLD, lacking, one_table
+from wirebayes.io.bench.no_weight import without_weight
 from wirebayes.io.bench.quantities import UNITS
 from wirebayes.io.bench.recorded import Cut
 from wirebayes.io.bench.resolution import evident_step
@@ -164,6 +165,8 @@ def _convert(table: RawTable, about: About, choices: Choices) -> Converted:
     if control == "force" and recorded.not_read is not None:  # a setting goes on, a reading does not
         raise table.complain(recorded.not_read, columns["displacement"].index, "an empty cell", _NOT_READ)
     holds = cut(recorded.readings(control), choices.time_since)
+    if control == "force":
+        holds = without_weight(holds, values["tension"])
     holds, thin = _thin(holds)
     notes += _what_was_set(control) + recorded.numbering + holds.notes + thin + _missing_holds(holds)
     resolution = _resolution(columns[READS[control]], recorded.texts[READS[control]])
@@ -174,12 +177,15 @@ def _convert(table: RawTable, about: About, choices: Choices) -> Converted:
     rows, origin = _rows(holds, values, control)
     experiment = as_experiment(table, columns, header, rows, origin, about, resolution, control)
     check_direction(table, columns["displacement"], experiment)
-    recording = None
-    if holds.of_test:
-        since = holds.clock_s - holds.clock_s[0]
-        starts = np.array([since[of_hold[0]] - t[0] for of_hold, t in zip(holds.rows, holds.time_s, strict=True)])
-        recording = Recording(since, values["displacement"], values["tension"], starts)
+    recording = _recording(holds, values) if holds.of_test else None
     return Converted(experiment, rows, header, notes, recording, holds.warnings)
+
+
+def _recording(holds: Cut, values: Mapping[Any, Floats]) -> Recording:
+    """Everything that was recorded, with the moments at which holds begin."""
+    since = holds.clock_s - holds.clock_s[0]
+    starts = np.array([since[of_hold[0]] - t[0] for of_hold, t in zip(holds.rows, holds.time_s, strict=True)])
+    return Recording(since, values["displacement"], values["tension"], starts)
 
 
 def _control(recorded: Recorded) -> Control:
@@ -221,8 +227,11 @@ def _rows(holds: Cut, values: Mapping[Any, Floats], control: Control) -> tuple[l
         readings: list[tuple[float, float | None, int]] = [
             (_tidy(time), float(read[row]), int(row)) for row, time in zip(of_hold, times, strict=True)
         ]
-        if end is not None and _tidy(end) > readings[-1][0]:
-            readings.append((_tidy(end), None, readings[-1][2]))
+        last_s, _, last = readings[-1]
+        if number in holds.unread:
+            readings = [(max(last_s, _tidy(end or 0.0)), None, last)]
+        elif end is not None and _tidy(end) > last_s:
+            readings.append((_tidy(end), None, last))
         for time, value, row in readings:
             x, tension = (level, value) if control == "displacement" else (value, level)
             temperature = None if value is None or "temperature" not in values else float(values["temperature"][row])

@@ -77,6 +77,8 @@ class Cut:
         Times of all rows as they were read, pieces of a recording joined.
     warnings : tuple of Notice
         What of the recording has no place in holds.
+    unread : frozenset of int
+        Numbers of holds of which no reading is used.
     """
 
     rows: list[Ints]
@@ -88,6 +90,7 @@ class Cut:
     notes: list[str]
     clock_s: Floats
     warnings: tuple[Notice, ...] = ()
+    unread: frozenset[int] = frozenset()
 
 
 def restarts(readings: Readings) -> Bools:
