@@ -29,11 +29,6 @@ def test_a_rest_in_which_nothing_was_read_is_no_reading(tmp_path):
     file = written(tmp_path / "log.csv", "step,mass (kg),time (s),dial (mm)", rows)
     with pytest.raises(InputError, match=r"line 5, column 4 \(dial \(mm\)\): found an empty cell, expected a reading"):
         wb.import_bench(file, length_mm=1500, material="Kevlar", output=tmp_path / "out")
-    bare = written(tmp_path / "bare.csv", "step,mass (kg),time (s),dial (mm)", [(0, 0, 0, 1.0), *ROWS])
-    with pytest.raises(
-        InputError, match="expected a tension above 0 N: of a rest, the weight of the empty hook; .*unrecorded_holds"
-    ):
-        wb.import_bench(bare, length_mm=1500, material="Kevlar", output=tmp_path / "out", control="force")
 
 
 def test_a_column_that_speaks_of_a_force_comes_before_a_mass(tmp_path):

@@ -58,6 +58,32 @@ def test_what_a_copy_raises_is_raised_here():
 
 
 @LINUX
+def test_an_error_that_wants_more_than_a_message_is_raised_as_the_nearest_that_does_not():
+    found = run("""
+        class Wanting(KeyError):
+            def __init__(self, found, expected):
+                super().__init__(f"found {found}, expected {expected}")
+        here = os.getpid()
+        def piece():
+            time.sleep(0.2)
+            if os.getpid() != here:
+                raise Wanting("a", "b")
+        def asked():
+            raise Wanting("c", "d")
+        try:
+            in_copies([piece] * 4)
+        except KeyError as error:
+            print(error)
+        with copies.prepared_copy(lambda: None) as ask:
+            try:
+                ask(asked)
+            except KeyError as error:
+                print(error)
+    """)
+    assert "found a, expected b" in found and "found c, expected d" in found
+
+
+@LINUX
 def test_pieces_of_a_copy_that_is_gone_are_done_here():
     found = run("""
         here = os.getpid()

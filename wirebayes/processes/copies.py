@@ -6,8 +6,10 @@ would take longer to be sent what they show. `prepared_copy` is for what can beg
 """
 
 import os
+import pickle
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -143,7 +145,7 @@ def _prepare_and_serve(prepare: Callable[[], object], there: "Connection[Any, An
         try:
             there.send(function(*arguments))
         except Exception as error:
-            there.send(error)
+            there.send(_as_can_be_sent(error))
 
 
 def _queue(length: int) -> int:
@@ -165,7 +167,25 @@ def _work(pieces: Sequence[Callable[[], T]], waiting: int, answers: "Connection[
     try:
         answers.send({number: pieces[number]() for number in _numbers(waiting)})
     except Exception as error:
-        answers.send(error)
+        answers.send(_as_can_be_sent(error))
+
+
+def _as_can_be_sent(error: Exception) -> Exception:
+    """An error, or one of the nearest class above its own with the same message, if it cannot be made anew elsewhere.
+
+    Pickle makes an error by calling its class with the message alone, and some want more.
+    """
+    text = str(error)
+    above = [kind for kind in type(error).__mro__[1:] if issubclass(kind, Exception)]
+    makers: list[Callable[[], Exception]] = [lambda: error, *(partial(kind, text) for kind in above)]
+    for make in makers:
+        try:
+            sent = make()
+            pickle.loads(pickle.dumps(sent))
+        except Exception:
+            continue
+        return sent
+    return RuntimeError(text)
 
 
 def _answer(process: "BaseProcess", end: "Connection[Any, Any]") -> "dict[int, T] | Exception":
