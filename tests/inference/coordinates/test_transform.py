@@ -40,6 +40,11 @@ PROBLEMS = {
     "one weight each": draw(
         [Bench("a", weights_N=(10.0,)), Bench("b", length_mm=1710.0, weights_N=(20.0, 20.0))], Truth(), seed=3
     ).problem,
+    "one displacement each": draw(
+        [Bench("a", displacements_mm=(3.0,)), Bench("b", length_mm=1710.0, displacements_mm=(5.0, 0.0, 5.0))],
+        Truth({"k1": 800.0}),
+        seed=3,
+    ).problem,
     "together": draw([*LINE, Bench("c", "other")], seed=3).problem,
     "one hold": draw([Bench(displacements_mm=(1.0,))], Truth({"k1": 800.0}), seed=8).problem,
     "one displacement": draw([Bench(displacements_mm=(3.0, 0.0, 3.0))], Truth({"k1": 800.0}), seed=8).problem,

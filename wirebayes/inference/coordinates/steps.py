@@ -12,6 +12,7 @@ import numpy as np
 from wirebayes.inference.coordinates import shares
 from wirebayes.inference.coordinates.common_error import CommonError
 from wirebayes.inference.coordinates.displacement_level import DisplacementLevel
+from wirebayes.inference.coordinates.first_stretch import FirstStretch
 from wirebayes.inference.coordinates.ridge import Ridge
 from wirebayes.inference.coordinates.slack_edge import SlackEdge
 from wirebayes.inference.coordinates.tension_level import TensionLevel
@@ -67,7 +68,7 @@ class Loss(Step):
     """Log B becomes the log of what is lost in a hold, and what creeps beside the creep its share of that."""
 
     ridge: Ridge
-    level: TensionLevel | DisplacementLevel | None
+    level: TensionLevel | DisplacementLevel | FirstStretch | None
 
     def _beyond(self, theta: Array) -> Any:
         """(n,) log of what a test of one setting shows over what the ridge says."""
@@ -216,6 +217,49 @@ class Preload(Step):
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         return self.edge.log_slope(theta)
+
+
+@dataclass(frozen=True)
+class Stretched(Step):
+    """In one of several tests at one displacement each, the preload becomes its error in standard deviations."""
+
+    stretch: FirstStretch
+    scale: float
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        z[:, self.stretch.preload] = self.stretch.score(theta)
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        column = self.stretch.preload
+        theta[:, column] = self.stretch.value(z[:, column], theta)
+
+    def log_jacobian(self, theta: Array, z: Array) -> Array | float:
+        return self.stretch.log_slope(theta) - np.log(self.scale)
+
+
+@dataclass(frozen=True)
+class StretchLevel(Step):
+    """Where preloads are `Stretched`, the log of the loss becomes that of the true stretches: the mean of the tests."""
+
+    ridge: Ridge
+    levels: tuple[FirstStretch, ...]
+    scale: Array
+
+    @property
+    def preloads(self) -> list[int]:
+        """Their columns."""
+        return [level.preload for level in self.levels]
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        z[:, self.ridge.where["B"]] += self._log_gain(theta, z)
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        z[:, self.ridge.where["B"]] -= self._log_gain(theta, z)  # for the steps before this one
+
+    def _log_gain(self, theta: Array, z: Array) -> Array:
+        U = self.ridge.get(theta, "U")
+        gains = [each.log_gain(theta, U, z[:, each.preload]) for each in self.levels]
+        return np.asarray(np.mean(gains, axis=0))
 
 
 @dataclass(frozen=True)

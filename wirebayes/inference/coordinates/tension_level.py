@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.inference.coordinates.one_setting import is_one_setting
+from wirebayes.inference.coordinates.one_setting import is_one_displacement
 from wirebayes.inference.coordinates.slack_edge import SlackEdge
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.typing import Array
@@ -98,19 +98,13 @@ def tension_level(problem: Problem, slack_edges: list[SlackEdge]) -> TensionLeve
     if len(problem.samples) != 1 or any(edge.threshold != 0.0 for edge in slack_edges):
         return None
     (sample,) = problem.samples
+    if not is_one_displacement(sample):
+        return None
     protocol = sample.protocol
-    pulled = protocol.setting > 0.0
-    if protocol.control == "force" or not (pulled[0] and protocol.recorded[0]):
-        return None
-    if not is_one_setting(protocol.setting[pulled]):
-        return None
-    read = sample.readings[..., 0][protocol.mask & pulled[:, None]]
-    if read[0] <= 0.0 or read[-1] <= 0.0:
-        return None
     k1, preload = problem.names.index(problem.column("k1", sample)), problem.place("preload", sample)
     begin_s, end_s = float(protocol.time_s[0, 0]), float(protocol.duration_s[0])
     at, length = float(protocol.setting[0]), protocol.length_mm
-    return TensionLevel(k1, preload, at, length, float(read[0]), begin_s, end_s)
+    return TensionLevel(k1, preload, at, length, float(sample.readings[0, 0, 0]), begin_s, end_s)
 
 
 _LEAST = 1e-3  # of the stretch without a preload: with less the wire is slack, and k1 is what it is

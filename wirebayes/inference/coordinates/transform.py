@@ -20,6 +20,8 @@ measured in standard deviations of their prior. Then, one after the other (`wire
   (`wirebayes.inference.coordinates.tension_level`);
 - ``WeightLevel``: in a test of one weight, the preload and B become what its displacements say beside k1
   (`wirebayes.inference.coordinates.displacement_level`);
+- ``Stretched`` and ``StretchLevel``: in several tests at one displacement each, every preload becomes its error, and B
+  what the true stretches lose (`wirebayes.inference.coordinates.first_stretch`). Both ask for k1;
 - ``Hazard``: log k2 becomes the log hazard at half a typical hold, ``log k2 + N log t``;
 - ``Power``: log U becomes its distance from the power of tension that suits the measured losses best at this hazard
   (`wirebayes.inference.coordinates.power_of_tension`);
@@ -28,7 +30,7 @@ measured in standard deviations of their prior. Then, one after the other (`wire
 - ``Straightened``: beside a toe, the preload becomes what is left of it once the toe is straight.
 
 The map is triangular: to natural parameters the steps go backwards, so that each finds the parameters that it asks for.
-Those but of the preload and of shares have unit Jacobian. Those of U, the preload and shares are for proposals to draw
+Those but of preloads and of shares have unit Jacobian. Those of U, preloads and shares are for proposals to draw
 from: Laplace approximations, as the search for effects compares them, do without. The proposal learns the remaining
 curvature and funnels (`wirebayes.inference.sampler.transport_map`), for which the columns are ordered: errors before
 what they widen, the shape of the creep before its amount and the stiffness.
@@ -42,6 +44,7 @@ import numpy as np
 from wirebayes.inference.coordinates.columns import ColumnMap, columns_of
 from wirebayes.inference.coordinates.common_error import common_error
 from wirebayes.inference.coordinates.displacement_level import DisplacementLevel, displacement_levels
+from wirebayes.inference.coordinates.first_stretch import FirstStretch, first_stretches
 from wirebayes.inference.coordinates.ridge import Ridge, ridges_of
 from wirebayes.inference.coordinates.slack_edge import SlackEdge, slack_edge
 from wirebayes.inference.coordinates.steps import (
@@ -53,6 +56,8 @@ from wirebayes.inference.coordinates.steps import (
     SoftenedStiffness,
     Step,
     Straightened,
+    Stretched,
+    StretchLevel,
     WeightLevel,
 )
 from wirebayes.inference.coordinates.tension_level import TensionLevel, tension_level
@@ -60,6 +65,7 @@ from wirebayes.model.problem import Problem
 from wirebayes.model.sample import NOISES
 from wirebayes.numeric.typing import Array
 
+LevelStep = Level | WeightLevel | StretchLevel
 _FIRST = ("setting_sd", "sensor_sd", "U", "k2", "N")
 _LAST = ("k1", "B")
 
@@ -115,7 +121,7 @@ class Transformation:
         self.order = np.array(sorted(range(len(names)), key=lambda i: _rank(names[i])))
         slack = _slack_edges(problem, self.columns) if for_draws else []
         ridges = ridges_of(problem, self.columns, for_draws)
-        levels: list[Level | WeightLevel] = []
+        levels: list[LevelStep] = []
         if for_draws and _is_usual(problem, self.columns, ridges):
             (ridge,) = ridges
             if (tension := tension_level(problem, slack)) is not None:
@@ -123,12 +129,14 @@ class Transformation:
                 levels = [Level(ridges[0], tension)]
             elif weights := displacement_levels(problem, ridge):
                 levels = [WeightLevel(ridge, tuple(weights), common_error(problem), self.scale)]
-        toes = _toes(problem, self.columns) if for_draws and not any(isinstance(s, WeightLevel) for s in levels) else []
+            elif stretches := first_stretches(problem, ridge, slack):
+                levels, slack = [StretchLevel(ridge, tuple(stretches), self.scale)], []
+        preloads = {column for s in levels if not isinstance(s, Level) for column in s.preloads}
+        toes = _toes(problem, self.columns) if for_draws and not preloads else []
         self.steps = [*_steps(ridges, levels, [Preload(edge, self.scale[edge.preload]) for edge in slack]), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
-        preloads = {edge.preload for edge in slack}
-        preloads |= {column for s in levels if isinstance(s, WeightLevel) for column in s.preloads}
+        preloads |= {edge.preload for edge in slack}
         self._own_scale = [*self.shares, *sorted(preloads | {toe.preload for toe in toes})]
 
     @property
@@ -189,25 +197,30 @@ class Transformation:
         return np.asarray(out.T)
 
 
-def _steps(ridges: Sequence[Ridge], levels: Sequence[Level | WeightLevel], preloads: Sequence[Preload]) -> list[Step]:
+def _steps(ridges: Sequence[Ridge], levels: Sequence[LevelStep], preloads: Sequence[Preload]) -> list[Step]:
     """The steps, each kind for all materials: what one asks for may be a column that an earlier material owns."""
     asks_for_k1 = [step for step in preloads if step.edge.threshold != 0.0]
     level = _read_beside(levels)
+    of_stretches = [step for step in levels if isinstance(step, StretchLevel)]
     return [
         *asks_for_k1,
+        *(Stretched(each, step.scale[each.preload]) for step in of_stretches for each in step.levels),
         *(Loss(ridge, level) for ridge in ridges if "B" in ridge.shifted),
+        *of_stretches,
         *(SoftenedStiffness(ridge) for ridge in ridges if "k1" in ridge.shifted),
-        *levels,
+        *(step for step in levels if not isinstance(step, StretchLevel)),
         *(Hazard(ridge) for ridge in ridges if "k2" in ridge.shifted),
         *(Power(ridge) for ridge in ridges if "U" in ridge.shifted),
         *(step for step in preloads if step not in asks_for_k1),
     ]
 
 
-def _read_beside(levels: Sequence[Level | WeightLevel]) -> TensionLevel | DisplacementLevel | None:
+def _read_beside(
+    levels: Sequence[LevelStep],
+) -> TensionLevel | DisplacementLevel | FirstStretch | None:
     """What tests of one setting show over what the ridge says: the first of them stands for all."""
     for step in levels:
-        return step.levels[0] if isinstance(step, WeightLevel) else step.level
+        return step.level if isinstance(step, Level) else step.levels[0]
     return None
 
 
