@@ -8,9 +8,17 @@ from wirebayes.robot.export.mujoco_model import mjcf
 from wirebayes.robot.mechanics import rotation, schema, statics
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
+from wirebayes.robot.self_calibration import session_file
 
 # shipped robots that hang on their wires alone: what no plane carries
 HANGING = [name for name in schema.shipped() if schema.read_robot_file(name).plane is None]
+
+
+def session_header(robot, given=()):
+    """Columns of a session with poses and tensions, in the order of the docs."""
+    hold, duration, *joints = session_file.columns(robot, given).required
+    tensions = [f"tension_{i + 1}_N" for i in range(robot.legs)]
+    return [hold, *session_file.POSITION, *session_file.TURN, duration, *joints, *tensions]
 
 
 @dataclass

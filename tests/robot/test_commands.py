@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.robot.cases import session_header
 from wirebayes.cli import main
 from wirebayes.io.run_folder import read_json
 from wirebayes.model.sample import Sample
@@ -218,7 +219,6 @@ def session_csv(tmp_path):
     """A session on linear-7 whose true reference errors are known, written as the command reads it."""
     from wirebayes.robot.mechanics import draws, rotation, schema
     from wirebayes.robot.motion import inverse
-    from wirebayes.robot.self_calibration import session_file
     from wirebayes.robot.self_calibration.predicted import predict_session
     from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
@@ -237,7 +237,7 @@ def session_csv(tmp_path):
     truth[0, : robot.legs] = 1e-3 * np.array([3, -2, 1, 4, -5, 0, 2])
     real = predict_session(robot, prior, session, truth)
     tension = iter(real.readings.reshape(-1, robot.legs) * 0.02)
-    rows = [[*session_file.columns(robot).required]]
+    rows = [session_header(robot)]
     for k in range(len(x)):
         cells = [str(v) for v in (k + 1, *x[k], 0, 0, 0, 30.0, *commanded.joint_m[k])]
         rows.append([*cells, *([str(v) for v in next(tension)] if read[k] else [""] * robot.legs)])

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.robot.cases import session_header
 from tests.robot.test_calibration import _line
 from wirebayes.errors import InputError
 from wirebayes.robot.export import files
@@ -107,7 +108,7 @@ def test_a_session_may_give_motor_angles(tmp_path):
     for name, motors, values in (("a", False, joint), ("b", True, angle)):
         with (tmp_path / name).open("w", newline="") as file:
             rows = csv.writer(file)
-            rows.writerow(session_file.columns(robot, ["motor_1_rad"] if motors else []).required)
+            rows.writerow(session_header(robot, ["motor_1_rad"] if motors else []))
             rows.writerow([1, *robot.home_m, 0, 0, 0, 60, *map(float, values), *[2.0] * 8])
         sessions.append(session_file.read_session(tmp_path / name, robot, 0.02, 1e-3)[0])
     assert "joint_3_m" in session_file.columns(robot, ["motor_4_rad"]).required
@@ -136,7 +137,7 @@ def test_tables_may_give_the_straight_lengths_that_firmware_counts():
         return table.parse_log(csv_table(Path("log.csv"), text), robot, table.measured_columns).joint_m
 
     for read, names in (
-        (session, session_file.columns(robot, given).required),
+        (session, session_header(robot, given)),
         (log, table.measured_columns(robot, given).required),
     ):
         assert "straight_4_mm" in names

@@ -46,6 +46,25 @@ def _session(spread, line=LINE):
     return robot, cells | {f"tension_{i + 1}_N": tau[:, i] for i in range(6)}
 
 
+def test_columns_of_which_nothing_is_known_may_be_left_out(session):
+    """A printer's owner knows neither poses nor tensions, and a plotter has no rotations."""
+    robot, cells = session
+    empty = {name: [""] * HOLDS if may_be_empty(name) else values for name, values in cells.items()}
+    bare = {name: values for name, values in cells.items() if not may_be_empty(name)}
+    for all_empty, left_out in zip(_read(robot, empty), _read(robot, bare), strict=True):
+        np.testing.assert_equal(_plain(left_out), _plain(all_empty))
+    placed = {name: values for name, values in cells.items() if name not in TURN}
+    known, _ = _read(robot, placed)
+    np.testing.assert_array_equal(known.position_m, _read(robot, cells)[0].position_m)
+    assert np.isnan(known.rotation).all()
+    with pytest.raises(InputError, match="found no column y_m"):
+        _read(robot, {name: values for name, values in cells.items() if name != "y_m"})
+
+
+def _plain(value):
+    return vars(value) if hasattr(value, "joint_m") else value
+
+
 def _read(robot, cells, biased=False):
     given = {name: np.asarray(value).tolist() for name, value in cells.items()}
     return parse_session(columns_table(given, Path("log"), may_be_empty), robot, SD_N, 1e-3, biased)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.robot import drawn
+from tests.robot.cases import session_header
 from wirebayes.errors import InputError
 from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.rotation import vector
@@ -108,8 +109,6 @@ def test_millimetres_and_straight_lengths_are_refused_with_their_place(tmp_path)
             if scale == 1.0 and robot.beyond_m.any():
                 continue
             changed = [[*row[:8], *(scale * straight), *row[8 + robot.legs :]] for row in rows]
-            text = "\n".join(
-                [",".join(session_file.columns(robot).required), *(",".join(map(str, r)) for r in changed)]
-            )
+            text = "\n".join([",".join(session_header(robot)), *(",".join(map(str, r)) for r in changed)])
             with pytest.raises(InputError, match=rf"line 2, column \d+ \(joint_\d_m\): found .*, expected .*{reason}"):
                 session_file.parse_session(csv_table(Path("session.csv"), text), robot, 0.02, 1e-3)

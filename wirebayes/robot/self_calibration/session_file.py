@@ -1,6 +1,7 @@
 """Reads a calibration session from CSV, strictly: one row per hold, errors with line and column."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +23,13 @@ _NOISE = 5.0  # standard errors: so far below zero a slack wire may read, once i
 
 
 def columns(robot: Robot, given: Sequence[str] = ()) -> Header:
-    """The file's columns: requested pose, duration, joint values and tensions at the end; motions and the normal's.
+    """The file's columns: duration and joint values; poses and tensions where some are known; motions, the normal's.
 
     Joint values are in the units of a header that is given (`joint_columns`).
     """
     return Header(
-        ("hold", *POSITION, *TURN, "duration_s", *joint_columns(robot, given), *_of_legs(robot, "tension_{}_N")),
-        (_of_legs(robot, "motion_{}"), NORMAL),
+        ("hold", "duration_s", *joint_columns(robot, given)),
+        (POSITION, TURN, _of_legs(robot, "tension_{}_N"), _of_legs(robot, "motion_{}"), NORMAL),
     )
 
 
@@ -42,7 +43,8 @@ def read_session(
     """A session and its standardised readings ``(r,)``.
 
     A row without tensions is a hold that was not read; one without a position is a hold at a pose that nobody knows,
-    and one without a rotation at an orientation that nobody knows: NaN in the session. With the columns
+    and one without a rotation at an orientation that nobody knows: NaN in the session. So are all rows of a table that
+    leaves these columns out. With the columns
     ``normal_x,normal_y`` an inclinometer's readings join in. Tensions may be below zero by their noise, and by any
     amount where sensors may be `biased`; directions of motion, ``motion_1`` and so on, may be given for these only.
 
@@ -102,17 +104,15 @@ def parse_session(
     if not len(cells):
         raise InputError(f"{table.path}: found no holds, expected at least one row")
 
-    def some(names: tuple[str, ...]) -> Floats:
-        return np.asarray(cells[:, [table.header.index(name) for name in names]])
-
+    some = partial(_some, table, cells)
     number = some(("hold",))[:, 0]
     _refuse_twice(table, number)
     joints = joint_columns(robot, table.header)
     joint = joint_values(robot, joints, some(joints))
     plausible.refuse(robot, joint, table, joints)
-    plausible.refuse_far(robot, some(POSITION), table, POSITION)
     tension, normal = some(tensions), some(NORMAL if tilted else ())
     position, turn = some(POSITION), some(TURN)
+    plausible.refuse_far(robot, position, table, POSITION)
     _refuse_half(table, np.concatenate([tension, normal], axis=1), "the readings")
     _refuse_half(table, position, "the position")
     _refuse_half(table, turn, "the rotation")
@@ -132,6 +132,13 @@ def parse_session(
     # without any tension read, what is left is for the calibration of the whole robot
     read_N, read_normal = tension[was_read].ravel(), normal[was_read].ravel()
     return session, np.concatenate([read_N / tension_sd_N, read_normal / tilt_sd_rad])
+
+
+def _some(table: CsvTable, cells: Floats, names: tuple[str, ...]) -> Floats:
+    """(p, n) cells of some columns, NaN where the table leaves them out."""
+    if not set(names) <= set(table.header):
+        return np.full((len(cells), len(names)), np.nan)
+    return np.asarray(cells[:, [table.header.index(name) for name in names]])
 
 
 def _rotations(robot: Robot, position: Floats, turn: Floats) -> Floats:
