@@ -39,17 +39,20 @@ def eigh(matrices: Array) -> tuple[Array, Array]:
 def _each(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> tuple[Array, ...]:
     """Results of a numpy function for every matrix of the stack it can be computed for."""
     usable = np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))
-    if not usable.all():
-        matrices = np.where(usable[..., None, None], matrices, np.eye(matrices.shape[-1]))
+    matrices = _harmless(matrices, usable)
     try:
         out = tuple(function(matrices, *others))
     except np.linalg.LinAlgError:  # one of them at least: find out which
         usable = usable & _computable(function, matrices, *others)
-        matrices = np.where(usable[..., None, None], matrices, np.eye(matrices.shape[-1]))
-        out = tuple(function(matrices, *others))
+        out = tuple(function(_harmless(matrices, usable), *others))
     if usable.all():
         return out
     return tuple(np.where(usable.reshape(*usable.shape, *[1] * (a.ndim - usable.ndim)), a, np.nan) for a in out)
+
+
+def _harmless(matrices: Array, usable: Bools) -> Array:
+    """The stack with the identity for each matrix that is of no use."""
+    return matrices if usable.all() else np.where(usable[..., None, None], matrices, np.eye(matrices.shape[-1]))
 
 
 def _computable(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> Bools:

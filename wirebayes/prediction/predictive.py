@@ -117,15 +117,14 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: Ge
     walk = Walk(protocol, own, sample.model)
     creep, beside = walk.begin(n)
     out = []
-    for j in range(len(request.requested)):
-        if j < trained and request.requested[j]:
+    for j, requested in enumerate(request.requested):
+        anew = None
+        if j < trained and requested:
             past = list(walk.past)
-            out.append(walk.hold(j, protocol.setting[j] + again[j], creep, beside)[0])
+            anew, _, _ = walk.hold(j, protocol.setting[j] + again[j], creep, beside)
             walk.past = past
-            _, creep, beside = walk.hold(j, protocol.setting[j] + setting[j], creep, beside)
-        else:
-            readings, creep, beside = walk.hold(j, protocol.setting[j] + setting[j], creep, beside)
-            out.append(readings)
+        readings, creep, beside = walk.hold(j, protocol.setting[j] + setting[j], creep, beside)
+        out.append(readings if anew is None else anew)
     return np.array(out)
 
 

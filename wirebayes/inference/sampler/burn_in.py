@@ -265,8 +265,9 @@ def _hard_to_find(learned: Learned) -> bool:
 
 def _walked(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, tuple[Array, Array, Array]]:
     """Where walkers of the warm density come by: places (n, d), their log densities and the log density walked."""
-    power = WARM[min(state.learned.walks, len(WARM) - 1)]
-    steps = policy.round_draws // _walking(target, policy) * 2 ** min(state.learned.walks, len(WARM) - 1)
+    number = min(state.learned.walks, len(WARM) - 1)
+    power = WARM[number]
+    steps = policy.round_draws // _walking(target, policy) * 2**number
     move = move_of(state.learned, 1, steps, frozen=False)
     done = advance(target, state.walkers, move, steps, power)
     walked = done.sampler.get_log_prob(discard=steps // 2, flat=True)

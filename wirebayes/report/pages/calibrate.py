@@ -77,6 +77,9 @@ _ERRORS = (
 )
 
 
+_AXES = ("x, mm", "90 %", "y, mm", "90 %", "z, mm", "90 %")
+
+
 def _geometry(found: CalibrateJson) -> list[Section]:
     """Points that were estimated, what the readings leave open, and where the robot was at each hold."""
     blocks: list[Block] = []
@@ -85,21 +88,18 @@ def _geometry(found: CalibrateJson) -> list[Section]:
             continue
         columns = zip(points["mean"], points["q05"], points["q95"], strict=True)
         lines = [[str(i + 1), *_intervals(mean, low, high)] for i, (mean, low, high) in enumerate(columns)]
-        header = [value for axis in "xyz" for value in (f"{axis}, mm", "90 %")]
-        blocks.append(Table(["wire", *header], lines, f"The {of} of every wire."))
+        blocks.append(Table(["wire", *_AXES], lines, f"The {of} of every wire."))
     if not blocks:
         return []
-    open_ = found["identified"]["not_determined"]
     seen = found["identified"]
     words = [f"The readings determine {seen['determined']} of {seen['of']} combinations of geometry and references."]
-    words += [f"Not determined: {text}." for text in open_]
+    words += [f"Not determined: {text}." for text in seen["not_determined"]]
     poses = found["poses"]
     places = zip(poses["hold"], poses["mean"], poses["q05"], poses["q95"], strict=True)
     rows = [[f"{hold:g}", *_intervals(mean[:3], low[:3], high[:3])] for hold, mean, low, high in places]
-    header = [value for axis in "xyz" for value in (f"{axis}, mm", "90 %")]
     return [
         Section("Geometry", [*blocks, Columns([Points("What the readings determine", words)])]),
-        Section("Poses", [Table(["hold", *header], rows, "Where the platform was when each hold ended.")]),
+        Section("Poses", [Table(["hold", *_AXES], rows, "Where the platform was when each hold ended.")]),
     ]
 
 

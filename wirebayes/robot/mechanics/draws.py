@@ -204,16 +204,14 @@ def specimens_in_words(wires: WiresUsed) -> list[str]:
     wires : WiresUsed
         ``wires`` of ``pose.json``.
     """
-    return [
-        f"Specimens of {name} differ as estimated from {one['tests']} tests: "
-        + ", ".join(
-            f"{k} by {100 * one['spread'][k]['q50']:.2g} % ({100 * one['spread'][k]['q05']:.2g} to "
-            f"{100 * one['spread'][k]['q95']:.2g} %)"
-            for k in CORE
-        )
-        + "."
-        for name, one in wires.get("specimens", {}).items()
-    ]
+    sentences = []
+    for name, one in wires.get("specimens", {}).items():
+        shares = []
+        for parameter in CORE:
+            low, middle, high = (100 * one["spread"][parameter][key] for key in ("q05", "q50", "q95"))
+            shares.append(f"{parameter} by {middle:.2g} % ({low:.2g} to {high:.2g} %)")
+        sentences.append(f"Specimens of {name} differ as estimated from {one['tests']} tests: {', '.join(shares)}.")
+    return sentences
 
 
 def lines_of(robot: Robot, line: WireDraws) -> list[WireDraws]:

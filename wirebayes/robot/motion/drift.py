@@ -255,13 +255,14 @@ class CreepingHold:
         share = np.where(there.share < 1, there.share, 1.0)
         self.fall_s[fell] = ((a + share * (b - a)) ** (1 / self.power))[fell]
         self.drop_m[fell] = np.where(there.drop_m > 0, there.drop_m, np.inf)[fell]
-        tau = np.where(fell[:, None], there.here.tension_N, here.tension_N)
+        of_fallen = fell[:, None]
+        tau = np.where(of_fallen, there.here.tension_N, here.tension_N)
         moving = self.live[:, None] & np.isfinite(tau)
-        before = self.here.tension_N
-        newly = moving & (tau <= 0) & np.isinf(self.slack_s) & ~fell[:, None]
-        self.slack_s = np.where(newly & (before > 0), span_s[1], self.slack_s)
+        newly = moving & (tau <= 0) & np.isinf(self.slack_s) & ~of_fallen
+        was_taut = self.here.tension_N > 0
+        self.slack_s = np.where(newly & was_taut, span_s[1], self.slack_s)
         # A wire that has all but lost its tension when the platform falls is the one that goes slack.
-        slackens = fell[:, None] & np.isinf(self.slack_s) & (tau < 1e-3 * self.first_N)
+        slackens = of_fallen & np.isinf(self.slack_s) & (tau < 1e-3 * self.first_N)
         self.slack_s = np.where(slackens, self.fall_s[:, None], self.slack_s)
         self.lowest_N = np.where(moving, np.minimum(self.lowest_N, tau), self.lowest_N)
         if fell.any():

@@ -95,13 +95,13 @@ def stability_warnings(course: Course, spread: float, stable: bool = True) -> li
         for i, (p, t) in enumerate(zip(found["slack_probability"], found["slack_time_s"], strict=True))
         if t is not None
     ]
+    tension, stiffness = found["least_tension_share"]["q05"], found["stiffness_share"]["q05"]
     if slack:
         out.append(Notice("slack", f"wires go slack within {last:g} s ({who}): {'; '.join(slack)}"))
-    elif (tension := found["least_tension_share"]["q05"]) is not None and tension < NEAR_SLACK:
-        left = _percent(float(tension))
-        text = f"wire {found['least_tension_wire']} may keep only {left} of its tension within {last:g} s ({who})"
-        out.append(Notice("slack", text))
-    if (stiffness := found["stiffness_share"]["q05"]) is not None and stiffness < NEAR_LOOSE:
+    elif tension is not None and tension < NEAR_SLACK:
+        wire, left = found["least_tension_wire"], _percent(float(tension))
+        out.append(Notice("slack", f"wire {wire} may keep only {left} of its tension within {last:g} s ({who})"))
+    if stiffness is not None and stiffness < NEAR_LOOSE:
         left = _percent(max(float(stiffness), 0.0))
         text = f"the stiffness against the softest motion may fall to {left} within {last:g} s ({who})"
         out.append(Notice("fall", text))

@@ -7,6 +7,7 @@ a prior allows it, the bias of each tension sensor: its zero, or friction of gui
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from wirebayes.numeric.typing import Array, Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
@@ -135,18 +136,17 @@ class LengthPrior:
     def moments(self, legs: int) -> tuple[Floats, Floats]:
         """Mean ``(d,)`` and covariance ``(d, d)`` of the unknowns: references, (log) parameters, specimens, biases."""
         values = self.fitted
-        p, own = len(values), len(self.own) * legs
+        own = len(self.own) * legs
         biased = legs if self.bias_sd_N > 0 else 0
         mean = np.concatenate([np.zeros(legs), values.mean(1), np.zeros(own + biased)])
-        cov = np.zeros((len(mean), len(mean)))
-        cov[:legs, :legs] = self.reference_sd_m**2 * np.eye(legs)
         # A parameter that is given exactly still gets a relative uncertainty, far below anything that matters.
-        cov[legs : legs + p, legs : legs + p] = np.cov(values) if self.line.count > 1 else 0.0
-        cov[legs : legs + p, legs : legs + p] += 1e-12 * np.eye(p)
-        specimens, sensors = slice(legs + p, legs + p + own), slice(legs + p + own, None)
-        cov[specimens, specimens] = self.own_sd**2 * np.eye(own)
-        cov[sensors, sensors] = self.bias_sd_N**2 * np.eye(biased)
-        return mean, cov
+        fitted = 1e-12 * np.eye(len(values))
+        if self.line.count > 1:
+            fitted = fitted + np.cov(values)
+        references = self.reference_sd_m**2 * np.eye(legs)
+        specimens = self.own_sd**2 * np.eye(own)
+        sensors = self.bias_sd_N**2 * np.eye(biased)
+        return mean, block_diag(references, fitted, specimens, sensors)
 
     def wires(self, robot: Robot, unknowns: Floats) -> tuple[Wires, Floats]:
         """Wires, and reference errors ``(n, w)``, of unknowns ``(n, d)``."""
@@ -154,11 +154,13 @@ class LengthPrior:
         columns = iter(unknowns[:, legs : legs + p].T)
         lines = {}
         for wire, line in self.line.each.items():
-            values = {k: np.exp(v) if k in CORE else v for k, v in ((k, next(columns)) for k in _own(line))}
+            values = {name: next(columns) for name in _own(line)}
+            values |= {name: np.exp(values[name]) for name in CORE}
             lines[wire] = replace(line, parameters=values)
         first = lines.pop(self.line.name)
         wires = for_robot(robot, replace(first, others=lines))
-        own = unknowns[:, legs + p : legs + p + len(self.own) * legs].T.reshape(len(self.own), legs, n)
+        first_own = legs + p
+        own = unknowns[:, first_own : first_own + len(self.own) * legs].T.reshape(len(self.own), legs, n)
         theta = dict(wires.theta)
         for name, deviation in zip(self.own, own, strict=True):
             rms = [np.sqrt(np.mean(np.square(spread_of(one, name, self.own_sd)))) for one in lines_of(robot, self.line)]
