@@ -90,11 +90,17 @@ def stability_warnings(course: Course, spread: float, stable: bool = True) -> li
             f"way{fall}"
         )
         out.append(Notice("fall", text))
+    return [*out, *_margin_warnings(found, last, who)]
+
+
+def _margin_warnings(found: FallsReport, last: float, who: str) -> list[Notice]:
+    """Wires that go slack or nearly so, and a platform that comes loose, within the last time (s) for these draws."""
     slack = [
         f"wire {i + 1} in {_percent(p)} of the draws, first after {t['first']:.3g} s"
         for i, (p, t) in enumerate(zip(found["slack_probability"], found["slack_time_s"], strict=True))
         if t is not None
     ]
+    out = []
     tension, stiffness = found["least_tension_share"]["q05"], found["stiffness_share"]["q05"]
     if slack:
         out.append(Notice("slack", f"wires go slack within {last:g} s ({who}): {'; '.join(slack)}"))
