@@ -86,3 +86,10 @@ def test_names_of_holds_and_remarks_are_no_header(tmp_path):
     path.write_text("Step,x (mm),Time (s),Force (N),Remark\n" + "".join(rows))
     made = convert(path, ABOUT, Choices(time_since="test"))
     assert len([row for row in made.rows if row[3] is not None]) == 6
+
+
+def test_a_header_that_stands_again_in_other_letters_is_the_same(tmp_path):
+    path = tmp_path / "raw.csv"
+    block = "".join(f"{{0}},{10 * i},{5 - i / 10}\n" for i in range(3))
+    path.write_text("x (mm),Time (s),Force (N)\n" + block.format(1) + "X (mm),TIME (s),force (N)\n" + block.format(2))
+    assert [hold.setting for hold in convert(path, ABOUT, Choices()).experiment.holds] == [1.0, 2.0]

@@ -223,3 +223,13 @@ def test_a_clock_that_runs_a_minute_apart_from_a_stopwatch_is_asked_about(tmp_pa
     path.write_text("Time [hh:mm];seconds (s);x [mm];Force [N]\n8:00;0;2;5.1\n8:01;60;2;5.0\n8:05;362;2;4.9\n")
     with pytest.raises(Undecided, match="which tell different times from line 4 on"):
         convert(path, ABOUT, Choices())
+
+
+def test_durations_of_hours_may_begin_anew_where_the_user_says_what_they_count_from(tmp_path):
+    cells = ["1:00:00", "1:04:00", "8:04:00"]
+    with pytest.raises(InputError, match="1:00:00' after '8:04:00', .* or --time-since hold, if they are durations"):
+        times_of(tmp_path, "Time", cells)
+    assert times_of(tmp_path, "Time", cells, time_since="hold") == [3600.0, 3840.0, 29040.0]
+    dated = [f"2026-06-14 {cell:0>8}" for cell in cells]
+    with pytest.raises(InputError, match="found moments of a day"):
+        times_of(tmp_path, "Time", dated, time_since="hold")

@@ -7,6 +7,7 @@ from tests.io.bench_files import convert
 from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.multiples import unit_in_header
+from wirebayes.io.bench.numerals import is_count
 from wirebayes.io.bench.quantities import quantity_unit
 from wirebayes.io.bench.undecided import Choices, Undecided
 
@@ -92,3 +93,19 @@ def test_temperatures_have_no_more_digits_than_were_written(unit, value, celsius
     known = quantity_unit(unit, "temperature")
     assert known is not None
     assert known.convert(np.array([value])).tolist() == [celsius]
+
+
+@pytest.mark.parametrize(
+    ("cell", "count"),
+    [("1234", True), ("-12", True), ("1'234", True), ("1 234", True), ("1,234,567", True), ("1,234", False),
+     ("1.234", False), ("1'23", False), ("0'123", False), ("1,234.567", False)],
+)  # fmt: skip
+def test_thousands_are_counts_where_they_can_be_no_fraction(cell, count):
+    assert is_count(cell) == count
+
+
+def test_counts_grouped_by_apostrophes_are_read_as_counts(tmp_path):
+    path = tmp_path / "raw.csv"
+    rows = [f"{t};{x};{5 + n}\n" for n, x in enumerate(("1'000", "2'015")) for t in (0, 10, 20)]
+    path.write_text("Time (s);Dial [0.001 mm];Force (N)\n" + "".join(rows))
+    assert [hold.setting for hold in convert(path, ABOUT, Choices()).experiment.holds] == [1.0, 2.015]

@@ -44,6 +44,15 @@ def test_a_device_s_own_clock_stands_before_times_of_arrival(tmp_path):
     assert [row[2] for row in made.rows if row[3] is not None] == [0.0, 10.0, 20.0] * 2
 
 
+def test_a_reading_that_is_missing_is_missed_in_its_own_column(tmp_path):
+    path = log(tmp_path, "pos_mm,load_g")
+    lines = path.read_text().splitlines()
+    lines[4] = lines[4].rpartition(",")[0]
+    path.write_text("\n".join(lines))
+    with pytest.raises(InputError, match=r"line 5, column 2 \(load_g\): found an empty cell"):
+        convert(path, ABOUT, Choices())
+
+
 def test_a_stamp_that_is_missing_makes_it_no_such_log(tmp_path):
     path = log(tmp_path, "pos_mm,load_g")
     path.write_text(path.read_text() + "2.00,480.0\n")

@@ -22,6 +22,10 @@ _LATE = 3.0  # times the least time between readings: nobody who counts from zer
 _LAST_MONTH = 12  # a larger number in a date is a day
 CALLED = {60.0: "minutes and seconds", 3600.0: "hours and minutes"}  # by the seconds of one of the first part
 _WRITTEN = {60.0: "mm:ss", 3600.0: "hh:mm"}  # the same, as a unit of `--map`
+_WITHOUT_DOUBT = (
+    "AM or PM behind the times, hours to 24, or dates; or --time-since hold, if they are durations since each hold "
+    "began"
+)
 UNDERSTOOD = (
     "a time such as 0:01:30 or 10:01:30 AM, or with a date such as 2024-05-31 10:01:30, 2024-05-31T10:01:30+02:00, "
     "20240531 10:01:30, 31.05.2024 10:01:30, 05/31/2024 10:01:30 AM or 31-May-2024 10:01:30"
@@ -49,13 +53,15 @@ def is_clock(table: RawTable, column: int, unit: Unit | None) -> bool:
     return (unit is not None and unit.clock is not None) or has_moments(table, column)
 
 
-def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[Floats, bool, int]:
+def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool = False) -> tuple[Floats, bool, int]:
     """Times of a column of clocks or dates.
 
     Parameters
     ----------
     unit : Unit or None
         Where the header says how clocks are written.
+    durations : bool
+        Whether clocks without a date count from the beginning of each hold, and so begin anew, whatever they show.
 
     Returns
     -------
@@ -85,6 +91,8 @@ def seconds(table: RawTable, column: int, unit: Unit | None) -> tuple[Floats, bo
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
         return (days - days[0]) + values, True, 0
+    if durations and all(of_clock):
+        return values, False, 0
     if all(of_clock):
         _check_hours_go_beyond_twelve(table, column, values)
     of_day = short is None and (not of_clock[0] or values[0] >= _HOUR)
@@ -107,7 +115,7 @@ def _check_hours_go_beyond_twelve(table: RawTable, column: int, values: Floats) 
         row = int(np.flatnonzero(goes_round)[0])
         before, after = (table.rows[i].cell(column) for i in (row - 1, row))
         found = f"{shown(after)} after {shown(before)}, and no hour above 12"
-        raise table.complain(table.rows[row].line, column, found, "AM or PM behind the times, hours to 24, or dates")
+        raise table.complain(table.rows[row].line, column, found, _WITHOUT_DOUBT)
 
 
 def _days_begin(values: Floats, of_day: bool) -> Bools:

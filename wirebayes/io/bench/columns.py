@@ -17,6 +17,7 @@ from wirebayes.io.bench.header import (
     name_and_unit,
 )
 from wirebayes.io.bench.multiples import multiple_of_unit, unit_in_header
+from wirebayes.io.bench.numerals import is_count
 from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, quantity_unit
 from wirebayes.io.bench.sheet import is_number
 from wirebayes.io.bench.table import RawTable
@@ -223,7 +224,7 @@ def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
 def _check_counts(table: RawTable, index: int, role: Role, unit: Unit) -> None:
     """Ask what a graduation in the header means where numbers are no counts of it: it may be the step of the gauge."""
     numbers = (row for row in table.rows if is_number(row.cell(index)))
-    row = next((row for row in numbers if not row.cell(index).lstrip("+-−").isdigit()), None)
+    row = next((row for row in numbers if not is_count(row.cell(index))), None)
     if row is None:
         return
     place = f"{table.sheet.path}, {table.place(row.line, index)}"

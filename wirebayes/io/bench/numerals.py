@@ -15,6 +15,10 @@ from wirebayes.io.bench.undecided import Decimal, Undecided
 _GROUPED = r"[+\-\u2212]?[1-9]\d{{0,2}}({sign}\d{{3}})+"
 _EITHER = r"[+\-\u2212]?[1-9]\d{{0,2}}{sign}\d{{3}}"
 _OTHER_GROUPS = re.compile(r"(?<=\d)['\u2019 \u00a0\u2009\u202f](?=\d{3})")
+_COUNT = re.compile(
+    r"[+\-\u2212]?(\d+|[1-9]\d{0,2}(['\u2019 \u00a0\u2009\u202f]\d{3})+"
+    r"|[1-9]\d{0,2}(?P<sign>[.,])\d{3}((?P=sign)\d{3})+)"
+)
 _SIGNS: dict[Decimal, str] = {"point": ".", "comma": ","}
 
 
@@ -55,6 +59,11 @@ def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None
         "which",
         {f"--decimal {sign}": f"{cell} is {fraction}", f"--decimal {other}": f"{cell} is {whole}"},
     )
+
+
+def is_count(cell: str) -> bool:
+    """Whether a cell is a whole number in any country's writing, its thousands grouped by what is no decimal sign."""
+    return bool(_COUNT.fullmatch(cell))
 
 
 def _proves(cell: str, decimal: Decimal) -> bool:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
 from wirebayes.io.bench.table import find_table
 from wirebayes.io.bench.words import speaks_of
 
@@ -41,7 +41,7 @@ def with_arrivals(sheet: Sheet, arrivals: Sequence[str]) -> Sheet:
     width = len(table.header)
     rows = [
         _with_last(row, width, ARRIVAL if row.cells == head else arrivals[row.line - 1])
-        if row.cells == head or is_measured(row.filled)
+        if row.cells == head or is_value(row.filled[0])
         else row
         for row in sheet.rows
     ]

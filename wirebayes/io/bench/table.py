@@ -204,16 +204,20 @@ def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: 
 
 def _check_headers_repeat(sheet: Sheet, above: Sequence[SheetRow], head: SheetRow, body: Sequence[SheetRow]) -> None:
     """Refuse a header between readings, or its row of units, that is another than the one above the first of them."""
-    known = {row.cells for row in above}
+    known = {_in_small_letters(row) for row in above}
     readings = [i for i, row in enumerate(body) if is_measured(row.filled) and not are_a_statistic(row.filled)]
     for row in body[: max(readings, default=0)]:
-        if len(row.filled) == 1 or any(map(is_value, row.filled)) or row.cells in known:
+        if len(row.filled) == 1 or any(map(is_value, row.filled)) or _in_small_letters(row) in known:
             continue
         if _are_units(row) or sum(map(speaks_of_a_quantity, row.filled)) > 1:
             raise InputError(
                 f"{sheet.path}, line {row.line}: found another header, {', '.join(row.filled)}, expected the one of "
                 f"line {head.line}; readings in other columns or units belong in a file of their own"
             )
+
+
+def _in_small_letters(row: SheetRow) -> tuple[str, ...]:
+    return tuple(cell.casefold() for cell in row.cells)
 
 
 def _first(rows: tuple[SheetRow, ...]) -> int | None:

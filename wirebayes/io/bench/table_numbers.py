@@ -124,7 +124,8 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
         role: _numbers(table, column, decimal) for role, column in numbers.items() if role != "hold"
     }
     values: dict[Role, Floats] = {role: _converted(columns[role], text) for role, text in texts.items()}
-    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes)
+    of_holds = choices.time_since == "hold"
+    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes, durations=of_holds)
     _check_sizes(table, columns, values)
     values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
     notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
@@ -200,10 +201,12 @@ def _converted(column: Column, texts: list[str]) -> Floats:
     return column.unit.convert(np.array([float(text) for text in texts]))
 
 
-def _times(table: RawTable, column: Column, numbers: Floats | None, notes: list[str]) -> tuple[Floats, bool]:
+def _times(
+    table: RawTable, column: Column, numbers: Floats | None, notes: list[str], *, durations: bool
+) -> tuple[Floats, bool]:
     """Times in s, of numbers or of clocks, and whether they are moments of a day; what was done joins the notes."""
     if numbers is None:
-        time, of_day, midnights = clock.seconds(table, column.index, column.unit)
+        time, of_day, midnights = clock.seconds(table, column.index, column.unit, durations=durations)
     else:
         time, of_day, midnights = numbers, False, 0
     if midnights:
