@@ -42,6 +42,12 @@ def has_moments(table: RawTable, column: int) -> bool:
     return any(is_moment(cell) for cell in table.column(column))
 
 
+def are_moments(table: RawTable, column: int) -> bool:
+    """Whether all cells of a column are dates with times, whatever its name."""
+    found = [moment(cell) for cell in table.column(column)]
+    return all(m is not None and m["date"] and m["first"] for m in found)
+
+
 def is_clock(table: RawTable, column: int, unit: Unit | None) -> bool:
     """Whether a column holds clocks or dates, or is said to.
 

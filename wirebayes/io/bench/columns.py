@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from wirebayes.errors import InputError, shown
-from wirebayes.io.bench.clock import UNDERSTOOD, has_moments, looks_like_a_moment
+from wirebayes.io.bench.clock import UNDERSTOOD, are_moments, has_moments, looks_like_a_moment
 from wirebayes.io.bench.header import (
     NO_UNIT,
     UNIT_IN_BRACKETS,
@@ -28,6 +28,7 @@ from wirebayes.sentences import listed
 from wirebayes.strict.hint import hint
 
 IGNORE = "ignore"
+_FACTOR = re.compile(r"(?:^|[\s\d])[x×*·]\s?(?P<ten>10+)(?:\^(?P<power>-?\d))?(?!\w)")
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
 
 
@@ -84,6 +85,7 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
     for role in [role for role in ROLES if role not in roles and role not in open_questions]:
         likely = [i for i in free if may_be(table, i, role)] or [i for i in free if is_of_rig(table, i, role)]
         likely = likely or [i for i in free if is_called_of_sample(table, i, role)]
+        likely = likely or [i for i in free if role == "time" and are_moments(table, i)]
         try:
             if likely:
                 roles[role] = _one(table, likely, role)
@@ -196,6 +198,8 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
         raise _no_unit(table, index, role)
     if unit is not None and unit.multiple != 1.0:
         _check_counts(table, index, role, unit)
+    if unit is not None:
+        _check_no_factor(table, index, role, unit)
     return Column(role, index, header, unit)
 
 
@@ -234,6 +238,25 @@ def _check_counts(table: RawTable, index: int, role: Role, unit: Unit) -> None:
         f"{place}: found {row.cell(index)!r} under {unit.text!r}, which may be the unit or the step of the gauge",
         "which",
         {f"{map_to} [{whole}]": f"{unit.text} is the step", f"{map_to} [{unit.text}]": f"{unit.text} is the unit"},
+    )
+
+
+def _check_no_factor(table: RawTable, index: int, role: Role, unit: Unit) -> None:
+    """Ask what a factor beside a name means, as in ``Force x10 (N)``: to be applied, or applied already."""
+    header = table.header[index]
+    found = _FACTOR.search(header)
+    if found is None:
+        return
+    factor = 10 ** (int(found["power"]) if found["power"] else len(found["ten"]) - 1)
+    map_to = f"--map {header}={role}"
+    raise Undecided(
+        f"{table.sheet.path}, {table.place(table.header_line, index)}: found {found[0].strip()!r} beside the name",
+        "what it means",
+        {
+            f"{map_to} [{factor:g} {unit.text}]": f"one is {factor:g} {unit.text}",
+            f"{map_to} [{1 / factor:g} {unit.text}]": f"{factor:g} are one {unit.text}",
+            f"{map_to} [{unit.text}]": f"it is in {unit.text} already",
+        },
     )
 
 

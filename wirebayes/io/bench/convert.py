@@ -14,6 +14,7 @@ from wirebayes.io.bench.about import About, name_from
 from wirebayes.io.bench.as_experiment import as_experiment, check_direction
 from wirebayes.io.bench.columns import Column
 from wirebayes.io.bench.control import recognised
+from wirebayes.io.bench.dates_apart import with_dates
 from wirebayes.io.bench.decode import decode, read_raw
 from wirebayes.io.bench.delimited import sheet_of_text
 from wirebayes.io.bench.holds import cut, stretches
@@ -121,7 +122,7 @@ def convert_joined(paths: Sequence[Path], about: About, choices: Choices) -> Con
     InputError
         As `convert`, and where the files cannot be joined.
     """
-    tables = [find_table(_sheet(path, choices)) for path in paths]
+    tables = [with_dates(find_table(_sheet(path, choices))) for path in paths]
     table, notes = one_table(tables, choices.each_file or HOLD, choices.mapping)
     made = _of_table(table, about, choices)
     if len(made) > 1:
@@ -138,7 +139,7 @@ def lacks_a_setting(path: Path, choices: Choices) -> bool:
 
 def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted]:
     """The experiments of the specimens of a table."""
-    tables = specimen_tables(table, choices.mapping, choices.specimens)
+    tables = specimen_tables(with_dates(table), choices.mapping, choices.specimens)
     if len(tables) == 1:
         return [_convert(each, about, replace(choices, mapping=said)) for each, said in tables]
     names = _names_of([each.specimen for each, _ in tables], about)

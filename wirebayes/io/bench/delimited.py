@@ -13,6 +13,8 @@ _NAMES = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spa
 LONGEST_LINE = 100_000  # characters: thousands of columns; Python's csv refuses longer cells
 _LOOKED_AT = 2000  # lines: enough to see a habit
 _COMMENT = re.compile(r"\s*[\"']?(#|%|//)+\s*")
+_BETWEEN_WORDS = re.compile(r"\s+(?![(\[][^()\[\]]*[)\]])")  # but not before a unit in brackets: Load (N)
+_UNDER_A_HEADER = re.compile(r":?-{2,}:?")  # of a table in Markdown
 _WITH_UNIT = re.compile(r"[-+]?\d+([.,]\d+)? ?[^\W\d]{1,5}\d?")  # 4 mm, 11.02 N
 _SEPARATOR = re.compile(
     r"\ufeff?\"?sep=([^\w\s\"']|\t)\"?\s*", re.IGNORECASE
@@ -87,7 +89,7 @@ def _score(lines: list[str], sign: str) -> tuple[float, int, int]:
 
 def _cells(line: str, sign: str) -> list[str]:
     if sign == " ":
-        return line.split()
+        return _BETWEEN_WORDS.split(line.strip()) if line.strip() else []
     return [cell.strip() for cell in next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])]
 
 
@@ -99,6 +101,6 @@ def _rows(lines: list[str], sign: str) -> tuple[SheetRow, ...]:
         cells = _cells(content, sign)
         while cells and not cells[-1]:
             cells.pop()
-        if cells:
+        if cells and not all(map(_UNDER_A_HEADER.fullmatch, cells[cells[0] == "" :])):
             rows.append(SheetRow(number, tuple(cells), bool(sign_of_comment)))
     return tuple(rows)

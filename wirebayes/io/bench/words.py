@@ -52,8 +52,8 @@ LETTERS: dict[Role, tuple[str, ...]] = {  # mean something beside the right unit
 # What a strain or a stress is called; only beside a unit of one, for other quantities have these names too.
 SAMPLE_WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": (
-        "strain", "dehnung", "verformung", "deformation", "deformacion", "deformazione", "ε", "epsilon", "e", "应变",
-        "ひずみ",
+        "strain", "dehnung", "verformung", "deformation", "deformacion", "deformazione", "rek", "ε", "epsilon", "e",
+        "应变", "ひずみ",
     ),
     "tension": (
         "stress", "spannung", "contrainte", "esfuerzo", "sforzo", "tensao", "spanning", "σ", "sigma", "s",
@@ -63,7 +63,8 @@ SAMPLE_WORDS: dict[Role, tuple[str, ...]] = {
 # What a rig calls its weights, the gauge that reads the wire, and how long a weight has hung: only where no column
 # speaks of the quantity itself.
 RIG_WORDS: dict[Role, tuple[str, ...]] = {
-    "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok"),
+    "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok", "distance",
+                     "entfernung"),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
     "time": ("duration", "dauer", "durata", "duracion", "duracao", "duur"),
 }  # fmt: skip

@@ -1,0 +1,95 @@
+"""What a person reads at once: dates beside clocks, units apart from names, factors, tables in Markdown."""
+
+from datetime import datetime, timedelta
+
+import pytest
+
+from tests.io.bench_files import convert
+from wirebayes.errors import InputError
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.undecided import Choices, Undecided
+
+ABOUT = About("wire", "line", 1000.0)
+DAY_S = 86400.0
+ROWS = [(600.0 * hold + time, hold + 1.0, 5.0 * hold + 5.0 - time / 100) for hold in (0, 1, 2) for time in (0, 30, 60)]
+
+
+def read(tmp_path, header, lines, **choices):
+    path = tmp_path / "raw.csv"
+    path.write_text("\n".join([*header, *lines]))
+    return convert(path, ABOUT, Choices(**choices))
+
+
+def assert_is_the_test(made):
+    assert [hold.setting for hold in made.experiment.holds] == [1.0, 2.0, 3.0]
+    assert [list(hold.time_s) for hold in made.experiment.holds] == [[0.0, 30.0, 60.0]] * 3
+    assert [value for hold in made.experiment.holds for value in hold.readings] == pytest.approx([y for *_, y in ROWS])
+
+
+def two_days(time):
+    """A moment of the test, whose last hold is made a day later."""
+    return datetime(2026, 6, 14, 9) + timedelta(seconds=time, days=time >= 1200.0)
+
+
+@pytest.mark.parametrize(
+    ("form", "merged"),
+    [("%d.%m.%Y;%H:%M:%S", False), ("%m/%d/%Y;%I:%M:%S %p", False), ("%Y-%m-%d;%H:%M:%S", True),
+     ("%Y-%m-%d 00:00:00;%H:%M:%S", False)],
+)  # fmt: skip
+def test_a_day_that_passes_unread_is_known_by_a_column_of_dates(tmp_path, form, merged):
+    lines, last = [], ""
+    for time, x, y in ROWS:
+        date, clock = f"{two_days(time):{form}}".split(";")
+        lines.append(f"{'' if merged and date == last else date};{clock};{x};{y}")
+        last = date
+    made = read(tmp_path, ["Datum;Uhrzeit;Weg [mm];Kraft [N]"], lines)
+    assert_is_the_test(made)
+    assert [hold.start_s for hold in made.experiment.holds] == [0.0, 600.0, 1200.0 + DAY_S]
+    assert "dates from 'Datum'" in made.notes[0] and not any("not read" in note for note in made.notes)
+
+
+def test_dates_that_are_no_clocks_column_stay_unread(tmp_path):
+    lines = [f"2026-06-14;{time};{x};{y}" for time, x, y in ROWS]
+    made = read(tmp_path, ["Datum;Zeit [s];Weg [mm];Kraft [N]"], lines)
+    assert_is_the_test(made)
+    assert "not read: 'Datum'" in made.notes
+
+
+@pytest.mark.parametrize("name", ["When", "Stamp", "Zeitpunkt der Messung"])
+def test_moments_are_the_time_whatever_they_are_called(tmp_path, name):
+    lines = [f"{two_days(time):%Y-%m-%d %H:%M:%S};{x};{y}" for time, x, y in ROWS]
+    assert_is_the_test(read(tmp_path, [f"{name};Weg [mm];Kraft [N]"], lines))
+
+
+def test_units_in_brackets_belong_to_the_name_before_them_between_spaces(tmp_path):
+    lines = [f"{time:10.1f} {x:14.2f} {y:12.3f}" for time, x, y in ROWS]
+    assert_is_the_test(read(tmp_path, ["  Tiempo (s)   Desplazamiento (mm)   Carga [N]"], lines))
+
+
+def test_the_line_under_the_header_of_a_markdown_table_is_none(tmp_path):
+    lines = [f"| {time} | {x} | {y} |" for time, x, y in ROWS]
+    assert_is_the_test(read(tmp_path, ["| time (s) | position (mm) | force (N) |", "|---|:---:|---:|"], lines))
+
+
+@pytest.mark.parametrize(
+    ("header", "said", "times"),
+    [("Force x10 (N)", "10 N", 10.0), ("Load × 100 [N]", "100 N", 100.0), ("Force *10^3 [N]", "1000 N", 1e3)],
+)  # fmt: skip
+def test_a_factor_beside_a_name_is_asked_about(tmp_path, header, said, times):
+    lines = [f"{time};{x};{y / times}" for time, x, y in ROWS]
+    head = [f"Time (s);Position (mm);{header}"]
+    with pytest.raises(Undecided, match=r"beside the name, expected --map .*" + said):
+        read(tmp_path, head, lines)
+    assert_is_the_test(read(tmp_path, head, lines, mapping=(f"{header}=tension [{said}]",)))
+
+
+@pytest.mark.parametrize("header", ["Force 10 (N)", "Box 10 force (N)", "Force 2x (N)", "ax10 force (N)"])
+def test_other_numbers_beside_names_are_no_factors(tmp_path, header):
+    lines = [f"{time};{x};{y}" for time, x, y in ROWS]
+    assert_is_the_test(read(tmp_path, [f"Time (s);Position (mm);{header}"], lines))
+
+
+def test_an_ambiguous_date_in_a_column_of_its_own_is_refused(tmp_path):
+    lines = [f"{two_days(time).replace(day=4 + (time >= 1200.0)):%d/%m/%Y;%H:%M:%S};{x};{y}" for time, x, y in ROWS]
+    with pytest.raises(InputError, match="may begin with the day or with the month"):
+        read(tmp_path, ["Date;Time;Position (mm);Force (N)"], lines)
