@@ -16,15 +16,16 @@ from wirebayes.json_files.calibrate import (
 from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.progress import Progress, silent
-from wirebayes.robot.mechanics import drums, rotation
+from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
-from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.motion import control, hanging, home, inverse, plausible
 from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import GROSS, LengthPosterior, corrected_joints, length_posterior
+from wirebayes.robot.self_calibration.report_parts import estimated_lengths, pose_and_home, with_biases
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
+from wirebayes.robot.self_calibration.summary import Moment
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about
 from wirebayes.robot.self_calibration.whole import progress_of
 from wirebayes.sentences import number
@@ -33,6 +34,7 @@ CANDIDATES = 200  # in the workspace: the best of them come within a few percent
 # Times the error of a reference length and the creep of the wire that crept most, by which a pose may be off. In
 # simulated sessions of every shipped robot it was off by at most 2.7 times their sum.
 _FAR = 10.0
+_HALF = np.asarray(ndtri(0.95))  # standard deviations from the middle to the end of a 90 % interval
 
 
 def lengths_report(
@@ -69,9 +71,6 @@ def lengths_report(
     hooke = replace(prior, creeps=False)
     plain = length_posterior(robot, hooke, session, readings[None], progress=progress_of(progress, "without creep"))
     given: CalibrationPrior = {"reference_sd_mm": 1e3 * prior.reference_sd_m, "specimen_spread": prior.spread}
-    if prior.bias_sd_N > 0:
-        given["tension_bias_sd_N"] = prior.bias_sd_N
-        given["tension_bias_sign"] = "constant" if session.motion is None else "motion"
     contradicted = _contradicted(robot, prior, session, known)
     at_fault = None if usable(known) else _at_fault(robot, prior, session, readings, known)
     content: CalibrateJson = {
@@ -82,7 +81,7 @@ def lengths_report(
         "usable": usable(known) and not contradicted,
         "sensors_at_fault": sensors.sensors_json(at_fault),
         "misfit": float(known.misfit[0]),
-        "prior": given,
+        "prior": with_biases(given, prior, session),
         **_named(robot, prior, session, known),
         "length_rms_mm": None,
         "joint_sd_mm": None,
@@ -118,24 +117,26 @@ def usable(known: LengthPosterior) -> bool:
 
 def _named(robot: Robot, prior: LengthPrior, session: Session, known: LengthPosterior) -> NamedEstimates:
     """Estimates in the words of a whole robot's calibration; its geometry is exact here."""
-    half = float(ndtri(0.95))
     zero = np.zeros((robot.legs, 3))
-    sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
+    reference = _moment(known, slice(robot.legs))
+    learnt = reference.sd < 0.5 * prior.reference_sd_m
     turn = rotation.vector(np.where(np.isfinite(known.ended_rotation[0]), known.ended_rotation[0], np.eye(3)))
     pose = np.hstack([known.ended_m[0], turn])
-    determined = int((sd < 0.5 * prior.reference_sd_m).sum())
+    before_mm, now_mm = 1e3 * prior.reference_sd_m, 1e3 * reference.sd
     open_ = [
-        f"the reference length of wire {i + 1}: known to {1e3 * prior.reference_sd_m:.2g} mm before, to "
-        f"{1e3 * sd[i]:.2g} mm now"
-        for i in np.flatnonzero(~(sd < 0.5 * prior.reference_sd_m))
+        f"the reference length of wire {i + 1}: known to {before_mm:.2g} mm before, to {now_mm[i]:.2g} mm now"
+        for i in np.flatnonzero(~learnt)
     ]
     return {
-        "exit_points_m": interval_about(robot.exit_m, zero, half),
-        "platform_points_m": interval_about(robot.platform_m, zero, half),
-        "zero_tension_lengths_m": interval_about(known.length_m[0], known.length_sd_m[0], half),
-        "references_m": interval_about(known.unknowns[0, : robot.legs], sd, half),
-        "poses": {"hold": np.asarray(session.numbers, float).tolist(), **interval_about(pose, known.ended_sd[0], half)},
-        "identified": {"determined": determined, "of": robot.legs, "combinations": [], "not_determined": open_},
+        "exit_points_m": interval_about(robot.exit_m, zero, _HALF),
+        "platform_points_m": interval_about(robot.platform_m, zero, _HALF),
+        "zero_tension_lengths_m": interval_about(known.length_m[0], known.length_sd_m[0], _HALF),
+        "references_m": interval_about(*reference),
+        "poses": {
+            "hold": np.asarray(session.numbers, float).tolist(),
+            **interval_about(pose, known.ended_sd[0], _HALF),
+        },
+        "identified": {"determined": int(learnt.sum()), "of": robot.legs, "combinations": [], "not_determined": open_},
     }
 
 
@@ -145,14 +146,7 @@ def _poses(robot: Robot, prior: LengthPrior, known: LengthPosterior) -> Calibrat
         return {"pose_now": None, "joint_values_for_home_m": None}
     turn = rotation.vector(known.rotation)[0]
     joint = corrected_joints(robot, prior, known, robot.home_m, rotation.matrix(robot.home_rotation_rad))[0]
-    held = bool(np.isfinite(joint).all())
-    found: CalibratedPoses = {
-        "pose_now": {"position_m": known.position_m[0], "rotation_vector_rad": turn},
-        "joint_values_for_home_m": of_each_winch(robot, joint) if held else None,
-    }
-    if robot.drums is not None and held:
-        found["motor_angles_for_home_rad"] = of_each_winch(robot, drums.motor_angle(robot.drums, joint))
-    return found
+    return pose_and_home(robot, known.position_m[0], turn, joint)
 
 
 def _unsure(known: LengthPosterior, plain: LengthPosterior) -> list[Notice]:
@@ -214,26 +208,22 @@ def _at_fault(
     return sensors.weighed(other.unknowns[0, bias], other.covariance[0, bias, bias], widest)
 
 
+def _moment(known: LengthPosterior, part: slice) -> Moment:
+    """Of some of the unknowns."""
+    sd = np.sqrt(np.diag(known.covariance[0]))
+    return Moment(known.unknowns[0, part], sd[part], _HALF)
+
+
 def _lengths(robot: Robot, prior: LengthPrior, known: LengthPosterior) -> EstimatedLengths:
-    half = float(ndtri(0.95)) * known.length_sd_m[0]
-    sd = np.sqrt(np.diag(known.covariance[0]))[: robot.legs]
-    found: EstimatedLengths = {
-        "converged": bool(known.converged[0]),
-        "misfit": float(known.misfit[0]),
-        "p_joint": float(known.p_joint[0]),
-        "length_m": {
-            "mean": known.length_m[0],
-            "sd": known.length_sd_m[0],
-            "q05": known.length_m[0] - half,
-            "q95": known.length_m[0] + half,
-        },
-        "creep_strain": known.creep[0],
-        "reference_error_mm": {"mean": 1e3 * known.unknowns[0, : robot.legs], "sd": 1e3 * sd},
-    }
-    if prior.bias_sd_N > 0:
-        bias_sd = np.sqrt(np.diag(known.covariance[0]))[-robot.legs :]
-        found["tension_bias_N"] = {"mean": known.unknowns[0, -robot.legs :], "sd": bias_sd}
-    return found
+    return estimated_lengths(
+        converged=bool(known.converged[0]),
+        misfit=float(known.misfit[0]),
+        p_joint=float(known.p_joint[0]),
+        length_m=Moment(known.length_m[0], known.length_sd_m[0], _HALF),
+        creep=known.creep[0],
+        reference_m=_moment(known, slice(robot.legs)),
+        bias_N=_moment(known, slice(-robot.legs, None)) if prior.bias_sd_N > 0 else None,
+    )
 
 
 def _observed(robot: Robot, prior: LengthPrior, session: Session, rng: np.random.Generator, visits: int) -> Observed:

@@ -16,10 +16,9 @@ from wirebayes.json_files.calibrate import (
 from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.progress import Progress, silent
-from wirebayes.robot.mechanics import drums, rotation
+from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
-from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.motion import home, inverse, plausible
 from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated
@@ -28,6 +27,7 @@ from wirebayes.robot.self_calibration.identified import Identified, identified
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.open_where import most_open, odd_hold
 from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.robot.self_calibration.report_parts import estimated_lengths, pose_and_home, with_biases
 from wirebayes.robot.self_calibration.residuals import length_rms_m, lost, misfit, trust
 from wirebayes.robot.self_calibration.search import Searched, searched
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
@@ -174,10 +174,7 @@ def _prior(robot: Robot, prior: LengthPrior, errors: StatedErrors, session: Sess
         "pose_sd_mm": 1e3 * errors.pose_m,
         "drum_sd": errors.drum,
     }
-    if prior.bias_sd_N > 0:
-        given["tension_bias_sd_N"] = prior.bias_sd_N
-        given["tension_bias_sign"] = "constant" if session.motion is None else "motion"
-    return given
+    return with_biases(given, prior, session)
 
 
 def _poses(s: Summary, session: Session) -> EstimatedPoses:
@@ -186,17 +183,15 @@ def _poses(s: Summary, session: Session) -> EstimatedPoses:
 
 
 def _lengths(found: Whole, s: Summary) -> EstimatedLengths:
-    out: EstimatedLengths = {
-        "converged": found.converged,
-        "misfit": misfit(found),
-        "p_joint": trust(found),
-        "length_m": interval_about(*s.length_m),
-        "creep_strain": s.strain,
-        "reference_error_mm": {"mean": 1e3 * s.reference_m.mean, "sd": 1e3 * s.reference_m.sd},
-    }
-    if found.unknowns.prior.bias_sd_N > 0:
-        out["tension_bias_N"] = {"mean": s.bias_N.mean, "sd": s.bias_N.sd}
-    return out
+    return estimated_lengths(
+        converged=found.converged,
+        misfit=misfit(found),
+        p_joint=trust(found),
+        length_m=s.length_m,
+        creep=s.strain,
+        reference_m=s.reference_m,
+        bias_N=s.bias_N if found.unknowns.prior.bias_sd_N > 0 else None,
+    )
 
 
 def _by_hooke_alone(found: Whole, holds: Holds, prior: LengthPrior, progress: Progress) -> EstimatedLengths:
@@ -231,21 +226,15 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
     """Where the platform is after the last hold; joint values of the home pose where they can be used."""
     if not found.converged:
         return {"pose_now": None, "joint_values_for_home_m": None}
-    out: CalibratedPoses = {
-        "pose_now": {"position_m": s.position_m.mean[-1], "rotation_vector_rad": s.turn_rad.mean[-1]},
-        "joint_values_for_home_m": None,
-    }
     unknowns = found.unknowns
     parts = unknowns.parts(found.state.white)
     wires = unknowns.prior.wires(robot, parts.wires[None])[0]
     there, home, turn = moved(robot, parts), robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
     tau = inverse.tensions(there, home, turn)
     joint = inverse.commands(there, wires, home, turn, tau, s.strain[:, None], parts.reference_m[:, None]).joint_m[0]
-    if usable and np.isfinite(joint).all():
-        out["joint_values_for_home_m"] = of_each_winch(robot, joint)
-        if robot.drums is not None:
-            out["motor_angles_for_home_rad"] = of_each_winch(robot, drums.motor_angle(robot.drums, joint))
-    return out
+    if not usable:
+        joint = np.full(robot.legs, np.nan)
+    return pose_and_home(robot, s.position_m.mean[-1], s.turn_rad.mean[-1], joint)
 
 
 def _warnings(verdict: _Verdict) -> list[Notice]:
