@@ -73,17 +73,31 @@ def test_a_group_holds_what_is_at_least_so_alike() -> None:
 
 
 def test_the_probe_that_shows_best_says_what_is_detectable(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of each name that the block can show; thresholds are the name's own."""
+    """Of each name that the block can show, at one amplitude; thresholds are the name's own."""
     norms = np.array([[1.0, 3.0, 2.0, 9.0], [1.0, 3.0, 2.0, 9.0], [5.0, 3.0, 2.0, 9.0]])
-    monkeypatch.setattr(power, "amplitude_80", lambda null, trial, k, threshold: (trial, k, threshold))
+    monkeypatch.setattr(power, "amplitude_80", lambda null, trial, k, threshold: 10.0 * k + threshold)
+    trials: Any = [SimpleNamespace(step=1.0)] * 4
     where = [("a", 0, (0,)), ("a", 1, (0, 1)), ("b", 2, (0,)), ("b", 3, (1,))]
     candidates = [Candidate(k, name, blocks, True) for name, k, blocks in where]
     level = SimpleNamespace(threshold=lambda name, alpha: {"a": 5.0, "b": 6.0}[name])
     null: Any = SimpleNamespace(norm=norms)
-    found = power.detectable(null, ["p0", "p1", "p2", "p3"], candidates, level)  # type: ignore[list-item, arg-type]
-    assert found == {"a": (1, ("p1", 1, 5.0)), "b": (2, ("p2", 2, 6.0))}
-    there = power.detectable(null, ["p0", "p1", "p2", "p3"], candidates, level, 1)  # type: ignore[list-item, arg-type]
+    found = power.detectable(null, trials, candidates, level)  # type: ignore[arg-type]
+    assert found == {"a": (1, 15.0), "b": (2, 26.0)}
+    there = power.detectable(null, trials, candidates, level, 1)  # type: ignore[arg-type]
     assert {name: k for name, (k, _) in there.items()} == {"a": 1, "b": 3}
+
+
+def test_an_effect_that_grows_with_the_square_of_its_amplitude_is_not_promised_by_its_largest_probe() -> None:
+    """δ = (10 a)², seen from 4 on, so at 0.2: the probe at 0.9 alone would promise 4 / 90 = 0.044."""
+    steps = (0.03, 0.1, 0.3, 0.9)
+    rungs = [(step, k, 4.0 * step / (10.0 * step) ** 2) for k, step in enumerate(steps)]
+    assert power.smallest_seen(rungs) == (2, pytest.approx(0.2))
+    linear = [(step, k, 0.05) for k, step in enumerate(steps)]
+    assert power.smallest_seen(linear) == (1, pytest.approx(0.05))
+    assert power.smallest_seen([(0.1, 7, 0.02)]) == (7, 0.02)  # a form that is linear has one probe
+    assert power.smallest_seen([(0.1, 7, 0.5)]) == (7, 0.5)
+    assert power.smallest_seen([(0.1, 0, None), (0.3, 1, 0.2)]) == (1, 0.3)  # nothing is known in between
+    assert power.smallest_seen([(0.1, 0, 0.9), (0.3, 1, None)]) == (1, None)
 
 
 def test_what_does_not_show_is_not_detectable() -> None:

@@ -40,7 +40,8 @@ def test_a_comparison_is_a_ranking_in_words() -> None:
     ]
     table = {"base": "plain", "models": rows}
     assert headline.comparison_in_words("a", table) == (  # type: ignore[arg-type]
-        "a: toe predicts left-out holds best, by 12 ± 3.2 in log probability (elpd) against plain; then comes plain."
+        "a: toe predicts left-out holds best, by 12 ± 3.2 elpd (log probability of their readings) against "
+        "plain; then comes plain."
     )
     for elpd, se, chance in ((4.0, 2.0, False), (3.99, 0.1, True), (12.3, 6.2, True)):
         rows[0]["difference"] = {"elpd": elpd, "se": se}

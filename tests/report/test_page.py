@@ -319,7 +319,10 @@ WORSE = DISCOVERY["held_out"] | {"final": {"rmse_N": 0.2, "elpd": 9.0, "elpd_dif
     ("changes", "message"),
     [
         ({}, "On this protocol hard to distinguish from sensor nonlinearity."),
-        ({"group": ["strain_stiffening"]}, "wire-a: strain stiffening is missing, of size 12.0 (9.00 … 15.0); with it"),
+        (
+            {"group": ["strain_stiffening"]},
+            "is missing (the wire becomes stiffer (or softer) the more it is strained), of size 12.0 (9.00 … 15.0); ",
+        ),
         ({}, "; with it the error on unused holds goes from 0.100 to 0.0300 N (p < 0.001)."),
         ({"held_out": WORSE}, "; but with it the error on unused holds grows from 0.100 to 0.200 N (p < 0.001)."),
         ({"held_out": WORSE}, "On the unused holds 9 and 10 the rms error grows from 0.10 to 0.20 N"),
@@ -342,7 +345,7 @@ WORSE = DISCOVERY["held_out"] | {"final": {"rmse_N": 0.2, "elpd": 9.0, "elpd_dif
             {"verdict": "unknown", "effects": [], "probabilities": {}, "warnings": FEW},
             "wire-a: something is missing; so few holds do not say what",
         ),
-        ({"verdict": "partial"}, "strain stiffening is missing, and something else that no effect"),
+        ({"verdict": "partial"}, "the more it is strained), and something else that no effect"),
         ({"verdict": "partial", "effects": ["toe", "ageing"]}, "toe and ageing are missing, and something else"),
         ({}, "remains beside them with a probability of 2 %"),
         (

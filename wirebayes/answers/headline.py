@@ -88,13 +88,16 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     effects = [spoken(effect) for effect in report["effects"]]
     are = "are" if effects[1:] else "is"
     candidates = likely(report)
+    known = what_it_is(report["effects"][0]) if len(effects) == 1 else ""
+    meaning = f" ({known})" if known else ""
     what = {
         "nothing-missing": f"{verdict_in_words(report)}: the plain model and its noise explain them",
         "unknown": f"{verdict_in_words(report)}"
         + (f"; beside it most likely {candidates}, none of them established" if candidates else ""),
         "ambiguous": undecided(report),
-        "named": f"{listed(effects)} {are} missing",
-        "partial": f"{listed(effects)} {are} missing, and something else that no effect in the catalogue explains",
+        "named": f"{listed(effects)} {are} missing{meaning}",
+        "partial": f"{listed(effects)} {are} missing{meaning}, and something else that no effect in the catalogue "
+        "explains",
     }[report["verdict"]]
     sizes = [quantity(a["mean"], a["q05"], a["q95"], a["unit"]) for a in report["amplitudes"].values()]
     size = f", of size {listed(sizes)}" if sizes else ""
@@ -106,9 +109,7 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
         goes = f"; but {with_it} grows" if error_grows(held) else f"; {with_it} goes"
         gain = f"{goes} from {number(before)} to {number(after)} {unit_read(held['plain'])}"
     sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
-    known = [words for words in map(what_it_is, report["effects"]) if words] if report["verdict"] != "ambiguous" else []
-    meaning = "".join(f" {words[:1].upper()}{words[1:]}." for words in known)
-    return f"{name}: {what}{size}{gain}{sure}.{meaning}"
+    return f"{name}: {what}{size}{gain}{sure}."
 
 
 def comparison_in_words(name: str, table: ComparedModels) -> str:
@@ -130,8 +131,9 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
     if gain is not None and best["name"] != table["base"]:
         from wirebayes.comparison.compare import meaningful  # loaded by now, and by no other command
 
-        against = f", by {number(gain['elpd'], 2)} ± {number(gain['se'], 2)} in log probability (elpd) against "
-        against += table["base"] + ("" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance")
+        by = f"{number(gain['elpd'], 2)} ± {number(gain['se'], 2)} elpd (log probability of their readings)"
+        chance = "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
+        against = f", by {by} against {table['base']}{chance}"
     come = "come" if others[1:] else "comes"
     then = f"; then {come} {listed([row['name'] for row in others[:3]])}" if others else ""
     rest = f" and {len(others) - 3} more" if len(others) > 3 else ""

@@ -60,7 +60,10 @@ def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | 
 def detectable(
     null: Scan, trials: Sequence[Probe], candidates: Sequence[Candidate], level: GlobalTest, block: int = 0
 ) -> dict[str, tuple[int, float | None]]:
-    """For each effect that a block can show, its best probe and the amplitude that is detected in 80 % of tests.
+    """For each effect that a block can show, a probe and the amplitude that is detected in 80 % of tests.
+
+    The parameters bend themselves to some effects as long as these are small. A signature holds about the amplitude at
+    which it was taken, so the probes of an effect are followed from the smallest amplitude up.
 
     Parameters
     ----------
@@ -72,12 +75,48 @@ def detectable(
         What chance reaches over all blocks.
     block : int
     """
-    best: dict[str, int] = {}
+    best: dict[str, dict[float, int]] = {}  # of each name, the strongest probe at each amplitude
     strength = np.median(null.norm, axis=0)
     for c in candidates:
-        if block in c.blocks and (c.name not in best or strength[c.probe] > strength[best[c.name]]):
-            best[c.name] = c.probe
-    return {name: (k, amplitude_80(null, trials[k], k, level.threshold(name, ALPHA))) for name, k in best.items()}
+        if block in c.blocks:
+            ladder, step = best.setdefault(c.name, {}), trials[c.probe].step
+            if step not in ladder or strength[c.probe] > strength[ladder[step]]:
+                ladder[step] = c.probe
+    found = {}
+    for name, ladder in best.items():
+        threshold = level.threshold(name, ALPHA)
+        rungs = [(step, k, amplitude_80(null, trials[k], k, threshold)) for step, k in sorted(ladder.items())]
+        found[name] = smallest_seen(rungs)
+    return found
+
+
+def smallest_seen(rungs: Sequence[tuple[float, int, float | None]]) -> tuple[int, float | None]:
+    """The probe and the amplitude at which an effect begins to be seen, by probes at rising amplitudes.
+
+    It lies below the first probe whose own amplitude would be seen and above the one before; between the two, how
+    strongly it shows is taken to follow a power of the amplitude.
+
+    Parameters
+    ----------
+    rungs : sequence of (float, int, float or None)
+        Of each probe its amplitude, its number, and the amplitude that would be seen if the signature stayed as it is.
+    """
+    below: tuple[float, float | None] | None = None
+    for step, k, seen in rungs:
+        if seen is not None and seen <= step:
+            return k, seen if below is None else _between(below, (step, seen))
+        below = (step, seen)
+    _, k, seen = rungs[-1]
+    return k, seen
+
+
+def _between(below: tuple[float, float | None], above: tuple[float, float]) -> float:
+    """Where the share of what is needed to be seen, step over amplitude, passes one."""
+    (low, too_weak), (high, enough) = below, above
+    if too_weak is None:
+        return high
+    missing, beyond = np.log(too_weak / low), np.log(high / enough)
+    return float(low * (high / low) ** (missing / (missing + beyond)))
 
 
 def similarity(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> Cosines:

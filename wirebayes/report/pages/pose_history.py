@@ -57,8 +57,8 @@ def pose_history_page(folder: Path, configuration: dict[str, Any], pose: PoseHis
         Content of ``pose.json``.
     """
     measured = pose["history"]["kind"] == "measured"
-    about = "Poses from measured joint values." if measured else "Poses as commanded."
-    lead = f"{of_pose(pose)[-1]}; the interval holds 90 %. {about}"
+    about = "by its measured joint values" if measured else "on its commanded way"
+    lead = f"{of_pose(pose)[-1]}, {about}; the interval holds 90 %."
     if not pose["feasible"]:
         return Page(f"Robot {pose['robot']}", lead, [Section("Summary", before_the_answer(pose))])
     files = {name: picture_file(folder, name) for name in _CAPTIONS}
