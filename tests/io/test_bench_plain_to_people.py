@@ -1,5 +1,6 @@
 """What a person reads at once: dates beside clocks, units apart from names, factors, tables in Markdown."""
 
+import re
 from datetime import datetime, timedelta
 
 import pytest
@@ -83,7 +84,41 @@ def test_a_factor_beside_a_name_is_asked_about(tmp_path, header, said, times):
     assert_is_the_test(read(tmp_path, head, lines, mapping=(f"{header}=tension [{said}]",)))
 
 
-@pytest.mark.parametrize("header", ["Force 10 (N)", "Box 10 force (N)", "Force 2x (N)", "ax10 force (N)"])
+@pytest.mark.parametrize(("said", "times"), [("2 N", 2.0), ("N", 1.0)])
+def test_a_share_of_a_force_is_asked_about(tmp_path, said, times):
+    lines = [f"{time};{x};{y / times}" for time, x, y in ROWS]
+    head = ["Time (s);Position (mm);Force/2 (N)"]
+    with pytest.raises(Undecided, match=r"found '/2' beside the name, expected --map .*\[2 N\].*\[0.5 N\].*\[N\]"):
+        read(tmp_path, head, lines)
+    assert_is_the_test(read(tmp_path, head, lines, mapping=(f"Force/2 (N)=tension [{said}]",)))
+
+
+@pytest.mark.parametrize(
+    ("header", "option"),
+    [("log10 time (s);Position (mm);Force (N)", "log10 time (s)=time [s]"),
+     ("Time (s);Displacement increment (mm);Force (N)", "Displacement increment (mm)=displacement [mm]"),
+     ("Time (s);Position (mm);Force change (N)", "Force change (N)=tension [N]"),
+     ("Time (s);Position (mm);Load per strand (N)", "Load per strand (N)=tension [N]"),
+     ("Zeit (s);Weg (mm);Kraftänderung (N)", "Kraftänderung (N)=tension [N]")],
+)  # fmt: skip
+def test_what_was_made_of_a_quantity_is_taken_for_it_only_by_the_user(tmp_path, header, option):
+    lines = [f"{time};{x};{y}" for time, x, y in ROWS]
+    with pytest.raises(Undecided, match=f"in the name, expected --map .{re.escape(option)}. to say that it is the"):
+        read(tmp_path, [header], lines)
+    assert_is_the_test(read(tmp_path, [header], lines, mapping=(option,)))
+
+
+@pytest.mark.parametrize(
+    "header", ["Length change (mm)", "Change in length (mm)", "Längenänderung (mm)", "Delta L (mm)"]
+)
+def test_a_change_in_length_is_a_displacement(tmp_path, header):
+    lines = [f"{time};{x};{y}" for time, x, y in ROWS]
+    assert_is_the_test(read(tmp_path, [f"Time (s);{header};Force (N)"], lines, mapping=(f"{header}=displacement",)))
+
+
+@pytest.mark.parametrize(
+    "header", ["Force 10 (N)", "Sensor 1/2 force (N)", "Box 10 force (N)", "Force 2x (N)", "ax10 force (N)"]
+)
 def test_other_numbers_beside_names_are_no_factors(tmp_path, header):
     lines = [f"{time};{x};{y}" for time, x, y in ROWS]
     assert_is_the_test(read(tmp_path, [f"Time (s);Position (mm);{header}"], lines))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from wirebayes.errors import InputError, shown
 from wirebayes.io.bench.clock import UNDERSTOOD, are_moments, has_moments, looks_like_a_moment
+from wirebayes.io.bench.derived import check_itself
 from wirebayes.io.bench.header import (
     NO_UNIT,
     UNIT_IN_BRACKETS,
@@ -28,7 +29,6 @@ from wirebayes.sentences import listed
 from wirebayes.strict.hint import hint
 
 IGNORE = "ignore"
-_FACTOR = re.compile(r"(?:^|[\s\d])[x×*·]\s?(?P<ten>10+)(?:\^(?P<power>-?\d))?(?!\w)")
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
 
 
@@ -199,7 +199,7 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
     if unit is not None and unit.multiple != 1.0:
         _check_counts(table, index, role, unit)
     if unit is not None:
-        _check_no_factor(table, index, role, unit)
+        check_itself(table, index, role, unit)
     return Column(role, index, header, unit)
 
 
@@ -238,25 +238,6 @@ def _check_counts(table: RawTable, index: int, role: Role, unit: Unit) -> None:
         f"{place}: found {row.cell(index)!r} under {unit.text!r}, which may be the unit or the step of the gauge",
         "which",
         {f"{map_to} [{whole}]": f"{unit.text} is the step", f"{map_to} [{unit.text}]": f"{unit.text} is the unit"},
-    )
-
-
-def _check_no_factor(table: RawTable, index: int, role: Role, unit: Unit) -> None:
-    """Ask what a factor beside a name means, as in ``Force x10 (N)``: to be applied, or applied already."""
-    header = table.header[index]
-    found = _FACTOR.search(header)
-    if found is None:
-        return
-    factor = 10 ** (int(found["power"]) if found["power"] else len(found["ten"]) - 1)
-    map_to = f"--map {header}={role}"
-    raise Undecided(
-        f"{table.sheet.path}, {table.place(table.header_line, index)}: found {found[0].strip()!r} beside the name",
-        "what it means",
-        {
-            f"{map_to} [{factor:g} {unit.text}]": f"one is {factor:g} {unit.text}",
-            f"{map_to} [{1 / factor:g} {unit.text}]": f"{factor:g} are one {unit.text}",
-            f"{map_to} [{unit.text}]": f"it is in {unit.text} already",
-        },
     )
 
 

@@ -64,7 +64,7 @@ SAMPLE_WORDS: dict[Role, tuple[str, ...]] = {
 # speaks of the quantity itself.
 RIG_WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok", "distance",
-                     "entfernung"),
+                     "entfernung", "langenanderung"),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
     "time": ("duration", "dauer", "durata", "duracion", "duracao", "duur"),
 }  # fmt: skip

@@ -1,0 +1,65 @@
+"""Columns of what was made of a quantity: ten times it, its logarithm, what it changed by. They are asked about."""
+
+import re
+
+from wirebayes.io.bench.header import name_and_unit
+from wirebayes.io.bench.quantities import Role, Unit
+from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.undecided import Undecided
+from wirebayes.io.bench.words import words_in
+
+_FACTOR = re.compile(
+    r"(?:^|[\s\d])[x×*·]\s?(?P<ten>10+)(?:\^(?P<power>-?\d))?(?!\w)"  # Force x10, and no axis x1
+    r"|(?<![\d\s])\s?/\s?(?P<divisor>[2-9]|\d{2,})(?!\w)"  # Force/2, and no sensor 1/2
+)
+_ANY = {"log", "lg", "ln", "increment", "inkrement", "added", "additional"}
+# A change in length is a displacement, one of the force is no force.
+_WORDS: dict[Role, set[str]] = {
+    "displacement": _ANY,
+    "time": _ANY,
+    "tension": _ANY
+    | {"change", "difference", "loss", "drop", "per", "delta", "δ", "δf", "df", "anderung", "kraftanderung", "abfall"},
+}
+
+
+def check_itself(table: RawTable, index: int, role: Role, unit: Unit) -> None:
+    """Ask what a factor beside a name means, or whether the column is the quantity itself where its name doubts it.
+
+    Parameters
+    ----------
+    table : RawTable
+    index : int
+        Of the column.
+    role : str
+        The quantity.
+    unit : Unit
+        Of the column, as the file states it.
+
+    Raises
+    ------
+    Undecided
+    """
+    header = table.header[index]
+    name = name_and_unit(header, role)[0]
+    map_to = f"--map {header}={role}"
+    place = f"{table.sheet.path}, {table.place(table.header_line, index)}"
+    found = _FACTOR.search(name)
+    if found is not None:
+        times = _factor_of(found)
+        answers = {
+            f"{map_to} [{times:g} {unit.text}]": f"one is {times:g} {unit.text}",
+            f"{map_to} [{1 / times:g} {unit.text}]": f"{times:g} are one {unit.text}",
+            f"{map_to} [{unit.text}]": f"it is in {unit.text} already",
+        }
+        raise Undecided(f"{place}: found {found[0].strip()!r} beside the name", "what it means", answers)
+    doubtful = words_in(name) & _WORDS.get(role, set())
+    if doubtful:
+        word = min(doubtful)
+        answers = {f"{map_to} [{unit.text}]": f"it is the {role}, whatever its name"}
+        raise Undecided(f"{place}: found {word!r} in the name", f"that it is the {role} itself", answers)
+
+
+def _factor_of(found: re.Match[str]) -> float:
+    if found["divisor"]:
+        return float(found["divisor"])
+    return float(10 ** (int(found["power"]) if found["power"] else len(found["ten"]) - 1))
