@@ -183,6 +183,16 @@ def span(low: Any, high: Any, digits: int | None = None) -> str:
     return " … ".join(ends)
 
 
+def middle_and_span(middle: float | None, low: float | None, high: float | None) -> list[str]:
+    """A median and its interval, as two cells of a table.
+
+    Parameters
+    ----------
+    middle, low, high : float
+    """
+    return [number_within(middle, low, high), span(low, high)]
+
+
 def number_within(value: float | None, low: float | None, high: float | None) -> str:
     """A number for people beside its interval: three digits, or as many as show a fifth of the interval's width.
 

@@ -99,3 +99,15 @@ def test_a_calibration_says_first_what_became_of_the_exit_points() -> None:
     )
     exact = found | {"exit_points_m": {"sd": [[0.0] * 3] * 2}}
     assert headline.calibration_in_a_sentence(exact).startswith("The zero-tension lengths of r's 2 wires")  # type: ignore[arg-type]
+
+
+def test_the_size_of_one_of_several_is_not_said_of_all() -> None:
+    held = {"plain": {"rmse_N": 0.2}, "final": {"rmse_N": 0.02}}
+    report = {"verdict": "ambiguous", "effects": ["toe", "power_strain"], "families": [], "held_out": held}
+    report |= {"set": ["toe", "power_strain"], "probabilities": {"toe": 0.6, "power_strain": 0.35}}
+    report |= {"amplitudes": {"toe": {"mean": 2.9, "q05": 2.5, "q95": 3.2, "unit": "mm", "hold": None}}}
+    report |= {"p_global": 0.002, "p_simulations": 499}
+    assert headline.findings_in_a_sentence("a", report) == (  # type: ignore[arg-type]
+        "a: something is missing; these readings do not tell what: toe (60 %) or power strain (35 %); with toe of "
+        "2.90 mm (2.50 … 3.20) the error on unused holds goes from 0.200 to 0.0200 N (p < 0.01)."
+    )

@@ -99,17 +99,26 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
         "partial": f"{listed(effects)} {are} missing{meaning}, and something else that no effect in the catalogue "
         "explains",
     }[report["verdict"]]
-    sizes = [quantity(a["mean"], a["q05"], a["q95"], a["unit"]) for a in report["amplitudes"].values()]
-    size = f", of size {listed(sizes)}" if sizes else ""
-    held = report["held_out"]
-    before, after = (read_value(held[model], "rmse") for model in ("plain", "final"))
-    gain = ""
-    if report["effects"] and before is not None and after is not None:
-        with_it = f"with {'them' if effects[1:] else 'it'} the error on unused holds"
-        goes = f"; but {with_it} grows" if error_grows(held) else f"; {with_it} goes"
-        gain = f"{goes} from {number(before)} to {number(after)} {unit_read(held['plain'])}"
+    sizes = {e: quantity(a["mean"], a["q05"], a["q95"], a["unit"]) for e, a in report["amplitudes"].items()}
+    undecided_yet = report["verdict"] == "ambiguous"  # then the model has the most likely of several
+    size = f", of size {listed(list(sizes.values()))}" if sizes and not undecided_yet else ""
+    with_it = "with them" if effects[1:] else "with it"
+    if undecided_yet:
+        with_it = f"with {listed([f'{spoken(effect)} of {has}' for effect, has in sizes.items()])}"
+    gain = _gain_in_words(report, with_it)
     sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
     return f"{name}: {what}{size}{gain}{sure}."
+
+
+def _gain_in_words(report: ExperimentFindings, with_it: str) -> str:
+    """What the effects take away of the error on holds that were not used; empty where none was kept."""
+    held = report["held_out"]
+    before, after = (read_value(held[model], "rmse") for model in ("plain", "final"))
+    if not report["effects"] or before is None or after is None:
+        return ""
+    grows = error_grows(held)
+    goes = f"; {'but ' if grows else ''}{with_it} the error on unused holds {'grows' if grows else 'goes'}"
+    return f"{goes} from {number(before)} to {number(after)} {unit_read(held['plain'])}"
 
 
 def comparison_in_words(name: str, table: ComparedModels) -> str:

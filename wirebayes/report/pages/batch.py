@@ -60,7 +60,7 @@ def batch_page(folder: Path, configuration: dict[str, Any]) -> Page:
     return Page("Many experiments", lead, sections, seed_of_page(configuration))
 
 
-_PICTURE = "A dot a specimen, at its posterior median, with its 90 % interval; red ones are outliers of their material."
+_PICTURE = "Each dot is a specimen: its median and 90 % interval. Red ones are outliers of their material."
 _FILES = (
     ("summary.csv", "a row an experiment, with intervals"),
     ("batch.json", "the same as JSON, with outliers"),

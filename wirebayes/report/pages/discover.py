@@ -29,12 +29,11 @@ from wirebayes.report.blocks import (
     picture_file,
     pictures_in,
     seed_of_page,
-    span,
     unit_text,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.discover import waterfall
-from wirebayes.sentences import listed, p_in_words, said_beside, spoken
+from wirebayes.sentences import listed, middle_and_span, p_in_words, quantity, said_beside, spoken
 
 
 def discover_page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -206,9 +205,8 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
             [
                 name,
                 unit_text(after["unit"]) or "–",
-                *([number(before["q50"]), span(before["q05"], before["q95"])] if before else ["–", "–"]),
-                number(after["q50"]),
-                span(after["q05"], after["q95"]),
+                *(middle_and_span(before["q50"], before["q05"], before["q95"]) if before else ["–", "–"]),
+                *middle_and_span(after["q50"], after["q05"], after["q95"]),
                 _means(name),
             ]
         )
@@ -219,7 +217,7 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
 def _plain_parameters(parameters: Mapping[str, Parameter]) -> Table:
     """Those of the plain model, to which nothing had to be added."""
     rows = [
-        [name, unit_text(p["unit"]) or "–", number(p["q50"]), span(p["q05"], p["q95"]), _means(name)]
+        [name, unit_text(p["unit"]) or "–", *middle_and_span(p["q50"], p["q05"], p["q95"]), _means(name)]
         for name, p in parameters.items()
     ]
     header = ["parameter", "unit", "median", "90 % interval", "what it is"]
@@ -279,6 +277,5 @@ def _sizes(v: ExperimentFindings) -> list[str]:
 
 
 def _amplitude(effect: str, a: AmplitudeEstimate) -> str:
-    unit = "" if a.get("unit") in (None, "-", "1") else f" {a['unit']}"
     at = "" if a.get("hold") is None else f", from hold {a['hold']} on"
-    return f"{spoken(effect)}: {number(a['mean'])}{unit} ({span(a['q05'], a['q95'])}){at}."
+    return f"{spoken(effect)}: {quantity(a['mean'], a['q05'], a['q95'], a['unit'])}{at}."

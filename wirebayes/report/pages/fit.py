@@ -31,7 +31,6 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     seed_of_page,
-    span,
     unit_text,
 )
 from wirebayes.report.glossary import SYMBOLS, meaning
@@ -40,7 +39,7 @@ from wirebayes.report.pictures.curve import through_the_readings
 from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.parameters import unit_of
 from wirebayes.results.read_back import Stored, load_with_priors
-from wirebayes.sentences import counted, listed
+from wirebayes.sentences import counted, listed, middle_and_span
 from wirebayes.wire.effect import Effect
 
 _MOST_SENTENCES = 3  # at the head of a page; more hide its first picture
@@ -73,7 +72,7 @@ def fit_page(folder: Path, configuration: dict[str, Any]) -> Page:
 
 def _of_summary(summary: SummaryJson) -> Section:
     """A fit with effects of the user's own, from its summary alone: a page never executes a user's code."""
-    lines = [[name, number(s["q50"]), span(s["q05"], s["q95"])] for name, s in summary["parameters"].items()]
+    lines = [[name, *middle_and_span(s["q50"], s["q05"], s["q95"])] for name, s in summary["parameters"].items()]
     words = Text("Fitted with effects from a file of the user's own, so this section shows summary.json alone.")
     table = Table(["parameter", "median", "90 % interval"], lines)
     blocks = [*_cautions(summary), words, table, _derived(summary), Text(_sampled(summary))]
@@ -256,7 +255,7 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], sample: Sampl
         low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
         share = f"{100 * shrunk[name]:.0f} %" if name in shrunk else "–"
         unit = _unit(name, sample) or "–"
-        lines.append([name, unit, number(middle), span(low, high), share, _means(name, sample.model.effects)])
+        lines.append([name, unit, *middle_and_span(middle, low, high), share, _means(name, sample.model.effects)])
     caption = (
         "The interval contains the parameter with a probability of 90 %, if the model is right. "
         "Contraction is the share of the prior's variance that the readings took away, of the logarithm where a "
@@ -282,7 +281,7 @@ def _derived(summary: SummaryJson) -> Table:
         ("stiffness there, N per unit strain", derived["stiffness_N"], "–"),
     ]
     lines = [
-        [name, number(band["q50"]), span(band["q05"], band["q95"])] if band else [name, otherwise, "–"]
+        [name, *middle_and_span(band["q50"], band["q05"], band["q95"])] if band else [name, otherwise, "–"]
         for name, band, otherwise in rows
     ]
     caption = (
