@@ -7,17 +7,13 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar, cast
+from typing import ClassVar, Generic, TypeVar, cast
 
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, check_run, read_json, stored_results, write_bytes
 from wirebayes.json_files.values import Quantiles
 from wirebayes.notice import Notice, Warned, from_json
 from wirebayes.strict.files import PathLike
-
-if TYPE_CHECKING:
-    pass
-
 
 Content = TypeVar("Content")  # what the JSON file of a result holds
 _FIGURES = 4  # digits that a short form shows

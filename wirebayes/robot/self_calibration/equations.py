@@ -143,19 +143,17 @@ def linearised(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, cre
     p, w, d = len(session.duration_s), robot.legs, robot.degrees
     rows = _rows(robot, holds)
     k = max(part.stop for part in rows.values())
-    residual, known = np.zeros((p, k)), np.ones((p, k), bool)
     by_robot, by_hold = np.zeros((p, k, unknowns.count)), np.zeros((p, k, d + w))
-
+    out = Equations(np.zeros((p, k)), by_robot, by_hold, rows, np.ones((p, k), bool))
     R = np.moveaxis(state.rotation, 0, -1)
     shape = statics.geometry(here, state.position_m.T, R)
     J = np.moveaxis(statics.jacobian(here, shape) * robot.lines[:, None], -1, 0).swapaxes(1, 2) * robot.edge_scale
-    out = Equations(residual, by_robot, by_hold, rows, known)
     _loops(out, unknowns, holds, noise, state, creep, since, shape, J)
     _balance(out, unknowns, noise, state, here, shape, J)
-    _tensions(rows["tension"], unknowns, holds, noise, state, residual, by_robot, by_hold, known)
-    _poses(rows["pose"], unknowns, holds, state, residual, by_hold, known)
+    _tensions(out, unknowns, holds, noise, state)
+    _poses(out, unknowns, holds, state)
     if holds.tilt is not None:
-        _tilts(rows["tilt"], robot, holds, state, residual, by_hold, known)
+        _tilts(out, robot, holds, state)
     return out
 
 
@@ -303,79 +301,55 @@ def _swing(robot: Robot, shape: statics.Geometry, rotation: Floats, pull: Floats
     return -by_line, by_platform
 
 
-def _tensions(
-    rows: slice,
-    unknowns: Unknowns,
-    holds: Holds,
-    noise: Noise,
-    state: State,
-    residual: Floats,
-    by_robot: Floats,
-    by_hold: Floats,
-    known: Bools,
-) -> None:
+def _tensions(out: Equations, unknowns: Unknowns, holds: Holds, noise: Noise, state: State) -> None:
     """Tensions that were read, and what is usual where none was."""
     robot, session = unknowns.robot, holds.session
-    w, d = robot.legs, robot.degrees
+    w, d, rows = robot.legs, robot.degrees, out.rows["tension"]
     read = np.isfinite(holds.tension_N)
     sign = np.ones_like(session.joint_m) if session.motion is None else session.motion
     parts = unknowns.parts(state.white)
     pull, taut = pulled(state.pull_N, noise.soft_N)
     off = (pull + sign * parts.bias_N - holds.tension_N) / session.tension_sd_N
     usual = (state.pull_N - parts.level_N - noise.usual_N) / noise.pull_N
-    known[:, rows] = read
-    residual[:, rows] = np.where(read, off, usual)
+    out.known[:, rows] = read
+    out.residual[:, rows] = np.where(read, off, usual)
     leg = np.arange(w)
-    by_hold[:, rows.start + leg, d + leg] = np.where(read, taut / session.tension_sd_N, 1.0 / noise.pull_N)
+    row = rows.start + leg
+    out.by_hold[:, row, d + leg] = np.where(read, taut / session.tension_sd_N, 1.0 / noise.pull_N)
     if unknowns.errors.level_N > 0:
         level = unknowns.slices["level"].start + leg
-        by_robot[:, rows.start + leg, level] = np.where(read, 0.0, -unknowns.errors.level_N / noise.pull_N)
+        out.by_robot[:, row, level] = np.where(read, 0.0, -unknowns.errors.level_N / noise.pull_N)
     if unknowns.prior.bias_sd_N > 0:
         bias = unknowns.slices["wires"].stop - w + leg
-        by_robot[:, rows.start + leg, bias] = np.where(
-            read, sign * unknowns.prior.bias_sd_N / session.tension_sd_N, 0.0
-        )
+        by_bias = sign * unknowns.prior.bias_sd_N / session.tension_sd_N
+        out.by_robot[:, row, bias] = np.where(read, by_bias, 0.0)
 
 
-def _poses(
-    rows: slice,
-    unknowns: Unknowns,
-    holds: Holds,
-    state: State,
-    residual: Floats,
-    by_hold: Floats,
-    known: Bools,
-) -> None:
+def _poses(out: Equations, unknowns: Unknowns, holds: Holds, state: State) -> None:
     """Poses that were stated."""
-    robot, session = unknowns.robot, holds.session
+    robot, session, rows = unknowns.robot, holds.session, out.rows["pose"]
+    known, residual = out.known[:, rows], out.residual[:, rows]
     sd = max(unknowns.errors.pose_m, EXACT * robot.span_m)
-    known[:, rows][:, :3] = holds.placed[:, None]
-    residual[:, rows][:, :3] = np.where(holds.placed[:, None], state.position_m - session.position_m, 0.0) / sd
-    by_hold[:, rows, : robot.degrees] = known[:, rows, None] * np.eye(robot.degrees) / sd
+    placed = holds.placed[:, None]
+    known[:, :3] = placed
+    residual[:, :3] = np.where(placed, state.position_m - session.position_m, 0.0) / sd
     if robot.degrees == 6:
         there = np.where(holds.oriented[:, None, None], session.rotation, state.rotation)
         turned = turns.vector(state.rotation @ np.swapaxes(there, 1, 2))
-        known[:, rows][:, 3:] = holds.oriented[:, None]
-        residual[:, rows][:, 3:] = turned * robot.size_m / sd
-        by_hold[:, rows, :6] = known[:, rows, None] * np.eye(6) / sd
+        known[:, 3:] = holds.oriented[:, None]
+        residual[:, 3:] = turned * robot.size_m / sd
+    out.by_hold[:, rows, : robot.degrees] = known[..., None] * np.eye(robot.degrees) / sd
 
 
-def _tilts(
-    rows: slice,
-    robot: Robot,
-    holds: Holds,
-    state: State,
-    residual: Floats,
-    by_hold: Floats,
-    known: Bools,
-) -> None:
+def _tilts(out: Equations, robot: Robot, holds: Holds, state: State) -> None:
     """Components of the platform's normal that an inclinometer read."""
     sd = holds.session.tilt_sd_rad
     if holds.tilt is None or sd is None:
         return
-    known[:, rows] = np.isfinite(holds.tilt)
+    rows, read = out.rows["tilt"], np.isfinite(holds.tilt)
     normal = state.rotation[:, :, 2]
-    residual[:, rows] = np.where(known[:, rows], normal[:, :2] - holds.tilt, 0.0) / sd
+    out.known[:, rows] = read
+    out.residual[:, rows] = np.where(read, normal[:, :2] - holds.tilt, 0.0) / sd
     if robot.degrees == 6:
         slope = -turns.cross_matrix(normal)[:, :2] / robot.size_m
-        by_hold[:, rows, 3:6] = known[:, rows, None] * slope / sd
+        out.by_hold[:, rows, 3:6] = read[..., None] * slope / sd
