@@ -78,7 +78,7 @@ def test_wires_that_nobody_read_are_not_thought_slack(tmp_path):
 @pytest.mark.parametrize("read", [False, True])
 def test_an_unusual_error_of_the_lengths_is_as_improbable_as_an_f_test_says(read):
     worth, free, span = residuals._BLIND_DEGREES, 20.0, 3.0
-    usual = residuals._BLIND * span
+    usual = residuals.USUAL * span
     ratio = f.isf(0.01, free, worth)
     noise = np.sqrt((free * ratio + worth) / (free + worth)) * usual
     found = SimpleNamespace(
