@@ -49,6 +49,25 @@ def test_a_day_that_passes_unread_is_known_by_a_column_of_dates(tmp_path, form, 
     assert "dates from 'Datum'" in made.notes[0] and not any("not read" in note for note in made.notes)
 
 
+@pytest.mark.parametrize(("header", "first"), [("Day", 1), ("Tag", 0), ("Jour", 7)])
+def test_a_day_that_passes_unread_is_known_by_the_numbers_of_days(tmp_path, header, first):
+    lines = [f"{first + (time >= 1200.0)};{two_days(time):%H:%M:%S};{x};{y}" for time, x, y in ROWS]
+    made = read(tmp_path, [f"{header};Time;Position (mm);Force (N)"], lines)
+    assert_is_the_test(made)
+    assert [hold.start_s for hold in made.experiment.holds] == [0.0, 600.0, 1200.0 + DAY_S]
+    assert f"days from '{header}'" in made.notes[0]
+
+
+@pytest.mark.parametrize(("header", "last"), [("Run", 2), ("Day", 0)])
+def test_other_numbers_beside_clocks_are_no_days(tmp_path, header, last):
+    lines = [
+        f"{last if time >= 1200.0 else 1};{datetime(2026, 6, 14, 9) + timedelta(seconds=time):%H:%M:%S};{x};{y}"
+        for time, x, y in ROWS
+    ]
+    made = read(tmp_path, [f"{header};Time;Position (mm);Force (N)"], lines)
+    assert [hold.start_s for hold in made.experiment.holds] == [0.0, 600.0, 1200.0]
+
+
 def test_dates_that_are_no_clocks_column_stay_unread(tmp_path):
     lines = [f"2026-06-14;{time};{x};{y}" for time, x, y in ROWS]
     made = read(tmp_path, ["Datum;Zeit [s];Weg [mm];Kraft [N]"], lines)

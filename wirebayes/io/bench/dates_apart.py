@@ -1,11 +1,17 @@
-"""Dates in a column of their own beside clocks: together they are moments, and a day that passes is no guess."""
+"""Dates, or numbers of days, in a column of their own beside clocks: a day that passes is then no guess."""
 
 from dataclasses import replace
+from datetime import date, timedelta
+from itertools import pairwise
 
 from wirebayes.io.bench.compound_times import is_spelt
 from wirebayes.io.bench.sheet import moment
 from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.words import plain_letters
 
+_DAY = {"day", "days", "tag", "jour", "dia", "giorno", "dag", "day no", "tag nr", "jour no"}
+_FIRST_DAY = date(2001, 1, 1)  # whatever it was: days are counted
+_DIGITS = 3  # of the number of a day: no test lasts for years
 _MIDNIGHT = "00:00:00"  # what spreadsheets add to a date
 
 
@@ -20,19 +26,21 @@ def with_dates(table: RawTable) -> RawTable:
     """
     named = [i for i, name in enumerate(table.header) if name]
     dates = [i for i in named if _are_dates(table, i)]
+    days = [i for i in named if not dates and _are_days(table, i)]
     clocks = [i for i in named if _are_clocks(table, i)]
-    if len(dates) != 1 or len(clocks) != 1:
+    if len(dates + days) != 1 or len(clocks) != 1:
         return table
-    (of_date,), (of_clock,) = dates, clocks
-    rows, date = [], ""
+    (of_date,), (of_clock,) = dates + days, clocks
+    rows, last = [], ""
     for row in table.rows:
-        date = row.cell(of_date).removesuffix(_MIDNIGHT).strip() or date
+        last = row.cell(of_date).removesuffix(_MIDNIGHT).strip() or last
+        of_row = str(_FIRST_DAY + timedelta(days=int(last))) if days else last
         cells = list(row.cells)
         if row.cell(of_clock):
-            cells[of_clock] = f"{date} {row.cell(of_clock)}"
+            cells[of_clock] = f"{of_row} {row.cell(of_clock)}"
         rows.append(replace(row, cells=tuple(cells)))
     header = tuple("" if i == of_date else name for i, name in enumerate(table.header))
-    described = f"{table.sheet.described}, dates from {table.header[of_date]!r}"
+    described = f"{table.sheet.described}, {'days' if days else 'dates'} from {table.header[of_date]!r}"
     sheet = replace(table.sheet, described=described)
     return replace(table, sheet=sheet, header=header, rows=tuple(rows))
 
@@ -42,6 +50,16 @@ def _are_dates(table: RawTable, column: int) -> bool:
     cells = table.column(column)
     found = [moment(cell.removesuffix(_MIDNIGHT).strip()) for cell in cells if cell]
     return bool(cells and cells[0]) and all(m is not None and m["date"] and not m["first"] for m in found)
+
+
+def _are_days(table: RawTable, column: int) -> bool:
+    """Whether a column numbers days: its name says so, and its numbers rise by a few at a time, if they do."""
+    cells = [cell for cell in table.column(column) if cell]
+    if plain_letters(table.header[column]) not in _DAY or not table.rows[0].cell(column):
+        return False
+    if not all(cell.isdecimal() and len(cell) <= _DIGITS for cell in cells):
+        return False
+    return all(int(after) >= int(before) for before, after in pairwise(cells))
 
 
 def _are_clocks(table: RawTable, column: int) -> bool:
