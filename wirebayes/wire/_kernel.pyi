@@ -44,7 +44,14 @@ def courses(test: Test, law: Law, theta: Array, first_N: Array, most_steps: int)
 def chain(
     of: Staircases, readings: Array, mask: Array, variance: Array, setting_sd: Array
 ) -> tuple[Array, Array, Array]: ...
-def square_gained(drive: Array, reached: Array, which: NDArray[np.int64], kept: float) -> Array: ...
+def squares_gained(
+    drive: Array,
+    reached: Array,
+    shown: Array,
+    which_end: NDArray[np.int64],
+    which_read: NDArray[np.int64],
+    kept: float,
+) -> tuple[Array, Array]: ...
 def seen(
     tension: Array,
     by_setting: Array,

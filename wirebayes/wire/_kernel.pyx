@@ -890,23 +890,30 @@ cdef inline Read read_hold(
     return out
 
 
-def square_gained(const double[:, ::1] drive, const double[:, ::1] reached, const Py_ssize_t[::1] which, double kept):
-    """Squares (n,) of what creep gains in a hold, summed over holds: `wirebayes.inference.coordinates.transform`.
+def squares_gained(
+    const double[:, ::1] drive, const double[:, ::1] reached, const double[:, ::1] shown,
+    const Py_ssize_t[::1] which_end, const Py_ssize_t[::1] which_read, double kept
+):
+    """Squares (n,), summed over holds, of what creep gains in a hold, and of what a hold shows of that.
 
-    `drive` (H, n) is where creep goes in each hold, `reached` (T, n) the share of it reached, `which` (H,) of these.
+    `drive` (H, n) is where creep goes in each hold, `reached` (T, n) the share of it reached at its end, `shown` (P, n)
+    between its readings; `which_end` and `which_read` (H,) of these. See `wirebayes.inference.coordinates.ridge`.
     """
     cdef Py_ssize_t n = drive.shape[1], holds = drive.shape[0], i, j
-    if reached.shape[1] != n or which.shape[0] != holds:
-        raise ValueError("drive, reached and which are of different sizes")
-    out, past = np.zeros(n), np.zeros(n)
-    cdef double[::1] square = out, carried = past
-    cdef double gained
+    if reached.shape[1] != n or shown.shape[1] != n or which_end.shape[0] != holds or which_read.shape[0] != holds:
+        raise ValueError("drive, shares and holds are of different sizes")
+    all_gained, all_shown, past = np.zeros(n), np.zeros(n), np.zeros(n)
+    cdef double[::1] of_gained = all_gained, of_shown = all_shown, carried = past
+    cdef double amount, gained, seen
     for j in range(holds):
         for i in range(n):
-            gained = (drive[j, i] - kept * carried[i]) * reached[which[j], i]
+            amount = drive[j, i] - kept * carried[i]
+            gained = amount * reached[which_end[j], i]
+            seen = amount * shown[which_read[j], i]
             carried[i] += gained
-            square[i] += gained * gained
-    return out
+            of_gained[i] += gained * gained
+            of_shown[i] += seen * seen
+    return all_gained, all_shown
 
 
 cdef double LOG_2PI = log(2.0 * np.pi)

@@ -24,6 +24,9 @@ class Ridge:
     `effects` are those on the amount of creep, and `holds` what they see of the test, tensions as measured. `powers`
     are log hazards and the log U that suits the losses best at each of them. `fixture` is the column of a compliance in
     series with the wire, and `beside` what creeps beside the creep. `elongations` where these are read, not tensions.
+
+    Of the distinct `times_s`, holds end at `which_end`; `between` are pairs of them, of a first and a last reading, and
+    `which_pair` is that of each hold.
     """
 
     where: dict[str, int]
@@ -32,7 +35,9 @@ class Ridge:
     log_tension: Array
     log_step: float
     times_s: Array
-    which_time: Ints
+    which_end: Ints
+    between: Ints
+    which_pair: Ints
     kept: float
     hold_s: float
     log_length: float
@@ -80,55 +85,86 @@ class Ridge:
             return np.asarray(stiffness)
         return np.asarray(stiffness - np.logaddexp(0.0, np.log(theta[:, self.fixture]) + stiffness))
 
-    def softened(self, z: Array) -> Array:
-        """(n,) by how much the log stiffness is less after the creep, at sampled coordinates (n, d)."""
-        return np.asarray(np.logaddexp(0.0, z[:, self.where["B"]] - self.log_step))
+    def softened(self, theta: Array, z: Array) -> Array:
+        """(n,) by how much the log stiffness is less after the creep.
+
+        Parameters
+        ----------
+        theta, z : (n, d) arrays
+            Natural parameters, of which k1 and B are not looked at, and sampled coordinates.
+        """
+        log_gained = z[:, self.where["B"]] + self.log_unseen(theta)
+        return np.asarray(np.logaddexp(0.0, log_gained - self.log_step))
 
     def log_creep(self, theta: Array) -> Array:
-        """(n,) log G: root mean square of the elongation gained in a hold, for B = 1, at natural parameters (n, d)."""
-        mean = self._tensions[0]
-        drive, reached = self._drive(theta), self._reached(theta)
-        if compiled.kernel is not None and not self.effects:
-            # of parameters that are fixed there is one column
-            every, share = (
-                a if a.shape[1] == len(theta) else np.repeat(a, len(theta), axis=1) for a in (drive, reached)
-            )
-            square = compiled.kernel.square_gained(every, share, self.which_time, self.kept)
-        else:
-            square = (self._gained(drive, reached, theta) ** 2).sum(axis=0)
+        """(n,) log G: root mean square of the elongation that a hold shows, for B = 1, at natural parameters (n, d)."""
+        _, shown = self._squares(theta)
         # the floor keeps the logarithm finite
-        return np.asarray(self.get(theta, "U") * mean + 0.5 * np.log(np.maximum(square / len(self.which_time), 1e-300)))
+        return np.asarray(self.get(theta, "U") * self._tensions[0] + 0.5 * np.log(np.maximum(shown, _NOTHING)))
+
+    def log_unseen(self, theta: Array) -> Array | float:
+        """(n,) log of the elongation gained in a hold over what it shows, both root mean squares."""
+        if self._all_is_seen:
+            return 0.0
+        gained, shown = self._squares(theta)
+        return np.asarray(0.5 * (np.log(np.maximum(gained, _NOTHING)) - np.log(np.maximum(shown, _NOTHING))))
 
     def log_total(self, theta: Array, holds: int) -> Array:
-        """(n,) log of the elongation gained in the first holds together over the root mean square of all holds."""
-        gained = self._gained(self._drive(theta), self._reached(theta), theta)
+        """(n,) log of the elongation gained in the first holds together over the root mean square that a hold shows."""
+        gained, shown = self._gained(self._drive(theta), *self._shares(theta), theta)
         total = gained[:holds].sum(axis=0)
-        square = (gained**2).mean(axis=0)
-        return np.asarray(np.log(np.maximum(total, 1e-150)) - 0.5 * np.log(np.maximum(square, 1e-300)))
+        square = (shown**2).mean(axis=0)
+        return np.asarray(np.log(np.maximum(total, 1e-150)) - 0.5 * np.log(np.maximum(square, _NOTHING)))
+
+    @cached_property
+    def _all_is_seen(self) -> bool:
+        """Whether readings begin and end with the holds."""
+        first, last = self.between[self.which_pair].T
+        return bool((self.times_s[first] == 0.0).all() and (last == self.which_end).all())
 
     def _drive(self, theta: Array) -> Array:
         """What the creep of each hold aims at beside that at the mean tension."""
         return np.exp(self.get(theta, "U") * self._tensions[1])
 
-    def _reached(self, theta: Array) -> Array:
-        """The share of it that is reached at each of the times."""
-        return -np.expm1(-self.get(theta, "k2") * self.times_s[:, None] ** self.get(theta, "N"))
+    def _shares(self, theta: Array) -> tuple[Array, Array]:
+        """The shares of it that are reached at each of the times, and seen between each pair of them."""
+        reached = -np.expm1(-self.get(theta, "k2") * self.times_s[:, None] ** self.get(theta, "N"))
+        first, last = self.between.T
+        return reached, reached[last] - (1.0 - _COUNTED) * reached[first]
 
-    def _gained(self, drive: Array, reached: Array, theta: Array) -> Array:
-        """(H, n) elongation gained in each hold, whose squares `compiled.kernel.square_gained` sums.
+    def _squares(self, theta: Array) -> tuple[Array, Array]:
+        """(n,) mean squares of the elongation gained in a hold, and of what it shows; B and mean tension are one."""
+        driven = self._drive(theta), *self._shares(theta)
+        if compiled.kernel is not None and not self.effects:
+            # of parameters that are fixed there is one column
+            drive, reached, seen = (a if a.shape[1] == len(theta) else np.repeat(a, len(theta), axis=1) for a in driven)
+            holds = self.which_end, self.which_pair, self.kept
+            gained, shown = compiled.kernel.squares_gained(drive, reached, seen, *holds)
+        else:
+            gained, shown = ((part**2).sum(axis=0) for part in self._gained(*driven, theta))
+        return gained / len(self.which_end), shown / len(self.which_end)
+
+    def _gained(self, drive: Array, reached: Array, seen: Array, theta: Array) -> tuple[Array, Array]:
+        """(H, n) elongation gained in each hold, and what it shows: `compiled.kernel.squares_gained` sums the squares.
 
         Effects on the amount of creep are included here.
         """
-        carried, out = 0.0 * reached[0], []
+        carried, every_gained, every_shown = 0.0 * reached[0], [], []
         effects = Placed(self.effects, {c: self.get(theta, c) for e in self.effects for c in e.columns()})
-        for j, time in enumerate(self.which_time):
+        for j, (end, pair) in enumerate(zip(self.which_end, self.which_pair, strict=True)):
             amount = drive[j] - self.kept * carried
             if self.effects:
                 amount = effects.change("amount", amount[None], self.holds[j].carrying(carried[None]))[0]
-            gained = amount * reached[time]
+            gained = amount * reached[end]
             carried = carried + gained
-            out.append(gained)
-        return np.array(np.broadcast_arrays(*out))
+            every_gained.append(gained)
+            every_shown.append(amount * seen[pair])
+        return np.array(np.broadcast_arrays(*every_gained)), np.array(np.broadcast_arrays(*every_shown))
+
+
+_NOTHING = 1e-300  # of a square whose logarithm has to be finite
+# share of what is gained before a first reading that counts as shown, so that creep which is over by then has a size
+_COUNTED = 0.05
 
 
 def ridges_of(problem: Problem, columns: ColumnMap, for_draws: bool) -> list[Ridge]:
@@ -149,10 +185,10 @@ def ridges_of(problem: Problem, columns: ColumnMap, for_draws: bool) -> list[Rid
             continue  # a user's prior that allows negative values: leave this material's columns as they are
         shifted = _shifted(problem, sample, {name for name, column in where.items() if column not in taken})
         if not for_draws:
-            shifted -= {"U"}
+            shifted -= {"U", "k1"} if sample.protocol.control == "force" else {"U"}
         if shifted:
             taken |= {where[name] for name in shifted}
-            ridge = _ridge(problem, sample, where, fixed, shifted)
+            ridge = _ridge(problem, sample, where, fixed, shifted, for_draws)
             owned = [column for each in found for column in each.shares]
             found.append(_with_shares(ridge, problem, sample, columns, owned) if for_draws else ridge)
     return found
@@ -170,7 +206,7 @@ def for_sample(ridge: Ridge, problem: Problem, sample: Sample) -> Ridge:
     """
     if sample is problem.samples[0]:
         return ridge
-    return _ridge(problem, sample, dict(ridge.where), dict(ridge.fixed), ridge.shifted - {"U"})
+    return _ridge(problem, sample, dict(ridge.where), dict(ridge.fixed), ridge.shifted - {"U"}, for_draws=True)
 
 
 def _parameters(problem: Problem, sample: Sample, columns: ColumnMap) -> tuple[dict[str, int], dict[str, float]]:
@@ -193,15 +229,20 @@ def _mark(problem: Problem, material: str) -> str:
 def _shifted(problem: Problem, sample: Sample, free: set[str]) -> frozenset[str]:
     """Those of the free parameters that have another coordinate than their logarithm."""
     shifted = {"k2", "U", "B", "k1"} & free
-    if "B" not in shifted or sample.protocol.control == "force":
-        shifted -= {"k1"}  # the tension lost in a hold is not known
+    if "B" not in shifted:
+        shifted -= {"k1"}  # what is gained in a hold is not known
     if "k2" not in shifted or sample.model.history != "saturating" or problem.likelihood != "chain":
         shifted -= {"U"}  # every hold creeps anew, or the rate of the creep is not sampled here
     return frozenset(shifted)
 
 
 def _ridge(
-    problem: Problem, sample: Sample, where: dict[str, int], fixed: dict[str, float], shifted: frozenset[str]
+    problem: Problem,
+    sample: Sample,
+    where: dict[str, int],
+    fixed: dict[str, float],
+    shifted: frozenset[str],
+    for_draws: bool,
 ) -> Ridge:
     effects = tuple(e for e in sample.model.at("amount") if compiled.has_formula(e))  # others may ask for B
     for column in (c for e in effects for c in e.columns()):
@@ -213,7 +254,10 @@ def _ridge(
     tension = _driving(sample)
     hold_s, duration = sample.typical_hold_s, sample.protocol.duration_s
     durations = np.where(duration > 0, duration, hold_s)
-    times, which_time = np.unique(durations, return_inverse=True)
+    seen = _seen(sample, durations) if for_draws else (np.zeros_like(durations), durations)
+    times, which = np.unique([*seen, durations], return_inverse=True)
+    first, last, end = which.reshape(3, -1)
+    between, which_pair = np.unique(np.column_stack([first, last]), axis=0, return_inverse=True)
     no_power = np.zeros(1), np.zeros(1)  # U is sampled as it is
     powers = _powers(problem, sample, np.log(tension), durations / (0.5 * hold_s)) if "U" in shifted else no_power
     return Ridge(
@@ -223,7 +267,9 @@ def _ridge(
         log_tension=np.log(tension),
         log_step=0.5 * float(np.log(np.mean(np.diff(tension, prepend=0.0) ** 2))),
         times_s=times,
-        which_time=which_time,
+        which_end=end,
+        between=between,
+        which_pair=which_pair.reshape(-1),
         kept=1.0 if sample.model.history == "saturating" and problem.likelihood == "chain" else 0.0,
         hold_s=hold_s,
         log_length=float(np.log(_length_mm(sample))),
@@ -247,6 +293,14 @@ def _holds(sample: Sample, tension: Array) -> tuple[HoldContext, ...]:
         )
         for hold, first in zip(sample.protocol.holds, tension, strict=True)
     )
+
+
+def _seen(sample: Sample, durations: Array) -> tuple[Array, Array]:
+    """(H,) when the first and last reading of each hold were taken; its beginning and end where there are no two."""
+    protocol = sample.protocol
+    first, last = protocol.time_s[:, 0], protocol.time_s[np.arange(len(durations)), protocol.last_reading]
+    several = protocol.mask.sum(axis=1) > 1
+    return np.where(several, first, 0.0), np.where(several, last, durations)
 
 
 def _driving(sample: Sample) -> Array:
@@ -284,7 +338,7 @@ def _with_shares(ridge: Ridge, problem: Problem, sample: Sample, columns: Column
         amount = problem.names.index(names[0])
         if amount in owned or amount in ridge.shares or amount not in columns.edges or columns.edges[amount].ends:
             continue
-        if effect.in_series and "k1" in ridge.shifted:
+        if effect.in_series and "k1" in ridge.shifted and not ridge.elongations:
             ridge = replace(ridge, fixture=amount)
         elif effect.amplitudes[0].is_elongation and effect.place != "strain" and "B" in ridge.shifted:
             ridge = replace(ridge, beside=(*ridge.beside, _elongation(ridge, problem, effect, names)))
@@ -297,6 +351,6 @@ def _elongation(ridge: Ridge, problem: Problem, effect: Effect, names: list[str]
     others = {a.name: column for a, column in zip(effect.amplitudes[1:], columns[1:], strict=True)}
     ends = tuple(
         replace(hold, time_s=ridge.times_s[time].reshape(1, 1))
-        for hold, time in zip(ridge.holds, ridge.which_time, strict=True)
+        for hold, time in zip(ridge.holds, ridge.which_end, strict=True)
     )
     return Elongation(problem.names.index(names[0]), effect, others, ends, ridge.kept)

@@ -109,11 +109,11 @@ class SoftenedStiffness(Step):
             own = np.log(theta[:, ridge.fixture]) + np.log(ridge.get(theta, "k1")) - ridge.log_length
             z[:, ridge.fixture] = shares.score(own, np.zeros_like(own))
             z[:, column] -= np.logaddexp(0.0, own)
-        z[:, column] -= ridge.softened(z)
+        z[:, column] -= ridge.softened(theta, z)
 
     def to_natural(self, theta: Array, z: Array) -> None:
         ridge, column = self.ridge, self.ridge.where["k1"]
-        log_k1 = z[:, column] + ridge.softened(z)
+        log_k1 = z[:, column] + ridge.softened(theta, z)
         if ridge.fixture is not None:
             share, rest = shares.log_shares(z[:, ridge.fixture])
             theta[:, ridge.fixture] = np.exp(share - log_k1 + ridge.log_length)
@@ -123,6 +123,70 @@ class SoftenedStiffness(Step):
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         column = self.ridge.fixture
         return 0.0 if column is None else shares.log_slope(theta[:, column], z[:, column])
+
+
+@dataclass(frozen=True)
+class AddedCompliance(Step):
+    """Under weights, log k1 becomes the log stiffness of the wire after its creep.
+
+    Coordinates by which creep gives more than the whole compliance are of no wire.
+    """
+
+    ridge: Ridge
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        column = self.ridge.where["k1"]
+        z[:, column] -= np.log1p(theta[:, column] * self._of_creep(theta, z))
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        column = self.ridge.where["k1"]
+        share = np.exp(z[:, column]) * self._of_creep(theta, z)
+        theta[:, column] = np.exp(z[:, column] - np.log1p(-share))
+
+    def log_jacobian(self, theta: Array, z: Array) -> Array | float:
+        column = self.ridge.where["k1"]
+        return np.asarray(np.log(theta[:, column]) - z[:, column])
+
+    def _of_creep(self, theta: Array, z: Array) -> Array:
+        """(n,) strain gained in a hold over the step of the weight, 1/N."""
+        ridge = self.ridge
+        log_gained = z[:, ridge.where["B"]] + ridge.log_unseen(theta)
+        return np.exp(log_gained - ridge.log_length - ridge.log_step)
+
+
+@dataclass(frozen=True)
+class FirstElongation(Step):
+    """Under weights, the preload becomes what it is beside the elongation of the first hold.
+
+    Attributes
+    ----------
+    ridge : Ridge
+    preload : int
+        Its column.
+    scale : float
+        Of its coordinate, mm.
+    weight, time_s : float
+        Of the first hold, N; when it was read for the last time.
+    """
+
+    ridge: Ridge
+    preload: int
+    scale: float
+    weight: float
+    time_s: float
+
+    def to_sampled(self, z: Array, theta: Array) -> None:
+        z[:, self.preload] -= self._elongation(theta) / self.scale
+
+    def to_natural(self, theta: Array, z: Array) -> None:
+        theta[:, self.preload] = z[:, self.preload] * self.scale + self._elongation(theta)
+
+    def _elongation(self, theta: Array) -> Array:
+        """(n,) elastic stretch and creep, mm."""
+        k1, B, U, k2, N = (self.ridge.get(theta, name) for name in ("k1", "B", "U", "k2", "N"))
+        length, strain = np.exp(self.ridge.log_length), self.weight / k1
+        crept = B * self.weight**U * -np.expm1(-k2 * self.time_s**N)
+        return np.asarray(length * strain + crept * (1.0 + strain))
 
 
 @dataclass(frozen=True)

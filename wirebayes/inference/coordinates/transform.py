@@ -5,17 +5,19 @@ setting error, which is at most half a step, the log odds of that; amplitudes wh
 and uniform priors) become what is standard normal under their prior, so that no proposal leaves the support; others are
 measured in standard deviations of their prior. Then, one after the other (`wirebayes.inference.coordinates.steps`):
 
-- ``Loss``: log B becomes the log tension lost in a hold, root mean square over the holds of the test, with the first
-  readings taken as the tensions that drive the creep: ``log B + log G(U, k2, N) + log(k1 / L0)``. With the tensions
-  given, the creep is linear in B, so G does not depend on B and takes one pass along the holds. Effects on the amount
-  of creep belong to G. Under weights, elongations are read, and this is the elongation gained in a hold: without
-  ``log(k1 / L0)``. What creeps beside the creep in proportion to a sampled amplitude belongs to the tension lost, and
-  these amplitudes become their shares of it (`wirebayes.inference.coordinates.shares`);
+- ``Loss``: log B becomes the log tension lost between the first and the last reading of a hold, root mean square over
+  the holds of the test, with the first readings taken as the tensions that drive the creep: ``log B + log G(U, k2, N) +
+  log(k1 / L0)``. With the tensions given, the creep is linear in B, so G does not depend on B and takes one pass along
+  the holds. Effects on the amount of creep belong to G. Under weights, elongations are read, and this is the elongation
+  gained: without ``log(k1 / L0)``. What creeps beside the creep in proportion to a sampled amplitude belongs to the
+  tension lost, and these amplitudes become their shares of it (`wirebayes.inference.coordinates.shares`);
 - ``SoftenedStiffness``: log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + lost /
   step)``, with the tension lost in a hold over the root mean square of the steps between first readings. Where all
-  creep is over before a first reading, the readings see this stiffness alone; where there is little, it is k1. Under
-  weights it stays log k1. Where a fixture's compliance is sampled, k1 is in all this the stiffness of the wire with its
+  creep is over before a first reading, the readings see this stiffness alone; where there is little, it is k1. Where a
+  fixture's compliance is sampled, k1 is in all this the stiffness of the wire with its
   fixture, and the compliance becomes its share;
+- ``AddedCompliance`` and ``FirstElongation``: the same under weights, where compliances add up, and the preload becomes
+  what the first hold's elongation leaves of it, which asks for k1 and comes first;
 - ``Level``: in a test of one displacement, k1 and B become what its tensions say beside the preload
   (`wirebayes.inference.coordinates.tension_level`);
 - ``WeightLevel``: in a test of one weight, the preload and B become what its displacements say beside k1
@@ -30,8 +32,9 @@ measured in standard deviations of their prior. Then, one after the other (`wire
 - ``Straightened``: beside a toe, the preload becomes what is left of it once the toe is straight.
 
 The map is triangular: to natural parameters the steps go backwards, so that each finds the parameters that it asks for.
-Those but of preloads and of shares have unit Jacobian. Those of U, preloads and shares are for proposals to draw
-from: Laplace approximations, as the search for effects compares them, do without. The proposal learns the remaining
+Those but of preloads, shares and the added compliance have unit Jacobian. Those of preloads, shares, the added
+compliance and U are for proposals to draw from, and so is the difference between what is lost and what readings show of
+it: Laplace approximations, as the search for effects compares them, do without. The proposal learns the remaining
 curvature and funnels (`wirebayes.inference.sampler.transport_map`), for which the columns are ordered: errors before
 what they widen, the shape of the creep before its amount and the stiffness.
 """
@@ -48,6 +51,8 @@ from wirebayes.inference.coordinates.first_stretch import FirstStretch, first_st
 from wirebayes.inference.coordinates.ridge import Ridge, ridges_of
 from wirebayes.inference.coordinates.slack_edge import SlackEdge, slack_edge
 from wirebayes.inference.coordinates.steps import (
+    AddedCompliance,
+    FirstElongation,
     Hazard,
     Level,
     Loss,
@@ -122,21 +127,26 @@ class Transformation:
         slack = _slack_edges(problem, self.columns) if for_draws else []
         ridges = ridges_of(problem, self.columns, for_draws)
         levels: list[LevelStep] = []
+        firsts: list[FirstElongation] = []
         if for_draws and _is_usual(problem, self.columns, ridges):
             (ridge,) = ridges
             if (tension := tension_level(problem, slack)) is not None:
                 ridges = [replace(ridge, log_step=np.inf)]  # the level says what k1 is beside the creep
                 levels = [Level(ridges[0], tension)]
             elif weights := displacement_levels(problem, ridge):
-                levels = [WeightLevel(ridge, tuple(weights), common_error(problem), self.scale)]
+                ridges = [replace(ridge, shifted=ridge.shifted - {"k1"})]  # of one weight only the preload is told
+                levels = [WeightLevel(ridges[0], tuple(weights), common_error(problem), self.scale)]
             elif stretches := first_stretches(problem, ridge, slack):
                 levels, slack = [StretchLevel(ridge, tuple(stretches), self.scale)], []
+            else:
+                firsts = _first_elongations(problem, ridge, self.scale)
         preloads = {column for s in levels if not isinstance(s, Level) for column in s.preloads}
         toes = _toes(problem, self.columns) if for_draws and not preloads else []
-        self.steps = [*_steps(ridges, levels, [Preload(edge, self.scale[edge.preload]) for edge in slack]), *toes]
+        edges = [Preload(edge, self.scale[edge.preload]) for edge in slack]
+        self.steps = [*firsts, *_steps(ridges, levels, edges), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
-        preloads |= {edge.preload for edge in slack}
+        preloads |= {step.preload for step in firsts} | {edge.preload for edge in slack}
         self._own_scale = [*self.shares, *sorted(preloads | {toe.preload for toe in toes})]
 
     @property
@@ -207,12 +217,39 @@ def _steps(ridges: Sequence[Ridge], levels: Sequence[LevelStep], preloads: Seque
         *(Stretched(each, step.scale[each.preload]) for step in of_stretches for each in step.levels),
         *(Loss(ridge, level) for ridge in ridges if "B" in ridge.shifted),
         *of_stretches,
-        *(SoftenedStiffness(ridge) for ridge in ridges if "k1" in ridge.shifted),
+        *(_after_creep(ridge) for ridge in ridges if "k1" in ridge.shifted),
         *(step for step in levels if not isinstance(step, StretchLevel)),
         *(Hazard(ridge) for ridge in ridges if "k2" in ridge.shifted),
         *(Power(ridge) for ridge in ridges if "U" in ridge.shifted),
         *(step for step in preloads if step not in asks_for_k1),
     ]
+
+
+def _after_creep(ridge: Ridge) -> Step:
+    """The coordinate of the stiffness of a wire that has crept."""
+    return AddedCompliance(ridge) if ridge.elongations else SoftenedStiffness(ridge)
+
+
+def _first_elongations(problem: Problem, ridge: Ridge, scale: Array) -> list[FirstElongation]:
+    """The samples under weights whose preload is open.
+
+    Parameters
+    ----------
+    problem : Problem
+    ridge : Ridge
+        Of the material.
+    scale : (d,) array
+        Of each parameter by itself.
+    """
+    out = []
+    for sample in problem.samples:
+        protocol, preload = sample.protocol, problem.place("preload", sample)
+        if protocol.control == "force" and isinstance(preload, int):
+            first = int(np.flatnonzero(protocol.recorded)[0])
+            time_s = protocol.time_s[first, protocol.last_reading[first]]
+            weight = float(protocol.setting[first])
+            out.append(FirstElongation(ridge, preload, float(scale[preload]), weight, float(time_s)))
+    return out
 
 
 def _read_beside(
