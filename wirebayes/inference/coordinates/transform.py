@@ -129,25 +129,21 @@ class Transformation:
         levels: list[LevelStep] = []
         firsts: list[FirstElongation] = []
         if for_draws and _is_usual(problem, self.columns, ridges):
-            (ridge,) = ridges
-            if (tension := tension_level(problem, slack)) is not None:
-                ridges = [replace(ridge, log_step=np.inf)]  # the level says what k1 is beside the creep
-                levels = [Level(ridges[0], tension)]
-            elif weights := displacement_levels(problem, ridge):
-                ridges = [replace(ridge, shifted=ridge.shifted - {"k1"})]  # of one weight only the preload is told
-                levels = [WeightLevel(ridges[0], tuple(weights), common_error(problem), self.scale)]
-            elif stretches := first_stretches(problem, ridge, slack):
-                levels, slack = [StretchLevel(ridge, tuple(stretches), self.scale)], []
-            else:
-                firsts = _first_elongations(problem, ridge, self.scale)
-        preloads = {column for s in levels if not isinstance(s, Level) for column in s.preloads}
-        toes = _toes(problem, self.columns) if for_draws and not preloads else []
-        edges = [Preload(edge, self.scale[edge.preload]) for edge in slack]
+            ridge, levels = _of_one_setting(problem, ridges[0], slack, self.scale)
+            ridges = [ridge]
+            firsts = [] if levels else _first_elongations(problem, ridge, self.scale)
+        of_levels = {column for step in levels if not isinstance(step, Level) for column in step.preloads}
+        edges = [Preload(edge, self.scale[edge.preload]) for edge in slack if edge.preload not in of_levels]
+        toes = _toes(problem, self.columns) if for_draws and not of_levels else []
         self.steps = [*firsts, *_steps(ridges, levels, edges), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
-        preloads |= {step.preload for step in firsts} | {edge.preload for edge in slack}
-        self._own_scale = [*self.shares, *sorted(preloads | {toe.preload for toe in toes})]
+        others = [
+            *(step.preload for step in firsts),
+            *(step.preload for step in toes),
+            *(e.edge.preload for e in edges),
+        ]
+        self._own_scale = [*self.shares, *sorted(of_levels.union(others))]
 
     @property
     def kinds_of_creep(self) -> list[list[int]]:
@@ -223,6 +219,32 @@ def _steps(ridges: Sequence[Ridge], levels: Sequence[LevelStep], preloads: Seque
         *(Power(ridge) for ridge in ridges if "U" in ridge.shifted),
         *(step for step in preloads if step not in asks_for_k1),
     ]
+
+
+def _of_one_setting(
+    problem: Problem, ridge: Ridge, slack: list[SlackEdge], scale: Array
+) -> tuple[Ridge, list[LevelStep]]:
+    """Coordinates of tests at one setting each, if they are, and the ridge of their material beside these.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of one material.
+    ridge : Ridge
+    slack : list of SlackEdge
+        Coordinates of preloads that there may be instead.
+    scale : (d,) array
+        Of each parameter by itself.
+    """
+    if (tension := tension_level(problem, slack)) is not None:
+        beside = replace(ridge, log_step=np.inf)  # the level says what k1 is beside the creep
+        return beside, [Level(beside, tension)]
+    if weights := displacement_levels(problem, ridge):
+        beside = replace(ridge, shifted=ridge.shifted - {"k1"})  # one weight tells no stiffness
+        return beside, [WeightLevel(beside, tuple(weights), common_error(problem), scale)]
+    if stretches := first_stretches(problem, ridge, slack):
+        return ridge, [StretchLevel(ridge, tuple(stretches), scale)]
+    return ridge, []
 
 
 def _after_creep(ridge: Ridge) -> Step:
