@@ -16,9 +16,11 @@ from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration import answer, estimate
+from wirebayes.robot.self_calibration.mistaken import tension_notices
 from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.session_file import POSITION, TURN, may_be_empty, parse_session
 from wirebayes.strict.columns import columns_table
+from wirebayes.strict.table import csv_table
 
 LINE = WireDraws({k: np.full(2, v) for k, v in {"k1": 15e3, "B": 0.05, "U": 0.9, "k2": 0.03, "N": 0.7}.items()}, 1000.0)
 HOLDS = 4
@@ -44,6 +46,38 @@ def _session(spread, line=LINE):
     cells |= {"duration_s": np.full(HOLDS, 60.0)}
     cells |= {f"joint_{i + 1}_m": joint[:, i] for i in range(6)}
     return robot, cells | {f"tension_{i + 1}_N": tau[:, i] for i in range(6)}
+
+
+@pytest.mark.parametrize(
+    ("tension_N", "said"), [(0.49, True), (0.51, False), (799.0, False), (801.0, True), (float("nan"), False)]
+)
+def test_tensions_far_outside_the_range_of_the_file_are_said_where_no_pose_is_known(session, tension_N, said):
+    """From 1 to 400 N: half the one, twice the other. Most of the readings decide, not one."""
+    robot, cells = session
+    bare = {name: values for name, values in cells.items() if name not in (*POSITION, *TURN)}
+    value = "" if np.isnan(tension_N) else tension_N
+    given = {name: [value] * HOLDS if name.startswith("tension") else values for name, values in bare.items()}
+    if value:
+        given["tension_1_N"] = [20.0] * HOLDS
+    notices = tension_notices(robot, *_read(robot, given))
+    assert [notice.kind for notice in notices] == ["data"] * said
+    assert all("allows 1.00 to 400 N" in notice.text for notice in notices)
+
+
+@pytest.mark.parametrize(("separator", "name"), [(";", "semicolons"), ("\t", "tabs")])
+def test_a_spreadsheets_other_separators_are_named(separator, name):
+    text = f"hold{separator}joint_1_m\n1{separator}1,5\n"
+    with pytest.raises(InputError, match=f"line 1: found {name} between the columns, expected commas"):
+        csv_table(Path("log.csv"), text)
+    csv_table(Path("log.csv"), "hold\n1\n")
+
+
+def test_where_a_reading_may_be_missing_the_complaint_says_so(session):
+    robot, cells = session
+    with pytest.raises(InputError, match="found 'x', expected an empty cell or a number"):
+        _read(robot, cells | {"tension_2_N": ["x"] * HOLDS})
+    with pytest.raises(InputError, match="found 'x', expected a number"):
+        _read(robot, cells | {"joint_2_m": ["x"] * HOLDS})
 
 
 def test_columns_of_which_nothing_is_known_may_be_left_out(session):

@@ -193,7 +193,8 @@ class CsvTable:
             return math.nan
         value = float(text) if _NUMBER.fullmatch(text) else math.nan
         if not allowed.hold(value):
-            raise self.complain(row, column, shown(text) if text else "an empty cell", allowed.expected)
+            expected = f"an empty cell or {allowed.expected}" if allowed.empty else allowed.expected
+            raise self.complain(row, column, shown(text) if text else "an empty cell", expected)
         return value
 
 
@@ -231,13 +232,14 @@ def csv_table(source: Path, text: str) -> CsvTable:
     Raises
     ------
     InputError
-        It is no CSV, or a row is longer or shorter than the header.
+        It is no CSV, its columns are not divided by commas, or a row is longer or shorter than the header.
     """
     numbered = [(line, [cell.strip() for cell in row]) for line, row in csv_rows(source, text)]
     numbered = [(line, row) for line, row in numbered if any(row)]
     if not numbered:
         raise InputError(f"{source}, line 1: found nothing, expected a header and rows of numbers")
     (header_line, header), rows = numbered[0], numbered[1:]
+    _refuse_other_separators(source, header_line, header)
     table = CsvTable(
         source, header, [row for _, row in rows], header_line=header_line, lines=[line for line, _ in rows]
     )
@@ -245,11 +247,22 @@ def csv_table(source: Path, text: str) -> CsvTable:
     return table
 
 
+def _refuse_other_separators(source: Path, line: int, header: list[str]) -> None:
+    """Refuse a header of one cell that holds several names, as spreadsheets of some countries write it."""
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            raise InputError(
+                f"{source}, line {line}: found {name} between the columns, expected commas between them, "
+                "and points in the numbers"
+            )
+
+
 def _check_lengths(table: CsvTable) -> None:
     """Refuse a row that is longer or shorter than the header."""
     wanted = len(table.header)
+    many = counted(wanted, "field")
     for row, cells in enumerate(table.rows):
         if len(cells) != wanted:
             found = counted(len(cells), "field") if any(cells) or len(cells) > 1 else "a blank line"
             where = f"{table.path}, line {table.line(row)}, column {min(len(cells), wanted)}"
-            raise InputError(f"{where}: found {found}, expected {wanted} fields ({','.join(table.header)})")
+            raise InputError(f"{where}: found {found}, expected {many} ({','.join(table.header)})")

@@ -23,6 +23,7 @@ from wirebayes.robot.motion import control, hanging, home, inverse, plausible
 from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
 from wirebayes.robot.self_calibration.estimate import GROSS, LengthPosterior, corrected_joints, length_posterior
+from wirebayes.robot.self_calibration.mistaken import tension_notices
 from wirebayes.robot.self_calibration.report_parts import estimated_lengths, pose_and_home, with_biases
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Moment
@@ -94,6 +95,7 @@ def lengths_report(
             [
                 *_unsure(known, plain),
                 *contradicted,
+                *tension_notices(robot, session, readings),
                 *sensors.sensor_notices(at_fault),
                 *plausible.robot_notices(robot),
                 *home.home_notices(robot),

@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from wirebayes.errors import InputError
+from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -19,6 +20,7 @@ from wirebayes.sentences import number
 from wirebayes.strict.table import CsvTable
 
 _ANOTHER_UNIT = 3.0  # times: units of force differ by 3.6 (ounces) and more, masses that were measured badly by less
+_OUTSIDE = 2.0  # times: wires whose middle tension is that far outside the robot's range are not under its control
 _EVEN = 0.1  # of the weight: tensions that leave so much of it unbalanced are not those of the poses
 _BETTER = 5.0  # times smaller: what two columns must leave, put in the place of each other
 _FEWEST = 3  # holds: with fewer of them a constant error of each wire explains any lengths
@@ -51,6 +53,30 @@ def refuse_mistaken(robot: Robot, session: Session, tension_N: Floats, table: Cs
     read = placed & session.read
     if read.sum() >= _FEWEST:
         _refuse_tensions(robot, session, tension_N, read, table)
+
+
+def tension_notices(robot: Robot, session: Session, readings: Floats) -> list[Notice]:
+    """That tensions were read far outside the range of the robot's file, if so; no pose need be known.
+
+    Parameters
+    ----------
+    robot : Robot
+    session : Session
+    readings : (r,) array
+        Standardised, tensions first.
+    """
+    count = int(session.read.sum()) * robot.legs
+    if not count:
+        return []
+    usual = float(np.median(readings[:count])) * session.tension_sd_N
+    low, high = robot.rule.lowest_N, robot.rule.highest_N
+    if low / _OUTSIDE <= usual <= _OUTSIDE * high:
+        return []
+    text = (
+        f"tensions were read at {number(usual)} N, in the middle, where the robot's file allows {number(low)} to "
+        f"{number(high)} N (tension.lowest_N, highest_N): is the unit of the columns tension_1_N … newtons?"
+    )
+    return [Notice("data", text)]
 
 
 def _refuse_lengths(robot: Robot, session: Session, rows: Bools, table: CsvTable, joints: Sequence[str]) -> None:

@@ -24,6 +24,7 @@ from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
 from wirebayes.robot.self_calibration.identified import Identified, identified
+from wirebayes.robot.self_calibration.mistaken import tension_notices
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.open_where import most_open, odd_hold
 from wirebayes.robot.self_calibration.posterior import Whole
@@ -131,6 +132,7 @@ def calibration_report(
         "warnings": to_json(
             [
                 *_warnings(verdict),
+                *tension_notices(robot, session, readings),
                 *sensors.sensor_notices(search.at_fault),
                 *doubts(robot, prior.line),
             ]
