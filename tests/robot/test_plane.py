@@ -14,6 +14,7 @@ from wirebayes.robot.motion import forward, inverse
 from wirebayes.robot.pose import on_plane
 from wirebayes.robot.pose.answer import _why_not
 from wirebayes.robot.pose.orientation import Orientation
+from wirebayes.robot.self_calibration import identified
 
 G = 9.80665
 
@@ -107,6 +108,30 @@ def test_wires_that_lift_the_platform_are_refused_on_a_table_and_not_on_a_rail(s
     assert not on_plane.lifted(rail, rail.home_m, np.eye(3), tau)
     heavy = replace(high, mass_kg=100.0)
     assert not on_plane.lifted(heavy, heavy.home_m, np.eye(3), tau)
+
+
+@pytest.mark.parametrize(("share", "lifts"), [(0.0, False), (-0.9e-9, False), (-1.1e-9, True)])
+def test_a_force_of_rounding_size_lifts_nothing(sled, monkeypatch, share, lifts):
+    """On a wall whose wires run in its plane the force is nothing, of either sign."""
+    monkeypatch.setattr(plane, "normal_force", lambda *given: share * sled.mass_kg * G)
+    assert bool(on_plane.lifted(sled, sled.home_m, np.eye(3), np.ones(4))) == lifts
+
+
+AXES = ("x", "y", "the vertical")
+
+
+@pytest.mark.parametrize(
+    ("height_m", "ways"),
+    [
+        (0.0, ["moved along x", "moved along y", "turned about the vertical", "scaled"]),
+        (0.1, [f"{way} {axis}" for way in ("moved along", "turned about") for axis in AXES] + ["scaled"]),
+    ],
+)
+def test_a_robot_in_a_plane_is_moved_in_it_only(sled, height_m, ways):
+    """Four lines of the answer spoke of motions that no plotter could make, and left out what mattered."""
+    exits = np.array([[-1.0, -0.8, 0.0], [1.0, -0.8, 0.0], [1.0, 0.8, 0.0], [-1.0, 0.8, 0.0]])
+    flat = replace(sled, exit_m=exits, platform_m=0.1 * exits, home_m=np.array([0.0, 0.0, height_m]))
+    assert list(identified._motions(flat)) == ways
 
 
 def test_a_pose_off_the_plane_is_refused(sled):

@@ -193,7 +193,8 @@ class CsvTable:
             return math.nan
         value = float(text) if _NUMBER.fullmatch(text) else math.nan
         if not allowed.hold(value):
-            expected = f"an empty cell or {allowed.expected}" if allowed.empty else allowed.expected
+            no_number = allowed.empty and math.isnan(value)
+            expected = f"an empty cell or {allowed.expected}" if no_number else allowed.expected
             raise self.complain(row, column, shown(text) if text else "an empty cell", expected)
         return value
 

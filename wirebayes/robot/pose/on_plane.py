@@ -26,7 +26,7 @@ def lifted(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats
     if robot.plane is None or robot.plane.contact == "rail":
         return ""
     force = plane.normal_force(robot, position_m, rotation, tension_N)
-    if force >= 0:
+    if force >= -_ROUNDING * robot.mass_kg * GRAVITY:
         return ""
     return f"The wires lift the platform off its plane: the plane would have to pull with {-force:.3g} N."
 

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration.posterior import Whole
 
 _DETERMINED = 0.5  # of the standard deviation before
+_FLAT = 1e-6  # of the span
 _AXES = ("x", "y", "the vertical")
 _SAYS = {
     "moved along x": "the whole robot may be moved along x",
@@ -75,7 +78,7 @@ def identified(found: Whole) -> Identified:
     combinations = []
     if errors.exit_m > 0:
         inside = found.covariance[at["exit"], at["exit"]]
-        for name, direction in _motions(unknowns.robot.exit_m).items():
+        for name, direction in _motions(unknowns.robot).items():
             left = float(np.sqrt(direction @ inside @ direction))
             before = 1e3 * errors.exit_m / np.sqrt(len(unknowns.robot.exit_m))
             combinations.append(Combination(name, before, before * left, left < _DETERMINED))
@@ -94,12 +97,24 @@ def identified(found: Whole) -> Identified:
     return Identified(count, len(size), combinations, sentences)
 
 
-def _motions(points: Floats) -> dict[str, Floats]:
-    """Unit vectors ``(3 w,)`` of the ways in which all points move together; a point set without extent has fewer."""
+def _motions(robot: Robot) -> dict[str, Floats]:
+    """Unit vectors ``(3 w,)`` of the ways in which all exit points move together; a set without extent has fewer.
+
+    Of a robot that lies in a plane across an axis those that stay in it: across it no length changes at first.
+    """
+    points = robot.exit_m
     about = points - points.mean(0)
-    ways = {f"moved along {axis}": np.tile(np.eye(3)[i], (len(points), 1)) for i, axis in enumerate(_AXES)}
-    ways |= {f"turned about {axis}": np.cross(np.eye(3)[i], about) for i, axis in enumerate(_AXES)}
+    flat = _flat(robot)
+    turning = flat if flat.any() else np.ones(3, bool)
+    ways = {f"moved along {_AXES[i]}": np.tile(np.eye(3)[i], (len(points), 1)) for i in np.flatnonzero(~flat)}
+    ways |= {f"turned about {_AXES[i]}": np.cross(np.eye(3)[i], about) for i in np.flatnonzero(turning)}
     ways["scaled"] = about
     least = 1e-6 * max(float(np.linalg.norm(about)), 1e-12)
     sizes = {name: float(np.linalg.norm(way)) for name, way in ways.items()}
     return {name: way.ravel() / sizes[name] for name, way in ways.items() if sizes[name] > least}
+
+
+def _flat(robot: Robot) -> Bools:
+    """(3,) axes along which neither exit points nor platform have any extent."""
+    platform = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
+    return np.asarray(np.ptp(np.vstack([robot.exit_m, platform]), axis=0) < _FLAT * robot.span_m)
