@@ -142,3 +142,27 @@ def test_errors_name_line_and_file(tmp_path, tensions):
         read(paths, each_file="hold")
     with pytest.raises(InputError, match="found 'hold' for one file"):
         read(paths[0], each_file="hold")
+
+
+def test_a_list_goes_with_files_in_the_order_of_the_holds(tmp_path, tensions):
+    """In any other order, as a shell's, the list may be meant for the files or for the holds."""
+    header, cells = "Time [s];Force [N]", lambda hold, time, force: (time, force)
+    paths = write(tmp_path / "raw", tensions, "hold{hold}.csv", header=header, cells=cells)
+    settings = ", ".join(f"{x} mm" for x in SETTINGS)
+    assert_is(read(tmp_path / "raw", each_file=settings)[0], tensions)
+    with pytest.raises(InputError, match="^--each-file: .* order hold1.csv, hold10.csv.* names: hold1.csv, hold2.csv"):
+        read(sorted(paths), each_file=settings)
+    with pytest.raises(InputError, match="--each-file: found ''"):
+        read(paths, each_file="")
+
+
+def test_durations_beside_dates_are_durations_in_files_too_and_the_dates_tell_the_order(tmp_path, tensions):
+    def backwards(hold, time, force):
+        return f"2026-06-{14 - hold:02}", f"0:{time // 60:02.0f}:{time % 60:02.0f}", SETTINGS[hold], force
+
+    header = "Date;Time;Weg [mm];Kraft [N]"
+    write(tmp_path / "raw", tensions, "hold{hold}.csv", header=header, cells=backwards)
+    e, content = read(tmp_path / "raw", each_file="hold")
+    assert_is(e, tensions[::-1], SETTINGS[::-1])
+    assert [hold.duration_s for hold in e.holds] == [60.0] * 11
+    assert content["notes"][0].startswith("holds of one test in the order of their dates: hold11.csv")

@@ -58,6 +58,29 @@ def test_a_day_that_passes_unread_is_known_by_the_numbers_of_days(tmp_path, head
     assert f"days from '{header}'" in made.notes[0]
 
 
+@pytest.mark.parametrize(("clocks", "of_day"), [(["0:00", "0:01", "0:03"], False), (["0:00", "6:00", "18:00"], True)])
+def test_only_clocks_of_the_day_go_with_dates(tmp_path, clocks, of_day):
+    """Durations of holds begin anew at zero, and no date says how long the wire rested."""
+    lines = [f"2026-06-{day};{clock}:00;{day};{day - n / 10}" for day in (14, 16) for n, clock in enumerate(clocks)]
+    made = read(tmp_path, ["Date;Time;Position (mm);Force (N)"], lines)
+    assert [hold.duration_s for hold in made.experiment.holds] == ([2 * DAY_S, 64800.0] if of_day else [180.0] * 2)
+    assert ("dates from 'Date'" in made.notes[0]) == of_day
+
+
+def test_dates_beside_midnights_alone_are_the_times(tmp_path):
+    lines = [f"2026-06-{day};00:00:00;{1 + day // 14};{20 - day / 10}" for day in range(10, 18)]
+    made = read(tmp_path, ["Date;Time;Position (mm);Force (N)"], lines)
+    assert [hold.duration_s for hold in made.experiment.holds] == [4 * DAY_S, 3 * DAY_S]
+
+
+def test_dates_do_not_go_with_clocks_that_are_said_to_count_from_holds(tmp_path):
+    lines = [f"2026-06-{day};{n + 1}:00:00;{day};{day - n / 10}" for day in (14, 16) for n in range(3)]
+    head = ["Date;Time;Position (mm);Force (N)"]
+    assert [hold.duration_s for hold in read(tmp_path, head, lines).experiment.holds] == [2 * DAY_S, 7200.0]
+    of_holds = read(tmp_path, head, lines, time_since="hold")
+    assert [hold.duration_s for hold in of_holds.experiment.holds] == [10800.0, 10800.0]
+
+
 @pytest.mark.parametrize(("header", "last"), [("Run", 2), ("Day", 0)])
 def test_other_numbers_beside_clocks_are_no_days(tmp_path, header, last):
     lines = [

@@ -211,9 +211,8 @@ def _read_all(
         _, choices = _decided(partial(_check_what_files_are, paths), choices, ask)
     if choices.each_file not in (None, TEST):
         about = samples[0] if samples[0].name_is_stated else replace(samples[0], name=common_name(paths))
-        in_order = in_natural_order(paths)
-        joined, choices = _decided(partial(convert_joined, in_order, about), choices, ask)
-        return [(", ".join(path.name for path in in_order), joined)], choices
+        joined, choices = _decided(partial(convert_joined, paths, about), choices, ask)
+        return [(", ".join(path.name for path in in_natural_order(paths)), joined)], choices
     _check_names([(path, test.experiment.name) for path, test in tests])
     return [(path.name, test) for path, test in tests], choices
 

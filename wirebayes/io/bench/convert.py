@@ -112,7 +112,7 @@ def convert_joined(paths: Sequence[Path], about: About, choices: Choices) -> Con
     Parameters
     ----------
     paths : sequence of Path
-        In the order of their names.
+        In the order in which they were given.
     about : About
     choices : Choices
         `each_file` says what was set, or that the columns or the names of the files do.
@@ -122,8 +122,9 @@ def convert_joined(paths: Sequence[Path], about: About, choices: Choices) -> Con
     InputError
         As `convert`, and where the files cannot be joined.
     """
-    tables = [with_dates(find_table(_sheet(path, choices))) for path in paths]
-    table, notes = one_table(tables, choices.each_file or HOLD, choices.mapping)
+    tables = [find_table(_sheet(path, choices)) for path in paths]
+    each_file = HOLD if choices.each_file is None else choices.each_file
+    table, notes = one_table(tables, each_file, choices.mapping)
     made = _of_table(table, about, choices)
     if len(made) > 1:
         raise InputError(
@@ -139,7 +140,7 @@ def lacks_a_setting(path: Path, choices: Choices) -> bool:
 
 def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted]:
     """The experiments of the specimens of a table."""
-    tables = specimen_tables(with_dates(table), choices.mapping, choices.specimens)
+    tables = specimen_tables(with_dates(table, choices.time_since), choices.mapping, choices.specimens)
     if len(tables) == 1:
         return [_convert(each, about, replace(choices, mapping=said)) for each, said in tables]
     names = _names_of([each.specimen for each, _ in tables], about)

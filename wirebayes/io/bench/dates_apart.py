@@ -1,5 +1,6 @@
 """Dates, or numbers of days, in a column of their own beside clocks: a day that passes is then no guess."""
 
+import re
 from dataclasses import replace
 from datetime import date, timedelta
 from itertools import pairwise
@@ -7,15 +8,32 @@ from itertools import pairwise
 from wirebayes.io.bench.compound_times import is_spelt
 from wirebayes.io.bench.sheet import moment
 from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.undecided import TimeSince
 from wirebayes.io.bench.words import plain_letters
 
 _DAY = {"day", "days", "tag", "jour", "dia", "giorno", "dag", "day no", "tag nr", "jour no"}
 _FIRST_DAY = date(2001, 1, 1)  # whatever it was: days are counted
 _DIGITS = 3  # of the number of a day: no test lasts for years
+_HALF_A_DAY = 12  # hours: a clock of the day that begins anew has gone beyond
 _MIDNIGHT = "00:00:00"  # what spreadsheets add to a date
 
 
-def with_dates(table: RawTable) -> RawTable:
+def with_dates(table: RawTable, time_since: TimeSince | None) -> RawTable:
+    """The table with each date before its clock, unless clocks are durations, which no date places.
+
+    Parameters
+    ----------
+    table : RawTable
+    time_since : {"hold", "test"} or None
+        What the user says that times count from.
+    """
+    clocks = [i for i, name in enumerate(table.header) if name and _are_clocks(table, i)]
+    if time_since == "hold" or any(_count_from_zero(table, i) for i in clocks):
+        return table
+    return dated(table)
+
+
+def dated(table: RawTable) -> RawTable:
     """The table with each date before its clock, if one column holds dates alone and one other clocks alone.
 
     An empty cell has the date of the line above, as in merged cells.
@@ -60,6 +78,19 @@ def _are_days(table: RawTable, column: int) -> bool:
     if not all(cell.isdecimal() and len(cell) <= _DIGITS for cell in cells):
         return False
     return all(int(after) >= int(before) for before, after in pairwise(cells))
+
+
+def _count_from_zero(table: RawTable, column: int) -> bool:
+    """Whether clocks begin at zero, and anew long before a day is over, as durations of holds do."""
+    clocks = [m for cell in table.column(column) if (m := moment(cell)) is not None and m["first"]]
+    hours = [int(clock["first"]) for clock in clocks]
+    zeros = [_is_zero(clock) for clock in clocks]
+    begins = [i for i in range(len(clocks)) if i == 0 or hours[i] < hours[i - 1]]
+    return bool(clocks) and max(hours) < _HALF_A_DAY and all(zeros[i] for i in begins) and not all(zeros)
+
+
+def _is_zero(clock: re.Match[str]) -> bool:
+    return not clock[0].strip("0:., ")
 
 
 def _are_clocks(table: RawTable, column: int) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench import clock
+from wirebayes.io.bench.dates_apart import dated
 from wirebayes.io.bench.header import is_called_of_sample, is_of
 from wirebayes.io.bench.quantities import Role, quantity_unit
 from wirebayes.io.bench.sheet import SheetRow, moment
@@ -36,11 +37,12 @@ def in_natural_order(paths: Sequence[Path]) -> list[Path]:
     ----------
     paths : sequence of Path
     """
-    return sorted(paths, key=lambda path: [(s.isdigit(), int(s) if s.isdigit() else s) for s in _parts(path)])
+    return sorted(paths, key=_as_people_count)
 
 
-def _parts(path: Path) -> list[str]:
-    return [part for part in _DIGITS.split(str(path).casefold()) if part]
+def _as_people_count(path: Path) -> list[tuple[bool, int | str]]:
+    parts = [part for part in _DIGITS.split(str(path).casefold()) if part]
+    return [(part.isdigit(), int(part) if part.isdigit() else part) for part in parts]
 
 
 def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]) -> tuple[RawTable, list[str]]:
@@ -49,7 +51,7 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
     Parameters
     ----------
     tables : sequence of RawTable
-        Of each file, in the order of their names.
+        Of each file, in the order in which they were given.
     each_file : str
         `HOLD`, or what was set in each, with units: ``1 mm, 2 mm``.
     mapping : sequence of str
@@ -58,16 +60,17 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
     Raises
     ------
     InputError
-        Files differ in their columns, or do not say what was set.
+        Files differ in their columns, or do not say what was set, or what was is listed in another order than theirs.
     """
     _check_alike(tables)
-    moments = [begun for table in tables if (begun := _first_moment(table)) is not None]
-    dated = len(moments) == len(tables)
-    if dated:
-        tables = [tables[i] for i in np.argsort(moments, kind="stable")]
-    names = [table.sheet.path.name for table in tables]
-    notes = [f"holds of one test in the order of their {'dates' if dated else 'names'}: {listed(names)}"]
+    given = list(tables)
+    tables, by = _in_order(given)
+    names = _names(tables)
+    notes = [f"holds of one test in the order of their {by}: {names}"]
     settings, role, source = _settings(tables, each_file, mapping)
+    if each_file != HOLD and tables != given:  # which setting is whose may be meant either way
+        found = f"a list, and files in the order {_names(given)}"
+        raise InputError(f"--each-file: found {found}, expected both in the order of their {by}: {names}")
     first = tables[0]
     header, units = (*_without_numbers(first), HOLD), (*first.units, "")
     if role:
@@ -77,6 +80,19 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
     rows, pieces = _rows(tables, of_files)
     sheet = replace(first.sheet, path=path_of_all([table.sheet.path for table in tables]))
     return RawTable(sheet, header, units, rows, first.header_line, pieces=pieces), notes
+
+
+def _names(tables: Sequence[RawTable]) -> str:
+    return listed([table.sheet.path.name for table in tables])
+
+
+def _in_order(tables: Sequence[RawTable]) -> tuple[list[RawTable], str]:
+    """The tables as the holds followed each other, and by what of them that is known."""
+    tables = sorted(tables, key=lambda table: _as_people_count(table.sheet.path))
+    moments = [begun for table in tables if (begun := _first_moment(dated(table))) is not None]
+    if len(moments) < len(tables):
+        return tables, "names"
+    return [tables[i] for i in np.argsort(moments, kind="stable")], "dates"
 
 
 def _rows(
