@@ -213,10 +213,16 @@ def test_the_command_ends_in_one_line_and_goes_on_once_the_file_is_gone(
         main(command)
 
 
-def test_nothing_in_the_package_reads_pickles() -> None:
-    # a batch packs work for its own processes and unpacks it there, as the pool itself does; nothing of it is stored
-    sent = PACKAGE / "commands" / "one_experiment.py"
-    texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py") if path != sent}
-    assert re.findall(r"pickle\.load\w*\(\w*\)", sent.read_text(encoding="utf-8")) == ["pickle.loads(work)"]
+def test_nothing_in_the_package_reads_pickles_of_others() -> None:
+    # a batch packs work for its own processes and unpacks it there, and a copy tries out whether an error can be sent,
+    # as the pool itself packs and unpacks; nothing of either is stored
+    own = {
+        "commands/one_experiment.py": ["pickle.loads(work)"],
+        "processes/copies.py": ["pickle.loads(pickle.dumps(sent))"],
+    }
+    for path, calls in own.items():
+        assert re.findall(r"pickle\.load.*", (PACKAGE / path).read_text(encoding="utf-8")) == calls
+    sent = [PACKAGE / path for path in own]
+    texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py") if path not in sent}
     forbidden = re.compile(r"(import|from) (pickle|dill|cloudpickle|joblib|shelve|marshal)\b|allow_pickle\s*=\s*True")
     assert not [str(path) for path, text in texts.items() if forbidden.search(text)]
