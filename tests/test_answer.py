@@ -132,6 +132,7 @@ def test_a_comparison_says_errors_with_units_and_the_command_of_the_best_model(t
         ({"effects": ["grip_slip@3"]}, "wirebayes fit w.toml --effect grip_slip@3, or wirebayes discover w.toml"),
         ({"history": "additive"}, "wirebayes fit w.toml --history additive, or wirebayes discover w.toml"),
         ({}, "wirebayes discover w.toml"),  # a law of time that fit has no option for
+        ({"effects": ["own_power"]}, "wirebayes discover w.toml"),  # a user's own: fit asks for its file
     ):
         table = {"base": "plain", "models": [best | changed, plain]}
         found = stored(Comparison, tmp_path, "comparison.json", {"experiments": {"w": table}})

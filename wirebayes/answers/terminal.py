@@ -249,10 +249,10 @@ def _error_ahead(row: ComparedModel) -> str:
 
 
 def options_of_best(table: ComparedModels) -> str | None:
-    """What `wirebayes fit` needs for the model that predicts best; None for one that it has no options for."""
+    """What `wirebayes fit` needs for the model that predicts best; None for one that options alone do not describe."""
     rows = {row["name"]: row for row in table["models"] if row["failed"] is None}
     best, base = next(iter(rows.values()), None), rows.get(table["base"])
-    if best is None or base is None:
+    if best is None or base is None or any(not what_it_is(effect) for effect in best.get("effects", [])):
         return None
     choices = {f"--{key.replace('_', '-')} {best[key]}": best[key] != base[key] for key in _CHOICES}
     options = [*(f"--effect {effect}" for effect in best.get("effects", [])), *(o for o, new in choices.items() if new)]
