@@ -73,6 +73,12 @@ def test_strains_are_those_of_a_wire(strain, warned):
     assert bool(data_checks.strain_scale(test)) == warned
 
 
+@pytest.mark.parametrize(("second", "warned"), [(5.0, False), (6.0, True)])
+def test_strains_of_one_weight_say_nothing_of_units(second, warned):
+    test = checked(flat(0.5, 0.501), settings=[5.0, second], control="force")
+    assert bool(data_checks.strain_scale(test)) == warned
+
+
 @pytest.mark.parametrize(
     ("off", "rest", "warned"),
     [

@@ -159,7 +159,7 @@ def strain_scale(readings: CheckedTest) -> str:
     """Displacements so small or large beside the length that one of the two is in another unit."""
     place = readings.means if readings.protocol.control == "force" else readings.setting
     strain = np.ptp(place) / readings.protocol.length_mm
-    if strain == 0.0 or LEAST_STRAIN <= strain <= LARGEST_STRAIN:
+    if np.ptp(readings.setting) == 0.0 or strain == 0.0 or LEAST_STRAIN <= strain <= LARGEST_STRAIN:
         return ""
     much = "only " if strain < LEAST_STRAIN else ""
     return (
