@@ -116,7 +116,8 @@ def test_the_line_under_the_header_of_a_markdown_table_is_none(tmp_path):
 
 @pytest.mark.parametrize(
     ("header", "said", "times"),
-    [("Force x10 (N)", "10 N", 10.0), ("Load × 100 [N]", "100 N", 100.0), ("Force *10^3 [N]", "1000 N", 1e3)],
+    [("Force x10 (N)", "10 N", 10.0), ("Load × 100 [N]", "100 N", 100.0), ("Force *10^3 [N]", "1000 N", 1e3),
+     ("Force 10x (N)", "10 N", 10.0), ("100 × Load [N]", "100 N", 100.0)],
 )  # fmt: skip
 def test_a_factor_beside_a_name_is_asked_about(tmp_path, header, said, times):
     lines = [f"{time};{x};{y / times}" for time, x, y in ROWS]

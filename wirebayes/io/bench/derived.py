@@ -10,6 +10,7 @@ from wirebayes.io.bench.words import words_in
 
 _FACTOR = re.compile(
     r"(?:^|[\s\d])[x×*·]\s?(?P<ten>10+)(?:\^(?P<power>-?\d))?(?!\w)"  # Force x10, and no axis x1
+    r"|(?<![\w.,])(?P<before>10+)\s?[x×](?!\w)"  # Force 10x, and no box of 2x
     r"|(?<![\d\s])\s?/\s?(?P<divisor>[2-9]|\d{2,})(?!\w)"  # Force/2, and no sensor 1/2
 )
 _ANY = {"log", "lg", "ln", "increment", "inkrement", "added", "additional"}
@@ -60,6 +61,6 @@ def check_itself(table: RawTable, index: int, role: Role, unit: Unit) -> None:
 
 
 def _factor_of(found: re.Match[str]) -> float:
-    if found["divisor"]:
-        return float(found["divisor"])
+    if found["divisor"] or found["before"]:
+        return float(found["divisor"] or found["before"])
     return float(10 ** (int(found["power"]) if found["power"] else len(found["ten"]) - 1))
