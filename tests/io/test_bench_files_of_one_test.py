@@ -166,3 +166,14 @@ def test_durations_beside_dates_are_durations_in_files_too_and_the_dates_tell_th
     assert_is(e, tensions[::-1], SETTINGS[::-1])
     assert [hold.duration_s for hold in e.holds] == [60.0] * 11
     assert content["notes"][0].startswith("holds of one test in the order of their dates: hold11.csv")
+
+
+def test_columns_without_a_header_are_called_by_their_numbers_in_files_too(tmp_path, tensions):
+    paths = write(tmp_path / "raw", tensions, "hold{hold}.csv")
+    for path in paths:
+        path.write_text(path.read_text().partition("\n")[2])
+    with pytest.raises(InputError, match="numbers without a header, and no column of .* N the number of the column"):
+        read(paths, each_file="hold")
+    assert_is(
+        read(paths, each_file="hold", mapping=["1=time [s]", "2=displacement [mm]", "3=tension [N]"])[0], tensions
+    )

@@ -79,7 +79,7 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
     of_files = [(str(i + 1), settings[i][0]) if role else (str(i + 1),) for i in range(len(tables))]
     rows, pieces = _rows(tables, of_files)
     sheet = replace(first.sheet, path=path_of_all([table.sheet.path for table in tables]))
-    return RawTable(sheet, header, units, rows, first.header_line, pieces=pieces), notes
+    return replace(first, sheet=sheet, header=header, units=units, rows=rows, pieces=pieces), notes
 
 
 def _names(tables: Sequence[RawTable]) -> str:
