@@ -80,6 +80,39 @@ def test_masses_that_stay_are_weights(tmp_path, unit):
     assert [hold.setting for hold in made.experiment.holds] == pytest.approx([factor, 2 * factor])
 
 
+def twice_a_hold(path, unit, moved, of=4):
+    """Weights read twice each by hand, the gauge moving under some of them."""
+    lines = [f"Load ({unit});Minutes hanging;Ruler (mm)"]
+    for hold in range(1, of + 1):
+        second = 20 * hold + 1.5 * (hold <= moved)
+        lines += [f"{2 * hold};1;{20 * hold}", f"{2 * hold};10;{second}"]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(("moved", "control"), [(4, "force"), (1, "force"), (0, "displacement")])
+def test_masses_that_are_read_twice_each_are_weights_where_the_gauge_moves(tmp_path, moved, control):
+    made = read(twice_a_hold(tmp_path / "raw.csv", "kg", moved), 2000.0, time_since="hold")
+    assert made.experiment.control == control
+    assert len(made.experiment.holds) == 4
+
+
+def test_tensions_that_are_read_twice_each_and_stay_are_asked_about_where_most_displacements_do_not(tmp_path):
+    path = twice_a_hold(tmp_path / "raw.csv", "N", moved=2)
+    assert read(path, 2000.0, time_since="hold").experiment.control == "displacement"
+    path = twice_a_hold(path, "N", moved=3)
+    with pytest.raises(Undecided, match="tensions that stay within holds to the last digit, and displacements"):
+        read(path, 2000.0, time_since="hold")
+    assert read(path, 2000.0, time_since="hold", control="force").experiment.control == "force"
+
+
+def test_a_step_test_that_is_read_twice_a_hold_is_one(tmp_path):
+    path = tmp_path / "raw.csv"
+    rows = [(x + wobble, t, 2.0 * x - 0.1 * (t > 0)) for x in (1, 2, 3) for t, wobble in ((0, 0.0), (60, 0.01))]
+    path.write_text("Extension (mm),Time (s),Load (kg)\n" + "\n".join(f"{x:.2f},{t},{y:.2f}" for x, t, y in rows))
+    assert read(path, time_since="hold").experiment.control == "displacement"
+
+
 def steps(path, scatter, relaxes, holds=5, readings=6, seed=0, drifts=0.0, grain=0.01):
     """A test of steps with a measured displacement; the tension is that of 2 N/mm."""
     rng = np.random.default_rng(seed)

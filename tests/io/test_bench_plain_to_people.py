@@ -171,3 +171,17 @@ def test_an_ambiguous_date_in_a_column_of_its_own_is_refused(tmp_path):
     lines = [f"{two_days(time).replace(day=4 + (time >= 1200.0)):%d/%m/%Y;%H:%M:%S};{x};{y}" for time, x, y in ROWS]
     with pytest.raises(InputError, match="may begin with the day or with the month"):
         read(tmp_path, ["Date;Time;Position (mm);Force (N)"], lines)
+
+
+@pytest.mark.parametrize("header", ["Load no", "No. of load", "load #", "Weight number", "Stufe Nr.", "Nr. Last"])
+def test_what_numbers_the_loads_of_a_test_numbers_its_holds(tmp_path, header):
+    lines = [f"{x:.0f};{time};{x};{y}" for time, x, y in ROWS]
+    made = read(tmp_path, [f"{header};Time (s);Position (mm);Force (N)"], lines)
+    assert_is_the_test(made)
+    assert any(f"hold from '{header}'" in note for note in made.notes)
+
+
+@pytest.mark.parametrize("header", ["Força no fio (N)", "Load, sensor no. 2 (N)"])
+def test_a_number_amid_other_words_numbers_no_holds(tmp_path, header):
+    lines = [f"{time};{x};{y}" for time, x, y in ROWS]
+    assert_is_the_test(read(tmp_path, [f"Time (s);Position (mm);{header}"], lines))

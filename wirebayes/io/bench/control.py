@@ -21,6 +21,9 @@ MORE = 3.0  # times as much of a step the one that is read must drift: less may 
 SEEN = 0.02  # of a step: smaller drifts of both are a machine's settling
 BLOCKS = 12  # means of a hold in which a trend is looked for: noise of a drive is no independent noise
 ROUNDING = 1e-6  # of what the trend explains: numbers without any noise are a computer's
+MOVED = (
+    0.5  # of pairs of readings in which a displacement changes, where a coarse load cell may show no change of its own
+)
 THIRD = 3  # the drift of a hold is from the mean of its first third to that of its last
 
 
@@ -55,9 +58,40 @@ def recognised(by_tension: Sequence[Rows], displacement: Floats, tension: Floats
         return "force"
     if of_tension > MORE * of_displacement or relaxes > BY_CHANCE or of_displacement < SEEN:
         return "displacement"
+    raise _which_was_set(place, "displacement and tension that both drift within holds")
+
+
+def recognised_of_pairs(
+    pairs: Sequence[Rows], displacement: Floats, tension: Floats, is_mass: bool, place: str
+) -> Control:
+    """What was set in a test of two readings a hold, as people write it down, which show a change and no scatter.
+
+    Parameters
+    ----------
+    pairs : sequence of (k,) arrays of int
+        Rows of each stretch of two readings or more in which the tension stays.
+    displacement, tension, is_mass, place
+        As for `recognised`.
+
+    Raises
+    ------
+    Undecided
+        Tensions stay to the last digit, as weights do, and are not given as masses.
+    """
+    stay = all(np.ptp(tension[rows]) == 0.0 for rows in pairs)
+    moved = [np.ptp(displacement[rows]) > 0.0 for rows in pairs]
+    if not (stay and any(moved)):
+        return "displacement"
+    if is_mass:
+        return "force"
+    if np.mean(moved) <= MOVED:
+        return "displacement"
+    raise _which_was_set(place, "tensions that stay within holds to the last digit, and displacements that do not")
+
+
+def _which_was_set(place: str, found: str) -> Undecided:
     answers = {"--control displacement": "the displacement", "--control force": "the tension, by weights or a machine"}
-    found = "displacement and tension that both drift within holds"
-    raise Undecided(f"{place}: found {found}", "which was set", answers)
+    return Undecided(f"{place}: found {found}", "which was set", answers)
 
 
 def trend_by_chance(groups: Sequence[Rows], values: Floats) -> float:

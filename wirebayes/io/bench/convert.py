@@ -13,7 +13,7 @@ from wirebayes.io.bench import workbook
 from wirebayes.io.bench.about import About, name_from
 from wirebayes.io.bench.as_experiment import as_experiment, check_direction
 from wirebayes.io.bench.columns import Column
-from wirebayes.io.bench.control import recognised
+from wirebayes.io.bench.control import recognised, recognised_of_pairs
 from wirebayes.io.bench.dates_apart import with_dates
 from wirebayes.io.bench.decode import decode, read_raw
 from wirebayes.io.bench.delimited import sheet_of_text
@@ -200,6 +200,9 @@ def _control(recorded: Recorded) -> Control:
     if (exact and not is_mass) or len(by_tension) < min(2, len(by_displacement)):
         return "displacement"
     place = f"{recorded.table.sheet.path}, line {recorded.table.header_line}"
+    if not by_tension:
+        pairs = stretches(recorded.readings("force"), fewest=2)
+        return recognised_of_pairs(pairs, x, recorded.values["tension"], is_mass, place)
     return recognised(by_tension, x, recorded.values["tension"], is_mass, place)
 
 

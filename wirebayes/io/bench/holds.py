@@ -80,8 +80,8 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
     return by_plateaus(readings, resets)
 
 
-def stretches(readings: Readings) -> list[Rows]:
-    """Rows of each stretch of three readings or more in which the setting stays; none where it does not stay.
+def stretches(readings: Readings, fewest: int = FEWEST) -> list[Rows]:
+    """Rows of each stretch of some readings in which the setting stays; none where it does not stay.
 
     The same holds as those of `cut`, without their times: to see whether this is what was set.
     """
@@ -92,7 +92,7 @@ def stretches(readings: Readings) -> list[Rows]:
     candidates += [groups] if _are_holds(groups := groups_between(change)) else []
     for groups in candidates:
         if not wanders(x, groups):
-            return [rows for rows in groups if len(rows) >= FEWEST]
+            return [rows for rows in groups if len(rows) >= fewest]
     found = plateaus(x, np.arange(len(x), dtype=float), readings.step)
     rows = [np.arange(p.begin, p.end) for p in found]
     return rows if sum(map(len, rows)) >= COVERED * len(x) else []

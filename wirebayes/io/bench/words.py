@@ -64,7 +64,8 @@ SAMPLE_WORDS: dict[Role, tuple[str, ...]] = {
 # speaks of the quantity itself.
 RIG_WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok", "distance",
-                     "entfernung", "langenanderung"),
+                     "entfernung", "langenanderung", "ruler", "lineal", "regle", "regla", "righello", "regua",
+                     "liniaal"),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
     "time": ("duration", "dauer", "durata", "duracion", "duracao", "duur"),
 }  # fmt: skip
@@ -73,6 +74,8 @@ STATISTICS = {
     "mean", "average", "avg", "median", "max", "maximum", "min", "minimum", "sum", "total", "std", "stdev", "sd",
     "mittel", "mittelwert", "durchschnitt", "summe", "moyenne", "somme", "media", "promedio", "suma", "somma", "totale",
 }  # fmt: skip
+# What numbers the loads or steps of a test, first or last in its header; amid others it may be a Portuguese "in the".
+NUMBERING = {"no", "nr", "num", "number", "nummer", "numero", "№", "#"}
 _COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg or Prüfzeit
 
 
@@ -100,6 +103,8 @@ def words_in(text: str) -> set[str]:
 
 def last_named(header: str) -> Role | None:
     """Of a header that speaks of several quantities the one named last, as languages put it: step time, load time."""
+    if _numbers_what_is_set(header):
+        return "hold"
     words = re.findall(r"[^\W\d_]+", plain_letters(header))
     for word in reversed(words):
         for role in ROLES:
@@ -109,8 +114,20 @@ def last_named(header: str) -> Role | None:
 
 
 def speaks_of(text: str, role: Role) -> bool:
-    """Whether a word of a text names a quantity."""
+    """Whether a word of a text names a quantity; what numbers the loads or steps of a test names its holds."""
+    if _numbers_what_is_set(text):
+        return role == "hold"
     return any(_is_word(word, role) for word in words_in(text))
+
+
+def _numbers_what_is_set(text: str) -> bool:
+    """Whether a header such as "Load no." numbers the settings of a test."""
+    words = re.findall(r"[^\W\d_]+|\d+|[№#]", text.casefold())
+    if len(words) < 2 or not {words[0], words[-1]} & NUMBERING:
+        return False
+    others = " ".join(word for word in words if word not in NUMBERING)
+    set_by_weight = words_in(others) & set(RIG_WORDS["tension"])
+    return bool(set_by_weight) or any(speaks_of(others, role) for role in ("tension", "displacement"))
 
 
 def _is_word(word: str, role: Role) -> bool:
