@@ -26,8 +26,9 @@ def file_of(tmp_path, header, rows):
     [
         ([f"{i / 10 + 0.01:.2f}" for i in range(9)], None),  # ten different readings
         ([f"{i / 10 + 0.01:.2f}" for i in range(10)], 0.01),
-        ([f"{0.05 * i:.2f}" for i in range(1, 20)], 0.01),  # twenty, for a step that is none of a decimal place
-        ([f"{0.05 * i:.2f}" for i in range(1, 21)], 0.05),
+        ([f"{0.02 * i:.2f}" for i in range(1, 20)], 0.01),  # 2^-19, that of all readings none is odd by chance
+        ([f"{0.02 * i:.2f}" for i in range(1, 21)], 0.02),
+        ([f"{0.5 * i:.1f}" for i in range(1, 12)], 0.5),  # 5^-11
         ([f"{i / 10}2345671" for i in range(11, 23)], 1e-8),  # nine digits
         ([f"{i / 10}23456711" for i in range(11, 23)], None),
         ([f"{i / 10:.1f}" for i in range(11, 22)], 0.1),  # a tenth of the range

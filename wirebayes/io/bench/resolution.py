@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 FEWEST = 10  # different readings: that all are multiples of ten times the step by chance is then one in 10^10
-FEWEST_COARSE = 20  # for steps such as 0.02 or 0.05, of which chance leaves one in 2^20
+BY_CHANCE = 1e-6  # that different readings are all multiples of a step such as 0.02 or 0.05 while that is smaller
 MOST_DIGITS = 9  # of a reading: more are a computed number's, not a display's
 COARSEST = 0.1  # of the range of the readings: a coarser grid may be the test's own doing
 
@@ -33,10 +33,11 @@ def evident_step(numbers: Sequence[str]) -> float | None:
     places = max(-int(value.as_tuple().exponent) for value in values)
     unit = Decimal(1).scaleb(-places)
     whole = [int(value / unit) for value in values]
-    coarse = math.gcd(*(number - whole[0] for number in whole), whole[0]) if len(values) >= FEWEST_COARSE else 1
-    step = float(unit * max(coarse, 1))
+    common = max(math.gcd(*whole), 1)
+    coarse = common if common ** -len(values) < BY_CHANCE else 1
+    step = float(unit * coarse)
     if step > COARSEST * float(max(values) - min(values)):
         return None
-    # one number in ten ends in a zero, half of those in steps of 5: more mean that the last place is not the display's
-    last = sum(number % 10 != 0 for number in whole) / len(whole)
+    # one number of steps in ten ends in a zero: many more mean that the last place is not the display's
+    last = sum(number // coarse % 10 != 0 for number in whole) / len(whole)
     return step if last >= 0.5 else None
