@@ -119,3 +119,15 @@ def test_one_effect_makes_no_pair(expansion: Expansion) -> None:
 def test_the_largest_of_each_block_and_of_all_counts() -> None:
     each = [np.array([3.0, -4.0, 2.0]), np.array([-5.0, -1.0, 1.0])]
     np.testing.assert_array_equal(screening._alone_and_together(each), [3.0, -1.0, 3.0])
+
+
+def test_with_fewer_readings_than_parameters_pairs_that_explain_nothing_have_no_weight() -> None:
+    bench = Bench(weights_N=(10.0, 20.0, 30.0, 40.0), times_s=(60.0,), resolution_mm=0.1)
+    experiments = simulated_tests([bench], Truth({"k1": 900.0}), seed=3)
+    block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
+    trials, _ = screening.candidate_probes([block], CATALOGUE)
+    x = expand(block.target, block.z, trials)
+    assert x.degrees < 0
+    pairs = two_effects.log_bayes_of_each_pair(x)
+    assert not np.isnan(pairs).any()
+    assert pairs.max() < 50.0

@@ -7,7 +7,7 @@ there; a setting error takes the place of a slip only until the elastic curve ha
 import numpy as np
 
 from wirebayes.discovery.noise_integral import Expansion, Projected, has_tangent, project, with_each_signature
-from wirebayes.numeric.log_sum import log_sum
+from wirebayes.numeric.log_sum import log_sum, or_impossible
 from wirebayes.numeric.typing import Array, Ints
 
 # effects that are tried beside every other one; those of a pair that shows are hardly ever all farther down
@@ -70,7 +70,8 @@ def _log_evidence(x: Expansion, found: Projected, first: Ints, groups: list[Ints
     evidence = log_sum(found.shared[:, :, None, None] - 0.5 * x.degrees * np.log(left), axis=1)
     prior = _log_shares(x, groups)
     different = x.kinds[first][:, :, None] != x.kinds
-    return np.where(different, evidence + prior[first][:, :, None] + prior, -np.inf)
+    # with fewer readings than parameters, what explains nothing has no finite evidence
+    return np.where(different, or_impossible(evidence) + prior[first][:, :, None] + prior, -np.inf)
 
 
 def _log_shares(x: Expansion, groups: list[Ints]) -> Array:
