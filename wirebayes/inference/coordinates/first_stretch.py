@@ -140,7 +140,9 @@ class FirstStretch:
         """(n,) tension at the beginning that suits readings best, N; its standard deviation in those of a reading."""
         k1, U = self._k1(theta), self.ridge.get(theta, "U")
         longer = np.exp(_of(theta, self.length_exponent) * self.log_ratio)
-        strain_for_one = self.ridge.get(theta, "B") * longer * self._reached(theta, self.times_s[:, None]) / self.length
+        strain_for_one = (
+            self.ridge.get(theta, "B") * longer * self.ridge.reached(theta, self.times_s[:, None]) / self.length
+        )
         tension, square = np.full(len(theta), self.read[0]), np.ones(len(theta))
         for _ in range(_REPETITIONS):
             crept = strain_for_one * tension**U
@@ -153,17 +155,13 @@ class FirstStretch:
 
     def _extrapolated(self, theta: Array) -> Array:
         """(n,) tension at the beginning by the first and the last reading and the course of the creep, N."""
-        before, until = (self._reached(theta, time_s) for time_s in self.times_s[[0, -1]])
+        before, until = (self.ridge.reached(theta, time_s) for time_s in self.times_s[[0, -1]])
         lost = max(self.read[0] - self.read[-1], 0.0) * before / np.maximum(until - before, before / _MOST)
         return np.asarray(self.read[0] + lost)
 
     def _k1(self, theta: Array) -> Array:
         """(n,) stiffness, with a fixture where its compliance is sampled, N."""
         return np.exp(self.ridge.log_stiffness(theta) + self.ridge.log_length)
-
-    def _reached(self, theta: Array, time_s: Array | float) -> Array:
-        """Share of the creep that is over at a time."""
-        return np.asarray(-np.expm1(-self.ridge.get(theta, "k2") * time_s ** self.ridge.get(theta, "N")))
 
 
 def first_stretches(problem: Problem, ridge: Ridge, slack_edges: list[SlackEdge]) -> list[FirstStretch]:

@@ -85,6 +85,10 @@ class Ridge:
             return np.asarray(stiffness)
         return np.asarray(stiffness - np.logaddexp(0.0, np.log(theta[:, self.fixture]) + stiffness))
 
+    def reached(self, theta: Array, time_s: Array | float) -> Array:
+        """The share of its creep that a hold has reached after a time, (n,) or (T, n) for times (T, 1)."""
+        return np.asarray(-np.expm1(-self.get(theta, "k2") * time_s ** self.get(theta, "N")))
+
     def softened(self, theta: Array, z: Array) -> Array:
         """(n,) by how much the log stiffness is less after the creep.
 
@@ -128,7 +132,7 @@ class Ridge:
 
     def _shares(self, theta: Array) -> tuple[Array, Array]:
         """The shares of it that are reached at each of the times, and seen between each pair of them."""
-        reached = -np.expm1(-self.get(theta, "k2") * self.times_s[:, None] ** self.get(theta, "N"))
+        reached = self.reached(theta, self.times_s[:, None])
         first, last = self.between.T
         return reached, reached[last] - (1.0 - _COUNTED) * reached[first]
 

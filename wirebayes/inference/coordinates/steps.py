@@ -183,9 +183,9 @@ class FirstElongation(Step):
 
     def _elongation(self, theta: Array) -> Array:
         """(n,) elastic stretch and creep, mm."""
-        k1, B, U, k2, N = (self.ridge.get(theta, name) for name in ("k1", "B", "U", "k2", "N"))
+        k1, B, U = (self.ridge.get(theta, name) for name in ("k1", "B", "U"))
         length, strain = np.exp(self.ridge.log_length), self.weight / k1
-        crept = B * self.weight**U * -np.expm1(-k2 * self.time_s**N)
+        crept = B * self.weight**U * self.ridge.reached(theta, self.time_s)
         return np.asarray(length * strain + crept * (1.0 + strain))
 
 
