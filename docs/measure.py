@@ -49,7 +49,7 @@ STUDIES = {
         "--output {folder}/wires.json",
         "wires.json",
     ),
-    "coverage": ("-m analyses.posterior.coverage --output {folder}", "coverage.json"),
+    "coverage": ("-m analyses.posterior.coverage --wires 400 --output {folder}", "coverage.json"),
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
     "robot_calibration": (
         "-m analyses.robots.whole_calibration coverage 200 --seed 4000 --output {folder}/it.json",
