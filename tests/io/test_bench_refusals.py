@@ -361,9 +361,9 @@ def test_holds_that_go_on_long_after_their_last_readings_are_named(tmp_path, beg
 
 
 @pytest.mark.parametrize("sign", [";", ","])
-def test_units_in_the_cells_are_asked_into_the_header(tmp_path, sign):
-    lines = [["Step", "Stretch", "Time", "Pull"], ["1", "4 mm", "0 s", "11.02 N"], ["1", "4 mm", "10 s", "10.48 N"]]
-    with pytest.raises(wb.InputError, match="expected numbers alone in the cells, not '4 mm', and their units in the"):
+def test_units_that_are_not_known_are_asked_into_the_header(tmp_path, sign):
+    lines = [["Step", "Stretch", "Time", "Pull"], ["1", "4 cl", "0 x", "11.02 V"], ["1", "4 cl", "10 x", "10.48 V"]]
+    with pytest.raises(wb.InputError, match="expected numbers alone in the cells, not '4 cl', and their units in the"):
         read(tmp_path, "\n".join(map(sign.join, lines)))
 
 

@@ -12,6 +12,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench import workbook
 from wirebayes.io.bench.about import About, name_from
 from wirebayes.io.bench.as_experiment import as_experiment, check_direction
+from wirebayes.io.bench.cell_units import with_units_apart
 from wirebayes.io.bench.columns import Column
 from wirebayes.io.bench.control import recognised, recognised_of_pairs
 from wirebayes.io.bench.dates_apart import with_dates
@@ -248,13 +249,13 @@ def _rows(holds: Cut, values: Mapping[Any, Floats], control: Control) -> tuple[l
 def _sheet(path: Path, choices: Choices) -> Sheet:
     raw = read_raw(path)
     if raw.startswith(workbook.SIGNATURE):
-        return workbook.sheet_of_workbook(path, raw, choices.sheet)
+        return with_units_apart(workbook.sheet_of_workbook(path, raw, choices.sheet))
     if raw.startswith(workbook.OLD_EXCEL):
         raise InputError(f"{path}: found a workbook of Excel 2003 or older, expected xlsx or text; save it as xlsx")
     if choices.sheet is not None:
         raise InputError(f"{path}: found a text file, expected a workbook for --sheet {choices.sheet}")
     text, encoding = decode(path, raw, known_words)
-    return sheet_of_text(path, text, encoding)
+    return with_units_apart(sheet_of_text(path, text, encoding))
 
 
 def _thin(holds: Cut) -> tuple[Cut, list[str]]:

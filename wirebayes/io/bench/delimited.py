@@ -6,6 +6,7 @@ from pathlib import Path
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench import keyed_lines, labview, serial_monitor
+from wirebayes.io.bench.cell_units import bare, joined_measures
 from wirebayes.io.bench.decode import UNICODE
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
 
@@ -76,7 +77,7 @@ def _wanted(lines: list[str]) -> str:
 def _score(lines: list[str], sign: str) -> tuple[float, int, int]:
     """How well a sign splits lines: share of the cells that are values, headers of as many cells, cells."""
     split = [_cells(line, sign) for line in lines]
-    measured = [cells for cells in split if is_measured(cells)]
+    measured = [numbers for cells in split if is_measured(numbers := [*map(bare, cells)])]
     if not measured:
         return 0.0, 0, 0
     values = sum(is_value(cell) for cells in measured for cell in cells)
@@ -89,7 +90,7 @@ def _score(lines: list[str], sign: str) -> tuple[float, int, int]:
 
 def _cells(line: str, sign: str) -> list[str]:
     if sign == " ":
-        return _BETWEEN_WORDS.split(line.strip()) if line.strip() else []
+        return _BETWEEN_WORDS.split(joined_measures(line.strip())) if line.strip() else []
     return [cell.strip() for cell in next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])]
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes.errors import InputError
+from wirebayes.io.bench.cell_units import bare
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.strict.hint import hint
@@ -57,7 +58,7 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Shee
 
 
 def _measured(row: SheetRow) -> bool:
-    return sum(map(is_value, row.filled)) >= 2
+    return sum(is_value(bare(cell)) for cell in row.filled) >= 2
 
 
 def _rows(sheet: Any) -> tuple[SheetRow, ...]:

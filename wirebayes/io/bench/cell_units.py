@@ -1,0 +1,121 @@
+"""Cells that bear their unit, ``12.5 N``: the number stays in the cell, and the unit moves to a row of units above.
+
+A column of several units of one quantity, ``500 g`` and ``1 kg``, is written in the smallest of them.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from decimal import Decimal
+from functools import cache
+
+from wirebayes.io.bench.compound_times import is_spelt
+from wirebayes.io.bench.quantities import ROLES, Role, Unit, quantity_unit
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_number
+from wirebayes.io.bench.words import speaks_of
+
+FEWEST = 3  # cells with a unit: one row of them may be the ranges of sensors, or times that run along a header
+_MEASURE = re.compile(r"([+\-\u2212]?\d[\d.,'\u2019\s]*(?:[eE][+-]?\d+)?)(?<!\s)\s*([^\W\d_].*|[°%‰].*)")
+_APART = re.compile(r"(?<!\S)([+\-\u2212]?\d[\d.,]*)\s+([^\W\d_][^\s\d]*|[°%‰][^\s\d]*)(?!\S)")
+
+
+def bare(cell: str) -> str:
+    """The number of a cell that bears a unit; any other cell as it is."""
+    found = _measure(cell)
+    return found[0] if found else cell
+
+
+def joined_measures(line: str) -> str:
+    """A line between spaces in which no space stands between a number and its unit."""
+
+    def joined(found: re.Match[str]) -> str:
+        return f"{found[1]}{found[2]}" if _is_unit(found[2]) else found[0]
+
+    return _APART.sub(joined, line)
+
+
+def with_units_apart(sheet: Sheet) -> Sheet:
+    """The sheet with a row of units above its first reading, where cells bear units; else itself."""
+    readings = [i for i, row in enumerate(sheet.rows) if not row.comment and is_measured([*map(bare, row.filled)])]
+    if not readings:
+        return sheet
+    first = readings[0]
+    head = sheet.rows[first - 1] if first else SheetRow(1, ())
+    columns = dict[int, dict[str, str]]()
+    units = list[str]()
+    for column in range(max(len(sheet.rows[i].cells) for i in readings)):
+        found = (
+            None if speaks_of(head.cell(column), "hold") else _numbers([sheet.rows[i].cell(column) for i in readings])
+        )
+        units.append(found[0] if found else "")
+        if found:
+            columns[column] = found[1]
+    if not columns:
+        return sheet
+    rows = [_with_numbers(row, columns) for row in sheet.rows[first:]]
+    of_units = (
+        [] if _bears(head, units) else [SheetRow(sheet.rows[first].line, tuple(f"[{u}]" if u else "" for u in units))]
+    )
+    return replace(
+        sheet, rows=(*sheet.rows[:first], *of_units, *rows), described=f"{sheet.described}, units in the cells"
+    )
+
+
+def _bears(head: SheetRow, units: Sequence[str]) -> bool:
+    """Whether a row is one of these units already."""
+    return all(head.cell(i).strip("[]() ") == unit for i, unit in enumerate(units) if unit)
+
+
+def _with_numbers(row: SheetRow, columns: dict[int, dict[str, str]]) -> SheetRow:
+    """A row with the numbers of its measures; a line of one cell may be a title."""
+    if row.comment or len(row.filled) < 2:
+        return row
+    return replace(row, cells=tuple(columns.get(i, {}).get(cell, cell) for i, cell in enumerate(row.cells)))
+
+
+def _numbers(cells: Sequence[str]) -> tuple[str, dict[str, str]] | None:
+    """The unit of a column and the number of each of its cells; None where not all of them bear a unit, or are zero."""
+    filled = [cell for cell in dict.fromkeys(cells) if any(c.isdigit() for c in cell)]
+    measures = {cell: found for cell in filled if (found := _measure(cell))}
+    others = [cell for cell in filled if cell not in measures]
+    if sum(cell in measures for cell in cells) < FEWEST or any(cell.strip("0.,") for cell in others):
+        return None
+    if any(map(is_spelt, filled)):  # times in two units, which are read as such
+        return None
+    names = dict.fromkeys(unit for _, unit in measures.values())
+    if len(names) == 1:
+        return next(iter(names)), {cell: number for cell, (number, _) in measures.items()}
+    return _in_the_smallest(measures, list(names))
+
+
+def _in_the_smallest(measures: dict[str, tuple[str, str]], names: list[str]) -> tuple[str, dict[str, str]] | None:
+    """Measures in several units of one quantity, in the smallest of them; None where they are of several quantities."""
+    units = next((found for role in ROLES if (found := _all_of(names, role))), None)
+    if units is None or any(number.count(",") + number.count(".") > 1 for number, _ in measures.values()):
+        return None
+    smallest = min(names, key=lambda name: units[name].factor)
+    sign = "," if any("," in number for number, _ in measures.values()) else "."
+    numbers = {}
+    for cell, (number, name) in measures.items():
+        times = Decimal(f"{units[name].factor / units[smallest].factor:.12g}")
+        value = times * Decimal("".join(number.split()).replace("\u2212", "-").replace(",", "."))
+        numbers[cell] = f"{value:f}".replace(".", sign)
+    return smallest, numbers
+
+
+def _all_of(names: Sequence[str], role: Role) -> dict[str, Unit] | None:
+    """The units of one quantity that texts are, if they all are and have a common zero."""
+    found = {name: unit for name in names if (unit := quantity_unit(name, role))}
+    alike = len({(unit.offset, unit.of_sample) for unit in found.values()}) == 1
+    return found if len(found) == len(names) and alike and not any(unit.offset for unit in found.values()) else None
+
+
+def _measure(cell: str) -> tuple[str, str] | None:
+    """Number and unit of a cell that bears one."""
+    found = _MEASURE.fullmatch(cell)
+    return (found[1], found[2]) if found and is_number(found[1]) and _is_unit(found[2]) else None
+
+
+@cache
+def _is_unit(text: str) -> bool:
+    return any(quantity_unit(text, role) for role in ROLES)
