@@ -75,6 +75,13 @@ def test_rows_stand_the_other_way_round_where_most_times_fall(falling, refused, 
         convert(file_of(tmp_path, "Hold,x [mm],Time [s],Force [N]", rows), ABOUT, Choices())
 
 
+def test_a_gauge_that_reads_weights_may_stand_anywhere(tmp_path):
+    """What it shows of the wire without tension is estimated."""
+    rows = [(load, time, 500 + load + time / 900) for load in (5, 10, 15) for time in (0, 30, 60, 120)]
+    made = convert(file_of(tmp_path, "Load [kg],Time [s],Dial [mm]", rows), ABOUT, Choices())
+    assert made.experiment.control == "force" and made.experiment.holds[0].readings[0] == 505.0
+
+
 @pytest.mark.parametrize(
     ("first", "spread", "asked"),
     [(99.0, 1.0, False), (101.0, 1.0, True), (190.0, 94.0, True), (190.0, 96.0, False)],

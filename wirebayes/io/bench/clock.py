@@ -12,9 +12,10 @@ from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.sheet import MONTHS, is_moment, is_number, is_value, moment
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.numeric.typing import Array, Bools, Floats
+from wirebayes.sentences import counted
 
-_DAY, _HOUR = 86400.0, 3600.0
+_DAY, _HOUR, _MINUTE = 86400.0, 3600.0, 60.0
 _ROUND = 0.5 * _DAY  # of a clock with hands
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
 _PUT_BACK = 3600.0  # clocks are put back by an hour in autumn
@@ -59,7 +60,9 @@ def is_clock(table: RawTable, column: int, unit: Unit | None) -> bool:
     return (unit is not None and unit.clock is not None) or has_moments(table, column)
 
 
-def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool = False) -> tuple[Floats, bool, int]:
+def seconds(
+    table: RawTable, column: int, unit: Unit | None, *, durations: bool = False
+) -> tuple[Floats, bool, list[str]]:
     """Times of a column of clocks or dates.
 
     Parameters
@@ -74,8 +77,8 @@ def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool 
     time_s : (r,) array
     of_day : bool
         Whether they are moments of a calendar or a clock on the wall, so that nothing restarts.
-    midnights : int
-        How often a clock without dates has passed midnight.
+    passed : list of str
+        That a clock without dates has passed midnight, or one of minutes and seconds the hour, and how often.
 
     Raises
     ------
@@ -87,7 +90,7 @@ def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool 
         # durations are counted from zero, and may be longer than a day
         on_the_wall = values[0] >= _HOUR and values.max() < _DAY
         midnights = np.cumsum(_days_begin(values, of_day=False) & on_the_wall)
-        return values + _DAY * midnights, False, int(midnights[-1])
+        return values + _DAY * midnights, False, _passed("midnight", midnights)
     moments = _moments(table, column, unit)
     # what follows a date or stands before AM is of the day, and leaves no doubt
     of_clock = [m["date"] is None and m["half"] is None for m in moments]
@@ -96,14 +99,36 @@ def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool 
     values = np.array([_value(m, leading if bare else 3600.0) for m, bare in zip(moments, of_clock, strict=True)])
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
-        return (days - days[0]) + values, True, 0
+        return (days - days[0]) + values, True, []
     if durations and all(of_clock):
-        return values, False, 0
+        return values, False, []
+    if leading == _MINUTE and _minutes_go_round(values):
+        hours = np.cumsum(np.diff(values, prepend=values[0]) < 0.0)
+        return values + _HOUR * hours, False, _passed("the hour", hours)
     if all(of_clock):
         _check_hours_go_beyond_twelve(table, column, values)
     of_day = short is None and (not of_clock[0] or values[0] >= _HOUR)
     midnights = np.cumsum(_days_begin(values, of_day))
-    return values + _DAY * midnights, of_day, int(midnights[-1])
+    return values + _DAY * midnights, of_day, _passed("midnight", midnights)
+
+
+def _passed(what: str, rounds: Array) -> list[str]:
+    """How often a clock has gone round, (r,) counted up, in a sentence."""
+    return [f"the clock passes {what} {counted(int(rounds[-1]), 'time')}"] if rounds[-1] else []
+
+
+def _minutes_go_round(values: Floats) -> bool:
+    """Whether minutes and seconds (r,) in s count from the last full hour, and so fall by most of one where it is over.
+
+    Durations that begin anew begin alike, near zero or where the first of them began.
+    """
+    steps = np.diff(values)
+    falls = steps < 0.0
+    if not falls.any() or values.max() >= _HOUR or (steps[falls] > -0.5 * _HOUR).any():
+        return False
+    near = _LATE * steps[steps > 0.0].min(initial=np.inf)
+    after = values[1:][falls]
+    return bool(((after > near) & (np.abs(after - values[0]) > near)).any())
 
 
 def first_moment_s(table: RawTable, column: int) -> float:

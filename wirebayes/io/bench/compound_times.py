@@ -3,20 +3,20 @@
 import re
 from dataclasses import dataclass
 
-_HOURS = r"hh?|hrs?|hours?|std\.?|stunden?|heures?|horas?|ore"
-_MINUTES = r"mm?|mn|mins?\.?|minut[eo]s?|minuten|minuti"
-_SECONDS = r"ss?|secs?\.?|seconds?|sek\.?|sekunden?|secondes?|segundos?|secondi"
+HOURS = r"hh?|hrs?|hours?|std\.?|stunden?|heures?|horas?|ore"
+MINUTES = r"mm?|mn|mins?\.?|minut[eo]s?|minuten|minuti"
+SECONDS = r"ss?|secs?\.?|seconds?|sek\.?|sekunden?|secondes?|segundos?|secondi"
 _AND = r"\s+(?:and|und|et|y|e|en)\s+"
 _JOINT = rf"(?:{_AND}|\s*[:.,'\-–_]\s*|\s+)"
 _FRACTION = r"(?:[.,](?:f+|0+|x+|z+|s+|ms))?"
 _ANNOUNCED = re.compile(
-    rf"(?P<hours>{_HOURS})(?P<of_hours>{_JOINT})(?:{_MINUTES})(?P<seconds>{_JOINT}(?:{_SECONDS}){_FRACTION})?"
-    rf"|(?:{_MINUTES})(?P<of_minutes>{_JOINT})(?:{_SECONDS}){_FRACTION}",
+    rf"(?P<hours>{HOURS})(?P<of_hours>{_JOINT})(?:{MINUTES})(?P<seconds>{_JOINT}(?:{SECONDS}){_FRACTION})?"
+    rf"|(?:{MINUTES})(?P<of_minutes>{_JOINT})(?:{SECONDS}){_FRACTION}",
     re.IGNORECASE,
 )
 _SPELT = re.compile(
-    rf"(?:(?P<hours>\d+)\s*(?:{_HOURS})[\s,]*)?(?:(?P<minutes>\d+)\s*(?:{_MINUTES}|['′])[\s,]*)?"
-    rf"(?:(?P<seconds>\d+(?:[.,]\d+)?)\s*(?:{_SECONDS}|''|[\"″]))?(?P<rest>\d\d)?",
+    rf"(?:(?P<hours>\d+)\s*(?:{HOURS})[\s,]*)?(?:(?P<minutes>\d+)\s*(?:{MINUTES}|['′])[\s,]*)?"
+    rf"(?:(?P<seconds>\d+(?:[.,]\d+)?)\s*(?:{SECONDS}|''|[\"″]))?(?P<rest>\d\d)?",
     re.IGNORECASE,
 )
 

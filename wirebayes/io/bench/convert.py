@@ -13,6 +13,7 @@ from wirebayes.io.bench import workbook
 from wirebayes.io.bench.about import About, name_from
 from wirebayes.io.bench.as_experiment import as_experiment, check_direction
 from wirebayes.io.bench.cell_units import with_units_apart
+from wirebayes.io.bench.clock_parts import with_joined_parts
 from wirebayes.io.bench.columns import Column
 from wirebayes.io.bench.control import recognised, recognised_of_pairs
 from wirebayes.io.bench.dates_apart import with_dates
@@ -141,7 +142,9 @@ def lacks_a_setting(path: Path, choices: Choices) -> bool:
 
 def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted]:
     """The experiments of the specimens of a table."""
-    tables = specimen_tables(with_dates(table, choices.time_since), choices.mapping, choices.specimens)
+    tables = specimen_tables(
+        with_dates(with_joined_parts(table, choices.mapping), choices.time_since), choices.mapping, choices.specimens
+    )
     if len(tables) == 1:
         return [_convert(each, about, replace(choices, mapping=said)) for each, said in tables]
     names = _names_of([each.specimen for each, _ in tables], about)
@@ -165,6 +168,8 @@ def _convert(table: RawTable, about: About, choices: Choices) -> Converted:
     recorded, notes = recorded_in(table, about, choices)
     table, columns, values = recorded.table, recorded.columns, recorded.values
     control = choices.control or _control(recorded)
+    if control == "displacement" and choices.zero_mm is None:
+        recorded.check_zero(about.length_mm)
     if control == "force" and recorded.not_read is not None:  # a setting goes on, a reading does not
         raise table.complain(recorded.not_read, columns["displacement"].index, "an empty cell", _NOT_READ)
     holds = cut(recorded.readings(control), choices.time_since)

@@ -23,7 +23,7 @@ from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
 from wirebayes.io.bench.unread import unread
 from wirebayes.numeric.typing import Floats
-from wirebayes.sentences import counted, listed
+from wirebayes.sentences import listed
 from wirebayes.strict.table import LARGEST
 from wirebayes.wire.protocol import Control
 
@@ -85,6 +85,21 @@ class Recorded:
         """
         return self.table.complain(self.table.rows[row].line, self.columns[role].index, found, expected)  # type: ignore[index]
 
+    def check_zero(self, length_mm: float) -> None:
+        """Refuse steps of a machine's position: how far they stretch the wire is not known. Weights pull from any zero.
+
+        Raises
+        ------
+        Undecided
+        """
+        x = self.values["displacement"]
+        nearest = float(np.abs(x).min())
+        if nearest > FAR * length_mm and nearest > FAR_STEPS * float(np.ptp(x)):
+            found = f"found displacements from {x.min():g} to {x.max():g} mm of a wire of {length_mm:g} mm"
+            answers = {f"--zero-mm {x[0]:g}": "counted from the first reading", "--zero-mm 0": "as they stand"}
+            place = self.table.place(self.table.rows[0].line, self.columns["displacement"].index)
+            raise Undecided(f"{self.table.sheet.path}, {place}: {found}", "where the wire begins to pull", answers)
+
     def readings(self, control: Control) -> Readings:
         """The same, by what was set."""
         role: Literal["displacement", "tension"] = "displacement" if control == "displacement" else "tension"
@@ -127,7 +142,7 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     of_holds = choices.time_since == "hold"
     values["time"], of_day = _times(table, columns["time"], values.get("time"), notes, durations=of_holds)
     _check_sizes(table, columns, values)
-    values["displacement"] = _from_zero(table, columns["displacement"], values["displacement"], about, choices.zero_mm)
+    values["displacement"] = _from_zero(values["displacement"], choices.zero_mm)
     notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
     hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
     return Recorded(table, columns, texts, values, hold, of_day, numbering, not_read), notes
@@ -206,11 +221,10 @@ def _times(
 ) -> tuple[Floats, bool]:
     """Times in s, of numbers or of clocks, and whether they are moments of a day; what was done joins the notes."""
     if numbers is None:
-        time, of_day, midnights = clock.seconds(table, column.index, column.unit, durations=durations)
+        time, of_day, passed = clock.seconds(table, column.index, column.unit, durations=durations)
+        notes += passed
     else:
-        time, of_day, midnights = numbers, False, 0
-    if midnights:
-        notes.append(f"the clock passes midnight {counted(midnights, 'time')}")
+        time, of_day = numbers, False
     if is_coarse(table, column.index):
         time, spreading = spread(time)
         notes += spreading
@@ -226,17 +240,9 @@ def _check_sizes(table: RawTable, columns: dict[Role, Column], values: Mapping[A
             raise table.complain(line, index, shown(table.rows[row].cell(index)), expected)
 
 
-def _from_zero(table: RawTable, column: Column, x: Floats, about: About, zero_mm: float | None) -> Floats:
-    """Displacements counted from the zero-tension length, refused where they are a machine's position."""
-    if zero_mm is not None:
-        return np.array([float(f"{value:.12g}") for value in x - zero_mm])
-    nearest = float(np.abs(x).min())
-    if nearest > FAR * about.length_mm and nearest > FAR_STEPS * float(np.ptp(x)):
-        found = f"displacements from {x.min():g} to {x.max():g} mm of a wire of {about.length_mm:g} mm"
-        answers = {f"--zero-mm {x[0]:g}": "counted from the first reading", "--zero-mm 0": "as they stand"}
-        place = f"{table.sheet.path}, {table.place(table.rows[0].line, column.index)}"
-        raise Undecided(f"{place}: found {found}", "where the wire begins to pull", answers)
-    return x
+def _from_zero(x: Floats, zero_mm: float | None) -> Floats:
+    """Displacements counted from the zero-tension length, where the user says at which it is."""
+    return x if zero_mm is None else np.array([float(f"{value:.12g}") for value in x - zero_mm])
 
 
 def _hold_numbers(
