@@ -26,7 +26,9 @@ def bare(cell: str) -> str:
 
 
 def joined_measures(line: str) -> str:
-    """A line between spaces in which no space stands between a number and its unit."""
+    """A line between spaces, if it begins with a number, without the spaces between numbers and their units."""
+    if not line[:2].strip("+-\u2212")[:1].isdigit():
+        return line
 
     def joined(found: re.Match[str]) -> str:
         return f"{found[1]}{found[2]}" if _is_unit(found[2]) else found[0]
