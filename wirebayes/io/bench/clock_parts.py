@@ -20,7 +20,7 @@ _DATE = (
     {"day", "tag", "jour", "dia", "giorno", "dag"},
 )
 _WHOLE, _NUMBER = re.compile(r"\d+"), re.compile(r"\d+([.,]\d+)?")
-_BELOW = 60.0
+_BELOW = 60.0  # minutes of an hour, seconds of a minute
 
 
 @dataclass(frozen=True)
