@@ -13,6 +13,7 @@ from wirebayes.io.bench.header import name_and_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.words import plain_letters
 
+# by the seconds of one: an hour, a minute, a second
 _CLOCK = {3600.0: re.compile(HOURS, re.I), 60.0: re.compile(MINUTES, re.I), 1.0: re.compile(SECONDS, re.I)}
 _DATE = (
     {"year", "jahr", "annee", "an", "ano", "anno", "jaar"},
