@@ -192,23 +192,29 @@ def specimens(header, labels, holds=(1, 2, 3, 4), of_test=False, extra=""):
     ("header", "labels"),
     [("Probe", "AB"), ("Probe", "12"), ("Sample ID", "ABC"), ("Name", ("Draht 1", "Draht 2")), ("Éprouvette n°", "12")],
 )
-def test_several_specimens_in_a_file_are_refused_not_merged(tmp_path, header, labels, of_test):
-    text = specimens(header, labels, of_test=of_test)
-    message = rf"line 18, column 1 \({header}\): found '{labels[1]}' after '{labels[0]}' where the displacement begins"
-    with pytest.raises(
-        wb.InputError, match=f'{message} again, expected one .*; split .* "{header}=ignore" if'
-    ) as refused:
-        read(tmp_path, text)
-    assert "\n" not in str(refused.value)
-    assert len(read(tmp_path, text, mapping=(f"{header}=ignore",)).experiment.holds) == 4 * len(labels)
+def test_several_specimens_in_a_file_are_not_merged(tmp_path, header, labels, of_test):
+    (tmp_path / "raw.csv").write_text(specimens(header, labels, of_test=of_test))
+    made = convert_all(tmp_path / "raw.csv", ABOUT, Choices())
+    assert [[hold.setting for hold in each.experiment.holds] for each in made] == [[1.0, 2.0, 3.0, 4.0]] * len(labels)
+    assert [row[3] for row in made[-1].rows if row[3] is not None] == [
+        2 * h - i / 10 for h in (1, 2, 3, 4) for i in range(4)
+    ]
+    assert len({each.experiment.name for each in made}) == len(labels)
+    assert "in lines 18 to 33, columns 2, 3 and 4" in made[1].notes[0]
+    for choices in ({"mapping": (f"{header}=ignore",)}, {"specimens": "one"}):
+        assert len(read(tmp_path, specimens(header, labels, of_test=of_test), **choices).experiment.holds) == 4 * len(
+            labels
+        )
 
 
 def test_words_beside_times_that_begin_again_may_be_specimens_too(tmp_path):
-    with pytest.raises(wb.InputError, match=r"line 18, column 1 \(Bezeichnung\): found 'blue' after 'red'"):
-        read(tmp_path, specimens("Bezeichnung", ("red", "blue")))
-    merged = specimens("Bezeichnung", ("red", "blue")).splitlines()
-    merged = [row if i in (0, 1, 17) else ";" + row.partition(";")[2] for i, row in enumerate(merged)]
-    with pytest.raises(wb.InputError, match=r"line 18, column 1 \(Bezeichnung\): found 'blue' after 'red'"):
+    text = specimens("Bezeichnung", ("red", "blue"))
+    with pytest.raises(Undecided, match=r"line 18, column 1 \(Bezeichnung\): found 'blue' after 'red'.* or --spec"):
+        read(tmp_path, text)
+    made = convert_all(tmp_path / "raw.csv", ABOUT, Choices(specimens="several"))
+    assert [each.experiment.name for each in made] == ["red", "blue"]
+    merged = [row if i in (0, 1, 17) else ";" + row.partition(";")[2] for i, row in enumerate(text.splitlines())]
+    with pytest.raises(Undecided, match=r"line 18, column 1 \(Bezeichnung\): found 'blue' after 'red'"):
         read(tmp_path, "\n".join(merged))
     assert read(tmp_path, specimens("Bezeichnung", ("red", "blue"), of_test=True)).rows
 

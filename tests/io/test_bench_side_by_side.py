@@ -61,7 +61,7 @@ def test_specimens_side_by_side_are_a_test_each(tmp_path, header, rows, names):
     made = read(tmp_path, header, rows)
     assert [each.experiment.name for each in made] == names
     assert [rows_of(each) for each in made] == [SOFT, STIFF]
-    assert all("specimens side by side" in each.notes[0] for each in made)
+    assert all("one of several specimens: " in each.notes[0] for each in made)
 
 
 def test_a_unit_alone_names_no_column_of_one_specimen(tmp_path):

@@ -9,7 +9,8 @@ from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.sheet import SheetRow, is_value
 from wirebayes.io.bench.stamps import is_coarse
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.bench.words import are_a_statistic
+from wirebayes.io.bench.unread import speaks_of_specimens
+from wirebayes.io.bench.words import are_a_statistic, speaks_of_a_quantity
 from wirebayes.sentences import counted, listed
 
 _SHOWN = 3  # lines that a note names
@@ -72,21 +73,33 @@ def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Sh
 def _without_words(rows: list[SheetRow], columns: dict[Role, Column]) -> tuple[list[SheetRow], list[SheetRow]]:
     """Rows without those that name a part of the test, such as ``Cycle 2``, or a statistic below; and these.
 
-    Those are rows without a time, in which words stand where numbers are read: ``Points: | 9`` between blocks. A
-    reading whose time is missing is none, whatever its hold is called.
+    Those are rows without a time, in which words stand where numbers are read: ``Points: | 9`` between blocks; or where
+    the words there speak of a quantity or a specimen. A reading whose time is missing is none, whatever its hold is
+    called.
     """
-    time, displacement, tension = (columns[role].index for role in ("time", "displacement", "tension"))
     end = len(rows)
     while end and are_a_statistic(rows[end - 1].filled):
         end -= 1
-    kept, words = list[SheetRow](), list[SheetRow]()
-    for row in rows[:end]:
-        read = [row.cell(column.index) for column in columns.values()]
-        has_time = any(c.isdigit() for c in row.cell(time))
-        is_reading = is_value(row.cell(displacement)) and is_value(row.cell(tension))
-        of_words = not (has_time or is_reading) and any(_WORD.search(cell) for cell in read)
-        (words if of_words or not any(map(is_value, read)) else kept).append(row)
-    return kept, [*words, *rows[end:]]
+    words = [row for row in rows[:end] if _is_of_words(row, columns)]
+    lines = {row.line for row in words}
+    return [row for row in rows[:end] if row.line not in lines], [*words, *rows[end:]]
+
+
+def _is_of_words(row: SheetRow, columns: dict[Role, Column]) -> bool:
+    cells = [row.cell(column.index) for column in columns.values()]
+    time, displacement, tension = (row.cell(columns[role].index) for role in ("time", "displacement", "tension"))
+    if is_value(displacement) or is_value(tension):
+        both = is_value(displacement) and is_value(tension)
+        has_time = any(c.isdigit() for c in time)
+        return not (both or has_time) and any(map(_WORD.search, cells))
+    if any(map(_is_title, (time, displacement, tension))) or not any(map(is_value, cells)):
+        return True
+    return not any(c.isdigit() for c in time) and any(map(_WORD.search, cells))
+
+
+def _is_title(cell: str) -> bool:
+    """Whether a cell speaks of a quantity or a specimen, and is no number of one."""
+    return bool(_WORD.search(cell)) and (speaks_of_a_quantity(cell) or speaks_of_specimens(cell))
 
 
 def _is_missing(row: SheetRow, columns: dict[Role, Column]) -> bool:

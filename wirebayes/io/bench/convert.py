@@ -12,6 +12,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench import workbook
 from wirebayes.io.bench.about import About, name_from
 from wirebayes.io.bench.as_experiment import as_experiment, check_direction
+from wirebayes.io.bench.block_titles import with_titles_as_columns
 from wirebayes.io.bench.cell_units import with_units_apart
 from wirebayes.io.bench.clock_parts import with_joined_parts
 from wirebayes.io.bench.columns import Column
@@ -27,6 +28,7 @@ from wirebayes.io.bench.recorded import Cut
 from wirebayes.io.bench.resolution import evident_step
 from wirebayes.io.bench.sheet import Sheet
 from wirebayes.io.bench.specimens import specimen_tables
+from wirebayes.io.bench.specimens_below import one_after_another
 from wirebayes.io.bench.table import RawTable, find_table
 from wirebayes.io.bench.table_numbers import READS, Recorded, recorded_in
 from wirebayes.io.bench.thinning import MOST, kept_readings
@@ -129,9 +131,7 @@ def convert_joined(paths: Sequence[Path], about: About, choices: Choices) -> Con
     table, notes = one_table(tables, each_file, choices.mapping)
     made = _of_table(table, about, choices)
     if len(made) > 1:
-        raise InputError(
-            f"{table.sheet.path}: found {len(made)} specimens side by side, expected one whose holds these are"
-        )
+        raise InputError(f"{table.sheet.path}: found {len(made)} specimens, expected one whose holds these are")
     return replace(made[0], notes=[*notes, *made[0].notes])
 
 
@@ -142,16 +142,29 @@ def lacks_a_setting(path: Path, choices: Choices) -> bool:
 
 def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted]:
     """The experiments of the specimens of a table."""
-    tables = specimen_tables(
-        with_dates(with_joined_parts(table, choices.mapping), choices.time_since), choices.mapping, choices.specimens
-    )
+    table = with_titles_as_columns(table, choices.mapping)
+    table = with_dates(with_joined_parts(table, choices.mapping), choices.time_since)
+    tables = specimen_tables(table, choices.mapping, choices.specimens)
+    if len(tables) > 1:
+        names = _names_of([each.specimen for each, _ in tables], about)
+        of_each = [replace(about, name=name) for name in names]
+        return [
+            _convert(*recorded_in(each, own, said := replace(choices, mapping=mapping)), own, said)
+            for (each, mapping), own in zip(tables, of_each, strict=True)
+        ]
+    ((each, mapping),) = tables
+    return _one_below_another(each, about, replace(choices, mapping=mapping))
+
+
+def _one_below_another(table: RawTable, about: About, choices: Choices) -> list[Converted]:
+    """The experiments of specimens whose tests follow each other; of the only one, where there are not several."""
+    recorded, notes = recorded_in(table, about, choices)
+    tables = one_after_another(recorded, choices.mapping, choices.specimens)
     if len(tables) == 1:
-        return [_convert(each, about, replace(choices, mapping=said)) for each, said in tables]
-    names = _names_of([each.specimen for each, _ in tables], about)
-    return [
-        _convert(each, replace(about, name=name), replace(choices, mapping=said))
-        for (each, said), name in zip(tables, names, strict=True)
-    ]
+        return [_convert(recorded, notes, about, choices)]
+    names = _names_of([each.specimen for each in tables], about)
+    of_each = [replace(about, name=name) for name in names]
+    return [_convert(*recorded_in(each, own, choices), own, choices) for each, own in zip(tables, of_each, strict=True)]
 
 
 def _names_of(specimens: Sequence[str], about: About) -> list[str]:
@@ -163,9 +176,8 @@ def _names_of(specimens: Sequence[str], about: About) -> list[str]:
     return names if in_words and not about.name_is_stated else [f"{about.name}-{name}" for name in names]
 
 
-def _convert(table: RawTable, about: About, choices: Choices) -> Converted:
-    """The experiment of one specimen."""
-    recorded, notes = recorded_in(table, about, choices)
+def _convert(recorded: Recorded, notes: list[str], about: About, choices: Choices) -> Converted:
+    """The experiment of one specimen, of which it is known what was recorded and, in sentences, understood."""
     table, columns, values = recorded.table, recorded.columns, recorded.values
     control = choices.control or _control(recorded)
     if control == "displacement" and choices.zero_mm is None:

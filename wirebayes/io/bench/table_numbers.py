@@ -143,7 +143,7 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     values["time"], of_day = _times(table, columns["time"], values.get("time"), notes, durations=of_holds)
     _check_sizes(table, columns, values)
     values["displacement"] = _from_zero(values["displacement"], choices.zero_mm)
-    notes += unread(table, columns, choices.mapping, values["displacement"], values["time"])
+    notes += unread(table, columns)
     hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
     return Recorded(table, columns, texts, values, hold, of_day, numbering, not_read), notes
 
@@ -169,11 +169,12 @@ def _is_of_clocks(table: RawTable, column: Column) -> bool:
 
 
 def _whose(table: RawTable, columns: dict[Role, Column]) -> list[str]:
-    """Of which specimen these columns are, where several stand side by side."""
+    """Of which specimen these readings are, where there are several."""
     if not table.specimen:
         return []
     places = [table.sheet.column_name(i) for i in sorted(column.index for column in columns.values())]
-    return [f"specimens side by side: {table.whose} in columns {listed(places)}"]
+    lines = f"lines {table.line_text(table.rows[0].line)} to {table.line_text(table.rows[-1].line)}"
+    return [f"one of several specimens: {table.whose} in {lines}, columns {listed(places)}"]
 
 
 def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> str:

@@ -1,0 +1,124 @@
+"""Lines above blocks of readings that say what no column does: ``Step 2: 5 mm``, ``Load,10,kg``, ``Specimen 3``.
+
+Every block has such a line, and the lines are alike but for their numbers.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from wirebayes.io.bench.header import name_and_unit
+from wirebayes.io.bench.joined import lacking
+from wirebayes.io.bench.quantities import Role, quantity_unit
+from wirebayes.io.bench.sheet import is_measured
+from wirebayes.io.bench.table import RawTable
+from wirebayes.io.bench.unread import names_a_specimen
+from wirebayes.io.bench.words import are_a_statistic, speaks_of_a_quantity
+
+_NUMBER = r"[+\-\u2212]?\d+(?:[.,]\d+)?"
+_MEASURE = re.compile(rf"(?<![\w.,])({_NUMBER})[ _]?([^\W\d_]+)(?=$|[\s,;:.)\]])")
+_LAST = re.compile(rf"(.*?)[\s:=]+({_NUMBER})")
+Said = dict[str, tuple[str, str]]  # by a line without its numbers: what it says, and the unit of that
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Readings that follow each other without other lines between them, and the lines above.
+
+    Attributes
+    ----------
+    begin : int
+        Line of the first reading.
+    above : list of str
+        The lines between it and the block before.
+    """
+
+    begin: int
+    above: list[str]
+
+
+def with_titles_as_columns(table: RawTable, mapping: Sequence[str]) -> RawTable:
+    """The table with what lines above its blocks say as columns: the setting, if none has it, and the specimen.
+
+    Parameters
+    ----------
+    table : RawTable
+    mapping : sequence of str
+        What the user says of columns.
+    """
+    if table.turned or table.pieces:
+        return table
+    blocks = _blocks(table)
+    if len(blocks) < 2:
+        return table
+    missing = lacking(table, mapping)
+    if len(missing) == 1:
+        table = _with_column(table, blocks, missing[0], lambda line: _measures(line, missing[0]))
+    return _with_column(table, blocks, "specimen", _specimen)
+
+
+def _blocks(table: RawTable) -> list[_Block]:
+    blocks: list[_Block] = []
+    above: list[str] = []
+    in_block = False
+    for row in table.sheet.rows:
+        is_reading = row.line > table.header_line and is_measured(row.filled) and not row.comment
+        if is_reading and not are_a_statistic(row.filled):
+            if not in_block:
+                blocks.append(_Block(row.line, above))
+                above = []
+            in_block = True
+        else:
+            above.append(" ".join(row.filled))
+            in_block = False
+    return blocks
+
+
+def _with_column(table: RawTable, blocks: Sequence[_Block], name: str, said: Callable[[str], Said]) -> RawTable:
+    """The table with a column of what one line above each block says; itself where none or several do."""
+    each: list[Said] = [{key: found for line in block.above for key, found in said(line).items()} for block in blocks]
+    alike = [key for key in each[0] if len({found[key][1] for found in each if key in found}) == 1]
+    varied = [key for key in alike if all(key in found for found in each) and len({found[key] for found in each}) > 1]
+    of_quantity = [key for key in varied if any(map(speaks_of_a_quantity, re.findall(r"[^\W\d_]+", key)))]
+    chosen = of_quantity if len(varied) > 1 else varied
+    if len(chosen) != 1:
+        return table
+    values = [found[chosen[0]] for found in each]
+    width = len(table.header)
+    rows = []
+    for row in table.rows:
+        block = max((i for i, b in enumerate(blocks) if b.begin <= row.line), default=0)
+        cells = *(row.cell(i) for i in range(width)), values[block][0] if is_measured(row.filled) else ""
+        rows.append(replace(row, cells=cells))
+    first, last = (" ".join(filter(None, value)) for value in (values[0], values[-1]))
+    described = f"{table.sheet.described}, the {name} of each block from the line above it ({first} to {last})"
+    return replace(
+        table,
+        sheet=replace(table.sheet, described=described),
+        header=(*table.header, name),
+        units=(*table.units, values[0][1]),
+        rows=tuple(rows),
+        above=(*table.above, "") if table.above else (),
+    )
+
+
+def _measures(line: str, role: Role) -> Said:
+    """Numbers with a unit of a quantity in a line, or the last one under a name that has it: ``Weg [mm]: 2``."""
+    said: Said = {}
+    for place, found in enumerate(_MEASURE.finditer(line)):
+        if quantity_unit(found[2], role):
+            said[f"{place} {_without_numbers(line)}"] = found[1], found[2]
+    last = _LAST.fullmatch(line)
+    unit = name_and_unit(last[1], role)[1] if last else None
+    if last and unit and not said:
+        said[_without_numbers(line)] = last[2], unit.text
+    return said
+
+
+def _specimen(line: str) -> Said:
+    name = names_a_specimen(line)
+    return {_without_numbers(line.replace(name, "")): (name, "")} if name else {}
+
+
+def _without_numbers(line: str) -> str:
+    return re.sub(_NUMBER, "#", line)
