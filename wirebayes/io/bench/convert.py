@@ -28,7 +28,7 @@ from wirebayes.io.bench.recorded import Cut
 from wirebayes.io.bench.resolution import evident_step
 from wirebayes.io.bench.sheet import Sheet
 from wirebayes.io.bench.specimens import specimen_tables
-from wirebayes.io.bench.specimens_below import one_after_another
+from wirebayes.io.bench.specimens_below import tests_of_specimens
 from wirebayes.io.bench.table import RawTable, find_table
 from wirebayes.io.bench.table_numbers import READS, Recorded, recorded_in
 from wirebayes.io.bench.thinning import MOST, kept_readings
@@ -159,7 +159,7 @@ def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted
 def _one_below_another(table: RawTable, about: About, choices: Choices) -> list[Converted]:
     """The experiments of specimens whose tests follow each other; of the only one, where there are not several."""
     recorded, notes = recorded_in(table, about, choices)
-    tables = one_after_another(recorded, choices.mapping, choices.specimens)
+    tables = tests_of_specimens(recorded, choices.mapping, choices.specimens)
     if len(tables) == 1:
         return [_convert(recorded, notes, about, choices)]
     names = _names_of([each.specimen for each in tables], about)

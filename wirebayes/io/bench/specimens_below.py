@@ -19,7 +19,7 @@ MOSTLY = 0.5  # of the rows: tensions that stay are weights
 BACK = 0.25  # of that range from where the specimen before began: the next one begins near there
 
 
-def one_after_another(recorded: Recorded, mapping: Sequence[str], stated: Specimens | None) -> list[RawTable]:
+def tests_of_specimens(recorded: Recorded, mapping: Sequence[str], stated: Specimens | None) -> list[RawTable]:
     """The table of each specimen.
 
     A column tells them apart that changes where the displacement begins again, after a test of about the same range.
