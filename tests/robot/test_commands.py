@@ -214,6 +214,20 @@ def test_a_robot_in_a_vertical_plane_is_a_robot(fitted, tmp_path, legs):
     assert main(["report", str(out)]) == 0
 
 
+@pytest.mark.parametrize(("apart_m", "code"), [(0.0, 2), (0.01, 0)])
+def test_wires_that_all_leave_from_one_point_are_no_robot(fitted, tmp_path, capsys, apart_m, code):
+    file, out = tmp_path / "plotter.toml", tmp_path / "out"
+    legs = [f"[[leg]]\nexit_point_m = [{x}, 0.0, 1.4]\nplatform_point_m = [0.0, 0.0, 0.0]\n" for x in (0.0, apart_m)]
+    file.write_text(PLOTTER + "".join(legs))
+    assert main(["pose", str(file), "--wires", str(fitted), "--output", str(out), "--times", "0,60"]) == code
+    if code == 2:
+        said = capsys.readouterr().err
+        assert said.strip().endswith(
+            "leg 2, key exit_point_m: found [0.0, 0.0, 1.4] in every leg, expected exit points that lie apart"
+        )
+        assert not out.exists()
+
+
 @pytest.fixture
 def session_csv(tmp_path):
     """A session on linear-7 whose true reference errors are known, written as the command reads it."""

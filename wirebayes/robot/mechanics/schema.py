@@ -255,6 +255,10 @@ def _legs(top: Keys, declared: set[str]) -> tuple[list[dict[str, Any]], Indices 
     """All legs, and the number of each one's winch."""
     tables = [replace(leg, name=str(number)) for number, leg in enumerate(top.tables("leg", least=2), 1)]
     legs = [_leg(leg, declared) for leg in tables]
+    exits = np.array([leg["exit"] for leg in legs])
+    if not np.ptp(exits, axis=0).any():  # the robot's own measure of length would be zero
+        found = f"{shown(exits[0].tolist())} in every leg"
+        raise tables[-1].complain("exit_point_m", found, "exit points that lie apart")
     return legs, _winches(tables, legs)
 
 
