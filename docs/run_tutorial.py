@@ -8,6 +8,7 @@ it those of the Hangprinter's tutorial alone. Tests run the same commands and co
 
 import csv
 import json
+import os
 import re
 import shlex
 import shutil
@@ -65,11 +66,13 @@ def start(folder: Path) -> None:
 
 
 def said_by(command: list[str], folder: Path) -> str:
-    """What a command prints in a folder, stdout before stderr."""
-    done = subprocess.run(
-        [sys.executable, "-m", "wirebayes", *command], cwd=folder, capture_output=True, text=True, check=True
-    )
-    return "\n".join(filter(None, (done.stdout.rstrip(), done.stderr.rstrip()))) + "\n"
+    """What a command prints in a folder on a terminal of so many columns."""
+    program = [sys.executable, "-m", "wirebayes", *command]
+    both = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    done = subprocess.run(program, cwd=folder, env=os.environ | {"COLUMNS": "96"}, **both, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{shlex.join(command)}: {done.stdout}")
+    return f"{done.stdout.rstrip()}\n"
 
 
 def follow(folder: Path) -> dict[str, str]:

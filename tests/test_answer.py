@@ -1,11 +1,14 @@
 """The few lines that a command ends with."""
 
 import json
+import sys
+from contextlib import redirect_stderr
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from wirebayes.answers.lines import for_terminal
 from wirebayes.cli import answer
 from wirebayes.sentences import p_in_words, spoken
 from wirebayes.views.calibration import Calibration
@@ -74,7 +77,7 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
         "  error on holds kept out of the fit: 0.25 -> 0.05 N rms",
         "b: nothing is missing that these readings can show (p = 0.4)",
     ]
-    assert found.next_step() == "a: Unload. b: Hold longer."
+    assert found.next_step() == "a: Unload.\nb: Hold longer."
     few = {"warnings": [{"kind": "few-holds", "text": "2 holds: no effect can be established"}]}
     two = stored(Findings, tmp_path, "discovery.json", {"experiments": {"b": CLEAN | few}})
     assert two.lines() == ["b: nothing stands out (p = 0.4)"]
@@ -129,8 +132,8 @@ def test_a_comparison_says_errors_with_units_and_the_command_of_the_best_model(t
     ]
     (_, best), (_, plain) = scored
     for changed, next_ in (
-        ({"effects": ["grip_slip@3"]}, "wirebayes fit w.toml --effect grip_slip@3, or wirebayes discover w.toml"),
-        ({"history": "additive"}, "wirebayes fit w.toml --history additive, or wirebayes discover w.toml"),
+        ({"effects": ["grip_slip@3"]}, "wirebayes fit w.toml --effect grip_slip@3\nwirebayes discover w.toml"),
+        ({"history": "additive"}, "wirebayes fit w.toml --history additive\nwirebayes discover w.toml"),
         ({}, "wirebayes discover w.toml"),  # a law of time that fit has no option for
         ({"effects": ["own_power"]}, "wirebayes discover w.toml"),  # a user's own: fit asks for its file
     ):
@@ -140,7 +143,7 @@ def test_a_comparison_says_errors_with_units_and_the_command_of_the_best_model(t
         assert found.lines() == ["w: a (0.34 mm rms) predicts left-out holds best, then plain (1.7 mm rms)"]
     table = {"base": "plain", "models": [plain]}
     found = stored(Comparison, tmp_path, "comparison.json", {"experiments": {"w": table}})
-    assert found.next_step(Given("w.toml")) == "wirebayes fit w.toml, or wirebayes discover w.toml"
+    assert found.next_step(Given("w.toml")) == "wirebayes fit w.toml\nwirebayes discover w.toml"
 
 
 def test_a_pose_that_cannot_be_held_says_why(tmp_path: Path) -> None:
@@ -168,8 +171,53 @@ def test_a_calibration_offers_no_lengths_unless_it_converged(tmp_path: Path) -> 
     assert stored(Calibration, tmp_path, "calibration.json", bad).lines() == ["r: not converged, no lengths to use"]
 
 
+def test_what_is_found_is_used_and_what_is_not_is_measured(tmp_path: Path) -> None:
+    for verdict, steps in (("named", 2), ("nothing-missing", 3), ("partial", 1), ("unknown", 1)):
+        content = {"experiments": {"a": SLIP | {"verdict": verdict}}}
+        first, *others = stored(Findings, tmp_path, "discovery.json", content).next_step().splitlines()
+        assert len(others) == steps - 1
+        assert first.startswith("Unload" if steps == 1 else f"wirebayes predict {tmp_path} PROTOCOL.csv")
+        assert steps == 1 or others[0] == f"wirebayes pose ROBOT.toml --wires {tmp_path / 'a' / 'final'}"
+
+
+def test_a_line_is_as_wide_as_the_terminal_and_a_number_stays_with_its_interval(monkeypatch) -> None:
+    numbers = [f"B{i} 0.2402 [0.21, 0.2721] mm N⁻ᵁ" for i in range(6)]
+    line = f"  creep law: {', '.join(numbers)}"
+    monkeypatch.setenv("COLUMNS", "70")
+    shown = for_terminal([line])
+    assert max(map(len, shown)) <= 70 and [part[:4] for part in shown] == ["  cr", *(3 * ["    "])]
+    assert all(any(number in part for part in shown) for number in numbers)
+    monkeypatch.setenv("COLUMNS", "300")
+    assert 70 < max(map(len, for_terminal([line]))) <= 100
+    monkeypatch.delenv("COLUMNS")
+    monkeypatch.setattr("sys.__stdout__", None)  # as in a pipe
+    assert for_terminal([line]) == [line]
+
+
+def test_a_command_stays_in_one_line_to_be_copied(monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    command = f"wirebayes pose ROBOT.toml --wires {'a' * 40}"
+    assert answer.next_lines(f"{command}\n{'word ' * 12}") == [
+        f"Next: {command}",
+        "  or: word word word word word word word",
+        "    word word word word word",
+    ]
+
+
+def test_the_answer_stands_before_what_limits_it_and_the_next_step_behind(tmp_path, capfd) -> None:
+    """On a terminal, where both streams meet."""
+    few = {"warnings": [{"kind": "few-holds", "text": "2 holds: no effect can be established"}]}
+    content = {"version": 2, "experiments": {"b": CLEAN | few}, **few}
+    found = stored(Findings, tmp_path, "discovery.json", content)
+    with redirect_stderr(sys.stdout):
+        answer.print_answer(found)
+    shown = capfd.readouterr().out.splitlines()
+    starts = [line.split(":")[0].strip() for line in shown]
+    assert starts == ["b", "warning", "Results", "Next", "or", "or"]
+
+
 def test_json_is_the_summary_and_quiet_is_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"b": CLEAN}})
+    found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"b": CLEAN}, "warnings": []})
     (tmp_path / "report.html").write_text("")
     known = Findings(found.place, computed=False)
     answer.conclude(known, as_json=True)

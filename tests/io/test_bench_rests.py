@@ -43,4 +43,4 @@ def test_times_of_the_test_tell_rests_and_they_stay_with_it(tmp_path, header, we
 def test_times_of_each_hold_do_not_tell_rests_which_is_said(tmp_path, header, weights):
     made = rested(tmp_path, header, weights=weights, since="hold")
     assert [hold.duration_s for hold in made.experiment.holds] == [READ_S[-1]] * 4
-    assert any("how long it lasted after its last reading is not known" in note for note in made.notes)
+    assert any("when a hold ended is not known" in note for note in made.notes)

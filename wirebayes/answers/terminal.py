@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from textwrap import wrap
 from typing import Literal, cast
 
 import numpy as np
@@ -42,17 +41,25 @@ def of_fit(summary: SummaryJson) -> list[str]:
     state = "converged" if summary["converged"] else "NOT CONVERGED"
     passed = summary["model_check"]["passed"] if "model_check" in summary else None
     checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
-    names = [n for n in summary["parameters"] if n.split("[")[0].split(".")[0] in (*_SHOWN, *_effects(summary))]
-    parameters = ", ".join(f"{name} {_with_unit(summary['parameters'][name])}" for name in names)
     creep = f"creep after 2 min at {short(derived['tension_N'])} N: {_band(derived['creep_2min_mm'])} mm"
-    return [f"{summary['experiment']}: {state}, {checked}", f"  {parameters}", f"  {creep} (medians, 90 % intervals)"]
+    lines = [
+        f"{summary['experiment']}: {state}, {checked}",
+        f"  stiffness: {_parameters(summary, ('k1',))}",
+        f"  {creep}",
+        f"  creep law: {_parameters(summary, ('B', 'U', 'k2', 'N'))}",
+    ]
+    if summary["effects"]:
+        lines.append(f"  effects: {_parameters(summary, [key.split('@')[0] for key in summary['effects']])}")
+    return [*lines, "  (each a median, and the interval that holds it nine times in ten)"]
 
 
 _SHOWN = ("k1", "B", "U", "k2", "N")
 
 
-def _effects(summary: SummaryJson) -> list[str]:
-    return [key.split("@")[0] for key in summary["effects"]]
+def _parameters(summary: SummaryJson, wanted: Sequence[str]) -> str:
+    """Parameters with their intervals: those named, and those of effects and of experiments that are named."""
+    names = [name for name in summary["parameters"] if name.split("[")[0].split(".")[0] in wanted]
+    return ", ".join(f"{name} {_with_unit(summary['parameters'][name])}" for name in names)
 
 
 def of_findings(name: str, report: ExperimentFindings) -> list[str]:
@@ -181,14 +188,14 @@ def of_check(name: str, test: CheckedExperiment) -> list[str]:
         ranges = [
             f"{p} {_with_unit(range_)}" for p, range_ in test["parameters"].items() if range_["determined_by"] == source
         ]
-        lines += _wrapped(f"parameters from the {source}", ranges)
+        lines += _list(f"parameters from the {source}", ranges)
     for shows, words in _SHOWS.items():
         effects = [(e, found) for e, found in test["effects"].items() if found["shows"] == shows]
-        lines += _wrapped(words, [_size(e, found) for e, found in effects])
+        lines += _list(words, [_size(e, found) for e, found in effects])
     if test["hold_ends"] and "hold-ends" not in [notice["kind"] for notice in test["warnings"]]:
-        lines += wrap(test["hold_ends"]["sentence"], 110, initial_indent="  ", subsequent_indent="    ")
+        lines.append(f"  {test['hold_ends']['sentence']}")
     count = len(test["warnings"])
-    lines.append(f"  {counted(count, 'warning')}, on standard error" if count else "  nothing suspicious")
+    lines.append(f"  {counted(count, 'warning')}" if count else "  nothing suspicious")
     return lines
 
 
@@ -221,13 +228,9 @@ def _size(effect: str, found: EffectSize) -> str:
     return f"{spoken(effect)} {short(found['amplitude_80'], 2)}" + (f" {found['unit']}" if found["unit"] != "-" else "")
 
 
-def _wrapped(title: str, items: list[str]) -> list[str]:
-    """A list in lines that a terminal shows whole."""
-    if not items:
-        return []
-    whole = [item.replace(" ", "\u00a0") for item in items]  # no item is broken
-    lines = wrap(f"{title}: {', '.join(whole)}", 110, initial_indent="  ", subsequent_indent="    ")
-    return [line.replace("\u00a0", " ") for line in lines]
+def _list(title: str, items: list[str]) -> list[str]:
+    """A line for what there is of something; none where there is nothing."""
+    return [f"  {title}: {', '.join(items)}"] if items else []
 
 
 def of_comparison(name: str, table: ComparedModels) -> str:

@@ -1,13 +1,15 @@
 """What a command says at its end: the answer in a few lines, where the results lie, and what to do next."""
 
 import json
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from wirebayes.answers.lines import for_terminal
 from wirebayes.commands.write_report import write_report
 from wirebayes.json_files.plain import plain
 from wirebayes.processes.copies import prepared_copy
@@ -33,6 +35,7 @@ def conclude(
     *,
     as_json: bool = False,
     quiet: bool = False,
+    said: Collection[str] = (),
 ) -> None:
     """Write the page of a command's results and print the answer.
 
@@ -44,22 +47,56 @@ def conclude(
     as_json : bool
         Print the summary as JSON instead.
     quiet : bool
-        Print nothing.
+        Print nothing but the warnings.
+    said : collection of str
+        Warnings that were printed before the work.
     """
     folder = result.place.path
     if result.computed or not (folder / PAGE).is_file():
         write_page(folder)
-    print_answer(result, given, as_json=as_json, quiet=quiet)
+    print_answer(result, given, as_json=as_json, quiet=quiet, said=said)
 
 
 def print_answer(
-    result: Result[Any], given: Given = NOTHING, *, as_json: bool = False, quiet: bool = False, kept: bool = True
+    result: Result[Any],
+    given: Given = NOTHING,
+    *,
+    as_json: bool = False,
+    quiet: bool = False,
+    kept: bool = True,
+    said: Collection[str] = (),
 ) -> None:
-    """Print the answer of a command, as `conclude` does; for results without a page, or not `kept` in a folder, too."""
-    folder = result.place.path
+    """Print the answer of a command, what limits it, and what to do next.
+
+    Parameters
+    ----------
+    result : Result
+    given : Given
+    as_json, quiet, said
+        As for `conclude`.
+    kept : bool
+        Whether the results lie in a folder that stays.
+    """
+    shown = not (as_json or quiet)
     if as_json:
         print(json.dumps(plain(result.summary()), indent=2, ensure_ascii=False, allow_nan=False))
-    elif not quiet:
-        look = f" (open {folder / PAGE})" if (folder / PAGE).is_file() else ""
-        where = [f"Results: {folder}{look}"] if kept else []
-        print("\n".join([*result.lines(), *where, f"Next: {result.next_step(given)}"]))
+    if shown:
+        print(result, flush=True)  # before the warnings, which go another way
+    for line in for_terminal(message for message in result.messages if message not in said):
+        print(line, file=sys.stderr, flush=True)
+    if shown:
+        print("\n".join([*(_where(result) if kept else []), *next_lines(result.next_step(given))]))
+
+
+def _where(result: Result[Any]) -> list[str]:
+    """Where the results lie."""
+    folder = result.place.path
+    look = f" (open {folder / PAGE})" if (folder / PAGE).is_file() else ""
+    return [f"Results: {folder}{look}"]
+
+
+def next_lines(step: str) -> list[str]:
+    """The next step, an alternative a line: a command stays in one, to be copied."""
+    first, *others = step.splitlines()
+    lines = [f"Next: {first}", *(f"  or: {other}" for other in others)]
+    return [part for line in lines for part in ([line] if "wirebayes " in line else for_terminal([line]))]

@@ -1,6 +1,5 @@
 """``wirebayes batch``: many experiments in one table, each fitted and searched for missing effects."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -72,6 +71,4 @@ def batch_command(
             output=folder_for("batch", files[0], output),
             progress=report,
         )
-    for line in many.messages:
-        print(line, file=sys.stderr)
     conclude(many, Given(str(files[0])), as_json=as_json, quiet=quiet)

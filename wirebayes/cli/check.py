@@ -1,6 +1,5 @@
 """``wirebayes check``: what was understood of an experiment file."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -41,6 +40,4 @@ def check_command(
             output=output,
             progress=report,
         )
-    for line in checked.messages:
-        print(line, file=sys.stderr)
     print_answer(checked, Given(str(file)), as_json=as_json, quiet=quiet, kept=output is not None)

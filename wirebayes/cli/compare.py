@@ -44,6 +44,7 @@ def compare_command(
     Every model is judged twice: each hold left out in turn, and the last third of the holds (with --train-holds K, all
     after the K-th, and none of them is used before) predicted from the rest.
     """
+    from wirebayes.answers.lines import for_terminal
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.commands.compare import carry_out, plan_comparison
@@ -61,11 +62,8 @@ def compare_command(
         seed=seed,
     )
     said = [f"warning: {notice.text}" for notice in planned.warnings]
-    for line in said:  # before the work, which takes minutes
+    for line in for_terminal(said):  # before the work, which takes minutes
         typer.echo(line, err=True)
     with progress() as report:
         found = carry_out(planned, folder_for("compare", file, output), report)
-    for line in found.messages:
-        if line not in said:
-            typer.echo(line, err=True)
-    conclude(found, Given(str(file)), as_json=as_json, quiet=quiet)
+    conclude(found, Given(str(file)), as_json=as_json, quiet=quiet, said=said)

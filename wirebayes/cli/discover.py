@@ -1,7 +1,5 @@
 """``wirebayes discover``: what the plain model is missing, added to it where it has a name."""
 
-import sys
-
 from wirebayes.cli.options import (
     AsJson,
     DropBreaks,
@@ -53,6 +51,4 @@ def discover_command(
             output=folder_for("discover", file, output),
             progress=report,
         )
-    for line in findings.messages:
-        print(line, file=sys.stderr)
     conclude(findings, Given(str(file)), as_json=as_json, quiet=quiet)

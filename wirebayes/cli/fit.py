@@ -1,6 +1,5 @@
 """``wirebayes fit``: the posterior of each experiment, or of all samples of a material together."""
 
-import sys
 from typing import Annotated
 
 import typer
@@ -73,6 +72,4 @@ def fit_command(
                 output=folder_for("fit", file, output),
                 progress=report,
             )
-        for line in fitted.messages:
-            print(line, file=sys.stderr)
         conclude(fitted, Given(str(file)), write_page, as_json=as_json, quiet=quiet)

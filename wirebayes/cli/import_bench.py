@@ -106,8 +106,6 @@ def import_command(
         output=Path(raw[0].stem) if output is None else output,
         ask=_ask if sys.stdin.isatty() and sys.stderr.isatty() else None,
     )
-    for line in imported.messages:
-        print(line, file=sys.stderr)
     print_answer(imported, as_json=as_json, quiet=quiet)
 
 

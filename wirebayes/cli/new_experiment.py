@@ -17,5 +17,6 @@ def init_command(
 
     file = run(directory)
     if not quiet:
-        print(f"Written: {file} and {file.with_suffix('.csv')}; both are valid, replace their content by yours")
-        print(f"Next: wirebayes check {file}; for a raw file of a bench, wirebayes import")
+        print(f"Written: {file} and {file.with_suffix('.csv')}, a test to replace by yours")
+        print(f"Next: wirebayes check {file}")
+        print("  or: wirebayes import RAW.csv  (the file of a bench)")

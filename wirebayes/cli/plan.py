@@ -1,6 +1,5 @@
 """``wirebayes plan``: what a test would teach before it is done."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -64,6 +63,4 @@ def plan_command(
             output=folder_for("plan", source, output),
             progress=report,
         )
-    for line in planned.messages:
-        print(line, file=sys.stderr)
     conclude(planned, Given(str(source)), as_json=as_json, quiet=quiet)

@@ -51,6 +51,7 @@ def predict_command(
     training holds. With --fresh, PROTOCOL is the whole history of a fresh sample, its preload as uncertain as the
     fit's. A first reading in tension_N conditions its hold and those after it.
     """
+    from wirebayes.answers.lines import for_terminal
     from wirebayes.commands.predict import as_json as json_of
     from wirebayes.commands.predict import predict as run
     from wirebayes.json_files.plain import plain
@@ -68,11 +69,12 @@ def predict_command(
         output=table,
     )
     page = write_beside(predicted, table)
-    for warning in predicted.attrs.get("warnings", []):
-        typer.echo(f"warning: {warning}", err=True)
-    typer.echo(f"{protocol}: {predicted.attrs['prediction']}", err=True)
     if as_json:
         typer.echo(json.dumps(plain(json_of(predicted)), indent=2, ensure_ascii=False, allow_nan=False))
     elif not quiet:
-        typer.echo(in_a_sentence(predicted))
+        typer.echo("\n".join(for_terminal([in_a_sentence(predicted)])))
+    warnings = [f"warning: {warning}" for warning in predicted.attrs.get("warnings", [])]
+    for line in for_terminal([*warnings, f"{protocol}: {predicted.attrs['prediction']}"]):
+        typer.echo(line, err=True)
+    if not (as_json or quiet):
         typer.echo(f"Results: {table} (open {page})")

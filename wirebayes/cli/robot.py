@@ -138,8 +138,6 @@ def pose_command(
             output=folder_for("pose", robot, output),
             progress=report,
         )
-    for line in found.messages:
-        typer.echo(line, err=True)
     conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
 
 
@@ -222,8 +220,6 @@ def calibrate_command(
             output=folder_for("calibrate", robot, output),
             progress=report,
         )
-    for line in found.messages:
-        typer.echo(line, err=True)
     conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
 
 
@@ -239,8 +235,10 @@ def export_command(
     seed: Seed = 0,
 ) -> None:
     """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model."""
+    from wirebayes.cli.answer import print_answer
     from wirebayes.commands.export import export as run
     from wirebayes.commands.wires import named_lines
+    from wirebayes.views.result import Given
 
     exported = run(
         robot,
@@ -253,5 +251,4 @@ def export_command(
         seed=seed,
         output=folder_for("export", robot, output),
     )
-    for line in exported.messages:
-        typer.echo(line, err=True)
+    print_answer(exported, Given(robot, wires[0]))

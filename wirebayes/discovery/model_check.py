@@ -103,12 +103,11 @@ class ModelCheck:
 
     def _failed_in_words(self) -> str:
         model = "The model with these effects" if self.with_effects else "The plain model"
-        other = "other effects of the catalogue" if self.with_effects else "what is missing"
         directions = ", ".join(map(spoken, self.surprising))
         return (
-            f"{model} does not describe the readings ({self._p_in_words}; it fails below {self.alpha:.2g}): its "
-            "parameters, intervals and predictions can be wrong by more than they say. Run wirebayes discover to look "
-            f"for {other}; the readings deviate most in the direction of {directions}"
+            f"{model} does not describe the readings ({self._p_in_words}; it fails below {self.alpha:.2g}): "
+            "parameters and predictions can be wrong by more than their intervals. "
+            f"The readings deviate most towards {directions}"
         )
 
     def to_dict(self) -> ModelCheckResult:

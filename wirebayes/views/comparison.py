@@ -32,7 +32,7 @@ class Comparison(Result[ComparisonJson]):
         tables = list(self.summary()["experiments"].values())
         options = terminal.options_of_best(tables[0]) if len(tables) == 1 else None
         discover = f"wirebayes discover {given.file}"
-        return discover if options is None else f"{f'wirebayes fit {given.file} {options}'.rstrip()}, or {discover}"
+        return discover if options is None else f"{f'wirebayes fit {given.file} {options}'.rstrip()}\n{discover}"
 
     def _short_form(self) -> list[str]:
         return [

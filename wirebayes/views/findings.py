@@ -12,7 +12,7 @@ from wirebayes.results import read_back
 if TYPE_CHECKING:
     import xarray as xr
 
-from wirebayes.views.posterior import Posterior
+from wirebayes.views.posterior import Posterior, after_a_model
 from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
 
 
@@ -94,10 +94,15 @@ class Findings(Result[DiscoveryJson]):
         return [line for name, report in found.items() for line in terminal.of_findings(name, report)]
 
     def next_step(self, given: Given = NOTHING) -> str:
-        proposals = {name: found["next_measurement"] for name, found in self.report["experiments"].items()}
-        if len(proposals) == 1:
-            return next(iter(proposals.values()))
-        return " ".join(f"{name}: {proposal}" for name, proposal in proposals.items())
+        found = self.report["experiments"]
+        if len(found) > 1:
+            return "\n".join(f"{name}: {report['next_measurement']}" for name, report in found.items())
+        ((name, report),) = found.items()
+        measurement = report["next_measurement"]
+        if report["verdict"] not in ("named", "nothing-missing"):
+            return measurement
+        use = after_a_model(self.place.path, self.place.path / name / "final")
+        return use if report["verdict"] == "named" else f"{use}\n{measurement}"
 
     def _short_form(self) -> list[str]:
         return [

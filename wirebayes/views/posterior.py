@@ -240,6 +240,11 @@ class Posteriors(Result[dict[str, SummaryJson]], Mapping[str, Posterior]):
 def _after_fit(kinds: frozenset[str], place: ResultFolder, folder: Path, given: Given) -> str:
     """What to do with posteriors of a command's folder, of which one lies in `folder`."""
     if "model-check" in kinds:
-        return f"wirebayes discover {given.file}, to find out what the model is missing"
-    protocol = "PROTOCOL.csv (columns as in your readings, without what was read)"
-    return f"wirebayes predict {place.path} {protocol}, or wirebayes pose ROBOT.toml --wires {folder}"
+        return f"wirebayes discover {given.file}  (what is the model missing?)"
+    return after_a_model(place.path, folder)
+
+
+def after_a_model(results: Path, posterior: Path) -> str:
+    """What a model that describes its readings is good for."""
+    protocol = "PROTOCOL.csv  (PROTOCOL.csv: the holds to come)"
+    return f"wirebayes predict {results} {protocol}\nwirebayes pose ROBOT.toml --wires {posterior}"

@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import ClassVar, Generic, TypeVar, cast
 
+from wirebayes.answers.lines import for_terminal
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, check_run, read_json, stored_results, write_bytes
 from wirebayes.json_files.values import Quantiles
@@ -137,7 +138,7 @@ class Result(Generic[Content]):
         return [repr(self)]
 
     def next_step(self, given: Given = NOTHING) -> str:
-        """What a person would do with this result.
+        """What a person would do with this result, an alternative a line.
 
         Parameters
         ----------
@@ -147,7 +148,7 @@ class Result(Generic[Content]):
         return f"read {self.place.path}"
 
     def __str__(self) -> str:
-        return "\n".join(self.lines())
+        return "\n".join(for_terminal(self.lines()))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(self._short_form())})"

@@ -38,8 +38,8 @@ BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
 LATE = 3.0  # times the least time between readings: nobody who counts from the beginning of a hold begins so late
 ENDS_UNKNOWN = (
-    "times count from each hold, so how long it lasted after its last reading is not known: if the wire rested before "
-    "the next move, write a row without a reading at the moment of that move"
+    "when a hold ended is not known: if the wire rested between its last reading and the next move, add a row without "
+    "a reading at the moment of that move"
 )
 BACKWARDS = 0.5  # of the steps in time: holds of two readings or more whose times start again fall at fewer
 

@@ -1,0 +1,35 @@
+"""Sentences in lines that a terminal shows whole."""
+
+import re
+import shutil
+from collections.abc import Iterable
+from textwrap import wrap
+
+LETTERS = 100  # in a line at most, on terminals that have room for more: longer ones are hard to read
+_PIECE = re.compile(r"(?:\w+ )?\S+ \[[^]]*\](?: [^\s\d(]\S*)?|\d (?=[^\W\d])")  # a value with its interval and unit
+_FIXED = "\u00a0"  # stands for a space at which no line is broken
+
+
+def for_terminal(lines: Iterable[str]) -> list[str]:
+    """Lines as wide as the terminal at most, those that go on indented; whole where no terminal tells its width.
+
+    Parameters
+    ----------
+    lines : iterable of str
+    """
+    columns = min(shutil.get_terminal_size(fallback=(0, 0)).columns, LETTERS)
+    return [part for line in lines for part in (in_columns(line, columns) if columns else [line])]
+
+
+def in_columns(line: str, columns: int) -> list[str]:
+    """A line in lines of so many letters at most: a number stays with its interval and unit.
+
+    Parameters
+    ----------
+    line : str
+    columns : int
+    """
+    indent = len(line) - len(line.lstrip())
+    whole = _PIECE.sub(lambda piece: piece[0].replace(" ", _FIXED), line)
+    parts = wrap(whole, columns, subsequent_indent=" " * (indent + 2), break_long_words=False, break_on_hyphens=False)
+    return [part.replace(_FIXED, " ") for part in parts]
