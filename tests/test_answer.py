@@ -70,9 +70,9 @@ def test_an_error_on_held_out_holds_that_grows_is_said_to_be_no_better(tmp_path:
 def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) -> None:
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": SLIP, "b": CLEAN}})
     assert found.lines() == [
-        "a: something is missing; these readings do not tell what: grip slip (62 %), nothing known (17 %) or "
-        "toe (14 %) (p < 0.001)",
-        "  grip slip at hold 4 0.31 [0.25, 0.38] mm (the wire slipped in its grip once)",
+        "a: something is missing; these readings do not tell what: grip slip (62 %), toe (14 %) or none "
+        "of the catalogue (17 %) (p < 0.001)",
+        "  grip slip at hold 4 0.31 [0.25, 0.38] mm: the wire slipped in its grip once",
         "  hard to distinguish on this protocol: ageing",
         "  error on holds kept out of the fit: 0.25 -> 0.05 N rms",
         "b: nothing is missing that these readings can show (p = 0.4)",
@@ -114,7 +114,7 @@ def test_something_unknown_does_not_hide_the_names_that_are_likely_beside_it(tmp
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": likely, "b": alone}})
     assert found.lines() == [
         "a: something is missing that no effect in the catalogue explains (p < 0.001)",
-        "  beside it most likely toe (89 %) or nothing known (8 %); none of these is established",
+        "  its largest part may be toe (89 %) or none of the catalogue (8 %); nothing is established",
         "b: something is missing that no effect in the catalogue explains (p < 0.001)",
     ]
 
@@ -140,7 +140,10 @@ def test_a_comparison_says_errors_with_units_and_the_command_of_the_best_model(t
         table = {"base": "plain", "models": [best | changed, plain]}
         found = stored(Comparison, tmp_path, "comparison.json", {"experiments": {"w": table}})
         assert found.next_step(Given("w.toml")) == next_
-        assert found.lines() == ["w: a (0.34 mm rms) predicts left-out holds best, then plain (1.7 mm rms)"]
+        assert found.lines() == [
+            "w: a predicts left-out holds best, then plain",
+            "  rms error on the last holds: a 0.34 mm, plain 1.7 mm",
+        ]
     table = {"base": "plain", "models": [plain]}
     found = stored(Comparison, tmp_path, "comparison.json", {"experiments": {"w": table}})
     assert found.next_step(Given("w.toml")) == "wirebayes fit w.toml\nwirebayes discover w.toml"
@@ -156,7 +159,7 @@ def test_a_pose_says_its_drift_for_each_spread(tmp_path: Path) -> None:
     drift = [{"specimen_spread": 0.05, "times_s": [0.0, 600.0], "distance_mm": far}]
     found = stored(Pose, tmp_path, "pose.json", {"robot": "r", "feasible": True, "drift": drift})
     (line,) = found.lines()
-    assert line == "r: after 600 s the platform has drifted by 1 mm [0.5, 2] if wires cut from one line differ by 5 %"
+    assert line == "r: after 10 min the platform has drifted by 1 mm [0.5, 2] if wires cut from one line differ by 5 %"
 
 
 NAMED = {"usable": True, "exit_points_m": {"sd": [[0.0]]}, "identified": {"not_determined": []}}
@@ -240,7 +243,7 @@ def test_a_pose_that_no_draw_keeps_to_the_end_is_said_to_be_none(tmp_path: Path)
         "pose.json",
         {"robot": "r", "feasible": True, "drift": [drift | {"distance_mm": band}], "wires": {}},
     )
-    assert held.lines()[0].startswith("r: after 60 s the platform has drifted by 1.5 mm [1, 2]")
+    assert held.lines()[0].startswith("r: after 1 min the platform has drifted by 1.5 mm [1, 2]")
 
 
 def test_a_pose_that_nothing_holds_leads_to_another_one(tmp_path: Path) -> None:

@@ -55,10 +55,11 @@ def likely(found: SharedFindings) -> str:
         Of one experiment, as in ``discovery.json``.
     """
     shares = [(name, found["probabilities"][name]) for name in found["set"] if name in found["probabilities"]]
-    ranked = sorted(shares, key=lambda item: -item[1])
+    ranked = sorted(shares, key=lambda item: (item[0] == "unknown", -item[1]))
     if all(name == "unknown" for name, _ in ranked):
         return ""
-    return listed([f"{'nothing known' if n == 'unknown' else spoken(n)} ({100 * p:.0f} %)" for n, p in ranked], "or")
+    said = {name: "none of the catalogue" if name == "unknown" else spoken(name) for name, _ in ranked}
+    return listed([f"{said[name]} ({100 * p:.0f} %)" for name, p in ranked], "or")
 
 
 def families_said(found: SharedFindings) -> list[str]:

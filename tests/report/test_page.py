@@ -339,7 +339,7 @@ WORSE = DISCOVERY["held_out"] | {"final": {"rmse_N": 0.2, "elpd": 9.0, "elpd_dif
         ({"verdict": "unknown", "effects": [], "set": ["unknown"]}, "that no effect in the catalogue explains"),
         (
             {"verdict": "unknown", "effects": [], "probabilities": {"unknown": 0.2, "strain_stiffening": 0.8}},
-            "explains; beside it most likely strain stiffening (80 %), none of them established",
+            "explains; its largest part may be strain stiffening (80 %), and nothing is established",
         ),
         (
             {"verdict": "unknown", "effects": [], "probabilities": {}, "warnings": FEW},

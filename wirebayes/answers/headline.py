@@ -32,6 +32,8 @@ from wirebayes.sentences import (
     undecided,
 )
 
+USE = "Next: wirebayes predict for holds not measured yet, or wirebayes pose for a robot on this wire."
+
 
 def check_in_a_sentence(name: str, test: CheckedExperiment) -> str:
     """The stiffness as a quick look has it, what only the prior says, and how many effects the test would show.
@@ -93,7 +95,7 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     what = {
         "nothing-missing": f"{verdict_in_words(report)}: the plain model and its noise explain them",
         "unknown": f"{verdict_in_words(report)}"
-        + (f"; beside it most likely {candidates}, none of them established" if candidates else ""),
+        + (f"; its largest part may be {candidates}, and nothing is established" if candidates else ""),
         "ambiguous": undecided(report),
         "named": f"{listed(effects)} {are} missing{meaning}",
         "partial": f"{listed(effects)} {are} missing{meaning}, and something else that no effect in the catalogue "
@@ -144,9 +146,9 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
         chance = "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
         against = f", by {by} against {table['base']}{chance}"
     come = "come" if others[1:] else "comes"
-    then = f"; then {come} {listed([row['name'] for row in others[:3]])}" if others else ""
+    then = f"; then {come} {listed([spoken(row['name']) for row in others[:3]])}" if others else ""
     rest = f" and {len(others) - 3} more" if len(others) > 3 else ""
-    return f"{name}: {best['name']} predicts left-out holds best{against}{then}{rest}."
+    return f"{name}: {spoken(best['name'])} predicts left-out holds best{against}{then}{rest}."
 
 
 def batch_in_sentences(found: BatchJson) -> list[str]:

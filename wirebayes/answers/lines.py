@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from textwrap import wrap
 
 LETTERS = 100  # in a line at most, on terminals that have room for more: longer ones are hard to read
-_PIECE = re.compile(r"(?:\w+ )?\S+ \[[^]]*\](?: [^\s\d(]\S*)?|\d (?=[^\W\d])")  # a value with its interval and unit
+# not to be broken: a value with its interval and unit, a number with its unit, a unit in brackets
+_PIECE = re.compile(r"(?:\w+ )?\S+ \[[^]]*\](?: [^\s\d(]\S*)?|\d (?=[^\W\d])|\(\w+ \w+\)")
 _FIXED = "\u00a0"  # stands for a space at which no line is broken
 
 

@@ -22,6 +22,7 @@ from wirebayes.json_files.values import Quantiles
 from wirebayes.sentences import (
     coordinates,
     counted,
+    lasting,
     likely,
     listed,
     p_in_words,
@@ -43,14 +44,14 @@ def of_fit(summary: SummaryJson) -> list[str]:
     checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
     creep = f"creep after 2 min at {short(derived['tension_N'])} N: {_band(derived['creep_2min_mm'])} mm"
     lines = [
-        f"{summary['experiment']}: {state}, {checked}",
+        f"{summary['experiment']}: {state}, {checked} (medians, 90 % intervals)",
         f"  stiffness: {_parameters(summary, ('k1',))}",
         f"  {creep}",
         f"  creep law: {_parameters(summary, ('B', 'U', 'k2', 'N'))}",
     ]
     if summary["effects"]:
         lines.append(f"  effects: {_parameters(summary, [key.split('@')[0] for key in summary['effects']])}")
-    return [*lines, "  (each a median, and the interval that holds it nine times in ten)"]
+    return lines
 
 
 _SHOWN = ("k1", "B", "U", "k2", "N")
@@ -67,7 +68,7 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     verdict = report["verdict"]
     lines = [f"{name}: {_verdict(report)} ({p_in_words(report['p_global'], report['p_simulations'])})"]
     if verdict == "unknown" and likely(report):
-        lines.append(f"  beside it most likely {likely(report)}; none of these is established")
+        lines.append(f"  its largest part may be {likely(report)}; nothing is established")
     lines += [f"  {sentence}" for sentence in said_beside(report)]
     lines += [f"  {_effect_size(effect, size)}" for effect, size in report["amplitudes"].items()]
     lines += [f"  {elsewhere}" for elsewhere in in_other_tests(report)]
@@ -107,9 +108,8 @@ def _gain(report: ExperimentFindings) -> str:
 def _unit_and_meaning(effect: str, unit: str) -> str:
     """What stands behind the size of an effect."""
     known = what_it_is(effect)
-    if unit != "-":
-        return f" {unit} ({known})" if known else f" {unit}"
-    return f" (a pure number; {known})" if known else " (a pure number)"
+    size = "" if unit == "-" else f" {unit}"
+    return f"{size}: {known}" if known else size
 
 
 def in_other_tests(report: ExperimentFindings) -> list[str]:
@@ -233,22 +233,24 @@ def _list(title: str, items: list[str]) -> list[str]:
     return [f"  {title}: {', '.join(items)}"] if items else []
 
 
-def of_comparison(name: str, table: ComparedModels) -> str:
+def of_comparison(name: str, table: ComparedModels) -> list[str]:
     """Of one experiment: which models predict what they have not seen best, and with which error."""
     rows = [row for row in table["models"] if row["failed"] is None]
     if not rows:
-        return f"{name}: no model could be judged"
-    best, *others = [f"{row['name']}{_error_ahead(row)}" for row in rows]
-    base = next((f"; {row['name']}{_error_ahead(row)}" for row in rows[3:] if row["name"] == table["base"]), "")
-    then = f", then {', '.join(others[:2])}" if others else ""
-    return f"{name}: {best} predicts left-out holds best{then}{base}"
+        return [f"{name}: no model could be judged"]
+    best, *others = [spoken(row["name"]) for row in rows[:3]]
+    then = f", then {listed(others)}" if others else ""
+    base = [row for row in rows[3:] if row["name"] == table["base"]]
+    errors = [error for row in [*rows[:3], *base] if (error := _error_ahead(row))]
+    return [f"{name}: {best} predicts left-out holds best{then}", *_list("rms error on the last holds", errors)]
 
 
 def _error_ahead(row: ComparedModel) -> str:
-    """The rms error of a model on the last holds, in brackets; nothing where it was not scored on them."""
+    """A model with its rms error on the last holds; empty where it was not scored on them."""
     held = row.get("held_out")
     free = held["free"] if held else None
-    return f" ({short(error, 2)} {unit_read(free)} rms)" if free and (error := read_value(free, "rmse")) else ""
+    error = read_value(free, "rmse") if free else None
+    return f"{spoken(row['name'])} {short(error, 2)} {unit_read(free)}" if free and error else ""
 
 
 def options_of_best(table: ComparedModels) -> str | None:
@@ -280,7 +282,7 @@ def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
         if known_at_the_end(drift):
             middle, low, high = (short(far[q][-1], 3) for q in ("q50", "q05", "q95"))
             drifts.append(
-                f"{found['robot']}: after {time:g} s the platform {moved} by {middle} mm [{low}, {high}] "
+                f"{found['robot']}: after {lasting(time)} the platform {moved} by {middle} mm [{low}, {high}] "
                 f"if {specimens_are(drift['specimen_spread'])}"
             )
     return lines + (drifts or [f"{found['robot']}: no draw of the wires could be solved"])

@@ -19,4 +19,3 @@ def init_command(
     if not quiet:
         print(f"Written: {file} and {file.with_suffix('.csv')}, a test to replace by yours")
         print(f"Next: wirebayes check {file}")
-        print("  or: wirebayes import RAW.csv  (the file of a bench)")

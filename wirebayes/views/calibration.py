@@ -33,8 +33,8 @@ class Calibration(Result[CalibrateJson]):
             again = "with more poses, or once readings, stated errors and --anchor-sd are checked"
             return f"wirebayes calibrate {given.file} {again}"
         if robot.is_file():
-            settings = f"wirebayes export {robot} --wires {given.wires}, for the controller's settings"
-            return f"{settings}; references are in {lengths}"
+            settings = f"wirebayes export {robot} --wires {given.wires}  (the controller's settings)"
+            return f"{settings}, with the references of {lengths}"
         return f"set the lengths of {lengths} in the controller"
 
     def _short_form(self) -> list[str]:

@@ -28,8 +28,8 @@ class Check(Result[CheckJson]):
         return [line for name, test in found.items() for line in terminal.of_check(name, test)]
 
     def next_step(self, given: Given = NOTHING) -> str:
-        then = "once the warnings are settled" if self.warnings else f"then wirebayes discover {given.file}"
-        return f"wirebayes fit {given.file}, {then}"
+        then = "  (once the warnings are settled)" if self.warnings else f", then wirebayes discover {given.file}"
+        return f"wirebayes fit {given.file}{then}"
 
     def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]

@@ -26,7 +26,7 @@ class Comparison(Result[ComparisonJson]):
 
     def lines(self) -> list[str]:
         found = self.summary()["experiments"]
-        return [terminal.of_comparison(name, table) for name, table in found.items()]
+        return [line for name, table in found.items() for line in terminal.of_comparison(name, table)]
 
     def next_step(self, given: Given = NOTHING) -> str:
         tables = list(self.summary()["experiments"].values())

@@ -1,14 +1,11 @@
 """A robot with its wires for other programs."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION
 from wirebayes.json_files.export import ExportSummary
-
-if TYPE_CHECKING:
-    pass
-
+from wirebayes.sentences import counted, listed
 from wirebayes.views.result import Result, figure, html_table
 
 
@@ -30,6 +27,9 @@ class Export(Result[ExportSummary]):
         own = (CONFIGURATION, COMPLETE, self._content)
         paths = sorted(path for path in self.folder.iterdir() if path.is_file() and path.name not in own)
         return {path.name: path.read_text(encoding="utf-8") for path in paths}
+
+    def lines(self) -> list[str]:
+        return [f"{counted(len(self.files), 'file')}: {listed(list(self.files))}"]
 
     def _short_form(self) -> list[str]:
         return list(self.files)

@@ -84,7 +84,7 @@ def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path, given: Given) -
     if lost or not found.get("feasible", True):
         return "another pose or payload, or other bounds of the tension in the robot's file"
     calibrate = f"wirebayes calibrate {given.file} READINGS.csv --wires {given.wires}"
-    return f"{calibrate}, once the drift is more than you allow"
+    return f"{calibrate}  (when it drifts too far)"
 
 
 def _has_corrections(path: Path) -> bool:

@@ -94,6 +94,9 @@ def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
         f"alike, {100 * FALSE_ALARMS:g} % of materials have an outlier by chance."
     )
     rest = f" Not compared, with fewer than {LEAST_SPECIMENS} specimens: {_some(small)}." if small else ""
+    if set(small) == set(specimens):
+        none = f"No specimen is compared with others: no material has {LEAST_SPECIMENS}."
+        return [Text(none)]
     if not far:
         return [Text("No specimen is an outlier of its material.", strong=True), Text(rule + rest)]
     lines = [

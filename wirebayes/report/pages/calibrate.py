@@ -154,9 +154,16 @@ def _unknown(creep: EstimatedLengths, hooke: EstimatedLengths) -> Points:
         fits = "explains" if (result["p_joint"] or 0.0) >= SIGNIFICANT else "does not explain"
         points.append(
             f"With {name} the mean squared residual is {number(result['misfit'], 2)} (about 1 or less is expected): it "
-            f"{fits} readings and reference lengths (joint test, p = {number(result['p_joint'], 2)})."
+            f"{fits} readings and reference lengths (joint test, {_p(result['p_joint'])})."
         )
     return Points("How far it can be trusted", points)
+
+
+def _p(p: float | None) -> str:
+    """A p-value in words: how far below a thousandth it lies says nothing."""
+    if p is None:
+        return "no p"
+    return "p < 0.001" if p < 1e-3 else f"p = {number(p, 2)}"
 
 
 def _lengths(creep: EstimatedLengths, hooke: EstimatedLengths) -> Table:

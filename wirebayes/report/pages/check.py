@@ -90,9 +90,10 @@ def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
 def _about(e: CheckedExperiment) -> list[str]:
     """The sample and the test in sentences."""
     holds, readings = counted(e["recorded_holds"], "recorded hold"), counted(e["readings"], "reading")
+    unrecorded = f", {e['unrecorded_holds']} unrecorded" if e["unrecorded_holds"] else ""
     about = [
         f"{e['material']}, {number(e['length_mm'])} mm.",
-        f"{holds}, {e['unrecorded_holds']} unrecorded, {readings}.",
+        f"{holds}{unrecorded}, {readings}.",
         f"{number(e['duration_s'] / 60.0)} min in all.",
     ]
     ends = e.get("hold_ends")

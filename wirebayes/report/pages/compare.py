@@ -77,7 +77,7 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
         both = (held["free"], held["given_first"]) if held else (None, None)
         errors = (number(s and read_value(s, "rmse"), 2) for s in both)
         scores = (number(v, 2) for v in ((difference["elpd"], difference["se"]) if difference else (None, None)))
-        lines.append([r["name"], number(r.get("weight"), 2), *scores, *errors, _plain(r.get("meaning") or "")])
+        lines.append([r["name"], _share(r.get("weight")), *scores, *errors, _plain(r.get("meaning") or "")])
     blocks.append(
         Table(header, lines, "Best first. The weight is the model's share in the mixture with the best predictions.")
     )
@@ -86,6 +86,11 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     if failed:
         blocks.append(Table(["model", "why it was not scored"], failed))
     return Section(name, blocks)
+
+
+def _share(weight: float | None) -> str:
+    """A share of the mixture; what rounds to nothing is nothing."""
+    return number(weight if weight is None else round(weight, 3), 2)
 
 
 def _plain(meaning: str) -> str:

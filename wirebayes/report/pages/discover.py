@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers.headline import findings_in_a_sentence
+from wirebayes.answers.headline import USE, findings_in_a_sentence
 from wirebayes.answers.terminal import in_other_tests
+from wirebayes.effects.unknown import Discrepancy
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.discovery import AmplitudeEstimate, DiscoveryJson, ExperimentFindings
 from wirebayes.json_files.read_units import error_grows, read_value, unit_read
@@ -75,6 +76,8 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
     blocks: list[Block] = [*before_the_answer(v), *_alone(v), *beside_the_answer(v)]
     blocks += _curves(folder, name)
+    if v["verdict"] in ("named", "nothing-missing"):
+        blocks.append(Text(USE))
     if v.get("next_measurement"):
         blocks.append(Text(f"Measure next: {v['next_measurement']}"))
     blocks += _parameters(folder / name, v)
@@ -200,6 +203,8 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
         return [_plain_parameters(plain)]
     rows = []
     for name, after in final.items():
+        if name.startswith(f"{Discrepancy.name}."):
+            continue  # heights of a curve, a dozen of them
         before = plain.get(name)
         rows.append(
             [
@@ -211,7 +216,8 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
             ]
         )
     header = ["parameter", "unit", "plain", "90 %", "with what was found", "90 %", "what it is"]
-    return [Table(header, rows, "Each parameter before and after, both on all holds.")]
+    curve = " The smooth curve that stands for what has no name is left out." if len(rows) < len(final) else ""
+    return [Table(header, rows, f"Each parameter before and after, both on all holds.{curve}")]
 
 
 def _plain_parameters(parameters: Mapping[str, Parameter]) -> Table:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from wirebayes.answers.headline import fit_in_a_sentence
+from wirebayes.answers.headline import USE, fit_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.model.sample import Sample
@@ -164,7 +164,7 @@ def _next(summary: SummaryJson) -> str:
         return "Next: wirebayes discover with the same file looks for what the model is missing."
     if "not-converged" in kinds:
         return "Next: settle the warnings above, then fit again; these numbers are not to be used."
-    return "Next: wirebayes predict for holds not measured yet, or wirebayes pose for a robot on this wire."
+    return USE
 
 
 _CURVE = (
