@@ -8,7 +8,6 @@ it those of the Hangprinter's tutorial alone. Tests run the same commands and co
 
 import csv
 import json
-import os
 import re
 import shlex
 import shutil
@@ -20,6 +19,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from wirebayes.answers.lines import in_columns
 from wirebayes.report.blocks import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET
 from wirebayes.report.pictures.corner import corner
@@ -28,6 +28,7 @@ from wirebayes.report.pictures.discover import left_over
 from wirebayes.results.read_back import Stored, load_posterior
 
 DOCS = Path(__file__).parent
+COLUMNS = 96
 README = DOCS.parent / "README.md"
 CONTROLLERS = {
     "hooke_only": "ignores creep",
@@ -66,13 +67,14 @@ def start(folder: Path) -> None:
 
 
 def said_by(command: list[str], folder: Path) -> str:
-    """What a command prints in a folder on a terminal of so many columns."""
+    """What a command prints in a folder on a terminal of `COLUMNS`."""
     program = [sys.executable, "-m", "wirebayes", *command]
     both = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-    done = subprocess.run(program, cwd=folder, env=os.environ | {"COLUMNS": "96"}, **both, text=True)
+    done = subprocess.run(program, cwd=folder, **both, text=True)
     if done.returncode:
         raise RuntimeError(f"{shlex.join(command)}: {done.stdout}")
-    return f"{done.stdout.rstrip()}\n"
+    lines = done.stdout.rstrip().splitlines()
+    return "".join(f"{part}\n" for line in lines for part in in_columns(line, COLUMNS))
 
 
 def follow(folder: Path) -> dict[str, str]:

@@ -186,18 +186,19 @@ def test_what_is_found_is_used_and_what_is_not_is_measured(tmp_path: Path) -> No
 def test_a_line_is_as_wide_as_the_terminal_and_a_number_stays_with_its_interval(monkeypatch) -> None:
     numbers = [f"B{i} 0.2402 [0.21, 0.2721] mm N⁻ᵁ" for i in range(6)]
     line = f"  creep law: {', '.join(numbers)}"
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
     monkeypatch.setenv("COLUMNS", "70")
     shown = for_terminal([line])
     assert max(map(len, shown)) <= 70 and [part[:4] for part in shown] == ["  cr", *(3 * ["    "])]
     assert all(any(number in part for part in shown) for number in numbers)
     monkeypatch.setenv("COLUMNS", "300")
     assert 70 < max(map(len, for_terminal([line]))) <= 100
-    monkeypatch.delenv("COLUMNS")
-    monkeypatch.setattr("sys.__stdout__", None)  # as in a pipe
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: False)  # as in a pipe
     assert for_terminal([line]) == [line]
 
 
 def test_a_command_stays_in_one_line_to_be_copied(monkeypatch) -> None:
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
     monkeypatch.setenv("COLUMNS", "40")
     command = f"wirebayes pose ROBOT.toml --wires {'a' * 40}"
     assert answer.next_lines(f"{command}\n{'word ' * 12}") == [

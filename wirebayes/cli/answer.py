@@ -96,7 +96,6 @@ def _where(result: Result[Any]) -> list[str]:
 
 
 def next_lines(step: str) -> list[str]:
-    """The next step, an alternative a line: a command stays in one, to be copied."""
+    """The next step, an alternative a line."""
     first, *others = step.splitlines()
-    lines = [f"Next: {first}", *(f"  or: {other}" for other in others)]
-    return [part for line in lines for part in ([line] if "wirebayes " in line else for_terminal([line]))]
+    return for_terminal([f"Next: {first}", *(f"  or: {other}" for other in others)])
