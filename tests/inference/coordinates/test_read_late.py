@@ -72,13 +72,34 @@ def test_before_a_first_reading_creep_in_place_of_elastic_stretch_leaves_the_coo
     assert by_search == pytest.approx(np.log(k1), rel=1e-12)
 
 
-def test_the_coordinate_of_a_preload_is_the_last_reading_of_the_first_hold() -> None:
+def test_the_coordinate_of_a_preload_is_the_mean_of_last_readings() -> None:
     of = problem(5.0, 50.0, 100.0)
     theta = parameters(of, k1=np.geomspace(500.0, 2000.0, 5), k2=np.geomspace(0.003, 0.1, 5), preload=np.arange(5.0))
     coordinates = Transformation(of)
     column = of.names.index("preload")
     z = coordinates.to_sampled(theta)[:, column]
-    assert -z * coordinates.scale[column] == pytest.approx(readings(of, theta)[0, -1], rel=1e-9)
+    assert -z * coordinates.scale[column] == pytest.approx(readings(of, theta)[:, -1].mean(axis=0), rel=1e-9)
+
+
+@pytest.mark.parametrize("weights", [False, True])
+def test_creep_in_place_of_stretch_and_preload_leaves_their_coordinates(weights: bool) -> None:
+    """All creep over before it is read: a straight line through it adds to compliance and preload, whatever U is."""
+    made = draw([Bench(displacements_mm=(4.0, 8.0, 12.0, 16.0), times_s=(20.0, 50.0), resolution_N=0.0)], Truth(EXACT))
+    of = problem(20.0, 50.0) if weights else made.problem
+    (sample,) = of.samples
+    length, tension = sample.protocol.length_mm, np.array(WEIGHTS_N)
+    if not weights:
+        sample.readings[..., 0] = tension[:, None]
+    B = np.array([0.0, 0.3, 0.6])
+    slope, beside = np.polyfit(tension, tension**0.7, 1)
+    theta = parameters(of, k1=length / (length / 900.0 - slope * B), B=np.maximum(B, 1e-12), U=0.7, k2=10.0, N=1.0)
+    theta[:, of.names.index("preload")] += beside * B
+    coordinates, preload, k1 = Transformation(of), of.names.index("preload"), of.names.index("k1")
+    z = coordinates.to_sampled(theta)
+    assert np.ptp(theta[:, k1]) > 200.0
+    assert np.exp(z[:, k1]) == pytest.approx(900.0, rel=1e-9)
+    # but for the stretch of the creep itself, of a hundredth
+    assert np.ptp(z[:, preload]) * coordinates.scale[preload] < 0.05 * np.ptp(theta[:, preload])
 
 
 def test_a_creep_beyond_the_whole_compliance_is_of_no_wire() -> None:

@@ -89,6 +89,11 @@ class Ridge:
         """The share of its creep that a hold has reached after a time, (n,) or (T, n) for times (T, 1)."""
         return np.asarray(-np.expm1(-self.get(theta, "k2") * time_s ** self.get(theta, "N")))
 
+    @property
+    def end_s(self) -> Array:
+        """(H,) how long the holds last, s."""
+        return self.times_s[self.which_end]
+
     def softened(self, theta: Array, z: Array) -> Array:
         """(n,) by how much the log stiffness is less after the creep.
 
@@ -99,6 +104,16 @@ class Ridge:
         """
         log_gained = z[:, self.where["B"]] + self.log_unseen(theta)
         return np.asarray(np.logaddexp(0.0, log_gained - self.log_step))
+
+    def log_amount(self, theta: Array, z: Array) -> Array:
+        """(n,) log B as sampled, times what is read per elongation; with all that creeps beside the creep.
+
+        Parameters
+        ----------
+        theta, z : (n, d) arrays
+            Natural parameters, of which k1 and B are not looked at, and sampled coordinates.
+        """
+        return np.asarray(z[:, self.where["B"]] - self.log_creep(theta))
 
     def log_creep(self, theta: Array) -> Array:
         """(n,) log G: root mean square of the elongation that a hold shows, for B = 1, at natural parameters (n, d)."""

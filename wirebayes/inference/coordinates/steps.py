@@ -13,6 +13,7 @@ from wirebayes.inference.coordinates import shares
 from wirebayes.inference.coordinates.common_error import CommonError
 from wirebayes.inference.coordinates.displacement_level import DisplacementLevel
 from wirebayes.inference.coordinates.first_stretch import FirstStretch
+from wirebayes.inference.coordinates.last_readings import LastReadings
 from wirebayes.inference.coordinates.ridge import Ridge
 from wirebayes.inference.coordinates.slack_edge import SlackEdge
 from wirebayes.inference.coordinates.tension_level import TensionLevel
@@ -99,9 +100,17 @@ class Loss(Step):
 
 @dataclass(frozen=True)
 class SoftenedStiffness(Step):
-    """Log k1 becomes the log stiffness of the wire, with its fixture, after its creep; a fixture its share of it."""
+    """Log k1 becomes the log stiffness of the wire, with its fixture, after its creep; a fixture its share of it.
+
+    Attributes
+    ----------
+    ridge : Ridge
+    last : LastReadings, optional
+        By which the creep softens the wire; as much as in one hold where they are left out.
+    """
 
     ridge: Ridge
+    last: LastReadings | None = None
 
     def to_sampled(self, z: Array, theta: Array) -> None:
         ridge, column = self.ridge, self.ridge.where["k1"]
@@ -109,11 +118,11 @@ class SoftenedStiffness(Step):
             own = np.log(theta[:, ridge.fixture]) + np.log(ridge.get(theta, "k1")) - ridge.log_length
             z[:, ridge.fixture] = shares.score(own, np.zeros_like(own))
             z[:, column] -= np.logaddexp(0.0, own)
-        z[:, column] -= ridge.softened(theta, z)
+        z[:, column] -= self._softened(theta, z)
 
     def to_natural(self, theta: Array, z: Array) -> None:
         ridge, column = self.ridge, self.ridge.where["k1"]
-        log_k1 = z[:, column] + ridge.softened(theta, z)
+        log_k1 = z[:, column] + self._softened(theta, z)
         if ridge.fixture is not None:
             share, rest = shares.log_shares(z[:, ridge.fixture])
             theta[:, ridge.fixture] = np.exp(share - log_k1 + ridge.log_length)
@@ -124,15 +133,21 @@ class SoftenedStiffness(Step):
         column = self.ridge.fixture
         return 0.0 if column is None else shares.log_slope(theta[:, column], z[:, column])
 
+    def _softened(self, theta: Array, z: Array) -> Array:
+        if self.last is None:
+            return self.ridge.softened(theta, z)
+        return np.logaddexp(0.0, self.last.log_slope(theta) + self.ridge.log_amount(theta, z))
+
 
 @dataclass(frozen=True)
 class AddedCompliance(Step):
-    """Under weights, log k1 becomes the log stiffness of the wire after its creep.
+    """Under weights, log k1 becomes the log stiffness that last readings show: the creep until then adds compliance.
 
     Coordinates by which creep gives more than the whole compliance are of no wire.
     """
 
     ridge: Ridge
+    last: LastReadings
 
     def to_sampled(self, z: Array, theta: Array) -> None:
         column = self.ridge.where["k1"]
@@ -148,45 +163,32 @@ class AddedCompliance(Step):
         return np.asarray(np.log(theta[:, column]) - z[:, column])
 
     def _of_creep(self, theta: Array, z: Array) -> Array:
-        """(n,) strain gained in a hold over the step of the weight, 1/N."""
-        ridge = self.ridge
-        log_gained = z[:, ridge.where["B"]] + ridge.log_unseen(theta)
-        return np.exp(log_gained - ridge.log_length - ridge.log_step)
+        """(n,) strain by creep per tension, 1/N."""
+        return np.exp(self.last.log_slope(theta) + self.ridge.log_amount(theta, z) - self.ridge.log_length)
 
 
 @dataclass(frozen=True)
-class FirstElongation(Step):
-    """Under weights, the preload becomes what it is beside the elongation of the first hold.
+class MeanElongation(Step):
+    """The preload becomes what it is beside the mean elongation at last readings.
 
     Attributes
     ----------
-    ridge : Ridge
+    last : LastReadings
     preload : int
         Its column.
     scale : float
         Of its coordinate, mm.
-    weight, time_s : float
-        Of the first hold, N; when it was read for the last time.
     """
 
-    ridge: Ridge
+    last: LastReadings
     preload: int
     scale: float
-    weight: float
-    time_s: float
 
     def to_sampled(self, z: Array, theta: Array) -> None:
-        z[:, self.preload] -= self._elongation(theta) / self.scale
+        z[:, self.preload] -= self.last.mean_elongation(theta) / self.scale
 
     def to_natural(self, theta: Array, z: Array) -> None:
-        theta[:, self.preload] = z[:, self.preload] * self.scale + self._elongation(theta)
-
-    def _elongation(self, theta: Array) -> Array:
-        """(n,) elastic stretch and creep, mm."""
-        k1, B, U = (self.ridge.get(theta, name) for name in ("k1", "B", "U"))
-        length, strain = np.exp(self.ridge.log_length), self.weight / k1
-        crept = B * self.weight**U * self.ridge.reached(theta, self.time_s)
-        return np.asarray(length * strain + crept * (1.0 + strain))
+        theta[:, self.preload] = z[:, self.preload] * self.scale + self.last.mean_elongation(theta)
 
 
 @dataclass(frozen=True)

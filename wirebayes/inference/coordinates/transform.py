@@ -11,13 +11,15 @@ measured in standard deviations of their prior. Then, one after the other (`wire
   the holds. Effects on the amount of creep belong to G. Under weights, elongations are read, and this is the elongation
   gained: without ``log(k1 / L0)``. What creeps beside the creep in proportion to a sampled amplitude belongs to the
   tension lost, and these amplitudes become their shares of it (`wirebayes.inference.coordinates.shares`);
-- ``SoftenedStiffness``: log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + lost /
-  step)``, with the tension lost in a hold over the root mean square of the steps between first readings. Where all
-  creep is over before a first reading, the readings see this stiffness alone; where there is little, it is k1. Where a
-  fixture's compliance is sampled, k1 is in all this the stiffness of the wire with its
-  fixture, and the compliance becomes its share;
-- ``AddedCompliance`` and ``FirstElongation``: the same under weights, where compliances add up, and the preload becomes
-  what the first hold's elongation leaves of it, which asks for k1 and comes first;
+- ``SoftenedStiffness``: log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + k1 a / L0)``,
+  with a slope a of the elongation by creep over the tensions that holds were last read at
+  (`wirebayes.inference.coordinates.last_readings`); where these are all alike, and for normal approximations, of the
+  tension lost in a hold over the root mean square of the steps between first readings. Where all creep is over before
+  it is read, the readings see this stiffness alone; where there is little, it is k1. Where a fixture's compliance is
+  sampled, k1 is in all this the stiffness of the wire with its fixture, and the compliance becomes its share;
+- ``AddedCompliance``: the same under weights, where elongations are sampled and compliances add up;
+- ``MeanElongation``: the preload becomes what the mean elongation at last readings leaves of it, which asks for k1 and
+  comes first;
 - ``Level``: in a test of one displacement, k1 and B become what its tensions say beside the preload
   (`wirebayes.inference.coordinates.tension_level`);
 - ``WeightLevel``: in a test of one weight, the preload and B become what its displacements say beside k1
@@ -48,14 +50,15 @@ from wirebayes.inference.coordinates.columns import ColumnMap, columns_of
 from wirebayes.inference.coordinates.common_error import common_error
 from wirebayes.inference.coordinates.displacement_level import DisplacementLevel, displacement_levels
 from wirebayes.inference.coordinates.first_stretch import FirstStretch, first_stretches
+from wirebayes.inference.coordinates.last_readings import LastReadings, last_readings
 from wirebayes.inference.coordinates.ridge import Ridge, ridges_of
 from wirebayes.inference.coordinates.slack_edge import SlackEdge, slack_edge
 from wirebayes.inference.coordinates.steps import (
     AddedCompliance,
-    FirstElongation,
     Hazard,
     Level,
     Loss,
+    MeanElongation,
     Power,
     Preload,
     SoftenedStiffness,
@@ -127,19 +130,19 @@ class Transformation:
         slack = _slack_edges(problem, self.columns) if for_draws else []
         ridges = ridges_of(problem, self.columns, for_draws)
         levels: list[LevelStep] = []
-        firsts: list[FirstElongation] = []
         if for_draws and _is_usual(problem, self.columns, ridges):
             ridge, levels = _of_one_setting(problem, ridges[0], slack, self.scale)
             ridges = [ridge]
-            firsts = [] if levels else _first_elongations(problem, ridge, self.scale)
+        lasts = _last_readings(problem, ridges) if for_draws and not levels else [[] for _ in ridges]
+        means = _mean_elongations(problem, lasts, self.columns)
         of_levels = {column for step in levels if not isinstance(step, Level) for column in step.preloads}
         edges = [Preload(edge, self.scale[edge.preload]) for edge in slack if edge.preload not in of_levels]
         toes = _toes(problem, self.columns) if for_draws and not of_levels else []
-        self.steps = [*firsts, *_steps(ridges, levels, edges), *toes]
+        self.steps = [*_steps(ridges, lasts, levels, means, edges), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
         others = [
-            *(step.preload for step in firsts),
+            *(step.preload for step in means),
             *(step.preload for step in toes),
             *(e.edge.preload for e in edges),
         ]
@@ -203,21 +206,39 @@ class Transformation:
         return np.asarray(out.T)
 
 
-def _steps(ridges: Sequence[Ridge], levels: Sequence[LevelStep], preloads: Sequence[Preload]) -> list[Step]:
-    """The steps, each kind for all materials: what one asks for may be a column that an earlier material owns."""
-    asks_for_k1 = [step for step in preloads if step.edge.threshold != 0.0]
+def _steps(
+    ridges: Sequence[Ridge],
+    lasts: Sequence[Sequence[LastReadings]],
+    levels: Sequence[LevelStep],
+    means: Sequence[MeanElongation],
+    preloads: Sequence[Preload],
+) -> list[Step]:
+    """The steps, each kind for all materials: what one asks for may be a column that an earlier material owns.
+
+    Parameters
+    ----------
+    ridges : sequence of Ridge
+    lasts : sequence of sequences of LastReadings
+        Of each ridge.
+    levels, means, preloads : sequences of Step
+        Of tests of one setting, of others, and where preloads lie near an edge.
+    """
+    beside = {step.preload for step in means}
+    before = [step for step in preloads if step.edge.threshold != 0.0 or step.edge.preload in beside]
     level = _read_beside(levels)
     of_stretches = [step for step in levels if isinstance(step, StretchLevel)]
+    crept = [_after_creep(*both) for both in zip(ridges, lasts, strict=True) if "k1" in both[0].shifted]
     return [
-        *asks_for_k1,
+        *before,
+        *means,
         *(Stretched(each, step.scale[each.preload]) for step in of_stretches for each in step.levels),
         *(Loss(ridge, level) for ridge in ridges if "B" in ridge.shifted),
         *of_stretches,
-        *(_after_creep(ridge) for ridge in ridges if "k1" in ridge.shifted),
+        *(step for step in crept if step is not None),
         *(step for step in levels if not isinstance(step, StretchLevel)),
         *(Hazard(ridge) for ridge in ridges if "k2" in ridge.shifted),
         *(Power(ridge) for ridge in ridges if "U" in ridge.shifted),
-        *(step for step in preloads if step not in asks_for_k1),
+        *(step for step in preloads if step not in before),
     ]
 
 
@@ -247,30 +268,34 @@ def _of_one_setting(
     return ridge, []
 
 
-def _after_creep(ridge: Ridge) -> Step:
-    """The coordinate of the stiffness of a wire that has crept."""
-    return AddedCompliance(ridge) if ridge.elongations else SoftenedStiffness(ridge)
+def _after_creep(ridge: Ridge, lasts: Sequence[LastReadings]) -> Step | None:
+    """The coordinate of the stiffness of a wire that has crept, by the test whose tensions differ most."""
+    widest = max(lasts, key=lambda last: last.spread, default=None)
+    if widest is None or widest.spread == 0.0:
+        return None if ridge.elongations else SoftenedStiffness(ridge)
+    return AddedCompliance(ridge, widest) if ridge.elongations else SoftenedStiffness(ridge, widest)
 
 
-def _first_elongations(problem: Problem, ridge: Ridge, scale: Array) -> list[FirstElongation]:
-    """The samples under weights whose preload is open.
-
-    Parameters
-    ----------
-    problem : Problem
-    ridge : Ridge
-        Of the material.
-    scale : (d,) array
-        Of each parameter by itself.
-    """
+def _last_readings(problem: Problem, ridges: Sequence[Ridge]) -> list[list[LastReadings]]:
+    """Those of the tests of each ridge whose stiffness is sampled after its creep, where some do not show its begin."""
     out = []
-    for sample in problem.samples:
-        protocol, preload = sample.protocol, problem.place("preload", sample)
-        if protocol.control == "force" and isinstance(preload, int):
-            first = int(np.flatnonzero(protocol.recorded)[0])
-            time_s = protocol.time_s[first, protocol.last_reading[first]]
-            weight = float(protocol.setting[first])
-            out.append(FirstElongation(ridge, preload, float(scale[preload]), weight, float(time_s)))
+    for ridge in ridges:
+        k1 = ridge.where["k1"] if "k1" in ridge.shifted and problem.likelihood == "chain" else None
+        own = [last_readings(ridge, problem, s) for s in problem.samples if problem.place("k1", s) == k1]
+        read = [last for last in own if last.read.any()]
+        out.append(read if any(last.without_begin for last in read) else [])
+    return out
+
+
+def _mean_elongations(
+    problem: Problem, lasts: Sequence[Sequence[LastReadings]], columns: ColumnMap
+) -> list[MeanElongation]:
+    """The coordinates of preloads that are open, where creep before a first reading may stand for preload."""
+    out = []
+    for last in (last for of_ridge in lasts for last in of_ridge):
+        preload = problem.place("preload", last.sample)
+        if isinstance(preload, int) and columns.is_linear(preload) and last.without_begin:
+            out.append(MeanElongation(last, preload, float(columns.scale[preload])))
     return out
 
 
