@@ -41,10 +41,12 @@ def creep_of(unknowns: Unknowns, holds: Holds, state: State, known: Grown | None
 
 
 def _resolution(unknowns: Unknowns, holds: Holds, here: "_Here") -> float:
-    """What the session resolves of a tension, N: a reading's error, or what the joint values' makes of it."""
+    """What the session resolves of a tension, N: a reading's error, or what a joint value's makes of it."""
+    read = bool(np.isfinite(holds.tension_N).any())
+    if read and unknowns.errors.joint_m is None:
+        return holds.session.tension_sd_N
     joint_m = joint_error(unknowns, holds)
     by_joint = float(np.median(here.wires.theta["k1"]) * joint_m / np.median(here.zero))
-    read = bool(np.isfinite(holds.tension_N).any())
     return max(by_joint, holds.session.tension_sd_N) if read else by_joint
 
 

@@ -11,11 +11,13 @@ from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.trust import joint_test
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
-_FLOOR = 1e-6  # of the span: no encoder with drum and wire does better
-_LEAST_DEGREES = 1.0  # weight of `_FLOOR` beside the readings, in degrees of freedom
-# Where nobody read tensions, their scatter explains what errors of lengths would: half a millimetre of five metres is
-# then thought of these, as drums that wind layers have them, unless ten readings or more say otherwise.
-USUAL, _BLIND_DEGREES = 1e-4, 10.0
+# Of the span: half a millimetre of five metres is thought of joint values before anything was read, as drums that wind
+# layers have them. Thought exact, they would stay so: loops that are closed exactly show no error.
+USUAL = 1e-4
+# Weight of `USUAL` beside the readings, in degrees of freedom. Where nobody read tensions, their scatter explains what
+# errors of lengths would, and ten readings or more must say otherwise.
+_LEAST_DEGREES, _BLIND_DEGREES = 1.0, 10.0
+_FINEST = 1e-2  # of the usual error: no encoder with drum and wire does better
 # Of the span: loops that stay so far open belong to another robot, in another unit or another order. Layers on a drum
 # and a printer's anchors that are off by a decimetre leave less.
 _LOST = 0.01
@@ -84,9 +86,8 @@ def most_open_m(found: Whole, share: float) -> float:
 
 def usual_joint(robot: Robot, holds: Holds) -> tuple[float, float]:
     """Error of a joint value before anything was read, m, and its weight in degrees of freedom."""
-    if np.isfinite(holds.tension_N).any():
-        return _FLOOR * robot.span_m, _LEAST_DEGREES
-    return USUAL * robot.span_m, _BLIND_DEGREES
+    read = np.isfinite(holds.tension_N).any()
+    return USUAL * robot.span_m, _LEAST_DEGREES if read else _BLIND_DEGREES
 
 
 def joint_error(unknowns: Unknowns, holds: Holds) -> float:
@@ -120,7 +121,7 @@ def noise_shown(found: Whole, usual_m: float, worth: float) -> tuple[Floats, flo
     if stated is not None:  # every error is: what is left unbalanced then speaks against them
         return np.log([found.noise.joint_m, FRICTIONLESS]), np.inf
     joint, degrees = shown("loop", found.noise.joint_m, usual_m, worth)
-    return np.log([np.clip(joint, 1e-2 * usual_m, robot.span_m), balance]), degrees
+    return np.log([np.clip(joint, _FINEST * usual_m, robot.span_m), balance]), degrees
 
 
 def leverage(found: Whole, rows: slice) -> Floats:

@@ -3,20 +3,21 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtr
+from scipy.special import chdtr, fdtrc
 
 from wirebayes.progress import Progress
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.posterior import Whole
-from wirebayes.robot.self_calibration.residuals import lost, trust
+from wirebayes.robot.self_calibration.residuals import lost, trust, usual_joint
 from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.sensors import Suspects, suspects
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 from wirebayes.robot.self_calibration.whole import estimate, progress_of
 
-_RATHER = 3.0  # times smaller errors of the loops, before stated poses are taken for requests
+_RATHER = 3.0  # times smaller errors of loops or balance, before stated poses are taken for requests
 _WELL, _CHANCE = 0.1, 1e-4  # of the standard deviation before; of estimates that near to their prior's mean
+_NO_DEGREES = 1e-9  # of freedom: what loops that always close are left with
 _UNSEEN = 1e-3  # of the weight: as long as the balance fails by less, no sensor is looked at
 
 
@@ -86,10 +87,28 @@ def _rather_requests(found: Whole, holds: Holds, allowed: bool, progress: Progre
     blind = replace(holds, session=holds.session.without_poses())
     state = replace(found.state, white=np.zeros_like(found.state.white))
     other = estimate(found.unknowns, blind, state, progress_of(progress, "poses as requests"))
-    clearer = other.noise.joint_m * _RATHER < found.noise.joint_m and trust(other) >= SIGNIFICANT
-    if too_good or (other.converged and clearer):
+    better = _steadier(found, other) or _closer(found, other, holds)
+    if too_good or (other.converged and better and trust(other) >= SIGNIFICANT):
         return other, blind, True
     return found, holds, False
+
+
+def _steadier(found: Whole, other: Whole) -> bool:
+    """Whether tensions balance without the stated poses, and not with them."""
+    return found.noise.balance > max(_UNSEEN, _RATHER * other.noise.balance)
+
+
+def _closer(found: Whole, other: Whole, holds: Holds) -> bool:
+    """Whether loops close so much better without the stated poses that chance is no reason.
+
+    Poses that are unknown close every loop of a robot that has no wires to spare: such loops say nothing.
+    """
+    times = found.noise.joint_m / other.noise.joint_m
+    if not times > _RATHER:
+        return False
+    _, worth = usual_joint(found.unknowns.robot, holds)
+    with_poses, without = (max(one.degrees - worth, _NO_DEGREES) for one in (found, other))
+    return bool(fdtrc(with_poses, without, times**2) < SIGNIFICANT)
 
 
 def _too_good(found: Whole) -> bool:
