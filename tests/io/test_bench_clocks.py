@@ -5,6 +5,7 @@ import pytest
 from tests.io.bench_files import convert
 from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
+from wirebayes.io.bench.compound_times import spelt_s
 from wirebayes.io.bench.undecided import Choices, Undecided
 
 ABOUT = About("wire", "line", 1000.0)
@@ -233,3 +234,24 @@ def test_durations_of_hours_may_begin_anew_where_the_user_says_what_they_count_f
     dated = [f"2026-06-14 {cell:0>8}" for cell in cells]
     with pytest.raises(InputError, match="found moments of a day"):
         times_of(tmp_path, "Time", dated, time_since="hold")
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ["0 days 00:00:00", "0 days 00:30:00.500000", "2 days 01:00:00"],
+        ["0:00:00", "0:30:00.500000", "2 days, 1:00:00"],
+        ["0d 00:00:00", "0d 00:30:00,5", "2d 01:00:00"],
+        ["0 d 0 h", "30 min 0.5 s", "2 d 1 h"],
+        ["0 Tage 0 h", "30 min 0,5 s", "2 Tage 1 h"],
+    ],
+)
+def test_durations_may_have_days(cells, tmp_path):
+    rows = [f"{x};{cell};{x * 2.5 - i / 7:.2f}" for x in (1, 2) for i, cell in enumerate(cells)]
+    path = tmp_path / "raw.csv"
+    path.write_text("\n".join(["x (mm);Elapsed;F (N)", *rows]))
+    assert [row[2] for row in convert(path, ABOUT, Choices()).rows] == [0.0, 1800.5, 176400.0] * 2
+
+
+def test_hours_after_days_count_to_23():
+    assert spelt_s("1 d 23 h") == 169200.0 and spelt_s("1 d 24 h") is None and spelt_s("1 day, 1:60:00") is None

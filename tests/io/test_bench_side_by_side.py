@@ -180,3 +180,16 @@ def test_specimens_are_written_each_and_all_together(tmp_path):
     raw.write_text("\n".join(["a,a,a,A,A,A\nTime [s],Stroke [mm],Load [N],Time [s],Stroke [mm],Load [N]", *APART]))
     names = list(wb.import_bench(raw, length_mm=1000, output=tmp_path / "alike").summary()["experiments"])
     assert names == ["bench-1", "bench-2"]  # no file system tells a from A everywhere
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["Weight (kg),1 min,10 min,1 h [mm]", "Weight (kg),ΔL (mm) after 1 min,ΔL (mm) after 10 min,ΔL (mm) after 1 h"],
+)
+def test_times_across_may_be_in_several_units(tmp_path, header):
+    path = tmp_path / "raw.csv"
+    rows = [f"{kg},{kg + 0.25:.2f},{kg + 0.5:.2f},{kg + 0.75:.2f}" for kg in (1, 2, 3)]
+    path.write_text("\n".join([header.replace(" [mm]", ""), *rows]))
+    mapping = ("displacement=displacement [mm]",) if "[mm]" in header else ()
+    (made,) = convert(path, ABOUT, Choices(mapping=mapping))
+    assert [(row[1], row[2]) for row in made.rows[:3]] == [(1.25, 60.0), (1.5, 600.0), (1.75, 3600.0)]

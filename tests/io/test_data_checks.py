@@ -191,3 +191,15 @@ def test_holds_of_one_setting_leave_them_open_too(control, which, second, said):
     two = from_arrays([1] * 3 + [2] * 3, columns[0], [0.0, 10.0, 20.0] * 2, columns[1], **options)
     texts = [notice.text for notice in data_checks.one_setting(two.protocol(), set())]
     assert [text.startswith(f"{which} not tell k1 and the preload apart") for text in texts] == [True] * said
+
+
+@pytest.mark.parametrize(("weights", "said"), [((2, 4, 6, 8), True), ((2, 4, 6), False), ((8, 6, 4, 2), False)])
+def test_displacements_that_fall_under_growing_weights_are_named(weights, said):
+    """As those of a step test do whose columns of tension and displacement are interchanged."""
+    times = np.array([0.0, 10.0, 30.0, 60.0])
+    falling = [2.5 * w - 0.05 * np.log1p(times) for w in weights]
+    for readings, named in ((falling, said), ([5.0 * w - row for w, row in zip(weights, falling, strict=True)], False)):
+        hold, weight = (np.repeat(v, len(times)) for v in (np.arange(len(weights)), np.array(weights)))
+        columns = hold, np.concatenate(readings), np.tile(times, len(weights)), weight
+        test = from_arrays(*columns, length_mm=1000.0, name="w", material="m", control="force")
+        assert any("under ever larger weights" in n.text for n in data_checks.of_experiment(test)) == named

@@ -26,6 +26,7 @@ LARGEST_STRAIN = 0.5  # lines and ropes break below; rubber is no wire of this m
 ISOLATED = 10.0  # times as far from its neighbours as nine in ten readings
 GROSS = 0.2  # of the range of all other tensions; smaller ones are the model check's affair
 RISING_HOLDS, RISING_SHARE, RISE = 5, 0.8, 2.0  # holds on loading, share that rise, rise in noise levels: not by chance
+SHRINKING_HOLDS = 4  # no wire shrinks under a load: fewer are enough, if all of them do
 JUMP, JUMP_STAYS = 2.0, 0.2  # times the changes before and after it; share of it that is left to the hold's end
 FASTER = 5.0  # times the speed of the changes before and after it, which neither creep gains and loses nor a misprint
 COPIED = 3  # different readings that agree one by one at two displacements: not by chance
@@ -222,6 +223,24 @@ def rising(readings: CheckedTest) -> str:
     )
 
 
+def creeping_back(readings: CheckedTest) -> str:
+    """Displacement that falls within holds of ever larger weights, under which a wire creeps on."""
+    weights, noise = readings.setting, readings.noise
+    loading = [
+        row for j, row in enumerate(readings.each) if len(row) > 1 and (j == 0 or weights[j] > weights[:j].max())
+    ]
+    if len(loading) < SHRINKING_HOLDS:
+        return ""
+    fall = np.array([row[0] - row[-1] for row in loading])
+    if (fall > 0).mean() < RISING_SHARE or np.median(fall) <= RISE * noise:
+        return ""
+    return (
+        f"the displacement falls within {int((fall > 0).sum())} of {len(fall)} holds under ever larger weights, by "
+        f"{np.median(fall):.3g} mm in the middle, while a loaded wire creeps on: check that displacement and tension "
+        "are not interchanged, that time_s runs forward, and the gauge and the room for drift"
+    )
+
+
 def jump_within_a_hold(readings: CheckedTest) -> str:
     """A change from one reading to the next out of its hold's course, which stays: no wire does that by itself."""
     control = readings.protocol.control
@@ -303,5 +322,15 @@ CHECKS: dict[Control, tuple[Callable[[CheckedTest], str], ...]] = {
         off_grid,
         repeated,
     ),
-    "force": (run_on_times, elongation, strain_scale, outlier, jump_within_a_hold, zero_shift, off_grid, repeated),
+    "force": (
+        run_on_times,
+        elongation,
+        strain_scale,
+        outlier,
+        jump_within_a_hold,
+        zero_shift,
+        creeping_back,
+        off_grid,
+        repeated,
+    ),
 }

@@ -13,6 +13,7 @@ from wirebayes.io.bench.columns import Column
 from wirebayes.io.bench.quantities import UNITS, Role
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.table_numbers import COLUMN_ROLES
+from wirebayes.io.bench.undecided import Undecided, quoted
 from wirebayes.io.data_checks import falls
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import experiment_of
@@ -23,8 +24,10 @@ from wirebayes.wire.protocol import Control
 RESOLUTION: dict[Control, str] = {"displacement": "resolution_N", "force": "resolution_mm"}
 
 
-def check_direction(table: RawTable, column: Column, experiment: Experiment) -> None:
+def check_direction(table: RawTable, column: Column, experiment: Experiment, mapping: Sequence[str]) -> None:
     """Refuse a displacement counted downwards: the wire pulls the more, the further it is below zero.
+
+    Under weights zero may be anywhere, and a gauge may read less and less: then the user is asked.
 
     Parameters
     ----------
@@ -34,22 +37,40 @@ def check_direction(table: RawTable, column: Column, experiment: Experiment) -> 
         Of the displacement.
     experiment : Experiment
         Read with it.
+    mapping : sequence of str
+        What the user says of columns.
     """
     holds = experiment.recorded_holds
     place, pull = (
         np.array(v) for v in zip(*((np.mean(h.displacement_mm), np.mean(h.tension_N)) for h in holds), strict=True)
     )
-    if place.max() > 0 or not falls(place, pull):
+    if not falls(place, pull):
+        return
+    as_it_stands = f"{column.header}={column.role} [{UNITS[column.role]}]"
+    if experiment.control == "force" and as_it_stands not in mapping and _step_down(experiment):
+        where = f"{table.sheet.path}, {table.place(table.rows[0].line, column.index)}"
+        found = f"found displacements that fall from {place.max():g} to {place.min():g} mm as the weights rise"
+        answers = {_turned(column): "it counts down", f"--map {as_it_stands}": "as it stands"}
+        raise Undecided(f"{where}: {found}", "how it counts", answers)
+    if place.max() > 0:
         return
     found = f"displacements down to {place.min():g} mm, the further down the more tension"
-    expected = f"what lengthens the wire counted up; change the sign with {_turned(column)}"
+    expected = f"what lengthens the wire counted up; change the sign with {quoted(_turned(column))}"
     raise table.complain(table.rows[0].line, column.index, found, expected)
+
+
+def _step_down(experiment: Experiment) -> bool:
+    """Whether displacements jump down at every larger weight, and up at every smaller one."""
+    holds = experiment.recorded_holds
+    jumps = np.array([b.displacement_mm[0] - a.displacement_mm[-1] for a, b in zip(holds, holds[1:], strict=False)])
+    moves = np.array([b.setting - a.setting for a, b in zip(holds, holds[1:], strict=False)])
+    return bool((jumps * moves <= 0.0).all())
 
 
 def _turned(column: Column) -> str:
     """The option that turns the sign of a column."""
     unit = column.unit.text if column.unit else UNITS[column.role]
-    return f'--map "{column.header}={column.role} [{unit[1:] if unit[0] in "-−" else f"-{unit}"}]"'
+    return f"--map {column.header}={column.role} [{unit[1:] if unit[0] in '-−' else f'-{unit}'}]"
 
 
 def as_experiment(
@@ -98,7 +119,7 @@ class _RawReadings(CsvTable):
     origin: list[int]
 
     def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
-        tension, displacement = (_turned(self.columns[role]) for role in ("tension", "displacement"))
+        tension, displacement = (quoted(_turned(self.columns[role])) for role in ("tension", "displacement"))
         both = f"the signs with {displacement} {tension}"
         expected = expected.replace("the signs of displacement_mm and of tension_N", both)
         expected = expected.replace("the sign of tension_N", f"the sign with {tension}")

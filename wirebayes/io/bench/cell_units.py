@@ -10,7 +10,7 @@ from decimal import Decimal
 from functools import cache
 
 from wirebayes.io.bench.compound_times import is_spelt
-from wirebayes.io.bench.quantities import ROLES, Role, Unit, quantity_unit
+from wirebayes.io.bench.quantities import ROLES, Role, quantity_unit
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_number
 from wirebayes.io.bench.words import speaks_of
 
@@ -84,32 +84,37 @@ def _numbers(cells: Sequence[str]) -> tuple[str, dict[str, str]] | None:
         return None
     if any(map(is_spelt, filled)):  # times in two units, which are read as such
         return None
-    names = dict.fromkeys(unit for _, unit in measures.values())
+    alike = next((same for role in ROLES if (same := in_one_unit([*measures.values()], role))), None)
+    return None if alike is None else (alike[0], dict(zip(measures, alike[1], strict=True)))
+
+
+def in_one_unit(measures: Sequence[tuple[str, str]], role: Role) -> tuple[str, list[str]] | None:
+    """The smallest unit of some measures of a quantity, and their numbers in it; None where they are of several.
+
+    Parameters
+    ----------
+    measures : sequence of (str, str)
+        Number and unit of each.
+    role : str
+        The quantity.
+    """
+    names = list(dict.fromkeys(name for _, name in measures))
+    units = {name: unit for name in names if (unit := quantity_unit(name, role))}
+    if len(units) < len(names):
+        return None
     if len(names) == 1:
-        return next(iter(names)), {cell: number for cell, (number, _) in measures.items()}
-    return _in_the_smallest(measures, list(names))
-
-
-def _in_the_smallest(measures: dict[str, tuple[str, str]], names: list[str]) -> tuple[str, dict[str, str]] | None:
-    """Measures in several units of one quantity, in the smallest of them; None where they are of several quantities."""
-    units = next((found for role in ROLES if (found := _all_of(names, role))), None)
-    if units is None or any(number.count(",") + number.count(".") > 1 for number, _ in measures.values()):
+        return names[0], [number for number, _ in measures]
+    alike = len({unit.of_sample for unit in units.values()}) == 1 and not any(unit.offset for unit in units.values())
+    if not alike or any(number.count(",") + number.count(".") > 1 for number, _ in measures):
         return None
     smallest = min(names, key=lambda name: units[name].factor)
-    sign = "," if any("," in number for number, _ in measures.values()) else "."
-    numbers = {}
-    for cell, (number, name) in measures.items():
+    sign = "," if any("," in number for number, _ in measures) else "."
+    numbers = []
+    for number, name in measures:
         times = Decimal(f"{units[name].factor / units[smallest].factor:.12g}")
         value = times * Decimal("".join(number.split()).replace("\u2212", "-").replace(",", "."))
-        numbers[cell] = f"{value:f}".replace(".", sign)
+        numbers.append(f"{value:f}".replace(".", sign))
     return smallest, numbers
-
-
-def _all_of(names: Sequence[str], role: Role) -> dict[str, Unit] | None:
-    """The units of one quantity that texts are, if they all are and have a common zero."""
-    found = {name: unit for name in names if (unit := quantity_unit(name, role))}
-    alike = len({(unit.offset, unit.of_sample) for unit in found.values()}) == 1
-    return found if len(found) == len(names) and alike and not any(unit.offset for unit in found.values()) else None
 
 
 def _measure(cell: str) -> tuple[str, str] | None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 HOURS = r"hh?|hrs?|hours?|std\.?|stunden?|heures?|horas?|ore"
 MINUTES = r"mm?|mn|mins?\.?|minut[eo]s?|minuten|minuti"
 SECONDS = r"ss?|secs?\.?|seconds?|sek\.?|sekunden?|secondes?|segundos?|secondi"
+_DAYS = r"d|days?|tage?|jours?|dias?|días?|giorn[oi]|dagen|dag"
 _AND = r"\s+(?:and|und|et|y|e|en)\s+"
 _JOINT = rf"(?:{_AND}|\s*[:.,'\-–_]\s*|\s+)"
 _FRACTION = r"(?:[.,](?:f+|0+|x+|z+|s+|ms))?"
@@ -15,8 +16,9 @@ _ANNOUNCED = re.compile(
     re.IGNORECASE,
 )
 _SPELT = re.compile(
-    rf"(?:(?P<hours>\d+)\s*(?:{HOURS})[\s,]*)?(?:(?P<minutes>\d+)\s*(?:{MINUTES}|['′])[\s,]*)?"
-    rf"(?:(?P<seconds>\d+(?:[.,]\d+)?)\s*(?:{SECONDS}|''|[\"″]))?(?P<rest>\d\d)?",
+    rf"(?:(?P<days>\d+)\s*(?:{_DAYS})[\s,]*)?(?:(?P<clock>\d{{1,2}}:\d\d:\d\d(?:[.,]\d+)?)"
+    rf"|(?:(?P<hours>\d+)\s*(?:{HOURS})[\s,]*)?(?:(?P<minutes>\d+)\s*(?:{MINUTES}|['′])[\s,]*)?"
+    rf"(?:(?P<seconds>\d+(?:[.,]\d+)?)\s*(?:{SECONDS}|''|[\"″]))?(?P<rest>\d\d)?)",
     re.IGNORECASE,
 )
 
@@ -48,13 +50,18 @@ def announced(text: str) -> Announced | None:
 
 
 def spelt_s(cell: str) -> float | None:
-    """Seconds of a cell that names its units, as ``1 h 30 min``, ``1h30``, ``2'30''`` or ``30 s``; None of others.
+    """Seconds of a cell that names its units, as ``1 h 30 min``, ``1h30``, ``2'30''``, ``30 s`` or ``1 day, 0:10:00``.
 
-    A part after a larger one counts to 59, and has two digits where it does not name its unit.
+    None of others, but for a clock alone. A part after a larger one counts to 59, or to 23, and has two digits where it
+    does not name its unit.
     """
     found = _SPELT.fullmatch(cell)
-    if found is None or not any(found.group("hours", "minutes", "seconds")):
+    if found is None or not any(found.group("days", "clock", "hours", "minutes", "seconds")):
         return None
+    days = 86400.0 * float(found["days"] or 0)
+    if found["clock"]:
+        hours, minutes, seconds = (float(part.replace(",", ".")) for part in found["clock"].split(":"))
+        return None if minutes >= 60.0 or seconds >= 60.0 else days + 3600.0 * hours + 60.0 * minutes + seconds
     rest = found["rest"]
     if rest and found["seconds"]:
         return None
@@ -65,8 +72,15 @@ def spelt_s(cell: str) -> float | None:
         seconds = float(rest)
     elif rest:
         minutes = float(rest)
-    too_many = found["hours"] and minutes >= 60.0 or (found["hours"] or found["minutes"]) and seconds >= 60.0
-    return None if too_many else 3600.0 * hours + 60.0 * minutes + seconds
+    too_many = (
+        found["days"]
+        and hours >= 24.0
+        or found["hours"]
+        and minutes >= 60.0
+        or (found["hours"] or found["minutes"])
+        and seconds >= 60.0
+    )
+    return None if too_many else days + 3600.0 * hours + 60.0 * minutes + seconds
 
 
 def is_spelt(cell: str) -> bool:

@@ -34,6 +34,7 @@ from wirebayes.io.bench.table_numbers import READS, Recorded, recorded_in
 from wirebayes.io.bench.thinning import MOST, kept_readings
 from wirebayes.io.bench.turned import row_for_each_reading
 from wirebayes.io.bench.undecided import Choices
+from wirebayes.io.bench.unit_names import with_units_beside
 from wirebayes.io.bench.words import known_words
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import OPTIONAL, REQUIRED
@@ -142,7 +143,7 @@ def lacks_a_setting(path: Path, choices: Choices) -> bool:
 
 def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted]:
     """The experiments of the specimens of a table."""
-    table = with_titles_as_columns(table, choices.mapping)
+    table = with_titles_as_columns(with_units_beside(table), choices.mapping)
     table = with_dates(with_joined_parts(table, choices.mapping), choices.time_since)
     tables = specimen_tables(table, choices.mapping, choices.specimens)
     if len(tables) > 1:
@@ -196,7 +197,7 @@ def _convert(recorded: Recorded, notes: list[str], about: About, choices: Choice
     header = (*REQUIRED, *(OPTIONAL if "temperature" in values else ()))
     rows, origin = _rows(holds, values, control)
     experiment = as_experiment(table, columns, header, rows, origin, about, resolution, control)
-    check_direction(table, columns["displacement"], experiment)
+    check_direction(table, columns["displacement"], experiment, choices.mapping)
     recording = _recording(holds, values) if holds.of_test else None
     return Converted(experiment, rows, header, notes, recording, holds.warnings)
 

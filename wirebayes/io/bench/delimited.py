@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from wirebayes.errors import InputError
-from wirebayes.io.bench import keyed_lines, labview, serial_monitor
+from wirebayes.io.bench import json_records, keyed_lines, labview, serial_monitor
 from wirebayes.io.bench.cell_units import bare, joined_measures
 from wirebayes.io.bench.decode import UNICODE
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
@@ -13,7 +13,7 @@ from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
 _NAMES = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 LONGEST_LINE = 100_000  # characters: thousands of columns; Python's csv refuses longer cells
 _LOOKED_AT = 2000  # lines: enough to see a habit
-_COMMENT = re.compile(r"\s*[\"']?(#|%|//)+\s*")
+_COMMENT = re.compile(r"\s*[\"']?(#|%|//)+(?![\"'])\s*")  # a cell "#" is a name
 _BETWEEN_WORDS = re.compile(r"\s+(?![(\[][^()\[\]]*[)\]])")  # but not before a unit in brackets: Load (N)
 _UNDER_A_HEADER = re.compile(r":?-{2,}:?")  # of a table in Markdown
 _WITH_UNIT = re.compile(r"[-+]?\d+([.,]\d+)? ?[^\W\d]{1,5}\d?")  # 4 mm, 11.02 N
@@ -40,6 +40,8 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     lines = text.splitlines() or [""]
     if labview.is_measurement(lines):
         return labview.sheet_of_measurement(path, lines, encoding)
+    if json_records.are_records(text):
+        return json_records.sheet_of_records(path, text, encoding)
     if serial_monitor.is_log(lines):
         sent, arrivals = serial_monitor.without_stamps(lines)
         return serial_monitor.with_arrivals(sheet_of_text(path, "\n".join(sent), encoding), arrivals)

@@ -13,7 +13,8 @@ UNIT_IN_BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
 _UNIT_FIRST = re.compile(
     r"(millis|micros|seconds|minutes|hours|sekunden|minuten|stunden|secondes|heures|segundos|minutos)(?!\S)", re.I
 )
-_BEFORE_UNIT = re.compile(r"\s*/\s*|,\s*|\s+in\s+|[_\s]+")
+_BRACKET = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+_BEFORE_UNIT = re.compile(r"\s*/\s*|,\s*|\s+in\s+|[_\s.]+")
 _DIVIDED = re.compile(r"/\s*\d+$")  # what stands before a unit that may be a share of it: Weg/10 mm
 # what a unit in brackets may begin with: durations in minutes
 _IN = re.compile(r"(?:.*\s)?(?:in|en|em)\s+", re.IGNORECASE)
@@ -47,7 +48,7 @@ def is_copy(table: RawTable, column: int, other: int) -> bool:
 
 
 def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
-    """A header without its unit, and the unit: in brackets, after a slash, a comma, ``in``, ``_`` or a space.
+    """A header without its unit, and the unit: in brackets, after a slash, a comma, ``in``, ``_``, a point or a space.
 
     A time may begin with its unit in full: hours at load.
     """
@@ -55,6 +56,14 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
     in_brackets = unit_in_header(_IN.sub("", bracket[2]), role) if bracket else None
     if bracket and in_brackets:
         return bracket[1], in_brackets
+    for inside in _BRACKET.finditer(header):  # Force (N) run 1
+        unit = unit_in_header(inside[1].strip(), role)
+        if unit and inside.start():
+            return f"{header[: inside.start()].strip()} {header[inside.end() :].strip()}".strip(), unit
+    if bracket and not any(unit_in_header(bracket[2], other) for other in ROLES):  # Force, N (serial number 7)
+        name, unit = name_and_unit(bracket[1], role)
+        if unit:
+            return f"{name} ({bracket[2]})", unit
     for sign in _BEFORE_UNIT.finditer(header):
         unit = unit_in_header(header[sign.end() :], role)
         if unit and sign.start() and not _DIVIDED.search(header[: sign.start()]):

@@ -97,6 +97,8 @@ class Recorded:
         if nearest > FAR * length_mm and nearest > FAR_STEPS * float(np.ptp(x)):
             found = f"found displacements from {x.min():g} to {x.max():g} mm of a wire of {length_mm:g} mm"
             answers = {f"--zero-mm {x[0]:g}": "counted from the first reading", "--zero-mm 0": "as they stand"}
+            if np.abs(x - length_mm).min() < FAR * length_mm:
+                answers |= {f"--zero-mm {length_mm:g}": "lengths of the wire"}
             place = self.table.place(self.table.rows[0].line, self.columns["displacement"].index)
             raise Undecided(f"{self.table.sheet.path}, {place}: {found}", "where the wire begins to pull", answers)
 

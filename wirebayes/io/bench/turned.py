@@ -1,12 +1,13 @@
 """Tables with a column for each time or each hold, as people write them on paper, as rows of one reading each.
 
 ``Weg [mm]; 0 s; 30 s; 60 s`` has a hold in each row, ``Zeit [s]; 1 mm; 2 mm; 3 mm`` one in each column. The headers of
-three columns or more then are numbers with one unit, and one other column is what these leave open.
+three columns or more then are numbers with units of one quantity, and one other column is what these leave open.
 """
 
 import re
 from dataclasses import dataclass, replace
 
+from wirebayes.io.bench.cell_units import in_one_unit
 from wirebayes.io.bench.header import is_of, name_and_unit
 from wirebayes.io.bench.quantities import Role, quantity_unit
 from wirebayes.io.bench.sheet import SheetRow, is_number
@@ -17,6 +18,7 @@ _NUMBER = r"[+\-\u2212]?\d+(?:[.,]\d+)?"
 _MEASURE = re.compile(
     rf"(?P<before>.*?)(?<![\w.,])(?P<number>{_NUMBER})\s*(?P<unit>[^\W\d_°]+\.?|\")(?!\w)(?P<after>.*)"
 )
+_AT = re.compile(r"(?<!\w)(after|nach|apr[eè]s|dopo|despu[eé]s de|at|bei)(?!\w)", re.IGNORECASE)
 _EMPTY = re.compile(r"\(\s*\)|\[\s*\]")
 _ALONG: tuple[Role, ...] = ("time", "displacement", "tension")  # what may run along the header
 
@@ -76,20 +78,23 @@ def row_for_each_reading(table: RawTable) -> RawTable:
 
 def _across(table: RawTable) -> _Across | None:
     """The columns whose headers are different values of one quantity in one unit; None where they are few."""
-    found: dict[tuple[Role, str, str], dict[int, str]] = {}
+    found: dict[tuple[Role, str], dict[int, tuple[str, str]]] = {}
     for i, name in enumerate(table.header):
         measure = _MEASURE.fullmatch(name)
         role = None if measure is None else next((r for r in _ALONG if quantity_unit(measure["unit"], r)), None)
         if measure is None or role is None:
             continue
-        left = _EMPTY.sub("", f"{measure['before']} {measure['after']}")
+        left = _AT.sub("", _EMPTY.sub("", f"{measure['before']} {measure['after']}"))
         cells = " ".join(left.split()).strip("@=,;: ")
-        found.setdefault((role, measure["unit"], cells), {})[i] = measure["number"]
+        found.setdefault((role, cells), {})[i] = measure["number"], measure["unit"]
     alike = max(found, key=lambda key: len(found[key]), default=None)
-    if alike is None or len(set(found[alike].values())) < max(FEWEST, len(found[alike])):
+    one_unit = None if alike is None else in_one_unit([*found[alike].values()], alike[0])
+    if alike is None or one_unit is None:
         return None
-    role, unit, cells = alike
-    return _Across(role, unit, found[alike], cells)
+    unit, numbers = one_unit
+    if len(set(numbers)) < max(FEWEST, len(numbers)):
+        return None
+    return _Across(alike[0], unit, dict(zip(found[alike], numbers, strict=True)), alike[1])
 
 
 def _name_of_cells(table: RawTable, across: _Across, read: Role) -> tuple[str, str]:

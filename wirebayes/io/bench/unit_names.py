@@ -9,7 +9,9 @@ from dataclasses import replace
 from wirebayes.io.bench.header import NO_UNIT
 from wirebayes.io.bench.quantities import ROLES, Role, quantity_unit
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.bench.words import speaks_of_a_quantity
+from wirebayes.io.bench.words import plain_letters, speaks_of_a_quantity
+
+_UNIT = {"unit", "units", "einheit", "unite", "unidad", "unita", "unidade", "eenheid", "enhet", "enhed"}
 
 
 def with_quantities(table: RawTable) -> RawTable:
@@ -37,6 +39,25 @@ def with_quantities(table: RawTable) -> RawTable:
     if of_specimens and _are_named_by_units(under_repeated):
         return replace(table, header=_quantities(table.header, under_repeated), above=table.header)
     return table
+
+
+def with_units_beside(table: RawTable) -> RawTable:
+    """The table without columns that hold a unit alone, each of which is the unit of the column before it.
+
+    Parameters
+    ----------
+    table : RawTable
+        As displays write it: ``12.5;N;2.0;mm``, under headers such as ``Force;Unit`` or ``Force;``.
+    """
+    header, units = list(table.header), list(table.units)
+    for i in range(1, len(header)):
+        cells = {cell for cell in table.column(i) if cell}
+        called = header[i] == "" or plain_letters(header[i]) in _UNIT
+        if len(cells) == 1 and called and not units[i - 1] and header[i - 1]:
+            (unit,) = cells
+            if any(quantity_unit(unit, role) for role in ROLES):
+                header[i], units[i - 1] = "", unit
+    return replace(table, header=tuple(header), units=tuple(units))
 
 
 def _are_named_by_units(cells: tuple[str, ...]) -> bool:

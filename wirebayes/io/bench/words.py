@@ -15,7 +15,8 @@ WORDS: dict[Role, tuple[str, ...]] = {
         "ступень", "шаг", "段階", "步骤", "步", "级", "단계",
     ),
     "displacement": (
-        "displacement", "extension", "elongation", "position", "pos", "stroke", "crosshead", "travel", "stretch", "weg",
+        "displacement", "extension", "elongation", "elong", "deflection",
+        "position", "pos", "stroke", "crosshead", "travel", "stretch", "weg",
         "verschiebung", "verlangerung", "dehnung", "auslenkung", "deplacement", "allongement", "course",
         "wegaufnehmer", "wegsensor",
         "desplazamiento", "alargamiento", "elongacion", "posicion", "carrera", "spostamento", "allungamento", "corsa",
@@ -65,7 +66,8 @@ SAMPLE_WORDS: dict[Role, tuple[str, ...]] = {
 RIG_WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok", "distance",
                      "entfernung", "langenanderung", "ruler", "lineal", "regle", "regla", "righello", "regua",
-                     "liniaal"),
+                     "liniaal", "length", "lange", "laenge", "longueur", "longitud", "lunghezza", "comprimento",
+                     "lengte"),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
     "time": ("duration", "dauer", "durata", "duracion", "duracao", "duur"),
 }  # fmt: skip

@@ -1,0 +1,108 @@
+"""What loggers and programs write: names with serial numbers or runs, units in columns of their own, JSON, lengths."""
+
+import json
+
+import pytest
+
+from tests.io.bench_files import convert
+from wirebayes.io.bench.about import About
+from wirebayes.io.bench.header import name_and_unit
+from wirebayes.io.bench.undecided import Choices, Undecided
+
+ABOUT = About("wire", "line", 1000.0)
+READINGS = [(x, t, 3.0 * x - t / 100.0) for x in (1.0, 2.0) for t in (0.0, 30.0, 120.0)]
+
+
+def read(tmp_path, text, **choices):
+    path = tmp_path / "raw.csv"
+    path.write_text(text)
+    return convert(path, ABOUT, Choices(**choices))
+
+
+def of_readings(made):
+    return [tuple(row[1:4]) for row in made.rows]
+
+
+@pytest.mark.parametrize(
+    ("header", "role", "name", "unit"),
+    [
+        ("Force (N) Run #1", "tension", "Force Run #1", "N"),
+        ("Force, N (LGR S/N: 1023, SEN S/N: 77)", "tension", "Force (LGR S/N: 1023, SEN S/N: 77)", "N"),
+        ("F.N", "tension", "F", "N"),
+        ("t.s", "time", "t", "s"),
+        ("Force No.2", "tension", "Force No.2", None),
+        ("(N) alone", "tension", "(N) alone", None),  # a unit is no name
+    ],
+)
+def test_units_amid_a_name_are_found(header, role, name, unit):
+    found = name_and_unit(header, role)
+    assert (found[0], found[1].text if found[1] else None) == (name, unit)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        '"#","Displacement, mm (LGR S/N: 1)","Time, s","Force, N (LGR S/N: 1)"',
+        '"","x.mm","t.s","F.N"',
+        "Reading,Elong. (mm) Run #1,Time (s) Run #1,Force (N) Run #1",
+    ],
+)
+def test_names_of_loggers_and_programs(tmp_path, header):
+    rows = [f"{i},{x},{t},{f:.2f}" for i, (x, t, f) in enumerate(READINGS, start=1)]
+    assert of_readings(read(tmp_path, "\n".join([header, *rows]))) == [pytest.approx(r) for r in READINGS]
+
+
+@pytest.mark.parametrize("header", ["x (mm);t (s);Force;Unit", "x (mm);t (s);Force;", "x (mm);t (s);Force;Einheit"])
+def test_a_unit_in_a_column_of_its_own_is_that_of_the_column_before(tmp_path, header):
+    rows = [f"{x};{t};{f / 1000:.5f};kN" for x, t, f in READINGS]
+    assert of_readings(read(tmp_path, "\n".join([header, *rows]))) == [pytest.approx(r) for r in READINGS]
+
+
+def test_a_column_that_is_no_unit_leaves_the_question(tmp_path):
+    rows = [f"{x};{t};{f:.5f};N" for x, t, f in READINGS]
+    with pytest.raises(Undecided, match=r"column 3 \(Force\): found no unit"):
+        read(tmp_path, "\n".join(["x (mm);t (s);Force;Mode", *rows]))
+    with pytest.raises(Undecided, match=r"column 3 \(Force\): found no unit"):
+        read(tmp_path, "\n".join(["x (mm);t (s);Force;Unit", *rows]).replace("N", "kN", 1).replace("N", "kN", 2))
+
+
+RECORDS = [{"t_s": t, "wire": {"position_mm": x, "force_N": f}, "ok": None} for x, t, f in READINGS]
+LISTS = {"x_mm": [r[0] for r in READINGS], "t_s": [r[1] for r in READINGS], "force_N": [r[2] for r in READINGS]}
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["\n".join(map(json.dumps, RECORDS)), json.dumps(RECORDS), json.dumps(RECORDS, indent=2), json.dumps(LISTS)],
+)
+def test_records_in_json_are_rows(tmp_path, text):
+    made = read(tmp_path, text)
+    assert of_readings(made) == [pytest.approx(r) for r in READINGS]
+    assert made.notes[0].startswith("records in JSON")
+
+
+def test_a_record_is_named_by_its_line(tmp_path):
+    bad = [*RECORDS[:4], {"t_s": 30.0, "wire": {"position_mm": 2.0, "force_N": "open"}}, RECORDS[5]]
+    with pytest.raises(ValueError, match=r"line 5, .*force_N\): found 'open'"):
+        read(tmp_path, "\n".join(map(json.dumps, bad)))
+    with pytest.raises(ValueError, match=r"line 34, .*force_N\): found 'open'"):
+        read(tmp_path, json.dumps(bad, indent=2))
+
+
+def test_a_length_is_counted_from_where_it_begins_to_pull(tmp_path):
+    rows = [f"{1000 + x},{t},{f:.2f}" for x, t, f in READINGS]
+    text = "\n".join(["Length (mm),Time (s),Force (N)", *rows])
+    with pytest.raises(Undecided) as asked:
+        read(tmp_path, text)
+    assert asked.value.answers["--zero-mm 1000"] == "lengths of the wire"
+    assert of_readings(read(tmp_path, text, zero_mm=1000.0)) == [pytest.approx(r) for r in READINGS]
+
+
+def test_a_gauge_that_counts_down_under_weights_is_asked_about(tmp_path):
+    rows = [f"{load},{t},{20 - load - t / 900:.3f}" for load in (1, 2, 3) for t in (0, 60, 300)]
+    text = "\n".join(["Weight (kg),Time (s),Dial (mm)", *rows])
+    with pytest.raises(Undecided, match="displacements that fall from 18.* to 16.* mm as the weights rise"):
+        read(tmp_path, text)
+    assert read(tmp_path, text, mapping=("Dial (mm)=displacement [-mm]",)).rows[0][1] == -19.0
+    assert read(tmp_path, text, mapping=("Dial (mm)=displacement [mm]",)).rows[0][1] == 19.0
+    longer = [f"{load},{t},{10 + load + 3 * i + t / 100:.3f}" for i, load in enumerate((3, 2, 1)) for t in (0, 60, 300)]
+    assert read(tmp_path, "\n".join(["Weight (kg),Time (s),Dial (mm)", *longer])).rows  # creep is more than the steps
