@@ -1,4 +1,4 @@
-"""What loggers and programs write: names with serial numbers or runs, units in columns of their own, JSON, lengths."""
+"""What loggers, programs and people write: names with runs, units in columns of their own, JSON, primes, inches."""
 
 import json
 
@@ -106,3 +106,63 @@ def test_a_gauge_that_counts_down_under_weights_is_asked_about(tmp_path):
     assert read(tmp_path, text, mapping=("Dial (mm)=displacement [mm]",)).rows[0][1] == 19.0
     longer = [f"{load},{t},{10 + load + 3 * i + t / 100:.3f}" for i, load in enumerate((3, 2, 1)) for t in (0, 60, 300)]
     assert read(tmp_path, "\n".join(["Weight (kg),Time (s),Dial (mm)", *longer])).rows  # creep is more than the steps
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\n".join(f"  - {{time_s: {t}, displacement_mm: {x}, force_N: {f:.2f}}}" for x, t, f in READINGS),
+        "\n".join(str({"time_s": t, "displacement_mm": x, "force_N": round(f, 2)}) for x, t, f in READINGS),
+    ],
+)
+def test_lines_of_yaml_and_python_name_each_value(tmp_path, text):
+    assert of_readings(read(tmp_path, text)) == [pytest.approx(r) for r in READINGS]
+
+
+@pytest.mark.parametrize("sign", [",", ";"])
+def test_lines_that_are_quoted_as_a_whole_are_lines(tmp_path, sign):
+    rows = [["x (mm)", "t (s)", "F (N)"], *([f"{x}", f"{t}", f"{f:.2f}"] for x, t, f in READINGS)]
+    text = "\n".join(f'"{sign.join(row)}"' for row in rows)
+    assert of_readings(read(tmp_path, text)) == [pytest.approx(r) for r in READINGS]
+
+
+def test_names_that_are_broken_in_two_lines_are_one_cell(tmp_path):
+    rows = [f'{x},{t},{f:.2f},"a 5"" pin"' for x, t, f in READINGS]
+    head = '"Displacement\n(mm)","Time\n(s)","Force\n(N)",Remark'
+    text = "\n".join([head, *rows, "3,0,x,"])
+    with pytest.raises(ValueError, match=r"line 11, column 3 \(Force \(N\)\): found 'x'"):
+        read(tmp_path, text)
+    assert of_readings(read(tmp_path, "\n".join([head, *rows]))) == [pytest.approx(r) for r in READINGS]
+
+
+def test_an_inch_behind_a_number_breaks_no_line(tmp_path):
+    rows = [f'{x},{t},{f:.2f},pin of 5"' for x, t, f in READINGS]
+    assert len(of_readings(read(tmp_path, "\n".join(["x (mm),t (s),F (N),Remark", *rows])))) == 6
+
+
+def test_full_width_letters_are_those_of_other_keyboards(tmp_path):
+    wide = {ord(narrow): chr(ord(narrow) + 0xFEE0) for narrow in "0123456789.()-"}
+    rows = [f"{x},{t},{f:.2f}".translate(wide) for x, t, f in READINGS]
+    text = "\n".join(["変位（mm）,時間（s）,荷重（N）", *rows])
+    assert of_readings(read(tmp_path, text)) == [pytest.approx(r) for r in READINGS]
+
+
+def test_primes_are_minutes_and_seconds(tmp_path):
+    cells = {0.0: "0", 30.0: "30''", 120.0: "2'"}
+    rows = [f"{x};{cells[t]};{f:.2f}" for x, t, f in READINGS]
+    assert of_readings(read(tmp_path, "\n".join(["x (mm);Time;F (N)", *rows]))) == [pytest.approx(r) for r in READINGS]
+
+
+@pytest.mark.parametrize(("header", "mark"), [("Stretch (in)", ""), ("Stretch", " in")])
+def test_rulers_in_inches_are_read_in_fractions(tmp_path, header, mark):
+    cells = ["1 1/2", "1 5/8", "1-3/4", "3", "3 1/64", "3 1/32"]
+    rows = [f"{10 + 10 * (i > 2)},{30 * i % 90},{cell}{mark}" for i, cell in enumerate(cells)]
+    found = read(tmp_path, "\n".join([f"m (kg),t (min),{header}", *rows]), control="force")
+    assert [row[1] for row in found.rows] == pytest.approx([25.4 * x for x in (1.5, 1.625, 1.75, 3, 3.015625, 3.03125)])
+
+
+def test_a_fraction_of_millimetres_or_of_another_number_is_none(tmp_path):
+    for header, cell in (("Stretch (mm)", "1 1/2"), ("Stretch (in)", "1 1/3")):
+        rows = [f"{10 + 10 * (i > 2)},{30 * i % 90},{cell if i == 1 else i}" for i in range(6)]
+        with pytest.raises(ValueError, match=f"line 3, .*found '{cell}', expected a number"):
+            read(tmp_path, "\n".join([f"m (kg),t (min),{header}", *rows]), control="force")

@@ -193,3 +193,24 @@ def test_times_across_may_be_in_several_units(tmp_path, header):
     mapping = ("displacement=displacement [mm]",) if "[mm]" in header else ()
     (made,) = convert(path, ABOUT, Choices(mapping=mapping))
     assert [(row[1], row[2]) for row in made.rows[:3]] == [(1.25, 60.0), (1.5, 600.0), (1.75, 3600.0)]
+
+
+@pytest.mark.parametrize(
+    ("labels", "settings"),
+    [
+        (("1 mm", "2 mm"), [1.0, 2.0]),
+        (("Step 1: 5 mm", "Step 2: 1 cm"), [5.0, 10.0]),
+        (("Rope 1 mm", "Rope 2 mm"), None),
+    ],
+)
+def test_holds_side_by_side_under_what_was_set_are_one_test(tmp_path, labels, settings):
+    rows = [f"{t},{5 - t / 100},{t if t < 90 else ''},{9 - t / 100 if t < 90 else ''}" for t in (0, 30, 60, 90)]
+    path = tmp_path / "raw.csv"
+    path.write_text("\n".join([f"{labels[0]},,{labels[1]},", "Time (s),Force (N),Time (s),Force (N)", *rows]))
+    if settings is None:  # thicknesses of two ropes
+        with pytest.raises(Undecided, match="found no column of displacement"):
+            convert(path, ABOUT, Choices())
+    else:
+        (made,) = convert(path, ABOUT, Choices())
+        assert [hold.setting for hold in made.experiment.holds] == settings
+        assert [list(hold.readings) for hold in made.experiment.holds] == [[5, 4.7, 4.4, 4.1], [9, 8.7, 8.4]]

@@ -60,6 +60,7 @@ def test_weights_stand_above_their_blocks(tmp_path):
         ["Step 1: 2 mm", "Step two: 4 mm"],  # not alike
         ["Step 1: 2 to 3 mm, 4 mm", "Step 2: 3 to 5 mm, 6 mm"],  # two measures
         ["Step 1: 2 mm/min", "Step 2: 4 mm/min"],  # of something else
+        ["Rope 2 mm", "Rope 4 mm"],  # a thickness
     ],
 )
 def test_titles_that_do_not_say_one_displacement_leave_it_open(tmp_path, titles):

@@ -9,15 +9,21 @@ from dataclasses import dataclass, replace
 
 from wirebayes.io.bench.header import name_and_unit
 from wirebayes.io.bench.joined import lacking
-from wirebayes.io.bench.quantities import Role, quantity_unit
+from wirebayes.io.bench.quantities import ROLES, Role, quantity_unit
 from wirebayes.io.bench.sheet import is_measured
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.unread import names_a_specimen
-from wirebayes.io.bench.words import are_a_statistic, speaks_of_a_quantity
+from wirebayes.io.bench.words import are_a_statistic, speaks_of_a_quantity, words_in
 
 _NUMBER = r"[+\-\u2212]?\d+(?:[.,]\d+)?"
 _MEASURE = re.compile(rf"(?<![\w.,])({_NUMBER})[ _]?([^\W\d_]+)(?=$|[\s,;:.)\]])")
 _LAST = re.compile(rf"(.*?)[\s:=]+({_NUMBER})")
+# Words of titles beside those of quantities; of others, such as Rope 6 mm, a measure may be a thickness.
+_OF_TITLES = {
+    "level", "niveau", "phase", "block", "run", "test", "versuch", "messung", "essai", "mesure", "prueba", "prova",
+    "part", "teil", "no", "nr", "at", "bei", "a", "to", "auf", "bis", "target", "soll", "set", "setpoint", "held",
+    "constant",
+}  # fmt: skip
 Said = dict[str, tuple[str, str]]  # by a line without its numbers: what it says, and the unit of that
 
 
@@ -53,7 +59,7 @@ def with_titles_as_columns(table: RawTable, mapping: Sequence[str]) -> RawTable:
         return table
     missing = lacking(table, mapping)
     if len(missing) == 1:
-        table = _with_column(table, blocks, missing[0], lambda line: _measures(line, missing[0]))
+        table = _with_column(table, blocks, missing[0], lambda line: _settings(line, missing[0]))
     return _with_column(table, blocks, "specimen", _specimen)
 
 
@@ -102,9 +108,18 @@ def _with_column(table: RawTable, blocks: Sequence[_Block], name: str, said: Cal
     )
 
 
-def _measures(line: str, role: Role) -> Said:
+def may_state_a_setting(title: str) -> bool:
+    """Whether all words of a title are those of quantities, of units, or of parts of a test."""
+    words = words_in(title)
+    units = {word for word in words if any(quantity_unit(word, role) for role in ROLES)}
+    return all(word in _OF_TITLES or speaks_of_a_quantity(word) for word in words - units)
+
+
+def _settings(line: str, role: Role) -> Said:
     """Numbers with a unit of a quantity in a line, or the last one under a name that has it: ``Weg [mm]: 2``."""
     said: Said = {}
+    if not may_state_a_setting(line):
+        return said
     for place, found in enumerate(_MEASURE.finditer(line)):
         if quantity_unit(found[2], role):
             said[f"{place} {_without_numbers(line)}"] = found[1], found[2]

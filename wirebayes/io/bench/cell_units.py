@@ -11,11 +11,11 @@ from functools import cache
 
 from wirebayes.io.bench.compound_times import is_spelt
 from wirebayes.io.bench.quantities import ROLES, Role, quantity_unit
-from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_number
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_number, of_fraction
 from wirebayes.io.bench.words import speaks_of
 
 FEWEST = 3  # cells with a unit: one row of them may be the ranges of sensors, or times that run along a header
-_MEASURE = re.compile(r"([+\-\u2212]?\d[\d.,'\u2019\s]*(?:[eE][+-]?\d+)?)(?<!\s)\s*([^\W\d_].*|[°%‰].*)")
+_MEASURE = re.compile(r"([+\-\u2212]?\d[\d.,'\u2019\s/\-]*(?:[eE][+-]?\d+)?)(?<!\s)\s*([^\W\d_].*|[°%‰].*)")
 _APART = re.compile(r"(?<!\S)([+\-\u2212]?\d[\d.,]*)\s+([^\W\d_][^\s\d]*|[°%‰][^\s\d]*)(?!\S)")
 
 
@@ -105,7 +105,7 @@ def in_one_unit(measures: Sequence[tuple[str, str]], role: Role) -> tuple[str, l
     if len(names) == 1:
         return names[0], [number for number, _ in measures]
     alike = len({unit.of_sample for unit in units.values()}) == 1 and not any(unit.offset for unit in units.values())
-    if not alike or any(number.count(",") + number.count(".") > 1 for number, _ in measures):
+    if not alike or any(re.search(r"[.,].*[.,]|/", number) for number, _ in measures):
         return None
     smallest = min(names, key=lambda name: units[name].factor)
     sign = "," if any("," in number for number, _ in measures) else "."
@@ -120,7 +120,11 @@ def in_one_unit(measures: Sequence[tuple[str, str]], role: Role) -> tuple[str, l
 def _measure(cell: str) -> tuple[str, str] | None:
     """Number and unit of a cell that bears one."""
     found = _MEASURE.fullmatch(cell)
-    return (found[1], found[2]) if found and is_number(found[1]) and _is_unit(found[2]) else None
+    return (
+        (found[1], found[2])
+        if found and (is_number(found[1]) or of_fraction(found[1])) and _is_unit(found[2])
+        else None
+    )
 
 
 @cache

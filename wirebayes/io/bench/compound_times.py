@@ -21,6 +21,7 @@ _SPELT = re.compile(
     rf"(?:(?P<seconds>\d+(?:[.,]\d+)?)\s*(?:{SECONDS}|''|[\"″]))?(?P<rest>\d\d)?)",
     re.IGNORECASE,
 )
+_PRIMES = re.compile(r"['′]$|''$|″$")  # minutes, seconds; a straight double quote is an inch as well
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,7 @@ def spelt_s(cell: str) -> float | None:
 
 
 def is_spelt(cell: str) -> bool:
-    """Whether a cell names a time in two units or more; one of a single unit may be any quantity with its unit."""
+    """Whether a cell names a time in two units or more, or by primes; another unit alone may be any quantity's."""
     found = _SPELT.fullmatch(cell)
-    return found is not None and sum(map(bool, found.groups())) > 1 and spelt_s(cell) is not None
+    parts = 0 if found is None else sum(map(bool, found.groups()))
+    return (parts > 1 or (parts == 1 and bool(_PRIMES.search(cell)))) and spelt_s(cell) is not None

@@ -17,6 +17,13 @@ _COMMENT = re.compile(r"\s*[\"']?(#|%|//)+(?![\"'])\s*")  # a cell "#" is a name
 _BETWEEN_WORDS = re.compile(r"\s+(?![(\[][^()\[\]]*[)\]])")  # but not before a unit in brackets: Load (N)
 _UNDER_A_HEADER = re.compile(r":?-{2,}:?")  # of a table in Markdown
 _WITH_UNIT = re.compile(r"[-+]?\d+([.,]\d+)? ?[^\W\d]{1,5}\d?")  # 4 mm, 11.02 N
+_QUOTED_LINE = re.compile(r'"([^"]|"")*"')
+_SIGN = re.compile(r"[,;\t|]")
+_OPEN_CELL = re.compile(
+    r'^(?:[^"]|"[^"]*")*(?:^|[,;\t|])\s*"[^"]*$'
+)  # a quote that begins a cell, and none that ends it
+_CLOSED_CELL = re.compile(r'[^"]*"\s*([,;\t|]|$)')
+MOST_BREAKS = 20  # of the cells of one line: a name and a unit in each of twenty columns
 _SEPARATOR = re.compile(
     r"\ufeff?\"?sep=([^\w\s\"']|\t)\"?\s*", re.IGNORECASE
 )  # the first line that Excel writes and obeys
@@ -37,7 +44,7 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     InputError
         No sign splits the lines into columns of numbers.
     """
-    lines = text.splitlines() or [""]
+    lines = _whole_lines(text.splitlines() or [""])
     if labview.is_measurement(lines):
         return labview.sheet_of_measurement(path, lines, encoding)
     if json_records.are_records(text):
@@ -65,6 +72,23 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     if encoding in UNICODE:
         return Sheet(path, _rows(lines, best), described=described)
     return Sheet(path, _rows(lines, best), described=f"{described}, {encoding.upper()}", encoding=encoding)
+
+
+def _whole_lines(lines: list[str]) -> list[str]:
+    """Lines as they were meant: without quotes round each of them, and with cells that are broken in two joined.
+
+    A line that goes on in the next one has its cells in the first of them, and the others are empty.
+    """
+    filled = [line.strip() for line in lines if line.strip()]
+    if all(_QUOTED_LINE.fullmatch(line) for line in filled) and any(map(_SIGN.search, filled)):
+        return [line.strip()[1:-1].replace('""', '"') for line in lines]
+    whole = list(lines)
+    for i in range(len(whole)):
+        for k in range(i + 1, min(i + 1 + MOST_BREAKS, len(whole))):
+            if not (_OPEN_CELL.search(whole[i]) and _CLOSED_CELL.match(whole[k])):
+                break
+            whole[i], whole[k] = f"{whole[i]} {whole[k]}", ""
+    return whole
 
 
 def _wanted(lines: list[str]) -> str:

@@ -16,8 +16,12 @@ _PAIR = re.compile(
 )
 
 
+_AROUND = re.compile(r"^\s*-\s+(?=[{\"'\w])|[{}'\"]")  # of a list in YAML, of a dict in Python
+
+
 def _pairs(line: str) -> list[tuple[str, str, str]]:
     """Key, value and unit of each pair of a line; none where the line is anything else."""
+    line = _AROUND.sub("", line)
     found, at = [], 0
     while line[at:].strip(" \t,;|"):
         match = _PAIR.match(line, at)

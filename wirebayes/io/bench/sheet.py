@@ -9,6 +9,7 @@ from wirebayes.io.bench.compound_times import is_spelt
 
 _SPACES = " \u00a0\u2009\u202f"
 _NUMBER = re.compile(rf"[+\-\u2212]?(\d{{1,3}}([.,'\u2019{_SPACES}]\d{{3}})+|\d*)([.,]\d*)?([eE][+-]?\d+)?")
+_OF_INCH = re.compile(r"(?:(\d+)[ -])?(\d+)/(2|4|8|16|32|64)")
 # By the first three letters of their names in English and German.
 MONTHS = {
     "jan": 1, "feb": 2, "mar": 3, "apr": 4, "may": 5, "jun": 6, "jul": 7, "aug": 8, "sep": 9, "oct": 10, "nov": 11,
@@ -97,6 +98,12 @@ def letters(column: int) -> str:
 def is_number(cell: str) -> bool:
     """Whether a cell looks like a number in any country's writing."""
     return bool(_NUMBER.fullmatch(cell)) and any(c.isdigit() for c in cell.lower().partition("e")[0])
+
+
+def of_fraction(cell: str) -> str | None:
+    """The number of a length as rulers in inches have it, ``12 5/8``; None of other cells."""
+    found = _OF_INCH.fullmatch(cell)
+    return f"{int(found[1] or 0) + int(found[2]) / int(found[3]):.6f}".rstrip("0") if found else None
 
 
 def moment(cell: str) -> re.Match[str] | None:

@@ -17,7 +17,7 @@ from wirebayes.io.bench.numerals import decimal_sign, plain_number
 from wirebayes.io.bench.quantities import UNITS, Role, quantity_unit
 from wirebayes.io.bench.recorded import Readings
 from wirebayes.io.bench.resolution import evident_step
-from wirebayes.io.bench.sheet import is_number
+from wirebayes.io.bench.sheet import is_number, of_fraction
 from wirebayes.io.bench.stamps import is_coarse, spread
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
@@ -36,6 +36,7 @@ COLUMN_ROLES: dict[str, Role] = {
 }
 _SIZE: dict[Role, str] = {"displacement": "length", "tension": "area"}  # what a strain and a stress are times of
 READS: dict[Control, Role] = {"displacement": "tension", "force": "displacement"}  # by what is set
+INCH = 25.4  # mm: rulers in inches are read in halves, quarters and so on
 FAR = 0.1  # of the length: a preload stretches a wire by less, so such a first displacement is a machine's position
 FAR_STEPS = 2.0  # and this many times the range of the test
 _AFTER_NUMBER = re.compile(r"^[-+−\d.,\s]+")
@@ -200,6 +201,8 @@ def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
     out = []
     for row in table.rows:
         number = plain_number(row.cell(column.index), decimal)
+        if number is None and column.unit is not None and abs(column.unit.factor) == INCH:
+            number = of_fraction(row.cell(column.index))
         if number is None:
             sign = "comma" if decimal == "comma" else "point"
             expected = f"a number (decimal {sign}, as elsewhere in the file)"

@@ -1,14 +1,17 @@
 """Tables with a column for each time or each hold, as people write them on paper, as rows of one reading each.
 
 ``Weg [mm]; 0 s; 30 s; 60 s`` has a hold in each row, ``Zeit [s]; 1 mm; 2 mm; 3 mm`` one in each column. The headers of
-three columns or more then are numbers with units of one quantity, and one other column is what these leave open.
+three columns or more then are numbers with units of one quantity, and one other column is what these leave open. Or
+each hold has columns of its own, ``Zeit [s]; Kraft [N]``, side by side under the row ``1 mm;; 2 mm;; 3 mm;``.
 """
 
 import re
 from dataclasses import dataclass, replace
 
+from wirebayes.io.bench.block_titles import may_state_a_setting
 from wirebayes.io.bench.cell_units import in_one_unit
 from wirebayes.io.bench.header import is_of, name_and_unit
+from wirebayes.io.bench.joined import lacking
 from wirebayes.io.bench.quantities import Role, quantity_unit
 from wirebayes.io.bench.sheet import SheetRow, is_number
 from wirebayes.io.bench.table import RawTable
@@ -58,7 +61,7 @@ def row_for_each_reading(table: RawTable) -> RawTable:
     """
     across = _across(table)
     if across is None:
-        return table
+        return _one_below_the_other(table)
     others = [i for i, name in enumerate(table.header) if name and i not in across.values]
     roles: tuple[Role, ...] = ("displacement", "tension") if across.role == "time" else ("time",)
     beside = [(i, role) for i in others for role in roles if is_of(table, i, role)]
@@ -74,6 +77,46 @@ def row_for_each_reading(table: RawTable) -> RawTable:
     described = f"{table.sheet.described}, a {'hold in each row' if by_row else 'hold in each column'}"
     sheet = replace(table.sheet, described=described)
     return RawTable(sheet, header, units, tuple(rows), table.header_line, turned=True)
+
+
+def _one_below_the_other(table: RawTable) -> RawTable:
+    """Holds that stand side by side under what was set in them, below each other; else the table itself."""
+    columns = _under_labels(table)
+    names = {tuple((table.header[i], table.units[i]) for i in own) for own in columns.values()}
+    if len(columns) < 2 or len(names) > 1 or not all(map(may_state_a_setting, columns)):
+        return table
+    header, units = zip(*names.pop(), strict=True)
+    missing = lacking(replace(table, header=header, units=units), ())
+    found = [_MEASURE.fullmatch(label) for label in columns]
+    settings = [(measure["number"], measure["unit"]) for measure in found if measure]
+    one_unit = in_one_unit(settings, missing[0]) if len(missing) == 1 and len(settings) == len(columns) else None
+    if one_unit is None:
+        return table
+    rows = _rows_under(table, [*columns.values()], one_unit[1])
+    sheet = replace(table.sheet, described=f"{table.sheet.described}, holds side by side")
+    all_names, all_units = ("hold", missing[0], *header), ("", one_unit[0], *units)
+    return RawTable(sheet, all_names, all_units, rows, table.header_line, turned=True)
+
+
+def _under_labels(table: RawTable) -> dict[str, list[int]]:
+    """The columns under each label of the row above the header, which stands over the first of them or over all."""
+    columns: dict[str, list[int]] = {}
+    last = ""
+    for i, (label, name) in enumerate(zip(table.above, table.header, strict=False)):
+        last = label or last
+        if last and name:
+            columns.setdefault(last, []).append(i)
+    return columns
+
+
+def _rows_under(table: RawTable, columns: list[list[int]], settings: list[str]) -> tuple[SheetRow, ...]:
+    """A row for each reading, with the number of its hold and what was set in it before its cells."""
+    return tuple(
+        SheetRow(row.line, (str(hold), setting, *(row.cell(i) for i in own)))
+        for hold, (own, setting) in enumerate(zip(columns, settings, strict=True), start=1)
+        for row in table.rows
+        if any(row.cell(i) for i in own)
+    )
 
 
 def _across(table: RawTable) -> _Across | None:

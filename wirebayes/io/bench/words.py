@@ -47,7 +47,7 @@ WORDS: dict[Role, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 LETTERS: dict[Role, tuple[str, ...]] = {  # mean something beside the right unit only
-    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t", "x_value"), "tension": ("f", "t"),
+    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t", "x_value"), "tension": ("f", "t", "p", "w", "m"),
     "temperature": ("t", "ϑ"),
 }  # fmt: skip
 # What a strain or a stress is called; only beside a unit of one, for other quantities have these names too.
@@ -66,7 +66,7 @@ SAMPLE_WORDS: dict[Role, tuple[str, ...]] = {
 RIG_WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok", "distance",
                      "entfernung", "langenanderung", "ruler", "lineal", "regle", "regla", "righello", "regua",
-                     "liniaal", "length", "lange", "laenge", "longueur", "longitud", "lunghezza", "comprimento",
+                     "liniaal", "length", "l", "lange", "laenge", "longueur", "longitud", "lunghezza", "comprimento",
                      "lengte"),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
     "time": ("duration", "dauer", "durata", "duracion", "duracao", "duur"),
