@@ -128,7 +128,7 @@ def test_fit_puts_a_failed_check_first(
     shown = capsys.readouterr()
     captured = shown.err.strip()
     assert captured.splitlines()[0] == f"warning: simulated: {summary['model_check']['sentence']}".rstrip(".")
-    assert shown.out.startswith("simulated: converged, MODEL CHECK FAILED\n")
+    assert shown.out.startswith("simulated: converged, MODEL CHECK FAILED (medians, 90 % intervals)\n")
     assert "Next: wirebayes discover" in shown.out
     page = (out / "report.html").read_text()
     assert page.index("does not describe the readings") < page.index("What was measured")
