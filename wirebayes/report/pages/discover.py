@@ -69,6 +69,10 @@ _FILES = (
 _MOST_SENTENCES = 3  # at the head of a page; more hide its first picture
 _SPEAKS = 0.05  # p of a pattern that says something
 _LEAST = 0.01  # probability of a candidate that is worth a row
+_NEAREST = (
+    "A name is that of the nearest effect in the catalogue: an effect that the catalogue lacks gets it too, where it "
+    "looks alike in this test."
+)
 _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % band", "gap closed")
 
 
@@ -110,7 +114,8 @@ def _within_a_minute(v: ExperimentFindings, hidden: list[str]) -> Columns:
     """Where model and measurement disagree, what is known, and what is not."""
     beside = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
     known = [point for point in (*beside, _held_out(v), *_sizes(v)) if point]
-    unknown = [f"This test cannot show {listed([spoken(what) for what in hidden])}."] if hidden else []
+    unknown = [_NEAREST] if v.get("effects") else []
+    unknown += [f"This test cannot show {listed([spoken(what) for what in hidden])}."] if hidden else []
     return Columns(
         [
             Points("Where model and measurement disagree", _disagreements(v)),
