@@ -183,6 +183,17 @@ def test_steps_are_the_typical_ones_of_those_that_move(simulated):
     assert posterior_checks.loose_steps({}, sample) == ""  # hold by hold there is no such error
 
 
+@pytest.mark.parametrize(
+    ("years", "said"), [(99.9, "nine tenths after 3e+09 s;"), (100.1, "after more than a century;")]
+)
+def test_creep_that_goes_on_for_more_than_a_century_is_not_given_in_seconds(years, said):
+    prior, exponent = {"N": np.linspace(0.1, 1.0, 11)}, 0.1
+    hazard = np.log(10.0) * (years * 365.25 * 86400) ** -exponent
+    assert said in posterior_checks.endless({"N": np.full(9, exponent), "k2": np.full(9, hazard)}, prior)
+    with np.errstate(all="raise"):  # so small an N that the times overflow
+        assert "more than a century" in posterior_checks.endless({"N": np.full(9, 0.001), "k2": np.ones(9)}, prior)
+
+
 @pytest.mark.parametrize(("decades", "named"), [(4.01, True), (3.99, False)])
 def test_creep_over_more_decades_than_a_test_reads_is_said_to_want_a_power_law(decades, named):
     """The tenth and nine tenths of 1 - exp(-k2 t^N), found here by trying times, lie so many decades apart."""

@@ -25,6 +25,7 @@ FAR_OUT = 3.7  # standard deviations from the middle of k1's prior: one line in 
 # decades of time between a tenth of the creep and nine tenths: from a second to three hours, which no hold shows
 ENDLESS = 4.0
 _TENTH, _NINE_TENTHS = np.log(10.0 / 9.0), np.log(10.0)  # of the creep is reached at this hazard k2 t^N
+_CENTURY_S = 100 * 365.25 * 86400  # beyond it seconds say nothing
 _DECADES_TIMES_N = float(np.log10(_NINE_TENTHS / _TENTH))
 LEAST_SHRINKAGE = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
 
@@ -144,13 +145,19 @@ def endless(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
     exponent = float(np.median(own["N"]))
     if _DECADES_TIMES_N / exponent <= ENDLESS:
         return ""
-    begins, ends = (np.median((hazard / own["k2"]) ** (1.0 / own["N"])) for hazard in (_TENTH, _NINE_TENTHS))
+    # in logarithms: at a small N the times themselves overflow
+    begins, ends = (np.median(np.log(hazard / own["k2"]) / own["N"]) for hazard in (_TENTH, _NINE_TENTHS))
     return (
         "the readings want creep spread over many decades of time, as a power law or the logarithm of time has it: at "
-        f"N = {exponent:.2g} a tenth is reached after {short(begins, 1)} s and nine tenths after {short(ends, 1)} s; "
+        f"N = {exponent:.2g} a tenth is reached after {_time(begins)} and nine tenths after {_time(ends)}; "
         "shown is the stretched exponential nearest to it, good for the times that were read: the stiffness before the "
         "first reading, creep long after the last and final creep are extrapolated"
     )
+
+
+def _time(log_s: float) -> str:
+    """Seconds, by their logarithm, in words."""
+    return "more than a century" if log_s > np.log(_CENTURY_S) else f"{short(float(np.exp(log_s)), 1)} s"
 
 
 def unchanged_prior(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
