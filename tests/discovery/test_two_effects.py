@@ -121,13 +121,19 @@ def test_the_largest_of_each_block_and_of_all_counts() -> None:
     np.testing.assert_array_equal(screening._alone_and_together(each), [3.0, -1.0, 3.0])
 
 
-def test_with_fewer_readings_than_parameters_pairs_that_explain_nothing_have_no_weight() -> None:
-    bench = Bench(weights_N=(10.0, 20.0, 30.0, 40.0), times_s=(60.0,), resolution_mm=0.1)
+@pytest.mark.parametrize(("weights", "degrees"), [(4, -2), (6, 0)])
+def test_with_no_more_readings_than_parameters_pairs_that_explain_nothing_have_no_weight(
+    weights: int, degrees: int
+) -> None:
+    bench = Bench(weights_N=tuple(10.0 * np.arange(1, 1 + weights)), times_s=(60.0,), resolution_mm=0.1)
     experiments = simulated_tests([bench], Truth({"k1": 900.0}), seed=3)
     block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
     trials, _ = screening.candidate_probes([block], CATALOGUE)
     x = expand(block.target, block.z, trials)
-    assert x.degrees < 0
+    assert x.degrees == degrees
+    with np.errstate(all="raise", under="ignore"):
+        scanned = scan(x)
+    assert not np.isnan(scanned.two).any()
     pairs = two_effects.log_bayes_of_each_pair(x)
     assert not np.isnan(pairs).any()
     assert pairs.max() < 50.0

@@ -67,10 +67,11 @@ def _forms_of_each(x: Expansion) -> list[Ints]:
 def _log_evidence(x: Expansion, found: Projected, first: Ints, groups: list[Ints]) -> Array:
     """(n, j, m) of some signatures (n, j) with each one of another effect; forms share the weight of their effect."""
     left = np.maximum(found.rss[:, :, None, None] - _explained(x, found, first), x.least[:, None, None, None])
-    evidence = log_sum(found.shared[:, :, None, None] - 0.5 * x.degrees * np.log(left), axis=1)
+    with np.errstate(invalid="ignore"):  # what explains nothing, with as many readings as parameters
+        evidence = log_sum(found.shared[:, :, None, None] - 0.5 * x.degrees * np.log(left), axis=1)
     prior = _log_shares(x, groups)
     different = x.kinds[first][:, :, None] != x.kinds
-    # with fewer readings than parameters, what explains nothing has no finite evidence
+    # with no more readings than parameters, what explains nothing has no finite evidence
     return np.where(different, or_impossible(evidence) + prior[first][:, :, None] + prior, -np.inf)
 
 
