@@ -8,6 +8,7 @@ from scipy.special import logsumexp
 
 from tests.simulated import simulated_tests
 from wirebayes.discovery import noise_integral, screening, two_effects
+from wirebayes.discovery.ascent import start
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.noise_integral import Expansion
 from wirebayes.effects import CATALOGUE, effect_named
@@ -122,17 +123,18 @@ def test_the_largest_of_each_block_and_of_all_counts() -> None:
 
 
 @pytest.mark.parametrize(("weights", "degrees"), [(4, -2), (6, 0)])
-def test_with_no_more_readings_than_parameters_pairs_that_explain_nothing_have_no_weight(
-    weights: int, degrees: int
-) -> None:
+def test_no_more_readings_than_parameters_are_evidence_for_nothing(weights: int, degrees: int) -> None:
     bench = Bench(weights_N=tuple(10.0 * np.arange(1, 1 + weights)), times_s=(60.0,), resolution_mm=0.1)
     experiments = simulated_tests([bench], Truth({"k1": 900.0}), seed=3)
     block = fitted(experiments, (), PLAIN_SPEC, np.random.default_rng(0))
     trials, _ = screening.candidate_probes([block], CATALOGUE)
     x = expand(block.target, block.z, trials)
     assert x.degrees == degrees
+    assert (x.least > 0.0).all()
     with np.errstate(all="raise", under="ignore"):
+        begin = start(block, block.z)
         scanned = scan(x)
+    assert np.isfinite(begin.largest).all()
     assert not np.isnan(scanned.two).any()
     pairs = two_effects.log_bayes_of_each_pair(x)
     assert not np.isnan(pairs).any()

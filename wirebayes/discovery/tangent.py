@@ -75,7 +75,8 @@ class Tangent:
     @property
     def least(self) -> Array:
         """(n,) below which a sum of squares counts as rounding error."""
-        return np.asarray(self.degrees * np.maximum(self.floor, _LEAST_NOISE))
+        most_free = max(self.degrees, 1)  # also where there are no more readings than parameters
+        return np.asarray(most_free * np.maximum(self.floor, _LEAST_NOISE))
 
     @property
     def prior_square(self) -> Array:
