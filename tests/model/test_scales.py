@@ -115,6 +115,18 @@ def test_for_powers_of_two_the_draws_are_the_same_to_the_last_bit(index):
     assert one.evaluations == other.evaluations
 
 
+@pytest.mark.parametrize("index", [0, 2])
+def test_a_start_in_other_units_leads_to_the_same_draws(index):
+    """A start is converted from what a search found, which changes its last digits."""
+    problem = drawn(index).problem()
+    first = fit_problem(problem, 3, policy=HASTY)
+    best = first.flat[np.argmax(first.log_density)]
+    starts = [dict(zip(problem.names, best * (1.0 + change), strict=True)) for change in (0.0, 1e-15, -1e-15)]
+    one, *others = (fit_problem(problem, 4, policy=HASTY, near=start).chains.z for start in starts)
+    for other in others:
+        np.testing.assert_array_equal(one, other)
+
+
 def draws(case, by, policy):
     """Parameters of a fit of the tests in other units, each in the units that the tests have of their own."""
     problem = case.problem(by)

@@ -40,6 +40,17 @@ def test_what_is_known_of_a_parameter_of_another_s_unit_is_its_product() -> None
     assert leaning(prior, theta, prior.names) == []
 
 
+@pytest.mark.parametrize("newtons", [0.001, 0.8, 1.0, 1.25, 1000.0])
+def test_what_leans_is_the_same_in_any_unit_of_tension(newtons: float) -> None:
+    """B at the test's tension does not lean; at a newton that is a little more or less it would move with U."""
+    U = 0.97 * draws(1.0)[:, 0]
+    B = np.exp(0.05 * RNG.permutation(U)) * newtons**-U
+    free = {"B": stats.lognorm(1.0), "U": stats.norm(0.0, 1.0)}
+    prior = Prior(free, {}, frozenset({"B"}), {"B": PowerScaled("U", float(np.log(newtons)))})
+    (found,) = leaning(prior, np.column_stack([B, U]), prior.names)
+    assert "the prior of U" in found.text and "the interval of U would" in found.text
+
+
 @pytest.mark.parametrize(
     ("noise", "other", "leans"),
     [

@@ -88,6 +88,7 @@ def fit_problem(
     start = None
     if near is not None and near.keys() >= set(walked):
         start = sampled(np.array([[near.get(name, 1.0) for name in problem.names]]))
+        start = np.round(start, _START_DIGITS)
     cloud = None if rough is None else sampled(rough)
     chains = ensemble.sample_posterior(
         target, seed, policy, checkpoint=checkpoint, progress=progress, near=start, rough=cloud
@@ -100,6 +101,9 @@ def fit_problem(
     _, theta, added = completed(target.problem, theta, np.random.default_rng(seed_of(seed, "completed")))
     theta = own.theta_in(problem.units, theta)
     return Fit(problem, theta.reshape(m, -1, theta.shape[1]), log_density + added.reshape(m, -1), chains, thin)
+
+
+_START_DIGITS = 6  # the digits of a start that are the same in every unit: conversions change the sixteenth
 
 
 def seed_of(seed: int, *words: str) -> int:

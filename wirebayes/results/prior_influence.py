@@ -22,7 +22,8 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
 
     The posterior under a wider prior is that of the draws, weighted by the ratio of the two priors. The prior of a
     noise may decide what is known of that noise and of the preload: a few holds never tell how well they were set, and
-    nothing that is said of the wire depends on it.
+    nothing that is said of the wire depends on it. Intervals are those of what the priors are of, as B at the test's
+    tension: by how much B at 1 N moves depends on what is called a newton.
 
     Parameters
     ----------
@@ -31,11 +32,11 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
     columns : sequence of str
         Which priors are looked at.
     """
-    before = np.quantile(theta, _ENDS, axis=0)
-    spread = np.maximum(theta.std(axis=0, ddof=1), np.finfo(float).tiny)
     known = prior.known(theta)
-    order = np.argsort(theta.T, axis=1)
-    ordered = np.take_along_axis(theta.T, order, axis=1)
+    before = np.quantile(known, _ENDS, axis=0)
+    spread = np.maximum(known.std(axis=0, ddof=1), np.finfo(float).tiny)
+    order = np.argsort(known.T, axis=1)
+    ordered = np.take_along_axis(known.T, order, axis=1)
     deciding: list[str] = []
     open_ones: set[int] = set()
     for name in columns:
