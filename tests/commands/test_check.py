@@ -16,15 +16,23 @@ def start(tmp_path_factory):
     return folder / "my-wire.toml"
 
 
-def test_a_start_is_valid_commented_and_never_overwrites(start, capsys):
+def test_a_start_is_valid_commented_and_written_once(start):
     assert len(wb.read_experiments(start)[0].recorded_holds) == 8
     text = start.read_text()
     assert text.count("#") > 10
-    before = start.read_bytes()
-    assert main(["init", str(start.parent)]) == 2
-    assert "my-wire.toml: found a file of this name" in capsys.readouterr().err
-    assert start.read_bytes() == before
     assert sorted(path.name for path in start.parent.iterdir()) == ["my-wire.csv", "my-wire.toml"]
+    assert main(["init", str(start.parent)]) == 0  # it is done already
+    assert start.read_text() == text
+
+
+@pytest.mark.parametrize("file", ["my-wire.toml", "my-wire.csv"])
+def test_a_start_that_somebody_edited_is_never_overwritten(file, tmp_path, capsys):
+    assert main(["init", str(tmp_path)]) == 0
+    edited = (tmp_path / file).read_bytes() + b"\n"
+    (tmp_path / file).write_bytes(edited)
+    assert main(["init", str(tmp_path)]) == 2
+    assert f"{file}: found a file of this name" in capsys.readouterr().err
+    assert (tmp_path / file).read_bytes() == edited
 
 
 def test_every_commented_line_of_the_start_is_right(start, tmp_path):

@@ -55,6 +55,7 @@ def mixed() -> wb.Experiment:
 
 COMMANDS: dict[str, Callable[[Any, Path], Result[Any]]] = {
     "fit": lambda fitted, out: wb.fit(wire(), policy=HASTY, check=False, output=out),
+    "fits": lambda fitted, out: wb.fit([wire(), mixed()], policy=HASTY, check=False, output=out),
     "check": lambda fitted, out: wb.check(mixed(), output=out),
     "discover": lambda fitted, out: wb.discover(mixed(), policy=HASTY, simulations=99, output=out),
     "compare": lambda fitted, out: wb.compare(mixed(), only="exponential", policy=HASTY, output=out),
@@ -77,6 +78,7 @@ COMMANDS: dict[str, Callable[[Any, Path], Result[Any]]] = {
 }
 WARNED = {  # what must be warned of, so that an empty list is no answer
     "fit": "not-converged",
+    "fits": "data",
     "check": "data",
     "discover": "data",
     "compare": "data",

@@ -186,6 +186,8 @@ BAD_TOML = [
     ('"wire-a"', '"wire a"', "line 2, experiment wire a, key name: found 'wire a', expected a name of letters"),
     ('"wire-a"', '".."', "key name: found '..'"),
     ('"wire-a"', '"wire-ä"', "key name: found 'wire-ä'"),
+    ('"wire-a"', '"summary.csv"', "key name: found 'summary.csv'", "not one that results have for themselves"),
+    ('"wire-a"', '"wire.svg"', "key name: found 'wire.svg'", "not one that results have for themselves"),
     ('"wire-a"', '".lock"', "key name: found '.lock', expected a name of letters"),
     ('"wire-a"', '"configuration.json"', "key name: found 'configuration.json', expected a name of letters"),
     ('"wire-a"', '"' + "w" * 101 + '"', "key name: found 'www"),

@@ -26,7 +26,7 @@ def new_experiment(folder: PathLike) -> Path:
     Raises
     ------
     InputError
-        One of the files is there already, or the folder cannot be written.
+        One of the files is there already and says something else, or the folder cannot be written.
 
     Examples
     --------
@@ -38,13 +38,19 @@ def new_experiment(folder: PathLike) -> Path:
     """
     target = Path(folder)
     toml, readings = target / f"{NAME}.toml", target / f"{NAME}.csv"
-    for path in (toml, readings):
-        if path.exists():
+    contents = {readings: CSV, toml: TOML}
+    for path, content in contents.items():
+        if path.exists() and not _holds(path, content):
             raise InputError(f"{path}: found a file of this name, expected a folder without it; nothing is overwritten")
     try:
         target.mkdir(parents=True, exist_ok=True)
-        write_text(readings, CSV)
-        write_text(toml, TOML)
+        for path, content in contents.items():
+            write_text(path, content)
     except OSError as error:
         raise InputError(f"{target}: cannot be written ({error.strerror}), expected a writable folder") from None
     return toml
+
+
+def _holds(path: Path, content: str) -> bool:
+    """Whether a file is one of ours as it was written."""
+    return path.is_file() and path.read_bytes() == content.encode("utf-8")

@@ -36,8 +36,10 @@ _RESOLUTION: dict[Control, tuple[str, str, float]] = {
     "force": ("resolution_mm", "mm", LARGEST["displacement_mm"]),
 }
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}", re.ASCII)
-# a folder beside the results' own files
-_TAKEN = re.compile(r"\.{1,2}|\.(lock|computing|checkpoint)|.*\.(json|html|partial)", re.IGNORECASE)
+# a folder beside the results' own files, and a name beside the key of the warnings
+_TAKEN = re.compile(
+    r"\.{1,2}|\.(lock|computing|checkpoint)|summary\.csv|warnings|.*\.(json|html|svg|partial)", re.IGNORECASE
+)
 SHORTEST = 1e-3  # mm, below any specimen; strains of far shorter ones overflow
 
 
@@ -126,8 +128,10 @@ def experiment_of(keys: Keys, readings: Callable[[], CsvTable]) -> Experiment:
     """
     expected = "a name of letters, digits, '.', '_' and '-' for a folder of results"
     name = keys.string("name", expected)
-    if not _NAME.fullmatch(name) or _TAKEN.fullmatch(name):
+    if not _NAME.fullmatch(name):
         raise keys.complain("name", shown(name), expected)
+    if _TAKEN.fullmatch(name):
+        raise keys.complain("name", shown(name), f"{expected}, and not one that results have for themselves")
     expected = "a name of at most 100 characters without '/', '\\' or control characters"
     material = keys.string("material", expected)
     if (

@@ -10,7 +10,7 @@ from wirebayes.answers import terminal
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, stored_results
 from wirebayes.json_files.summary import SummaryJson
-from wirebayes.notice import Notice, from_json
+from wirebayes.notice import Notice, NoticeJson, from_json, to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.results import read_back
 from wirebayes.results.read_back import Stored
@@ -184,7 +184,7 @@ class Posterior(Result[SummaryJson]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Posteriors(Result[dict[str, SummaryJson]], Mapping[str, Posterior]):
+class Posteriors(Result[dict[str, SummaryJson | list[NoticeJson]]], Mapping[str, Posterior]):
     """The posteriors of several experiments by name.
 
     Attributes
@@ -211,9 +211,10 @@ class Posteriors(Result[dict[str, SummaryJson]], Mapping[str, Posterior]):
     def __len__(self) -> int:
         return len(self.members)
 
-    def summary(self) -> dict[str, SummaryJson]:
-        """The summary of each, by name."""
-        return {name: posterior.summary() for name, posterior in self.members.items()}
+    def summary(self) -> dict[str, SummaryJson | list[NoticeJson]]:
+        """The summary of each, by name, and the ``warnings`` of all of them."""
+        found: dict[str, SummaryJson | list[NoticeJson]] = {name: each.summary() for name, each in self.members.items()}
+        return found | {"warnings": to_json(self.warnings)}
 
     def to_datatree(self) -> "xr.DataTree":
         """One tree with a branch for each."""
