@@ -17,6 +17,7 @@ _ENOUGH = 0.25  # of what a step promises to gain: with less, damped ones are tr
 _LONGEST = 2.0  # step of a coordinate; they are of order one under the prior
 _NARROW = 1e-2  # standard deviation assumed where none is known yet, so that differences stay inside it
 _NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard deviation
+_NO_DENSITY = 1e3  # how far below its neighbour the log density counts where there is none: downhill, whatever the step
 # added to the curvature (of order one under the prior alone), tried in one batch where a step gains too little
 _DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
 _PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there are many such steps
@@ -106,18 +107,27 @@ class _Climbs:
 
     def take_step(self, rows: Ints, local: _Local, tolerance: float) -> None:
         """Lead rows to what they looked at, and plan their next steps from what is known there."""
-        self.z[rows], self.value[rows] = self.ahead[rows], local.value
+        here = self.ahead[rows]
+        self.z[rows] = here
+        self.value[rows] = local.value
         eigen, vectors = _positive(local.curvature)
         slope = np.einsum("nij,ni->nj", vectors, local.gradient)
-        self.eigen[rows], self.vectors[rows], self.slope[rows] = eigen, vectors, slope
-        half_decrement = 0.5 * (slope**2 / eigen).sum(axis=1)
-        self.converged[rows] = self.done[rows] = half_decrement < tolerance
-        damping = np.where(self.arrived[rows], self.damping[rows], self.damping[rows] * _RELAX)
-        damping[damping < _LEAST_DAMPING] = 0.0
-        self.damping[rows] = damping
-        self.promised[rows] = 0.5 * (slope**2 / (eigen + damping[:, None])).sum(axis=1)
-        self.ahead[rows] = self.z[rows] + _step(slope, eigen, vectors, damping[:, None])[:, 0]
+        self.eigen[rows] = eigen
+        self.vectors[rows] = vectors
+        self.slope[rows] = slope
+        self.converged[rows] = self.done[rows] = _half_decrement(slope, eigen) < tolerance
+        damping = self._relaxed(rows)
+        self.damping[rows] = damping[:, 0]
+        self.promised[rows] = _half_decrement(slope, eigen + damping)
+        self.ahead[rows] = here + _step(slope, eigen, vectors, damping)[:, 0]
         self.arrived[rows] = False
+
+    def _relaxed(self, rows: Ints) -> Array:
+        """(m, 1) dampings of the next steps: less where the last step was good, none where they hardly matter."""
+        damping = self.damping[rows]
+        damping = np.where(self.arrived[rows], damping, damping * _RELAX)
+        damping[damping < _LEAST_DAMPING] = 0.0
+        return damping[:, None]
 
     def most_promised(self, rows: Ints) -> Array:
         """(n,) densities that rows hardly rise beyond."""
@@ -238,6 +248,11 @@ def _damped(
     return trial[i, best], tried[i, best], _DAMPINGS[best]
 
 
+def _half_decrement(slope: Array, eigen: Array) -> Array:
+    """(n,) what a Newton step gains where slopes (n, d) and curvatures (n, d), along its own axes, are right."""
+    return np.asarray(0.5 * (slope**2 / eigen).sum(axis=1))
+
+
 def _step(slope: Array, eigen: Array, vectors: Array, damping: Array) -> Array:
     """(n, k, d) steps with k dampings (n, k) or (k,): the more damped, the less far along what is little curved."""
     damping = np.broadcast_to(damping, (len(slope), np.shape(damping)[-1]))
@@ -260,16 +275,22 @@ def _positive(matrices: Array) -> tuple[Array, Array]:
 def _by_residuals(residuals: Residuals, z: Array, rows: Ints, *_: Array) -> _Local:
     """Curvature as the expected information, and the gradient, from one more evaluation a coordinate."""
     n, d = z.shape
-    points = z[:, None] + np.concatenate([np.zeros((1, d)), _NEAR * np.eye(d)])
-    values, each = residuals(points.reshape(-1, d), np.repeat(rows, d + 1))
-    values, each = values.reshape(n, d + 1), each.reshape(-1, n, d + 1)
+    moves = np.concatenate([np.zeros((1, d)), _NEAR * np.eye(d)])
+    points = z[:, None] + moves
+    flat, each = residuals(points.reshape(-1, d), np.repeat(rows, d + 1))
+    values = flat.reshape(n, d + 1)
+    each = each.reshape(-1, n, d + 1)
     with np.errstate(all="ignore"):
-        slopes = np.moveaxis(each[..., 1:] - each[..., :1], 0, 1) / _NEAR
-        slopes = np.where(np.isfinite(slopes), slopes, 0.0)
+        slopes = _finite(np.moveaxis(each[..., 1:] - each[..., :1], 0, 1) / _NEAR)
         curvature = np.swapaxes(slopes, 1, 2) @ slopes
-        # a difference to one side, put right by the curvature
-        gradient = (values[:, 1:] - values[:, :1]) / _NEAR + 0.5 * _NEAR * np.einsum("nii->ni", curvature)
-    return _Local(values[:, 0], np.where(np.isfinite(gradient), gradient, 0.0), curvature)
+        one_sided = (values[:, 1:] - values[:, :1]) / _NEAR
+        put_right = 0.5 * _NEAR * np.einsum("nii->ni", curvature)
+        gradient = _finite(one_sided + put_right)
+    return _Local(values[:, 0], gradient, curvature)
+
+
+def _finite(values: Array) -> Array:
+    return np.where(np.isfinite(values), values, 0.0)
 
 
 def _by_differences(density: Density, z: Array, rows: Ints, eigen: Array, vectors: Array) -> _Local:
@@ -304,15 +325,17 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
     unit = np.eye(d)
     both = unit[i] + unit[j]
     moves = np.concatenate([unit, -unit, both, -both] if sides == 2 else [unit, -unit, both])
-    points = z[:, None, :] + moves[None] * h[:, None, :]
-    f = density(points.reshape(-1, d), np.repeat(rows, len(moves))).reshape(n, len(moves))
-    f = np.where(np.isfinite(f), f, value[:, None] - 1e3)
-    plus, minus, both_plus, both_minus = np.split(f, [d, 2 * d, 2 * d + len(i)], axis=1)
-    gradient = (plus - minus) / (2.0 * h)
-    hessian = np.zeros((n, d, d))
-    hessian[:, np.arange(d), np.arange(d)] = (plus + minus - 2.0 * value[:, None]) / h**2
-    mixed = both_plus - plus[:, i] - plus[:, j] + value[:, None]
+    points = z[:, None] + moves * h[:, None]
+    found = density(points.reshape(-1, d), np.repeat(rows, len(moves))).reshape(n, -1)
+    centre = value[:, None]
+    found = np.where(np.isfinite(found), found, centre - _NO_DENSITY)
+    plus, minus, both_plus, both_minus = np.split(found, [d, 2 * d, 2 * d + len(i)], axis=1)
+    mixed = both_plus - plus[:, i] - plus[:, j] + centre
     if sides == 2:
-        mixed = 0.5 * (mixed + both_minus - minus[:, i] - minus[:, j] + value[:, None])
+        mixed = 0.5 * (mixed + both_minus - minus[:, i] - minus[:, j] + centre)
+    hessian = np.zeros((n, d, d))
     hessian[:, i, j] = hessian[:, j, i] = mixed / (h[:, i] * h[:, j])
+    diagonal = np.arange(d)
+    hessian[:, diagonal, diagonal] = (plus + minus - 2.0 * centre) / h**2
+    gradient = (plus - minus) / (2.0 * h)
     return gradient, hessian

@@ -4,7 +4,7 @@ What is certainly wrong is refused where the file is read (`wirebayes.io.reading
 a warning here.
 """
 
-from collections.abc import Callable, Set
+from collections.abc import Callable, Sequence, Set
 
 import numpy as np
 
@@ -175,43 +175,50 @@ def outlier(readings: CheckedTest) -> str:
     Creep runs one way within a hold, so a reading counts by what it stands above both neighbours, or below both. A
     hold's last one counts beyond the range of all others once more; creep may be over after the first.
     """
-    apart, where = [], []
-    for j, row in enumerate(readings.each):
-        if len(row) < 3:
-            continue
-        before, after = row[1:-1] - row[:-2], row[1:-1] - row[2:]
-        peaks = np.where(before * after > 0, np.minimum(np.abs(before), np.abs(after)), 0.0)
-        rest = np.concatenate([row[:-1], *(r for k, r in enumerate(readings.each) if k != j)])
-        beyond = max(row[-1] - rest.max(), rest.min() - row[-1]) - np.ptp(rest)
-        apart.append(np.concatenate([[0.0], peaks, [max(0.0, beyond)]]))
-        where += [(j, i) for i in range(len(row))]
-    if not apart:
+    each, unit = readings.each, readings.unit
+    long_enough = [j for j, row in enumerate(each) if len(row) >= 3]
+    if not long_enough:
         return ""
-    distance = np.concatenate(apart)
+    distance = np.concatenate([_apart(each, j) for j in long_enough])
     worst = int(distance.argmax())
-    hold, at = where[worst]
-    others = np.concatenate([np.delete(row, at) if j == hold else row for j, row in enumerate(readings.each)])
+    hold, at = [(j, i) for j in long_enough for i in range(len(each[j]))][worst]
     usual = max(float(np.quantile(np.delete(distance, worst), 0.9)), readings.noise)
-    if distance[worst] <= max(ISOLATED * usual, GROSS * np.ptp(others)):
+    if distance[worst] <= max(ISOLATED * usual, GROSS * np.ptp(_others(each, hold, at))):
         return ""
-    time, unit = readings.times_s[hold][at], readings.unit
     return (
-        f"the reading of {readings.each[hold][at]:.5g} {unit} in hold {readings.number[hold]} at {time:g} s is "
-        f"{distance[worst]:.3g} {unit} from its neighbours: check it, correct a misprint or leave its row out"
+        f"the reading of {each[hold][at]:.5g} {unit} in hold {readings.number[hold]} at "
+        f"{readings.times_s[hold][at]:g} s is {distance[worst]:.3g} {unit} from its neighbours: check it, correct a "
+        "misprint or leave its row out"
     )
+
+
+def _apart(each: Sequence[Floats], j: int) -> Floats:
+    """(r,) how far each reading of a hold stands apart, as `outlier` counts it."""
+    row = each[j]
+    inner = row[1:-1]
+    before, after = inner - row[:-2], inner - row[2:]
+    nearest = np.minimum(np.abs(before), np.abs(after))
+    peaks = np.where(before * after > 0, nearest, 0.0)
+    last, rest = row[-1], _others(each, j, -1)
+    beyond = max(last - rest.max(), rest.min() - last) - np.ptp(rest)
+    return np.concatenate([[0.0], peaks, [max(0.0, beyond)]])
+
+
+def _others(each: Sequence[Floats], j: int, at: int) -> Floats:
+    """All readings of the test but one of hold j."""
+    return np.concatenate([np.delete(row, at) if k == j else row for k, row in enumerate(each)])
 
 
 def rising(readings: CheckedTest) -> str:
     """Tension that rises within holds on loading, where creep lets it fall."""
     place, each, noise = readings.setting, readings.each, readings.noise
-    # a hold that begins below the end of the one before has creep to give back
-    loading = [
-        row
-        for j, row in enumerate(each)
-        if len(row) > 1
-        and row[0] > FLAT * noise
-        and (j == 0 or (place[j] > place[:j].max() and row[0] > each[j - 1][-1]))
-    ]
+
+    def is_loading(j: int) -> bool:
+        # a hold that begins below the end of the one before has creep to give back
+        return j == 0 or bool(place[j] > place[:j].max() and each[j][0] > each[j - 1][-1])
+
+    taut = [j for j, row in enumerate(each) if len(row) > 1 and row[0] > FLAT * noise]
+    loading = [each[j] for j in taut if is_loading(j)]
     if len(loading) < RISING_HOLDS:
         return ""
     rise = np.array([row[-1] - row[0] for row in loading])
@@ -268,14 +275,16 @@ def _jump(row: Floats, time_s: Floats, noise: float) -> int | None:
     Creep may be over after the first reading, and the last one may be a misprint.
     """
     change = np.diff(row)
-    speed = np.abs(change) / np.diff(time_s)
+    sizes, way = np.abs(change), np.sign(change)
+    speed = sizes / np.diff(time_s)
     for i in range(1, len(change) - 1):
-        size, beside = abs(change[i]), [i - 1, i + 1]
-        against = (change.sum() - change[i]) * np.sign(change[i]) <= FLAT * noise
+        beside = [i - 1, i + 1]
+        large = sizes[i] > max(ISOLATED * noise, JUMP * sizes[beside].max())
+        against = (change.sum() - change[i]) * way[i] <= FLAT * noise
         # after a burst of readings a pause shows more change than they do, and is no faster
         out_of_course = speed[i] > (1.0 if against else FASTER) * speed[beside].max()
-        stays = ((row[i + 1 :] - row[i]) * np.sign(change[i]) > JUMP_STAYS * size).all()
-        if size > max(ISOLATED * noise, JUMP * np.abs(change[beside]).max()) and out_of_course and stays:
+        stays = ((row[i + 1 :] - row[i]) * way[i] > JUMP_STAYS * sizes[i]).all()
+        if large and out_of_course and stays:
             return i
     return None
 

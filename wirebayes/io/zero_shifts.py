@@ -71,19 +71,24 @@ def zero_shift(readings: CheckedTest) -> str:
 
 def _moves(readings: CheckedTest, way: float) -> _Moves:
     """The moves of one way; a move after a reversal shows friction, and one of a slack wire nothing."""
-    begins, ends = (np.array([row[at] for row in readings.each]) for at in (0, -1))
-    second, last_but_one = np.array([(row[:2][-1], row[-2:][0]) for row in readings.each]).T
+    each, protocol = readings.each, readings.protocol
+    first = np.array([row[0] for row in each])
+    last = np.array([row[-1] for row in each])
+    # where there is a single reading, that one
+    second = np.array([row[:2][-1] for row in each])
+    last_but_one = np.array([row[-2:][0] for row in each])
     moved = np.diff(readings.setting)
+    middle = readings.setting[:-1] + 0.5 * moved
     this_way = np.sign(moved) == way
     used = this_way & np.concatenate([[True], this_way[:-1]])
-    used &= np.diff(np.flatnonzero(readings.protocol.recorded)) == 1
+    used &= np.diff(np.flatnonzero(protocol.recorded)) == 1
     used &= ~_late(readings)[1:]
-    if readings.protocol.control == "displacement":
-        taut = max(SLACK * float(begins.max()), NOISE * readings.noise)
-        used &= np.minimum(begins[1:], ends[:-1]) > taut
+    if protocol.control == "displacement":
+        taut = max(SLACK * float(first.max()), NOISE * readings.noise)
+        used &= np.minimum(first[1:], last[:-1]) > taut
     at = np.flatnonzero(used)
-    middle = readings.setting[:-1] + 0.5 * moved
-    added, inner = begins[1:] - ends[:-1], second[1:] - last_but_one[:-1]
+    added = first[1:] - last[:-1]
+    inner = second[1:] - last_but_one[:-1]
     return _Moves(at + 1, added[at], inner[at], moved[at], middle[at])
 
 
@@ -99,16 +104,24 @@ def _shift(moves: _Moves, noise: float) -> tuple[float, int, float, float] | Non
     if len(moves.hold) < FEWEST:
         return None
     off, inner = moves.off(moves.added), moves.off(moves.inner)
+    sizes, expected = np.abs(off), moves.added - off
+    scatter = _scatter(moves.added, sizes, noise)
     usual = float(np.median(np.abs(moves.added)))
-    rounding = float(np.finfo(float).eps * np.abs(moves.added).max())
-    own = max(float(np.median(np.abs(off))) / 0.6745, np.sqrt(2.0) * noise, rounding)
-    expected = moves.added - off
+    large = sizes > OF_A_MOVE * np.maximum(usual, np.abs(expected))
     found = []
-    for i in np.flatnonzero(np.abs(off) > OF_A_MOVE * np.maximum(usual, np.abs(expected))):
-        size, sign = abs(off[i]), np.sign(off[i])
-        excess = float(size / max(np.quantile(np.abs(np.delete(off, i)), 0.9), own))
-        taken_back = (-sign * off[np.abs(moves.hold - moves.hold[i]) == 1]).max(initial=0.0)
+    for i in np.flatnonzero(large):
+        size, sign = sizes[i], np.sign(off[i])
+        others = float(np.quantile(np.delete(sizes, i), 0.9))
+        excess = float(size / max(others, scatter))
+        beside = np.abs(moves.hold - moves.hold[i]) == 1
+        taken_back = (-sign * off[beside]).max(initial=0.0)
         stays = taken_back <= TAKEN_BACK * size and sign * inner[i] >= BESIDE * size
         if excess > STANDS_OUT and stays:
             found.append((excess, int(moves.hold[i]), float(moves.added[i]), float(expected[i])))
     return max(found, default=None)
+
+
+def _scatter(added: Floats, sizes: Floats, noise: float) -> float:
+    """The standard deviation of moves about their course: that of the middle ones, no less than that of the noise."""
+    rounding = float(np.finfo(float).eps * np.abs(added).max())
+    return max(float(np.median(sizes)) / 0.6745, float(np.sqrt(2.0) * noise), rounding)

@@ -126,7 +126,8 @@ def _nothing(protocol: Protocol, n: int) -> Linearised:
 
 
 def _by_closed_form(protocol: Protocol, theta: Theta, model: Model) -> Linearised:
-    walk, out = Walk(protocol, theta, model), _nothing(protocol, np.shape(theta["k1"])[0])
+    walk = Walk(protocol, theta, model)
+    out = _nothing(protocol, np.shape(theta["k1"])[0])
     for j, setting in enumerate(protocol.setting):
         here = walk.closed_form(j, walk.base + setting, out.creep[j])
         out.reading[j], out.by_setting[j], out.by_creep[j] = here[:3]
@@ -137,20 +138,24 @@ def _by_closed_form(protocol: Protocol, theta: Theta, model: Model) -> Linearise
 def _by_complex_steps(protocol: Protocol, theta: Theta, model: Model) -> Linearised:
     """Both complex steps in one pass: the first n columns take that of the setting error, the others the creep's."""
     n = np.shape(theta["k1"])[0]
-    walk, out = Walk(protocol, {k: np.tile(v, 2) for k, v in theta.items()}, model), _nothing(protocol, n)
+    twice = {name: np.tile(value, 2) for name, value in theta.items()}
+    walk = Walk(protocol, twice, model)
+    out = _nothing(protocol, n)
     of_setting, of_creep = slice(None, n), slice(n, None)
-    steps = 1j * np.repeat([[_STEP, 0.0], [0.0, _STEP]], n, axis=1)
-    before, beside = walk.begin(2 * n)
-    out.creep[0] = before[:n]
+    setting_step, creep_step = 1j * np.repeat([[_STEP, 0.0], [0.0, _STEP]], n, axis=1)
+    carried, beside = walk.begin(2 * n)
+    out.creep[0] = carried[:n]
     for j, setting in enumerate(protocol.setting):
-        y, carried, beside = walk.hold(j, setting + steps[0], np.tile(out.creep[j], 2) + steps[1], beside)
-        out.reading[j], out.creep[j + 1] = y[:, of_creep].real, carried[of_creep].real
-        out.by_setting[j], out.carry_by_setting[j] = y[:, of_setting].imag, carried[of_setting].imag
-        out.by_creep[j], out.carry_by_creep[j] = y[:, of_creep].imag, carried[of_creep].imag
+        creep = np.tile(out.creep[j], 2) + creep_step
+        reading, carried, beside = walk.hold(j, setting + setting_step, creep, beside)
+        out.reading[j] = reading[:, of_creep].real
+        out.by_setting[j] = reading[:, of_setting].imag / _STEP
+        out.by_creep[j] = reading[:, of_creep].imag / _STEP
+        out.creep[j + 1] = carried[of_creep].real
+        out.carry_by_setting[j] = carried[of_setting].imag / _STEP
+        out.carry_by_creep[j] = carried[of_creep].imag / _STEP
         walk.past = [(start_s, goal.real, k2.real) for start_s, goal, k2 in walk.past]
         beside = {key: value.real for key, value in beside.items()}
-    for derivative in (out.by_setting, out.by_creep, out.carry_by_setting, out.carry_by_creep):
-        derivative /= _STEP
     return out
 
 
@@ -178,19 +183,20 @@ class Walk:
         self.protocol, self.model = protocol, model
         self.past: list[Clock] = []
         self.late: Any = 0.0
-        self.effects = Placed(model.effects, theta)
-        self.at, self.change = self.effects.at, self.effects.change
+        effects = Placed(model.effects, theta)
+        self.at, self.change = effects.at, effects.change
         self.theta: dict[str, Array] = dict(theta)
         if "sample" in self.at:
             self.theta = self.change("sample", self.theta, self._context(0))
-        self.late = self.change("time", np.zeros((1, 1)), self._context(0)) if "time" in self.at else 0.0
-        self.creep = Creep(self.effects, self.theta, model.history)
+        if "time" in self.at:
+            self.late = self.change("time", np.zeros((1, 1)), self._context(0))
         self.k1, self.B, self.U = self.theta["k1"], self.theta["B"], self.theta["U"]
         self.k2, self.N = self.theta["k2"], self.theta["N"]
-        self.base = protocol.length_mm + self.theta["preload"]
-        elastic = Elastic(self.effects, self.k1, protocol.length_mm, model.law)
-        self.bench = SETTINGS[protocol.control](self.effects, elastic, self.base)
+        self.creep = Creep(effects, self.theta, model.history)
         self.kept = self.creep.kept
+        self.base = protocol.length_mm + self.theta["preload"]
+        elastic = Elastic(effects, self.k1, protocol.length_mm, model.law)
+        self.bench = SETTINGS[protocol.control](effects, elastic, self.base)
         self.own_time = bool(self.at.keys() & {"rate", "clock", "fraction"})
         # Holds mostly share their reading times, so the exponentials are few.
         times, self.where = protocol.distinct_times
@@ -226,7 +232,8 @@ class Walk:
         hold.initial_tension = self._first(held, sum(beside.values(), hold.carried), hold)
         if "wait" in self.at:
             beside = self._wait(held, self.change("wait", np.zeros((1, 1)), hold), beside, hold)
-        amount, k2 = law.amount(hold.initial_tension, hold), law.rate(hold)
+        amount = law.amount(hold.initial_tension, hold)
+        k2 = law.rate(hold)
         fraction = law.fraction(k2, hold) if self.own_time else self.fraction[self.where[j]]
         hold.grown = law.creep(hold.carried + amount * fraction, hold)
         self.past.append((hold.start_s, hold.carried + amount, k2))
@@ -234,7 +241,8 @@ class Walk:
         total = sum(courses.values(), hold.grown)
         readings = self.bench.read(held, total, hold)
         end = self.protocol.end[j]
-        return readings, hold.grown[end], {key: course[end][None] for key, course in courses.items()}
+        beside = {key: course[end][None] for key, course in courses.items()}
+        return readings, hold.grown[end], beside
 
     def begin(self, n: int) -> tuple[Array, dict[str, Array]]:
         """What the wire brings into the first hold: its creep (n,), and elongations beside it by effect key."""

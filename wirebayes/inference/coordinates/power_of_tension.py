@@ -42,19 +42,26 @@ def suiting_powers(
     known = np.isfinite(lost)
     if known.sum() < _LEAST_HOLDS or not lost[known].any():
         return _LOG_HAZARDS, np.full(len(_LOG_HAZARDS), middle)
-    reached = -np.expm1(-np.exp(_LOG_HAZARDS)[:, None, None] * relative_s**N)  # (m, 1, H)
-    drive = np.exp(np.exp(powers)[:, None] * (log_tension - log_tension.max()))  # (p, H)
+    gained = _gained(np.exp(powers), log_tension, relative_s**N)[known]
+    lost = lost[known, None, None]
+    scale = (gained * lost).sum(axis=0) / np.maximum((gained**2).sum(axis=0), 1e-300)
+    left = ((lost - scale * gained) ** 2).sum(axis=0) / (lost**2).sum() + _LEAST_LEFT
+    log_likelihood = -0.5 * len(lost) * np.log(left)
+    log_density = log_likelihood - 0.5 * _SPREADS**2
+    weight = np.exp(log_density - log_density.max(axis=1, keepdims=True))
+    return _LOG_HAZARDS, weight @ powers / weight.sum(axis=1)
+
+
+def _gained(powers: Array, log_tension: Array, relative_s: Array) -> Array:
+    """(H, m, p) elongation gained in every hold for B = 1 and N = 1, at each hazard and each power U."""
+    reached = -np.expm1(-np.exp(_LOG_HAZARDS)[:, None, None] * relative_s)  # (m, 1, H)
+    drive = np.exp(powers[:, None] * (log_tension - log_tension.max()))  # (p, H)
     carried = np.zeros((len(_LOG_HAZARDS), len(powers)))
     gained = np.empty((len(log_tension), *carried.shape))
     for j in range(len(log_tension)):
         gained[j] = (drive[:, j] - carried) * reached[..., j]
         carried = carried + gained[j]
-    gained, lost = gained[known], lost[known, None, None]
-    scale = (gained * lost).sum(axis=0) / np.maximum((gained**2).sum(axis=0), 1e-300)
-    left = ((lost - scale * gained) ** 2).sum(axis=0) / (lost**2).sum() + _LEAST_LEFT
-    log_density = -0.5 * len(lost) * np.log(left) - 0.5 * _SPREADS**2
-    weight = np.exp(log_density - log_density.max(axis=1, keepdims=True))
-    return _LOG_HAZARDS, weight @ powers / weight.sum(axis=1)
+    return gained
 
 
 _LOG_HAZARDS = np.arange(-10.0, 4.01, 0.25)  # beyond, creep is linear in time, or over at once: nothing changes

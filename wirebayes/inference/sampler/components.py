@@ -74,22 +74,27 @@ class Components:
         -------
         (n, d + 1) array
         """
-        (n, d), k, row = x.shape, self.straightened, np.arange(len(x))
-        inverse = np.linalg.inv(self.mixture.factors)
-        straight, jacobian = (x, 0.0) if self.straight is None else self.straight.forward(x)
-        centres = self.mixture.centres[:, None]
-        apart = np.concatenate([straight - centres[:k], x - centres[k:]])  # (components, n, d)
-        deviates = apart @ inverse.transpose(0, 2, 1)
+        n, d = x.shape
+        deviates, jacobian = self._deviates(x)
         distances = np.einsum("knd,knd->kn", deviates, deviates)
         logs = self.mixture.log_parts(distances)
-        logs[:k] += jacobian
+        logs[: self.straightened] += jacobian
         which = np.argmax(logs + random.gumbel(size=logs.shape), axis=0)
+        chosen = which, np.arange(n)
         degrees = self.mixture.degrees[which]
-        stretch = random.chisquare(degrees + d) / (degrees + distances[which, row])
+        stretch = random.chisquare(degrees + d) / (degrees + distances[chosen])
         points = np.empty((n, d + 1))
         points[:, 0] = self._until[which] - self.mixture.weights[which] * random.uniform(size=n)
-        points[:, 1:] = ndtr(deviates[which, row] * np.sqrt(stretch)[:, None])
+        points[:, 1:] = ndtr(deviates[chosen] * np.sqrt(stretch)[:, None])
         return points
+
+    def _deviates(self, x: Array) -> tuple[Array, Any]:
+        """(components, n, d) of places (n, d), each in a component's own units, and what straightening adds to logs."""
+        centres, k = self.mixture.centres[:, None], self.straightened
+        straight, jacobian = (x, 0.0) if self.straight is None else self.straight.forward(x)
+        apart = np.concatenate([straight - centres[:k], x - centres[k:]])
+        inverse = np.linalg.inv(self.mixture.factors)
+        return apart @ inverse.transpose(0, 2, 1), jacobian
 
 
 _SMALLEST = 1e-15  # from the borders of the cube, where deviates are not finite

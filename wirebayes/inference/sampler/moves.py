@@ -66,25 +66,36 @@ class PoolMove(Move):  # type: ignore[misc]
 
     def _pooled(self, model: Any, state: EmceeState, k: int) -> list[tuple[Array, Array, Bools]]:
         """The next k places of all walkers: (n, d), their log densities (n,), and whether they changed (n,)."""
-        (n, d), random = state.coords.shape, model.random
-        points = net.around(self.components.to_cube(state.coords, random), k + 1, random)
-        # not in the net's own order: that goes to and fro between halves of the cube, as equal steps do not expect
-        y = self.components.from_cube(points[:, 1 + random.permutation(k)].reshape(n * k, -1), random)
-        y, beyond = _within(y, np.repeat(state.coords, k, axis=0))
-        drawn = np.where(beyond, -np.inf, model.compute_log_prob_fn(y)[0])
-        value = np.column_stack([state.log_prob, drawn.reshape(n, k)])
-        pool = np.concatenate([state.coords[:, None], y.reshape(n, k, d)], axis=1)
-        weight = value - self._log_proposal(pool)
-        weight = np.exp(weight - weight.max(axis=1, keepdims=True))
-        until = np.cumsum(weight, axis=1)
-        at = (random.uniform(size=(n, 1)) + np.arange(k) / k) % 1.0 * until[:, -1:]
-        taken = np.array([np.searchsorted(ends, places) for ends, places in zip(until, at, strict=True)])
+        pool, value = self._pools(model, state, k)
+        taken = _taken(value - self._log_proposal(pool), k, model.random)
         changed = np.diff(taken, axis=1, prepend=0) != 0
-        row = np.arange(n)
-        return [(pool[row, i], value[row, i], new) for i, new in zip(taken.T, changed.T, strict=True)]
+        walker = np.arange(len(pool))
+        return [(pool[walker, i], value[walker, i], new) for i, new in zip(taken.T, changed.T, strict=True)]
+
+    def _pools(self, model: Any, state: EmceeState, k: int) -> tuple[Array, Array]:
+        """(n, 1 + k, d) each walker's place and k draws, and their log densities (n, 1 + k)."""
+        x, random = state.coords, model.random
+        n, d = x.shape
+        points = net.around(self.components.to_cube(x, random), k + 1, random)
+        # not in the net's own order: that goes to and fro between halves of the cube, as equal steps do not expect
+        drawn_points = points[:, 1 + random.permutation(k)]
+        drawn = self.components.from_cube(drawn_points.reshape(n * k, -1), random)
+        drawn, beyond = _within(drawn, np.repeat(x, k, axis=0))
+        value = np.where(beyond, -np.inf, model.compute_log_prob_fn(drawn)[0])
+        pool = np.concatenate([x[:, None], drawn.reshape(n, k, d)], axis=1)
+        return pool, np.column_stack([state.log_prob, value.reshape(n, k)])
 
     def _log_proposal(self, pool: Array) -> Array:
         return self.proposal.log_density(pool.reshape(-1, pool.shape[-1])).reshape(pool.shape[:2])
+
+
+def _taken(log_weight: Array, k: int, random: Any) -> Array:
+    """(n, k) members of n pools by weight: k equal steps around a circle on which each has an arc of its weight."""
+    weight = np.exp(log_weight - log_weight.max(axis=1, keepdims=True))
+    arc_ends = np.cumsum(weight, axis=1)
+    turns = (random.uniform(size=(len(weight), 1)) + np.arange(k) / k) % 1.0
+    places = turns * arc_ends[:, -1:]
+    return np.array([np.searchsorted(ends, at) for ends, at in zip(arc_ends, places, strict=True)])
 
 
 class EvolutionMove(RedBlueMove):  # type: ignore[misc]
@@ -99,8 +110,8 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
     ensembles : int
         Of the same even number of walkers, one after the other.
     straight : Straight, optional
-        Transformation as they are when left out; then a fifth of the steps is as long as differences are, from mode to
-        mode.
+        Coordinates stay as they are when left out; then a fifth of the steps is as long as differences are, from mode
+        to mode.
     """
 
     def __init__(self, ensembles: int, straight: Straight | None = None) -> None:
@@ -125,15 +136,18 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
         log_factor : (n,) array
             Added to the log acceptance ratio; not zero where the map that straightens the coordinates changes volume.
         """
-        (n, d), each = x.shape, len(others[0]) // self.ensembles
-        (u, slope), (pool, _) = self._forward(x), self._forward(others[0])
+        n, d = x.shape
+        u, slope = self._forward(x)
+        pool, _ = self._forward(others[0])
+        each = len(pool) // self.ensembles
+        first = np.repeat(np.arange(self.ensembles) * each, n // self.ensembles)  # of the walker's own ensemble
         one = random.randint(each, size=n)
         other = (one + random.randint(1, each, size=n)) % each
-        own = np.repeat(np.arange(self.ensembles) * each, n // self.ensembles)
+        difference = pool[first + one] - pool[first + other]
         scale = 2.38 / np.sqrt(2.0 * d)
         # short steps for the walker whom long ones do not serve
         lengths = (scale, 0.5 * scale) if self.straight else (scale, scale, scale, scale, 1.0)
-        u = u + random.choice(lengths, size=(n, 1)) * (pool[own + one] - pool[own + other])
+        u = u + random.choice(lengths, size=(n, 1)) * difference
         y, _ = _within(self.straight.inverse(u) if self.straight else u, x)
         return y, slope - self._forward(y)[1]
 

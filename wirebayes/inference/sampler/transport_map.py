@@ -95,17 +95,15 @@ class Straight:
 
     def inverse(self, u: Array) -> Array:
         """(n, d) points of straightened ones."""
-        location, width, skewness = self.shape[:, :, None]
-        u = np.ascontiguousarray(u.T)
-        # the hyperbolic sine of a sum, arcsinh(u) + skewness, written out
-        u = location + width * (u * np.cosh(skewness) + np.sqrt(1.0 + u * u) * np.sinh(skewness))
-        v, held = np.zeros_like(u), np.zeros_like(u)
-        for j in range(len(u)):
+        left = _skewed(np.ascontiguousarray(u.T), self.shape[:, :, None])
+        v, held = np.zeros_like(left), np.zeros_like(left)
+        for j in range(len(v)):
             before, inside = v[:j], held[:j]
             mean = self.constant[j] + self.linear[j, :j] @ before
             mean += ((self.quadratic[j, :j, :j] @ inside) * (before - 0.5 * inside)).sum(axis=0)
             log_scale = self.log_scale[j, 0] + self.log_scale[j, 1 : j + 1] @ before
-            v[j] = mean + u[j] * np.exp(np.clip(log_scale, self.least[j], self.most[j]))
+            log_scale = np.clip(log_scale, self.least[j], self.most[j])
+            v[j] = mean + left[j] * np.exp(log_scale)
             held[j] = np.clip(v[j], self.low[j], self.high[j])
         x = np.empty(v.T.shape)
         x[:, self.order] = v.T * self.scale + self.centre
@@ -238,6 +236,13 @@ def _normal(x: Array, shape: Array) -> tuple[Array, Array]:
     return w * even - root * odd, (even - w / root * odd) / width
 
 
+def _skewed(u: Array, shape: Array) -> Array:
+    """The inverse of `_normal`: its sinh(arcsinh u + skewness), written out."""
+    location, width, skewness = shape
+    w = u * np.cosh(skewness) + np.sqrt(1.0 + u * u) * np.sinh(skewness)
+    return location + width * w
+
+
 def _shapes(x: Array, weight: Array) -> Array:
     """(3, m) shapes of weighted points (n, m), by which their quantiles come nearest to those of a normal.
 
@@ -248,14 +253,18 @@ def _shapes(x: Array, weight: Array) -> Array:
     spread = np.maximum(np.sqrt(weight @ (x - middle) ** 2 / weight.sum()), 1e-12)
     quantiles = (_quantiles(x, weight, ndtr(SCORES)) - middle) / spread
     inner = np.arcsinh(SCORES) + SKEWNESSES[:, None]
-    curve, slope = np.sinh(inner), np.cosh(inner) / np.sqrt(1.0 + SCORES**2)
-    lines = np.stack([np.ones_like(curve), curve], axis=-1) / slope[..., None]
-    weighted = quantiles / slope[..., None]
+    curve = np.sinh(inner)
+    slope = (np.cosh(inner) / np.sqrt(1.0 + SCORES**2))[..., None]
+    lines = np.stack([np.ones_like(curve), curve], axis=-1) / slope
+    weighted = quantiles / slope
     line = np.linalg.pinv(lines) @ weighted
-    location, width = line[:, 0], np.maximum(line[:, 1], 1e-3)
-    off = ((weighted - lines @ line) ** 2).sum(axis=1) / width**2 + (RESERVE * SKEWNESSES[:, None]) ** 2
-    best, m = np.argmin(off, axis=0), np.arange(x.shape[1])
-    return np.array([middle + spread * location[best, m], spread * width[best, m], SKEWNESSES[best]])
+    width = np.maximum(line[:, 1], 1e-3)
+    misfit = ((weighted - lines @ line) ** 2).sum(axis=1) / width**2
+    reserve = (RESERVE * SKEWNESSES[:, None]) ** 2
+    best = np.argmin(misfit + reserve, axis=0)
+    chosen = best, np.arange(x.shape[1])
+    location = line[:, 0][chosen]
+    return np.array([middle + spread * location, spread * width[chosen], SKEWNESSES[best]])
 
 
 def _quantiles(x: Array, weight: Array, shares: Array) -> Array:
