@@ -149,12 +149,13 @@ def log_weights(
     kinds = names - sum(len(f) - 1 for f in families)
     without, beside = [], []
     for s in sets:
-        prior = log_prior(len(s.names), kinds) - sum(np.log(len(family_of(n, families))) for n in s.names)
         smooth = -np.inf if s.remainder is None else over_subsets(s.remainder)[0]
         if s.names:
-            without.append(prior + s.log_bayes)
+            members = sum(np.log(len(family_of(n, families))) for n in s.names)
+            alone = log_prior(len(s.names), kinds) - members + s.log_bayes
             more = np.logaddexp(smooth, other.get(s.key, -np.inf))
-            beside.append(prior + s.log_bayes + np.log(MORE) + more)
+            without.append(alone)
+            beside.append(alone + np.log(MORE) + more)
         else:
             without.append(-np.inf)  # nothing at all: the global test has excluded it
             beside.append(np.log(UNKNOWN_WEIGHT) + smooth)

@@ -107,12 +107,16 @@ def weigh_names(
     refitted: dict[str, float] = {}
     while wave := _next_wave(waiting, promise, list(refitted.values()), room):
         waiting = waiting[len(wave) :]
-        tasks = _tasks([form for n in wave for form in by_name[n][:forms_a_name]], trials, scans, reach)
-        done = parallel_map(partial(refit, blocks), [on for _, on in tasks], *zip(*tasks.values(), strict=True))
+        promising = [form for name in wave for form in by_name[name][:forms_a_name]]
+        tasks = _tasks(promising, trials, scans, reach)
+        on_blocks = [on for _, on in tasks]
+        done = parallel_map(partial(refit, blocks), on_blocks, *zip(*tasks.values(), strict=True))
         found |= zip(tasks, done, strict=True)
-        summed = _summed([form for n in wave for form in by_name[n]], found, len(blocks))
+        every = [form for name in wave for form in by_name[name]]
+        summed = _summed(every, found, len(blocks))
         refitted |= {name: summed.log_bayes[name] for name in wave}
-    return replace(_summed(forms, found, len(blocks)), reach=reach, tried={**before, **refitted})
+    tried = {**before, **refitted}
+    return replace(_summed(forms, found, len(blocks)), reach=reach, tried=tried)
 
 
 def _by_name(forms: Sequence[_Form]) -> dict[str, list[_Form]]:

@@ -122,15 +122,18 @@ def _another_length(problem: Problem) -> tuple[str, Problem]:
     Twice the length takes twice the displacements; weights stay.
     """
     longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
-    p, length = longest.protocol, 2.0 * longest.protocol.length_mm
-    settings = p.setting[p.recorded] * (1.0 if p.control == "force" else 2.0)
+    p = longest.protocol
+    length = 2.0 * p.length_mm
+    stretch, alike = (1.0, "the same weights") if p.control == "force" else (2.0, "steps scaled alike")
+    settings = stretch * p.setting[p.recorded]
     protocol = _holds(settings, _longest_series(p), length, p.control)
+    unread = np.zeros((*protocol.time_s.shape, 1))
     model = replace(longest.model, length_ref_mm=longest.model.length_ref_mm or p.length_mm)
-    more = replace(longest, protocol=protocol, readings=np.zeros((*protocol.time_s.shape, 1)), model=model)
+    more = replace(longest, protocol=protocol, readings=unread, model=model)
     exponent = {} if LENGTH_EXPONENT in problem.prior.names else {LENGTH_EXPONENT: 1.0}
     prior = replace(problem.prior, fixed=exponent | problem.prior.fixed)
-    which = "a second" if len({s.protocol.length_mm for s in problem.samples}) == 1 else "another"
-    alike = "the same weights" if p.control == "force" else "steps scaled alike"
+    lengths = {s.protocol.length_mm for s in problem.samples}
+    which = "a second" if len(lengths) == 1 else "another"
     words = f"repeat the test at {which} length, {problem.units.length_mm * length:g} mm, with {alike}"
     return words, replace(problem, samples=(*problem.samples, more), prior=prior)
 

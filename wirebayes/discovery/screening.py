@@ -128,17 +128,20 @@ def _of_the_bench(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protoco
 
 def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array, Array]:
     """(n,) log Bayes factor with the same prior on every amplitude, best amplitude, and amplitude per δ."""
-    one_sided = bool(scans[candidate.blocks[0]].pieces.one_sided[candidate.probe])
-    chosen = [(scans[b], own) for b, own in zip(candidate.blocks, best_probes(candidate, scans), strict=True)]
-    lr = np.array([_each(found.effects, own) for found, own in chosen])
-    a = np.array([_each(found.amplitude, own) for found, own in chosen])
+    blocks = candidate.blocks
+    one_sided = bool(scans[blocks[0]].pieces.one_sided[candidate.probe])
+    chosen = [(scans[b], own) for b, own in zip(blocks, best_probes(candidate, scans), strict=True)]
+    log_ratio = np.array([_each(found.effects, own) for found, own in chosen])
+    amplitude = np.array([_each(found.amplitude, own) for found, own in chosen])
     norm = np.array([_each(found.norm, own) for found, own in chosen])
     if one_sided:
-        a = np.maximum(a, 0.0)
-    if not candidate.shared or len(candidate.blocks) == 1:
-        return lr.sum(axis=0) + occam(one_sided) * len(candidate.blocks), a[0], 1.0 / np.maximum(norm[0], 1e-300)
-    value, mean = shared_amplitude(lr, a, norm)
-    return value + occam(one_sided), mean, 1.0 / np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
+        amplitude = np.maximum(amplitude, 0.0)
+    if not candidate.shared or len(blocks) == 1:
+        value = log_ratio.sum(axis=0) + occam(one_sided) * len(blocks)
+        return value, amplitude[0], 1.0 / np.maximum(norm[0], 1e-300)
+    value, mean = shared_amplitude(log_ratio, amplitude, norm)
+    together = np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
+    return value + occam(one_sided), mean, 1.0 / together
 
 
 def best_probes(candidate: Candidate, scans: Sequence[Scan]) -> list[Ints]:

@@ -150,18 +150,21 @@ def _beside_discrepancy(
     bases: Sequence[LaplaceFit], train: Sequence[int], rng: Generator, parallel_map: ParallelMap
 ) -> list[_Smooth]:
     """A smooth discrepancy beside the effects of each base, its size what they leave over in the holds trained on."""
-    n, handed_over = len(train), []
+    n = len(train)
+    # everything is handed over before anything is waited for
+    handed_over = []
     for base in bases:
         first = [e.train(k) for e, k in zip(base.experiments, train, strict=True)]
         added = parallel_map(with_discrepancy, repeat(base), [*base.experiments, *first], rng.spawn(2 * n))
         handed_over.append((base, added, rng.spawn(n)))
     fitting = []
-    for base, added, own in handed_over:
-        effects, alone_ = list(added), [(e,) for e in base.experiments]
+    for base, added, generators in handed_over:
+        effects = list(added)
+        singly = [(e,) for e in base.experiments]
         one_scale = partial(fitted, scales=base.scales)
-        fits = parallel_map(one_scale, alone_, effects[:n], repeat(base.spec), own)
-        trained = zip(alone_, train, effects[n:], strict=True)
-        fitting.append((fits, [_Trained(e, (k,), extra, base) for e, k, extra in trained]))
+        fits = parallel_map(one_scale, singly, effects[:n], repeat(base.spec), generators)
+        trained = [_Trained(e, (k,), extra, base) for e, k, extra in zip(singly, train, effects[n:], strict=True)]
+        fitting.append((fits, trained))
     return [_Smooth(list(fits), trained) for fits, trained in fitting]
 
 

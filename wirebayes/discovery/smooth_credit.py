@@ -16,7 +16,8 @@ def beside_smooth(x: Expansion) -> Array:
     It is taken at the best amplitude, whose prior is not in it (`wirebayes.discovery.refit.occam`); sizes of the
     remainder and noise ratios are summed over as in `wirebayes.discovery.linear_scan.scan`.
     """
-    first, nothing = x.of(np.array([0])), np.full(x.signatures.shape[2], -np.inf)
+    first = x.of(np.array([0]))
+    nothing = np.full(x.signatures.shape[2], -np.inf)
     if not has_tangent(first)[0]:
         return nothing
     found = project(first)
@@ -24,13 +25,14 @@ def beside_smooth(x: Expansion) -> Array:
     if not seen.any():
         return nothing
     shared, rss, along, square = _with_remainder(found, seen)
-    least, half = float(x.least[0]), 0.5 * x.degrees
-    left = np.maximum(rss, least)
     upward = np.where(x.one_sided, np.maximum(along, 0.0), along)
     absorbed = ABSORBED * (x.signatures[0] ** 2).sum(axis=0)
     gain = np.where(square > absorbed, upward**2 / np.where(square > 0, square, np.inf), 0.0)
+    least, half = float(x.least[0]), 0.5 * x.degrees
+    left = np.maximum(rss, least)
+    left_beside = np.maximum(left[..., None] - gain, least)
     without = shared - half * np.log(left)
-    beside = shared[..., None] - half * np.log(np.maximum(left[..., None] - gain, least))
+    beside = shared[..., None] - half * np.log(left_beside)
     return np.asarray(log_sum(beside.reshape(-1, beside.shape[2])) - log_sum(without.ravel()))
 
 
@@ -49,15 +51,19 @@ def _with_remainder(found: Projected, seen: Bools) -> _Products:
     crossed = smooth.products(found.form, found.shrink)
     # along the eigenvectors of its functions' products the remainder is a sum of independent ones
     values, vectors = eigh(functions[0][seen])
-    values, turn = np.maximum(values, 0.0), np.swapaxes(vectors, 1, 2)
+    values = np.maximum(values, 0.0)
+    turn = np.swapaxes(vectors, 1, 2)
     of_residual = (turn @ with_residual[0][seen][..., None])[:, None, :, 0]
     of_signatures = turn @ crossed[0][seen]
-    variance = SIZES**2 / np.maximum(values.sum(axis=1), 1e-300)[:, None]
-    excess = variance[..., None] * values[:, None]
-    taken = variance[..., None] / (1.0 + excess)
+    variance = (SIZES**2 / np.maximum(values.sum(axis=1), 1e-300)[:, None])[..., None]
+    excess = variance * values[:, None]
+    taken = variance / (1.0 + excess)
+    shared, rss, along, square = (
+        each[0][seen][:, None] for each in (found.shared, found.rss, found.along, found.square)
+    )
     return _Products(
-        found.shared[0][seen][:, None] - 0.5 * np.log1p(excess).sum(axis=2),
-        found.rss[0][seen][:, None] - (taken * of_residual**2).sum(axis=2),
-        found.along[0][seen][:, None] - (taken * of_residual) @ of_signatures,
-        found.square[0][seen][:, None] - taken @ of_signatures**2,
+        shared - 0.5 * np.log1p(excess).sum(axis=2),
+        rss - (taken * of_residual**2).sum(axis=2),
+        along - (taken * of_residual) @ of_signatures,
+        square - taken @ of_signatures**2,
     )

@@ -73,21 +73,23 @@ def explore(
     references = [reference_of(block) for block in plain]
     smooth = np.array([remainder_evidence(b, r) for b, r in zip(plain, references, strict=True)])
     root = EffectSet((), 0.0, {}, smooth)
+    start = FittedSet(root, plain, (), found, ([], []))
     frontier = Frontier(len(settings.kinds), families)
     credits = _credits(expansions, trials)
     for name in found.winners:
         beside = np.maximum(smooth + credits[name], 0.0).sum() if name in credits else -np.inf
         frontier.add(root, name, found, float(beside))
     frontier.lead_to(_leading_pair(expansions, trials))
-    done, start = frontier.fitted, FittedSet(root, plain, (), found, ([], []))
-    while wave := frontier.next_looks(_looks(len(done))):
-        parents = [done.get(frontier.parents[key][0], start) for key in wave]
+    common = repeat(families), repeat(references), repeat(settings)
+    while wave := frontier.next_looks(_looks(len(frontier.fitted))):
+        parents = [frontier.fitted.get(frontier.parents[key][0], start) for key in wave]
         names = [frontier.parents[key][1] for key in wave]
-        common = repeat(families), repeat(references), repeat(settings)
         fitted_sets = parallel_map(_fit, parents, names, *common, rng.spawn(len(wave)))
         for key, new in zip(wave, fitted_sets, strict=True):
-            _keep(frontier, key, new, _log_evidence(new.blocks) - _log_evidence(plain))
-    return Explored((root, *frontier.known.values()), done, _left_over(frontier), frontier.parents, start)
+            own_fit = _log_evidence(new.blocks) - _log_evidence(plain)
+            _keep(frontier, key, new, own_fit)
+    sets = root, *frontier.known.values()
+    return Explored(sets, frontier.fitted, _left_over(frontier), frontier.parents, start)
 
 
 def _looks(done: int) -> int:

@@ -176,18 +176,20 @@ def points_of(target: LogPosterior, around: Around, readings: Sequence[Array] | 
     both = around.theta[: n * (1 + around.columns)]
     theta = both[:n]
     for at, sample in enumerate(problem.samples):
-        mask = sample.protocol.mask
+        protocol, model = sample.protocol, sample.model
+        mask = protocol.mask
         own = problem.parameters(theta, sample)
         sd = np.sqrt(sample.variance(own))
-        line = linearise(sample.protocol, own, sample.model)
+        line = linearise(protocol, own, model)
         y = sample.readings if readings is None else readings[at]
-        moved = simulate(sample.protocol, problem.parameters(both, sample), sample.model)
+        residual = ((y - line.reading)[mask] / sd).T
+        moved = simulate(protocol, problem.parameters(both, sample), model)
         moved = moved.reshape(*moved.shape[:2], 1 + around.columns, n)
         slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
-        scaled = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
-        jac = np.moveaxis(likelihoods.setting_jacobian(line)[mask] * (own["setting_sd"] / sd), -1, 0)
-        floor = np.broadcast_to(sample.resolution**2 / 12.0, sd.shape) / sd**2
-        yield Point(line.reading, slopes, sd, ((y - line.reading)[mask] / sd).T, scaled, jac, floor)
+        by_parameters = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
+        by_setting = likelihoods.setting_jacobian(line)[mask] * (own["setting_sd"] / sd)
+        rounding = np.broadcast_to(sample.resolution**2 / 12.0, sd.shape)
+        yield Point(line.reading, slopes, sd, residual, by_parameters, np.moveaxis(by_setting, -1, 0), rounding / sd**2)
 
 
 def tangent_of(target: LogPosterior, around: Around, points: Sequence[Point]) -> Tangent:

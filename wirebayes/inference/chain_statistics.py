@@ -189,14 +189,15 @@ def pareto_fit(excess: Array) -> tuple[float, float]:
     n = len(excess)
     steps = 30 + int(np.sqrt(n))
     quartile = excess[int(n / 4 + 0.5) - 1]
-    rate = (1.0 - np.sqrt(steps / (np.arange(steps) + 0.5))) / (3.0 * quartile) + 1.0 / excess[-1]
-    shape = np.log1p(-rate[:, None] * excess).mean(axis=1)
-    log_likelihood = n * (np.log(-rate / shape) - shape - 1.0)
+    below_one = 1.0 - np.sqrt(steps / (np.arange(steps) + 0.5))
+    rates = below_one / (3.0 * quartile) + 1.0 / excess[-1]
+    shapes = np.log1p(-rates[:, None] * excess).mean(axis=1)
+    log_likelihood = n * (np.log(-rates / shapes) - shapes - 1.0)
     weight = np.exp(log_likelihood - logsumexp(log_likelihood))
     weight = np.where(weight < _NEGLIGIBLE, 0.0, weight)
-    best = float(rate @ weight / weight.sum())
-    raw = float(np.log1p(-best * excess).mean())
-    return (n * raw + 5.0) / (n + 10.0), -raw / best
+    rate = float(rates @ weight / weight.sum())
+    shape = float(np.log1p(-rate * excess).mean())
+    return (n * shape + 5.0) / (n + 10.0), -shape / rate
 
 
 _TAILS = (0.05, 0.95)  # the ends of a 90 % interval

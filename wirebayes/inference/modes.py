@@ -122,17 +122,25 @@ def search(target: LogPosterior, rng: Generator, *, extra: Array | None = None) 
         Further starts, in sampled coordinates.
     """
     alone = _SideBySide(target, 1, None)
+
+    def density(z: Array) -> Array:
+        return alone.density(z, np.zeros(len(z), int))
+
     z = _prior(target, _ANNEALED, rng)
-    value = alone.density(z, np.zeros(len(z), int))
-    passed, height = _cooled(lambda z: alone.density(z, np.zeros(len(z), int)), z, value, rng)
+    value = density(z)
+    passed, height = _cooled(density, z, value, rng)
     width = passed.std(axis=0)
     apart = spread_rows(passed / np.where(width > 0, width, 1.0), _FIRST, rng)
+    highest = int(np.argmax(height))
     possible = _possible(z, value)
     [spread] = alone.with_ratios([_spread(target, possible, _FIRST, rng)])
-    begin = [spread, passed[[int(np.argmax(height)), *apart]], *([] if extra is None else [extra])]
+    begin = [spread, passed[[highest, *apart]]]
+    if extra is not None:
+        begin.append(extra)
     found = alone.climbed([np.vstack(begin)], [])
     [every] = alone.further(found, [_some(possible, _STARTS, rng)])
-    return Search(every, passed[-_WARM_STEPS * _ANNEALED :], passed[-_ANNEALED:], height[-_ANNEALED:])
+    warm, cold = passed[-_WARM_STEPS * _ANNEALED :], passed[-_ANNEALED:]
+    return Search(every, warm, cold, height[-_ANNEALED:])
 
 
 class _SideBySide:

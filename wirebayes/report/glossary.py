@@ -91,13 +91,21 @@ def meaning(
     if model:
         named_symbols = [(f"{n}{_unit(unit_of(n))}", f"{sentence}.") for n, sentence in SYMBOLS.items()]
         blocks += [Text(_IN_WORDS), Definitions("Symbols", named_symbols if symbols else [], _LAWS)]
-    names = list(dict.fromkeys(effect.split("@")[0].split(".")[0] for effect in effects))
-    known = {**CATALOGUE, Discrepancy.name: Discrepancy, **{n: type(e) for n, e in (own or {}).items()}}
-    named = [(spoken(name), _effect(known[name])) for name in names if name in known]
-    blocks += [Definitions("Effects named here", named)] if named else []
+    named = _effects_named(effects, own or {})
+    if named:
+        blocks.append(Definitions("Effects named here", named))
     defined = [(term, TERMS[term]) for term in terms]
-    blocks += [Definitions("Other words", defined)] if defined else []
+    if defined:
+        blocks.append(Definitions("Other words", defined))
     return Section("What the words and symbols mean", blocks, folded=True)
+
+
+def _effects_named(effects: Iterable[str], own: Mapping[str, Effect]) -> list[tuple[str, str]]:
+    """The effects by their spoken names, each once, and what each is."""
+    users = {name: type(effect) for name, effect in own.items()}
+    known = {**CATALOGUE, Discrepancy.name: Discrepancy, **users}
+    names = dict.fromkeys(effect.split("@")[0].split(".")[0] for effect in effects)
+    return [(spoken(name), _effect(known[name])) for name in names if name in known]
 
 
 def _effect(kind: type[Effect]) -> str:

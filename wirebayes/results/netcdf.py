@@ -106,14 +106,15 @@ def _write(node: Any, group: Group, numbers: Iterator[int]) -> None:
         scale.attrs["_Netcdf4Dimid"] = np.int32(next(numbers))
     auxiliary = [name for name in group.coordinates if name not in sizes]
     for name, variable in both.items():
+        dataset = written[name]
         if name not in sizes:
-            for axis, dim in zip(written[name].dims, variable.dims, strict=True):
+            for axis, dim in zip(dataset.dims, variable.dims, strict=True):
                 axis.attach_scale(node[dim])
         if name in group.units:
-            written[name].attrs["units"] = group.units[name]
-        labelling = [other for other in auxiliary if set(group.coordinates[other].dims) <= set(variable.dims)]
+            dataset.attrs["units"] = group.units[name]
+        labelling = [other for other in auxiliary if set(both[other].dims) <= set(variable.dims)]
         if labelling and name in group.variables:  # as the conventions for climate and forecast (CF) have it
-            written[name].attrs["coordinates"] = " ".join(labelling)
+            dataset.attrs["coordinates"] = " ".join(labelling)
 
 
 def _dataset(node: Any, name: str, values: Array) -> Any:
@@ -133,17 +134,18 @@ def _describe(node: Any, attributes: Mapping[str, Any]) -> None:
 
 
 def _read(node: Any) -> Group:
+    found = Group({}, {}, {}, {name: _entry(value) for name, value in node.attrs.items()})
     stored = {name: dataset for name, dataset in node.items() if not _is_bare(dataset)}
-    variables = {name: Variable(_dims(dataset), _values(dataset)) for name, dataset in stored.items()}
-    units = {name: _entry(d.attrs["units"]) for name, d in stored.items() if "units" in d.attrs}
-    auxiliary = [_entry(d.attrs["coordinates"]) for d in stored.values() if "coordinates" in d.attrs]
-    labels = {name for names in auxiliary for name in names.split()}
-    for variable in variables.values():
-        labels.update(variable.dims)
-    values = {name: variable for name, variable in variables.items() if name not in labels}
-    coordinates = {name: variable for name, variable in variables.items() if name in labels}
-    attributes = {name: _entry(value) for name, value in node.attrs.items()}
-    return Group(values, coordinates, units, attributes)
+    labels: set[str] = set()
+    for dataset in stored.values():
+        labels.update(_dims(dataset))
+        labels.update(_entry(dataset.attrs.get("coordinates", "")).split())
+    for name, dataset in stored.items():
+        place = found.coordinates if name in labels else found.variables
+        place[name] = Variable(_dims(dataset), _values(dataset))
+        if "units" in dataset.attrs:
+            found.units[name] = _entry(dataset.attrs["units"])
+    return found
 
 
 def _is_bare(dataset: Any) -> bool:

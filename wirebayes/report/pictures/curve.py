@@ -51,19 +51,22 @@ def curve(stored: Stored) -> Curve:
     ----------
     stored : Stored
     """
-    protocol, sample = stored.sample.protocol, stored.sample
-    rows = np.linspace(0, len(stored.theta) - 1, min(len(stored.theta), DRAWS)).astype(int)
+    sample, draws = stored.sample, len(stored.theta)
+    protocol = sample.protocol
+    rows = np.linspace(0, draws - 1, min(draws, DRAWS)).astype(int)
     own = {name: values[rows] for name, values in stored.draws.items()}
-    courses = []
-    for dense in (_dense(protocol), protocol):
-        holds = len(dense.setting)
-        request = PredictionRequest(dense, holds, np.zeros(holds, bool), np.full(holds, np.nan))
-        courses.append(chain_course(own, sample, request, np.random.default_rng(0)))
+
+    def course(read: Protocol) -> Floats:
+        holds = len(read.setting)
+        request = PredictionRequest(read, holds, np.zeros(holds, bool), np.full(holds, np.nan))
+        return chain_course(own, sample, request, np.random.default_rng(0))
+
+    quantiles = np.quantile(course(_dense(protocol)), [0.05, 0.5, 0.95], axis=2)[..., :_POINTS]
+    at_readings = np.median(course(protocol), axis=2)
     inside = _MARGIN + (1.0 - 2.0 * _MARGIN) * _SHARES
     recorded = np.cumsum(protocol.recorded) - 1.0
-    quantiles = np.quantile(courses[0], [0.05, 0.5, 0.95], axis=2)[..., :_POINTS]
-    noise = float(np.median(np.hypot(own["sensor_sd"], sample.resolution / np.sqrt(12.0))))
-    return Curve(recorded[:, None] + inside, quantiles, np.median(courses[1], axis=2), noise)
+    noise = np.hypot(own["sensor_sd"], sample.resolution / np.sqrt(12.0))
+    return Curve(recorded[:, None] + inside, quantiles, at_readings, float(np.median(noise)))
 
 
 def _dense(protocol: Protocol) -> Protocol:

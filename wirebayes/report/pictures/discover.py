@@ -92,9 +92,7 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     heights = [rmse for s in steps if (rmse := read_value(s, "rmse")) is not None]
     unit = unit_read(steps[0])
     names = ["plain model", *(spoken(s["model"]) for s in steps[1:]), "left over", "noise"]
-    bars = [(0.0, heights[0], _MEASURED)]
-    bars += [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
-    bars += [(min(floor, heights[-1]), heights[-1], _HELD), (0.0, floor, "0.7")]
+    bars = _bars(heights, floor)
     figure = Figure(figsize=(max(1.1 * len(bars), 5.4), 3.4), layout="constrained")
     axis = figure.subplots()
     for x, ((low, high, colour), label) in enumerate(zip(bars, _sizes(heights, floor, unit), strict=True)):
@@ -107,6 +105,14 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     axis.margins(y=0.12)
     without_frame(axis)
     return figure
+
+
+def _bars(heights: list[float], floor: float) -> list[tuple[float, float, str]]:
+    """Lower and upper end and colour of each bar of the waterfall."""
+    measured, last = heights[0], heights[-1]
+    changes = [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
+    left = min(floor, last), last, _HELD
+    return [(0.0, measured, _MEASURED), *changes, left, (0.0, floor, "0.7")]
 
 
 def _sizes(heights: list[float], floor: float, unit: str) -> list[str]:

@@ -77,23 +77,34 @@ def scene(
         Default: a round factor that makes the drift a twentieth of the robot.
     """
     view = scene_points(robot, position_m, rotation, course, exaggeration)
-    exaggeration, here = view["exaggeration"], np.asarray(view["platform"])
-    there = here + exaggeration * (view["drifted"][-1] - here)
+    enlarged, here = view["exaggeration"], np.asarray(view["platform"])
+    there = here + enlarged * (view["drifted"][-1] - here)
     figure = Figure(figsize=(6.0, 5.2))
     axes: Any = figure.add_axes((0.0, 0.06, 0.92, 0.86), projection="3d")
-    for i, (a, p, q) in enumerate(zip(robot.exit_m, here, there, strict=True)):
-        axes.plot(*(a + traced(robot.pulleys, i, p - a)).T, color=QUIET, lw=1.0)
-        axes.plot(*(a + traced(robot.pulleys, i, q - a)).T, color=HOLD, lw=0.7, ls=":")
-    for points, colour, name in ((here, CHAIN, "commanded"), (there, HOLD, "drifted")):
-        for i, j in platform_edges(robot.platform_m):
-            axes.plot(*points[[i, j]].T, color=colour, lw=1.6)
-        axes.plot(*points.T, color=colour, lw=0, marker="o", ms=3.5, label=name)
-    axes.scatter(*robot.exit_m.T, color=INK, s=14, label="exit points")
-    _label_axes(axes, np.concatenate([robot.exit_m, here, there]), position_m, np.ptp(robot.exit_m, axis=0).max())
-    head = f"{verbatim(robot.name)}: mean drift after {course.times_s[-1]:g} s, enlarged {exaggeration:g} times"
+    for i in range(robot.legs):
+        _draw_wire(axes, robot, i, here[i], color=QUIET, lw=1.0)
+        _draw_wire(axes, robot, i, there[i], color=HOLD, lw=0.7, ls=":")
+    _draw_platform(axes, robot, here, CHAIN, "commanded")
+    _draw_platform(axes, robot, there, HOLD, "drifted")
+    exits = robot.exit_m
+    axes.scatter(*exits.T, color=INK, s=14, label="exit points")
+    _label_axes(axes, np.concatenate([exits, here, there]), position_m, np.ptp(exits, axis=0).max())
+    head = f"{verbatim(robot.name)}: mean drift after {course.times_s[-1]:g} s, enlarged {enlarged:g} times"
     figure.text(0.02, 0.95, head, fontsize=10.5, color=INK)
     figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False, fontsize=8.5)
     return figure
+
+
+def _draw_wire(axes: Any, robot: Robot, i: int, end: Floats, **style: Any) -> None:
+    """From its exit point, around its pulley, to its platform point."""
+    begin = robot.exit_m[i]
+    axes.plot(*(begin + traced(robot.pulleys, i, end - begin)).T, **style)
+
+
+def _draw_platform(axes: Any, robot: Robot, points: Floats, colour: str, name: str) -> None:
+    for i, j in platform_edges(robot.platform_m):
+        axes.plot(*points[[i, j]].T, color=colour, lw=1.6)
+    axes.plot(*points.T, color=colour, lw=0, marker="o", ms=3.5, label=name)
 
 
 def _label_axes(axes: Any, points: Floats, position_m: Floats, size_m: float) -> None:

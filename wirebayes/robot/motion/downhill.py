@@ -195,19 +195,24 @@ def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, Ints]:
     x = cases.x + move[:3]
     R = turning.compose(move[3:], cases.R) if robot.degrees == 6 else cases.R
     new = _evaluate(robot, cases.wires, cases.zero, cases.offset, x, R, scale)
-    noise = 1e-14 * (np.abs(cases.at.energy) + robot.mass_kg * GRAVITY * cases.span)
-    is_newton = step.positive & (cases.damping == 0)
-    accept = new.energy <= cases.at.energy + 1e-4 * step.downhill + noise
-    accept |= is_newton & (new.size < 0.5 * cases.at.size) & (step.length < 1e-3 * robot.size_m)
+    before, undamped = cases.at, cases.damping == 0
+    noise = 1e-14 * (np.abs(before.energy) + robot.mass_kg * GRAVITY * cases.span)
+    is_newton = step.positive & undamped
+    accept = new.energy <= before.energy + 1e-4 * step.downhill + noise
+    accept |= is_newton & (new.size < 0.5 * before.size) & (step.length < 1e-3 * robot.size_m)
     moved = cases.moved(accept, x, R, new)
     balanced = moved.at.size <= cases.floor
-    damping = np.where(accept, _calmer(cases, step, new, noise), np.maximum(1e-3, cases.damping * 10))
+    more = np.maximum(1e-3, cases.damping * 10)
+    damping = np.where(accept, _calmer(cases, step, new, noise), more)
     damping = np.where(balanced, 0.0, damping)  # so that the next step uses the bare stiffness
-    lost = np.abs(moved.x).max(0) > _FAR * cases.span
-    done = is_newton & (balanced | (accept & (step.length < 1e-9 * robot.size_m)))
-    loose = balanced & ~step.positive & (cases.damping == 0)
-    stuck = damping > 1e12
-    ended = np.select([lost, done, loose, stuck], [NO_EQUILIBRIUM, FOUND, NOT_HELD, NOT_CONVERGED], _GOING_ON)
+    hardly_moves = accept & (step.length < 1e-9 * robot.size_m)
+    ends = {
+        NO_EQUILIBRIUM: np.abs(moved.x).max(axis=0) > _FAR * cases.span,
+        FOUND: is_newton & (balanced | hardly_moves),
+        NOT_HELD: balanced & ~step.positive & undamped,
+        NOT_CONVERGED: damping > 1e12,
+    }
+    ended = np.select(list(ends.values()), list(ends), _GOING_ON)
     return replace(moved, damping=damping), ended
 
 

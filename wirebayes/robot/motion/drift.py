@@ -69,17 +69,20 @@ def hold(
     """
     times = np.asarray(times_s, float)
     walk = CreepingHold(robot, wires, joint_m, (start_m, start_rotation), carried, follow, tolerance)
-    n, legs = walk.n, robot.legs
-    position, rotation = np.empty((n, len(times), 3)), np.empty((n, len(times), 3, 3))
-    tension, status = np.empty((n, len(times), legs)), np.empty((n, len(times)), np.int64)
+    rows = walk.n, len(times)
+    position = np.empty((*rows, 3))
+    rotation = np.empty((*rows, 3, 3))
+    tension = np.empty((*rows, robot.legs))
+    status = np.empty(rows, np.int64)
     for k, time in enumerate(times):
         walk.to(float(time))
-        lost = ~walk.live
-        for out, value in ((position, walk.here.position_m), (rotation, walk.here.rotation)):
-            out[:, k] = value
-            out[lost, k] = np.nan
-        tension[:, k], status[:, k] = walk.here.tension_N, walk.here.status
-        tension[lost, k] = np.nan
+        here = walk.here
+        position[:, k] = here.position_m
+        rotation[:, k] = here.rotation
+        tension[:, k] = here.tension_N
+        status[:, k] = here.status
+        for values in (position, rotation, tension):
+            values[~walk.live, k] = np.nan
     return Course(times, position, rotation, tension, status, walk.creep.state(), walk.falls())
 
 
@@ -251,27 +254,37 @@ class CreepingHold:
 
     def _note(self, fell: Bools, there: path.Followed, here: forward.Equilibria, span_s: tuple[float, float]) -> None:
         """Write down falls and slack wires of a step."""
-        a, b = (t**self.power for t in span_s)
-        share = np.where(there.share < 1, there.share, 1.0)
-        self.fall_s[fell] = ((a + share * (b - a)) ** (1 / self.power))[fell]
-        self.drop_m[fell] = np.where(there.drop_m > 0, there.drop_m, np.inf)[fell]
-        of_fallen = fell[:, None]
-        tau = np.where(of_fallen, there.here.tension_N, here.tension_N)
+        last = there.here
+        self._note_falls(fell, there, span_s)
+        tau = np.where(fell[:, None], last.tension_N, here.tension_N)
+        self._note_slack(fell[:, None], tau, span_s[1])
         moving = self.live[:, None] & np.isfinite(tau)
-        newly = moving & (tau <= 0) & np.isinf(self.slack_s) & ~of_fallen
-        was_taut = self.here.tension_N > 0
-        self.slack_s = np.where(newly & was_taut, span_s[1], self.slack_s)
-        # A wire that has all but lost its tension when the platform falls is the one that goes slack.
-        slackens = of_fallen & np.isinf(self.slack_s) & (tau < 1e-3 * self.first_N)
-        self.slack_s = np.where(slackens, self.fall_s[:, None], self.slack_s)
         self.lowest_N = np.where(moving, np.minimum(self.lowest_N, tau), self.lowest_N)
         if fell.any():
-            held = there.here.position_m, there.here.rotation
-            self.left = np.where(fell, self._stiffness(held), self.left)
+            stiffness = self._stiffness((last.position_m, last.rotation))
+            self.left = np.where(fell, stiffness, self.left)
         self.live = self.live & ~fell
-        here.status[fell] = np.where(there.here.found, outcome.FELL, there.here.status)[fell]
+        here.status[fell] = np.where(last.found, outcome.FELL, last.status)[fell]
         lost = ~self.live & ~fell
         here.status[lost] = self.here.status[lost]
+
+    def _note_falls(self, fell: Bools, there: path.Followed, span_s: tuple[float, float]) -> None:
+        """When platforms fell, and how far."""
+        begin, end = (t**self.power for t in span_s)
+        share = np.where(there.share < 1, there.share, 1.0)
+        time_s = (begin + share * (end - begin)) ** (1 / self.power)
+        drop_m = np.where(there.drop_m > 0, there.drop_m, np.inf)
+        self.fall_s[fell] = time_s[fell]
+        self.drop_m[fell] = drop_m[fell]
+
+    def _note_slack(self, fell: Bools, tau: Floats, now_s: float) -> None:
+        """When wires go slack, of which these are the tensions (n, w); `fell` (n, 1) are those whose platform fell."""
+        goes_slack = self.live[:, None] & np.isfinite(tau) & (tau <= 0) & (self.here.tension_N > 0)
+        newly = goes_slack & np.isinf(self.slack_s) & ~fell
+        self.slack_s = np.where(newly, now_s, self.slack_s)
+        # A wire that has all but lost its tension when the platform falls is the one that goes slack.
+        slackens = fell & np.isinf(self.slack_s) & (tau < 1e-3 * self.first_N)
+        self.slack_s = np.where(slackens, self.fall_s[:, None], self.slack_s)
 
     def _stiffness(self, pose: Poses | None = None) -> Floats:
         pose = pose or (self.here.position_m, self.here.rotation)

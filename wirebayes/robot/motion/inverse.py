@@ -136,17 +136,19 @@ def _of_each_line(
 ) -> Commands:
     """`commands` as if every line had a winch of its own."""
     grown = 1.0 + creep
-    shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
-    linear = robot.is_linear[:, None]
     tau = tension_N.T
-    free = statics.stretched(robot, shape, robot.beyond_m[:, None])
-    zero, offset = zero_tension_length(wires, free, tau), robot.beyond_m[:, None]
+    offset = robot.beyond_m[:, None]
+    shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
+    free = statics.stretched(robot, shape, offset)
+    zero = zero_tension_length(wires, free, tau)
     joint = zero / grown - (robot.beyond_joint_m[:, None] + error_m)
+    linear = robot.is_linear[:, None]
     if linear.any():
         fixed = (robot.wire_m[:, None] + error_m) * grown
         moved = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
+        ratio = np.where(linear, robot.ratio[:, None], 1.0)
         zero = np.where(linear, fixed, zero)
-        joint = np.where(linear, moved / np.where(linear, robot.ratio[:, None], 1.0), joint)
+        joint = np.where(linear, moved / ratio, joint)
         offset = offset + np.where(linear, moved, 0.0)
     feasible = np.isfinite(zero).all(0) & np.isfinite(tau).all(0)
     zero, joint, offset, tau = np.broadcast_arrays(zero, joint, offset, tau)

@@ -56,24 +56,32 @@ def held(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> Bools:
 
 def _bounds(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> tuple[Bools, Floats, Floats]:
     """Where any wire is just not slack, and least and largest stiffness, ``(n,)`` each; NaN where there is no pose."""
-    known = np.asarray(np.isfinite(pose[0]).all(1))
     turn, zero = np.moveaxis(pose[1], 0, -1), lengths[0].T
     shape = statics.geometry(robot, pose[0].T, turn)
     stretched = statics.stretched(robot, shape, np.broadcast_to(lengths[1], lengths[0].shape).T)
     touching = np.abs(stretched / zero - 1.0) < TOUCHING
+    any_touching = np.asarray(touching.any(axis=0))
+    # the form of the taut wires, which resist both ways, and its values
     tau, slope = (np.where(touching, 0.0, value) for value in tension(wires, stretched, zero))
-    scale = robot.edge_scale[:, None]
-    both = np.moveaxis(statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)[1], -1, 0)
-    both = np.where(np.isfinite(both), both, 0.0) * (scale * scale.T)
+    _, stiffness = statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)
+    both = _at_edge(robot, stiffness)
     values = np.asarray(np.linalg.eigvalsh(both), np.float64)
-    least = values[:, 0].copy()
-    along = statics.wire_jacobian(robot, shape) * scale[:, None]
-    taut = tension(wires, np.maximum(stretched, zero * (1.0 + TOUCHING)), zero)[1]
-    resisting = along * np.sqrt(taut)
+    least, largest = values[:, 0].copy(), values[:, -1]
+    # what each wire would add as soon as it is taut
+    _, slope = tension(wires, np.maximum(stretched, zero * (1.0 + TOUCHING)), zero)
+    resisting = statics.wire_jacobian(robot, shape) * robot.edge_scale[:, None, None] * np.sqrt(slope)
+    known = np.isfinite(pose[0]).all(axis=1)
     decided = known & np.isfinite(resisting).all(axis=(0, 1))
-    for k in np.flatnonzero(decided & touching.any(0) & (least <= _APART * values[:, -1])):
+    for k in np.flatnonzero(decided & any_touching & (least <= _APART * largest)):
         least[k] = _least_of(both[k], resisting[:, touching[:, k], k])
-    return np.asarray(touching.any(0)), np.where(known, least, np.nan), values[:, -1]
+    return any_touching, np.where(known, least, np.nan), largest
+
+
+def _at_edge(robot: Robot, stiffness: Floats) -> Floats:
+    """(n, d, d) stiffnesses (d, d, n) with rotations in metres at the platform's edge; zero where there is none."""
+    scale = robot.edge_scale[:, None]
+    first = np.moveaxis(stiffness, -1, 0)
+    return np.where(np.isfinite(first), first, 0.0) * (scale * scale.T)
 
 
 def _least_of(both: Floats, one_way: Floats) -> Floats:
@@ -91,8 +99,9 @@ def _least_of(both: Floats, one_way: Floats) -> Floats:
     size = np.abs(both).max() + (one_way**2).sum()
     apart = both + _APART * size * (noise + noise.T)
     sets = np.array(list(product((0.0, 1.0), repeat=m)))
-    vectors = np.linalg.eigh(apart + np.einsum("im,sm,jm->sij", one_way, sets, one_way))[1]
-    tried = np.concatenate([vectors, -vectors], -1).swapaxes(1, 2).reshape(-1, d)
+    of_sets = np.einsum("im,sm,jm->sij", one_way, sets, one_way)
+    _, vectors = np.linalg.eigh(apart + of_sets)
+    tried = np.concatenate([vectors, -vectors], axis=-1).swapaxes(1, 2).reshape(-1, d)
     stretch = np.maximum(tried @ one_way, 0.0)
-    value = np.einsum("vi,ij,vj->v", tried, both, tried) + (stretch**2).sum(1)
+    value = np.einsum("vi,ij,vj->v", tried, both, tried) + (stretch**2).sum(axis=1)
     return np.asarray(value.min())

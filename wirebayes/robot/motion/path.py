@@ -95,9 +95,9 @@ def follow(
     live = np.flatnonzero(~good & np.isfinite(whole.position_m).all(1))
     while live.size:
         to = np.minimum(followed.share[live] + divided.step[live], 1.0)
-        between = tuple(a[live] + to[:, None] * (b[live] - a[live]) for a, b in zip(old, new, strict=True))
+        between = _between(old, new, live, to)
         part, at = wires.part(live), (whole.position_m[live], whole.rotation[live])
-        there, held = _step(robot, part, at, whole.tension_N[live], (between[0], between[1]))
+        there, held = _step(robot, part, at, whole.tension_N[live], between)
         followed._go_on(live[held], there, held, to)
         divided.adapt(live, held)
         fell = ~held & (divided.step[live] < smallest)
@@ -106,6 +106,12 @@ def follow(
             followed._fall(robot, part.part(np.flatnonzero(fell)), live[fell], lengths, pose)
         live = live[~fell & (followed.share[live] < 1.0)]
     return followed
+
+
+def _between(old: Lengths, new: Lengths, rows: Indices, share: Floats) -> Lengths:
+    """Some lengths and offsets on the straight line from old to new ones, each at its own share of the way."""
+    zero, offset = (a[rows] + share[:, None] * (b[rows] - a[rows]) for a, b in zip(old, new, strict=True))
+    return zero, offset
 
 
 def _undivided(robot: Robot, wires: Wires, start: Poses, old: Lengths, new: Lengths) -> tuple[Followed, Bools]:
@@ -157,16 +163,22 @@ def _step(
     ahead = np.where(np.isfinite(ahead), ahead, 0.0)
     close = np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
     close &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
-    there = forward.solve_equilibrium(robot, wires, np.where(close[:, None], lengths[0], np.nan), lengths[1], *near)
+    zero, offset = lengths
+    there = forward.solve_equilibrium(robot, wires, np.where(close[:, None], zero, np.nan), offset, *near)
     loose = np.flatnonzero(there.status == outcome.NOT_HELD)
     if loose.size:
         _let_go(robot, wires, there, loose, lengths)
-    turn = there.rotation @ np.swapaxes(predicted[1], -1, -2) - np.eye(3)
-    off = np.maximum(
-        np.linalg.norm(there.position_m - predicted[0], axis=1), robot.size_m * np.linalg.norm(turn, axis=(1, 2))
-    )
-    close &= off <= _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
+    trusted = _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
+    close &= _apart_m(robot, there, predicted) <= trusted
     return there, np.asarray(there.found & close)
+
+
+def _apart_m(robot: Robot, there: forward.Equilibria, predicted: Poses) -> Floats:
+    """(n,) how far solutions lie from predicted poses: in place, or by the turn at the platform's edge."""
+    position, rotation = predicted
+    moved_m = np.linalg.norm(there.position_m - position, axis=1)
+    turn = there.rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)
+    return np.maximum(moved_m, robot.size_m * np.linalg.norm(turn, axis=(1, 2)))
 
 
 def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, loose: Indices, lengths: Lengths) -> None:

@@ -268,17 +268,18 @@ def _by_leg(values: Floats) -> Band:
 
 def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Floats, R: Floats) -> ForwardKinematics:
     """Forward kinematics of the commands, from a start beside the pose, must return to it."""
-    beside = plane.onto(robot, (x + 0.01 * robot.size_m)[None], R[None])
-    back = forward.solve_equilibrium(robot, wires, commands.zero_m, commands.offset_m, beside[0][0], beside[1][0])
-    n = len(commands.zero_m)
-    pose = np.repeat(x[None], n, 0), commands.rotation
-    stiff = one_sided.lowest_stiffness(robot, wires, pose, (commands.zero_m, commands.offset_m))[commands.feasible]
+    lengths = commands.zero_m, commands.offset_m
+    near, turned = plane.onto(robot, (x + 0.01 * robot.size_m)[None], R[None])
+    back = forward.solve_equilibrium(robot, wires, *lengths, near[0], turned[0])
+    off_m = np.abs(back.position_m - x)[back.found]
+    pose = np.repeat(x[None], len(commands.zero_m), axis=0), commands.rotation
+    stiffness = one_sided.lowest_stiffness(robot, wires, pose, lengths)
     return {
         "solved": float(back.found.mean()),
         "statuses": {text: int((back.status == code).sum()) for code, text in outcome.STATUS.items()},
-        "largest_round_trip_error_m": float(np.abs(back.position_m - x)[back.found].max(initial=0.0)),
+        "largest_round_trip_error_m": float(off_m.max(initial=0.0)),
         "slack_wires": int((commands.tension_N[0] <= 0).sum()),
-        "lowest_stiffness_N_m": band_over_draws(stiff),
+        "lowest_stiffness_N_m": band_over_draws(stiffness[commands.feasible]),
     }
 
 
@@ -358,12 +359,6 @@ def _shares(robot: Robot, line: WireDraws, courses: dict[float, Course], x: Floa
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
     size = {s: np.linalg.norm(drift.distance_moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
     held = np.isfinite(size[0.0])
-    kept: dict[str, Floats] = {}
-    for wire, one in line.each.items():
-        names = [*draws.CORE, *(column for effect in one.material() for column in effect.columns())]
-        names += [name for name in (draws.LENGTH_EXPONENT,) if name in one.parameters]
-        own = f"{wire} " if line.others else ""
-        kept |= {f"{own}{name}": one.parameters[name][held] for name in names}
     result: VarianceShares = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
     if robot.is_on_given_wires:
         result["sentence"] = "The robot's file gives the parameters of all wires: no share comes from the fit."
@@ -371,7 +366,25 @@ def _shares(robot: Robot, line: WireDraws, courses: dict[float, Course], x: Floa
     if held.sum() < 30:
         result["sentence"] = "Fewer than 30 draws that hold the platform: no shares are computed."
         return result
-    result["shared_draw"] = variance_shares.shares(kept, size[0.0][held])
-    sd = {s: float(v[np.isfinite(v)].std()) if np.isfinite(v).any() else None for s, v in size.items()}
-    result["sd_mm"] = [{"specimen_spread": s, "sd_mm": None if v is None else 1e3 * v} for s, v in sd.items()]
+    parameters = {name: values[held] for name, values in _parameters(line).items()}
+    result["shared_draw"] = variance_shares.shares(parameters, size[0.0][held])
+    result["sd_mm"] = [{"specimen_spread": s, "sd_mm": _sd_mm(distance_m)} for s, distance_m in size.items()]
     return result
+
+
+def _parameters(line: WireDraws) -> dict[str, Floats]:
+    """(n,) draws of all parameters that a drift depends on, named after their wire where there are several."""
+    out: dict[str, Floats] = {}
+    for wire, one in line.each.items():
+        names = [*draws.CORE, *(column for effect in one.material() for column in effect.columns())]
+        if draws.LENGTH_EXPONENT in one.parameters:
+            names.append(draws.LENGTH_EXPONENT)
+        mark = f"{wire} " if line.others else ""
+        out |= {f"{mark}{name}": one.parameters[name] for name in names}
+    return out
+
+
+def _sd_mm(distance_m: Floats) -> float | None:
+    """Of the draws that have a distance; None where none has."""
+    known = distance_m[np.isfinite(distance_m)]
+    return 1e3 * float(known.std()) if known.size else None
