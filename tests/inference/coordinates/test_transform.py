@@ -39,6 +39,14 @@ PROBLEMS = {
     "toes of one wire": draw([*LINE, Bench("c")], Truth(effects=(effect_named("toe"),)), seed=9).problem,
     "read late": draw([Bench(times_s=(20.0, 60.0, 120.0))], Truth({"k1": 800.0}), seed=1).problem,
     "weights": draw([Bench("a", weights_N=(2.0, 6.0, 4.0), times_s=(5.0, 60.0, 300.0))], Truth(), seed=3).problem,
+    "read late, beside weights and another wire": draw(
+        [
+            Bench("a", "one", times_s=(20.0, 60.0)),
+            Bench("b", "one", weights_N=(2.0, 6.0, 4.0)),
+            Bench("c", "other", weights_N=(3.0, 5.0), times_s=(9.0, 60.0)),
+        ],
+        seed=5,
+    ).problem,
     "weights, a toe": draw(
         [Bench("a", weights_N=(2.0, 6.0, 4.0)), Bench("b", length_mm=1710.0, weights_N=(5.0, 3.0))],
         Truth(effects=(effect_named("toe"),)),
