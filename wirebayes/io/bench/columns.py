@@ -23,6 +23,7 @@ from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role,
 from wirebayes.io.bench.sheet import is_number
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
+from wirebayes.io.bench.two_units import finest_of_same
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.io.bench.words import last_named
 from wirebayes.sentences import listed
@@ -105,6 +106,9 @@ def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
     """The column of a quantity among those that may be it."""
     of_wire = [i for i in likely if not is_of_sample(table, i, role)]  # a force before a stress
     different = _without_copies(table, of_wire or likely)
+    if len(different) > 1 and role in ("tension", "displacement"):
+        varying = [i for i in different if len(set(table.column(i))) > 1]  # beside a breaking load, or a preload
+        different = finest_of_same(table, varying if len(varying) == 1 else different, role)
     if len(different) == 1:
         return _column(table, different[0], role, None)
     if role == "time":

@@ -60,7 +60,15 @@ def _moves_to(x: Floats, time: Floats, found_holds: Sequence[Plateau]) -> tuple[
 
 def _lasted(time: Floats, left: int, hold: Plateau, zero_s: float) -> float:
     """How long a move took; 0 where nothing was recorded on the way, and a hold begins with its first reading."""
-    return float(time[hold.begin] - time[left]) if zero_s < time[hold.begin] else 0.0
+    return float(time[hold.begin]) - _set_out_s(time, left, hold) if zero_s < time[hold.begin] else 0.0
+
+
+def _set_out_s(time: Floats, left: int, hold: Plateau) -> float:
+    """When a move began: at the last reading before it, or after a pause an interval before the first on the way."""
+    intervals = np.diff(time[left : hold.begin + 1])
+    if len(intervals) > 1 and intervals[0] > PAUSE * np.median(intervals[1:]):
+        return float(time[left + 1] - np.median(intervals[1:]))
+    return float(time[left])
 
 
 def _check_rising(readings: Readings) -> None:
@@ -151,9 +159,10 @@ def _moved(x: Floats, time: Floats, left: int, hold: Plateau) -> float:
     on_the_way = x[left : hold.begin + 1].copy()
     on_the_way[-1] = hold.level
     whole = hold.level - on_the_way[0]
-    to_go = np.trapezoid(hold.level - on_the_way, time[left : hold.begin + 1])
-    lasts = float(time[hold.begin] - time[left])
-    return float(time[left]) + (float(np.clip(to_go / whole, 0.0, lasts)) if whole else 0.5 * lasts)
+    begun = _set_out_s(time, left, hold)
+    to_go = np.trapezoid(hold.level - on_the_way, np.concatenate([[begun], time[left + 1 : hold.begin + 1]]))
+    lasts = float(time[hold.begin]) - begun
+    return begun + (float(np.clip(to_go / whole, 0.0, lasts)) if whole else 0.5 * lasts)
 
 
 def _after_move(time: Floats, hold: Plateau, move_s: float) -> Ints:

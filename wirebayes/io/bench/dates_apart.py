@@ -5,7 +5,9 @@ from dataclasses import replace
 from datetime import date, timedelta
 from itertools import pairwise
 
+from wirebayes.io.bench.clock import are_moments
 from wirebayes.io.bench.compound_times import is_spelt
+from wirebayes.io.bench.header import is_of
 from wirebayes.io.bench.sheet import moment
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import TimeSince
@@ -28,9 +30,26 @@ def with_dates(table: RawTable, time_since: TimeSince | None) -> RawTable:
         What the user says that times count from.
     """
     clocks = [i for i, name in enumerate(table.header) if name and _are_clocks(table, i)]
+    dates = [i for i, name in enumerate(table.header) if name and _are_dates(table, i)]
+    others = [
+        i for i in range(len(table.header)) if i not in dates and (is_of(table, i, "time") or are_moments(table, i))
+    ]
+    if len(dates) == 1 and not clocks and not others:
+        return _at_midnight(table, dates[0])
     if time_since == "hold" or any(_count_from_zero(table, i) for i in clocks):
         return table
     return dated(table)
+
+
+def _at_midnight(table: RawTable, column: int) -> RawTable:
+    """The table with dates as moments, where nothing else tells the time: a reading a day, at the same hour."""
+    rows, last = [], ""
+    for row in table.rows:
+        last = row.cell(column).removesuffix(_MIDNIGHT).strip() or last
+        cells = [f"{last} 00:00" if i == column and any(row.filled) else cell for i, cell in enumerate(row.cells)]
+        rows.append(replace(row, cells=tuple(cells)))
+    sheet = replace(table.sheet, described=f"{table.sheet.described}, dates without times")
+    return replace(table, sheet=sheet, rows=tuple(rows))
 
 
 def dated(table: RawTable) -> RawTable:

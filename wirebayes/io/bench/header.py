@@ -11,7 +11,8 @@ from wirebayes.io.bench.words import LETTERS, RIG_WORDS, SAMPLE_WORDS, last_name
 NO_UNIT = ("", "-", "–", "1")  # what stands in a row of units where there is none
 UNIT_IN_BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
 _UNIT_FIRST = re.compile(
-    r"(millis|micros|seconds|minutes|hours|sekunden|minuten|stunden|secondes|heures|segundos|minutos)(?!\S)", re.I
+    r"(days?|tage?|jours?|dias?|giorn[oi]|dag|dagen|weeks?|wochen?|millis|micros|seconds|minutes|hours|sekunden|minuten|stunden|secondes|heures|segundos|minutos)(?!\S)",
+    re.I,
 )
 _BRACKET = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 _BEFORE_UNIT = re.compile(r"\s*/\s*|,\s*|\s+in\s+|[_\s.]+")

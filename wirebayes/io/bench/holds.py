@@ -158,6 +158,9 @@ def _ingroups_between(
         levels = [level_of(x[rows]) for rows in groups]
         notes.append(_scatter(readings, groups))
     number = [int(readings.hold[rows[0]]) if readings.hold is not None else i + 1 for i, rows in enumerate(groups)]
+    if any(b <= a for a, b in zip(number, number[1:], strict=False)) and all(np.diff(levels) != 0.0):
+        number = list(range(1, len(groups) + 1))
+        notes.append(f"{counted(len(groups), 'hold')}, numbered in order: what numbers or names them comes again")
     if readings.hold is None:
         count = counted(len(groups), "hold")
         notes.append(f"{count}: a new one wherever the {readings.role} changes or the time starts again")

@@ -22,6 +22,8 @@ OF_SAMPLE: dict[Role, tuple[str, ...]] = {"displacement": ("mm/mm", "%", "mm"), 
 
 # Spellings that pint does not know, or knows as something else.
 _SPELLINGS = {
+    "tag": "d", "tage": "d", "jour": "d", "jours": "d", "dia": "d", "dias": "d", "días": "d", "giorno": "d",
+    "giorni": "d", "dag": "d", "dagen": "d", "woche": "week", "wochen": "week", "semaines": "week", "semanas": "week",
     "sek": "s", "sek.": "s", "sekunden": "s", "sekunde": "s", "secs": "s", "sec.": "s", "segundos": "s",
     "secondes": "s",
     "min.": "min", "mins": "min", "minuten": "min", "minutos": "min", "std": "h", "std.": "h", "hrs": "h",

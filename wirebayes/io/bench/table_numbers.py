@@ -148,7 +148,26 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     values["displacement"] = _from_zero(values["displacement"], choices.zero_mm)
     notes += unread(table, columns)
     hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
-    return Recorded(table, columns, texts, values, hold, of_day, numbering, not_read), notes
+    recorded = Recorded(table, columns, texts, values, hold, of_day, numbering, not_read)
+    return _from_zero_on(recorded, notes)
+
+
+def _from_zero_on(recorded: Recorded, notes: list[str]) -> tuple[Recorded, list[str]]:
+    """Without the readings that a trigger keeps of the time before each hold, counted below zero."""
+    time = recorded.values["time"]
+    before = time < 0.0
+    if not before.any() or not (np.diff(time) < 0.0).any():
+        return recorded, notes
+    kept = np.flatnonzero(~before)
+    rows = tuple(recorded.table.rows[i] for i in kept)
+    without = replace(
+        recorded,
+        table=replace(recorded.table, rows=rows),
+        texts={role: [texts[i] for i in kept] for role, texts in recorded.texts.items()},
+        values={role: values[kept] for role, values in recorded.values.items()},
+        hold=None if recorded.hold is None else recorded.hold[kept],
+    )
+    return without, [*notes, f"readings before time zero left out: {int(before.sum())}"]
 
 
 def _of_sample(table: RawTable, columns: dict[Role, Column], about: About) -> dict[Role, Column]:

@@ -69,7 +69,8 @@ RIG_WORDS: dict[Role, tuple[str, ...]] = {
                      "liniaal", "length", "l", "lange", "laenge", "longueur", "longitud", "lunghezza", "comprimento",
                      "lengte"),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
-    "time": ("duration", "dauer", "durata", "duracion", "duracao", "duur"),
+    "time": ("day", "tag", "jour", "dia", "giorno", "dag", "week", "woche",
+             "duration", "dauer", "durata", "duracion", "duracao", "duur"),
 }  # fmt: skip
 # What stands before a statistic of a column, below its readings.
 STATISTICS = {
