@@ -52,7 +52,7 @@ def read(folder, text, **choices):
         ),
         (HEADER.replace(" [s]", "") + BODY, r"line 1, column 2 \(Zeit\): found no unit", "--map Zeit=time [min]"),
         (
-            HEADER.replace("\n", ",Kraft 2 [N]\n") + BODY.replace("\n", ",1\n"),
+            HEADER.replace("\n", ",Kraft 2 [N]\n") + BODY.replace("\n", ",1\n").replace("4.1,1", "4.1,2"),
             r"line 1: found Kraft \[N\] and Kraft 2 \[N\], each of which may be the tension",
             "--map Kraft 2 [N]=tension",
         ),

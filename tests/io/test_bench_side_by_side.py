@@ -214,3 +214,18 @@ def test_holds_side_by_side_under_what_was_set_are_one_test(tmp_path, labels, se
         (made,) = convert(path, ABOUT, Choices())
         assert [hold.setting for hold in made.experiment.holds] == settings
         assert [list(hold.readings) for hold in made.experiment.holds] == [[5, 4.7, 4.4, 4.1], [9, 8.7, 8.4]]
+
+
+@pytest.mark.parametrize(
+    "above",
+    [
+        ["Displacement,Time,Force", "Ch 1,Ch 0,Ch 2", "mm,s,N"],
+        ["Displacement,Time,Force", "mm,s,N", "LVDT 50,internal clock,S-beam 500N"],
+        ["Test of displacement,at a time,and force", "x (mm),t (s),F (N)"],  # a title above names with units
+    ],
+)
+def test_a_row_of_channels_is_no_header(tmp_path, above):
+    path = tmp_path / "raw.csv"
+    path.write_text("\n".join([*above, *(f"{x},{t},{5 * x - t / 100}" for x in (1, 2) for t in (0, 30, 60))]))
+    (made,) = convert(path, ABOUT, Choices())
+    assert [row[1:] for row in made.rows[:2]] == [[1.0, 0.0, 5.0], [1.0, 30.0, 4.7]]

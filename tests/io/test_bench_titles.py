@@ -81,11 +81,13 @@ def test_titles_that_name_specimens_divide_them(tmp_path, titles):
     assert [each.rows[0][3] for each in made] == [5.1, 5.2]
 
 
-def test_titles_that_count_readings_divide_nothing(tmp_path):
-    """A block for each hold, at displacements that go on."""
+def test_samples_at_displacements_that_go_on_may_be_holds(tmp_path):
     titles = ["Sample 1", "Sample 2", "Sample 3"]
-    (made,) = in_blocks(tmp_path, titles, "x (mm),Time (s),Force (N)", lambda i, t: f"{i},{tension(i, t)}")
+    with pytest.raises(Undecided, match="found '2' after '1' where times begin again, expected --specimens several"):
+        in_blocks(tmp_path, titles, "x (mm),Time (s),Force (N)", lambda i, t: f"{i},{tension(i, t)}")
+    (made,) = convert_all(tmp_path / "raw.csv", ABOUT, Choices(specimens="one"))
     assert [hold.setting for hold in made.experiment.holds] == [1.0, 2.0, 3.0]
+    assert len(convert_all(tmp_path / "raw.csv", ABOUT, Choices(specimens="several"))) == 3
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,14 @@ def test_a_position_is_a_machine_s_beyond_a_tenth_of_the_length_and_twice_the_te
         assert convert(path, ABOUT, Choices(time_since="hold")).experiment.holds[0].setting == first
 
 
+def replace_times(path):
+    """The same file with times that run on."""
+    head, *rows = path.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    path.write_text("\n".join([head, *(",".join([a, b, str(30 * i), d]) for i, (a, b, _, d) in enumerate(cells))]))
+    return path
+
+
 @pytest.mark.parametrize(
     ("second", "several"),
     [
@@ -110,9 +118,16 @@ def test_a_column_names_specimens_where_the_same_test_begins_again(second, sever
     each = [("A", x) for x in (1.0, 2.0, 3.0, 4.0, 5.0)] + [("B", x) for x in second]
     rows = [(name, x, time, x - time / 100) for name, x in each for time in (0, 30, 60)]
     path = file_of(tmp_path, "Sample,x [mm],Time [s],Force [N]", rows)
-    made = convert_all(path, ABOUT, Choices())
-    assert len(made) == (2 if several else 1)
-    assert several or "not read: 'Sample'" in " ".join(made[0].notes)
+    if several:
+        assert len(convert_all(path, ABOUT, Choices())) == 2
+    else:
+        with pytest.raises(
+            Undecided, match="found 'B' after 'A' where times begin again, expected --specimens several"
+        ):
+            convert_all(path, ABOUT, Choices())
+        assert [len(convert_all(path, ABOUT, Choices(specimens=s))) for s in ("several", "one")] == [2, 1]
+        running = replace_times(path)
+        assert "not read: 'Sample'" in " ".join(convert(running, ABOUT, Choices(time_since="test")).notes)
 
 
 @pytest.mark.parametrize(

@@ -106,9 +106,11 @@ def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
     """The column of a quantity among those that may be it."""
     of_wire = [i for i in likely if not is_of_sample(table, i, role)]  # a force before a stress
     different = _without_copies(table, of_wire or likely)
-    if len(different) > 1 and role in ("tension", "displacement"):
+    if len(different) > 1 and role == "tension":
         varying = [i for i in different if len(set(table.column(i))) > 1]  # beside a breaking load, or a preload
-        different = finest_of_same(table, varying if len(varying) == 1 else different, role)
+        different = varying if len(varying) == 1 else different
+    if len(different) > 1 and role in ("tension", "displacement"):
+        different = finest_of_same(table, different, role)
     if len(different) == 1:
         return _column(table, different[0], role, None)
     if role == "time":

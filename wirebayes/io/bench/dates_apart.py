@@ -31,10 +31,9 @@ def with_dates(table: RawTable, time_since: TimeSince | None) -> RawTable:
     """
     clocks = [i for i, name in enumerate(table.header) if name and _are_clocks(table, i)]
     dates = [i for i, name in enumerate(table.header) if name and _are_dates(table, i)]
-    others = [
-        i for i in range(len(table.header)) if i not in dates and (is_of(table, i, "time") or are_moments(table, i))
-    ]
-    if len(dates) == 1 and not clocks and not others:
+    of_time = [i for i in range(len(table.header)) if is_of(table, i, "time") or are_moments(table, i)]
+    of_days = len(dates) == 1 and 2 * len(set(table.column(dates[0]))) > len(table.rows)
+    if of_days and not clocks and set(of_time) <= set(dates):
         return _at_midnight(table, dates[0])
     if time_since == "hold" or any(_count_from_zero(table, i) for i in clocks):
         return table

@@ -157,14 +157,21 @@ def _ingroups_between(
     if any(np.ptp(x[rows]) > 0 for rows in groups):
         levels = [level_of(x[rows]) for rows in groups]
         notes.append(_scatter(readings, groups))
-    number = [int(readings.hold[rows[0]]) if readings.hold is not None else i + 1 for i, rows in enumerate(groups)]
-    if any(b <= a for a, b in zip(number, number[1:], strict=False)) and all(np.diff(levels) != 0.0):
-        number = list(range(1, len(groups) + 1))
-        notes.append(f"{counted(len(groups), 'hold')}, numbered in order: what numbers or names them comes again")
-    if readings.hold is None:
-        count = counted(len(groups), "hold")
-        notes.append(f"{count}: a new one wherever the {readings.role} changes or the time starts again")
+    number, numbering = _numbers(readings, groups, levels)
+    notes += numbering
     return Cut(groups, number, levels, times, ends, of_test, notes, readings.time_s)
+
+
+def _numbers(readings: Readings, groups: Sequence[Rows], levels: Sequence[float]) -> tuple[list[int], list[str]]:
+    """The numbers of holds, and how they were numbered where the file does not do it."""
+    in_order, count = list(range(1, len(groups) + 1)), counted(len(groups), "hold")
+    if readings.hold is None:
+        return in_order, [f"{count}: a new one wherever the {readings.role} changes or the time starts again"]
+    number = [int(readings.hold[rows[0]]) for rows in groups]
+    come_again = any(b <= a for a, b in zip(number, number[1:], strict=False))
+    if come_again and all(np.diff(levels) != 0.0):
+        return in_order, [f"{count}, numbered in order: what numbers or names them comes again"]
+    return number, []
 
 
 def _check_rising(readings: Readings, groups: list[Rows], times: list[Floats]) -> None:

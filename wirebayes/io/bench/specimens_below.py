@@ -16,15 +16,16 @@ from wirebayes.numeric.typing import Floats, Ints
 
 WHOLE_TEST = 0.5  # of the displacement's range within each specimen: blocks and phases of one test have less
 MOSTLY = 0.5  # of the rows: tensions that stay are weights
+FEWEST = 3  # readings of a test
 BACK = 0.25  # of that range from where the specimen before began: the next one begins near there
 
 
 def tests_of_specimens(recorded: Recorded, mapping: Sequence[str], stated: Specimens | None) -> list[RawTable]:
     """The table of each specimen.
 
-    A column tells them apart that changes where the displacement begins again, after a test of about the same range.
-    Its header or its cells speak of specimens; where neither does, they must be words, and the time must begin again
-    too: a number may be a cycle's. Then the user is asked.
+    A column tells them apart whose header or cells speak of specimens, and that changes where the displacement begins
+    again, after a test of about the same range. Where it does not, but times begin again, the user is asked; and where
+    the column speaks of no specimens, but holds words, and both begin again: a number may be a cycle's.
 
     Parameters
     ----------
@@ -51,13 +52,17 @@ def tests_of_specimens(recorded: Recorded, mapping: Sequence[str], stated: Speci
         labels = _filled(table.column(index))
         changes = np.array([i for i in range(1, len(labels)) if labels[i] != labels[i - 1]], dtype=np.int64)
         names = [labels[i] for i in (0, *changes)]
-        if not _begins_again(recorded, changes) or len(set(names)) < len(names):
+        if not len(changes) or len(set(names)) < len(names):
             continue
-        certain = stated == "several" or any(map(speaks_of_specimens, (table.header[index], *names)))
-        if not certain and _may_be_specimens(names, recorded.values["time"], changes):
-            raise _which(table, index, int(changes[0]), names)
-        if certain:
+        are_named = any(map(speaks_of_specimens, (table.header[index], *names)))
+        is_repeated = _begins_again(recorded, changes)
+        times_restart = _restart(recorded.values["time"], changes)
+        if are_named and is_repeated:
             return _tables(table, index, changes, names)
+        if times_restart and (are_named or (is_repeated and _are_words(names))):
+            if stated == "several":
+                return _tables(table, index, changes, names)
+            raise _which(table, index, int(changes[0]), names, is_repeated)
     return [table]
 
 
@@ -81,14 +86,18 @@ def _filled(labels: Sequence[str]) -> list[str]:
 
 def _begins_again(recorded: Recorded, changes: Ints) -> bool:
     """Whether what was set begins again at each of some rows; of one setting, whether times do."""
-    if not len(changes):
-        return False
     time, tension = recorded.values["time"], recorded.values["tension"]
     are_weights = np.mean(np.diff(tension) == 0.0) > MOSTLY
     setting = tension if are_weights else recorded.values["displacement"]
     if np.ptp(setting) == 0.0:
-        return bool((time[changes] < time[changes - 1]).all())
+        return _restart(time, changes)
     return _is_repeated(setting, changes)
+
+
+def _restart(time: Floats, changes: Ints) -> bool:
+    """Whether times begin again at each of some rows, with more than a reading or two between them."""
+    sizes = np.diff([0, *changes, len(time)])
+    return bool(sizes.min() >= FEWEST and (time[changes] < time[changes - 1]).all())
 
 
 def _is_repeated(values: Floats, changes: Ints) -> bool:
@@ -98,13 +107,13 @@ def _is_repeated(values: Floats, changes: Ints) -> bool:
     return bool(ranges.min() >= WHOLE_TEST * whole and (np.abs(np.diff(values[begins])) <= BACK * whole).all())
 
 
-def _may_be_specimens(names: Sequence[str], time: Floats, changes: Ints) -> bool:
-    without_numbers = {re.sub(r"\d+", "", name) for name in names}
-    return len(without_numbers) == len(names) and bool((time[changes] < time[changes - 1]).all())
+def _are_words(names: Sequence[str]) -> bool:
+    return len({re.sub(r"\d+", "", name) for name in names}) == len(names)
 
 
-def _which(table: RawTable, index: int, row: int, names: Sequence[str]) -> Undecided:
+def _which(table: RawTable, index: int, row: int, names: Sequence[str], is_repeated: bool) -> Undecided:
     place = table.place(table.rows[row].line, index)
-    found = f"found {shown(names[1])} after {shown(names[0])} where the displacement begins again"
+    again = "the displacement begins" if is_repeated else "times begin"
+    found = f"found {shown(names[1])} after {shown(names[0])} where {again} again"
     answers = {"--specimens several": "specimens of their own", "--specimens one": "one specimen"}
     return Undecided(f"{table.sheet.path}, {place}: {found}", "what they are of", answers)

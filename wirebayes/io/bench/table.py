@@ -13,6 +13,7 @@ _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now
 LONGEST_HEADER = 200  # characters: names and units take a few words, prose is no header
 LONGEST_MARK = 2  # characters: a number or a letter says nothing without the word specimen
 _NUMBER_BEFORE = re.compile(r"^±?[-+−]?\d+([.,]\d+)?\s*")
+_LAST_WORD = re.compile(r"[^\s_/\[\]()]+")
 _SHOWN = 5  # rows that show how many columns there are
 
 
@@ -117,14 +118,7 @@ def find_table(sheet: Sheet) -> RawTable:
     if first is None:
         line = rows[0].line if rows else 1
         raise InputError(f"{sheet.path}, line {line}: found no rows of numbers, expected a header and readings")
-    above = [*rows[:first]]
-    while len(above) > 1 and _is_subheading(above[-1]):
-        above.pop()
-    if len(above) > 1 and _are_ranges(above[-1]) and _names_more(above[-2], above[-1]):
-        above.pop()
-    units: tuple[str, ...] = ()
-    if len(above) > 1 and _are_units(above[-1]) and len(above[-2].filled) >= max(2, len(above[-1].filled)):
-        units = tuple(cell.strip("[]() ") for cell in above.pop().cells)
+    above, units = _above_readings(rows[:first])
     if not above or not _is_header(above[-1]) or _is_title(above[-1], rows[first : first + _SHOWN]):
         return _without_header(sheet, first)
     head = above[-1]
@@ -138,6 +132,21 @@ def find_table(sheet: Sheet) -> RawTable:
     _check_width(sheet, head, body, width)
     _check_headers_repeat(sheet, rows[:first], head, body)
     return RawTable(sheet, header, padded, body, head.line, names)
+
+
+def _above_readings(rows: Sequence[SheetRow]) -> tuple[list[SheetRow], tuple[str, ...]]:
+    """The rows above readings up to the header, and the units that stand in a row below it."""
+    above = [*rows]
+    while len(above) > 1 and _is_subheading(above[-1]):
+        above.pop()
+    if len(above) > 1 and _are_ranges(above[-1]) and _names_more(above[-2], above[-1]):
+        above.pop()
+    above = _without_channels(above)
+    units: tuple[str, ...] = ()
+    if len(above) > 1 and _are_units(above[-1]) and len(above[-2].filled) >= max(2, len(above[-1].filled)):
+        units = tuple(cell.strip("[]() ") for cell in above.pop().cells)
+    above = _without_channels(above)
+    return above, units
 
 
 def _without_header(sheet: Sheet, first: int) -> RawTable:
@@ -167,6 +176,23 @@ def _are_ranges(row: SheetRow) -> bool:
         return False
     units = [_NUMBER_BEFORE.sub("", cell) for cell in row.filled]
     return all(any(quantity_unit(unit, role) for role in ROLES) for unit in units)
+
+
+def _without_channels(above: list[SheetRow]) -> list[SheetRow]:
+    """Rows above readings, without a last one of channels or sensors below one that names more quantities.
+
+    A row of units may stand between the two; a row that has units itself is the header.
+    """
+    upper = next((row for row in reversed(above[:-1]) if not _are_units(row)), None)
+    if upper is None or not _names_more(upper, above[-1]) or _are_units(above[-1]):
+        return above
+    named, below = (sum(map(speaks_of_a_quantity, row.filled)) for row in (upper, above[-1]))
+    with_unit = any(_is_a_unit(_LAST_WORD.findall(cell)[-1]) for cell in above[-1].filled if _LAST_WORD.findall(cell))
+    return above[:-1] if named > below and not with_unit else above
+
+
+def _is_a_unit(text: str) -> bool:
+    return any(quantity_unit(text, role) for role in ROLES)
 
 
 def _names_more(row: SheetRow, below: SheetRow) -> bool:
