@@ -166,3 +166,15 @@ def test_a_fraction_of_millimetres_or_of_another_number_is_none(tmp_path):
         rows = [f"{10 + 10 * (i > 2)},{30 * i % 90},{cell if i == 1 else i}" for i in range(6)]
         with pytest.raises(ValueError, match=f"line 3, .*found '{cell}', expected a number"):
             read(tmp_path, "\n".join([f"m (kg),t (min),{header}", *rows]), control="force")
+
+
+def test_a_plus_before_displacements_alone_may_mean_changes(tmp_path):
+    rows = [f"+{x},{t},{f:.2f}" for x, t, f in READINGS]
+    text = "\n".join(["x (mm),t (s),F (N)", *rows])
+    with pytest.raises(Undecided, match=r"column 1 \(x \(mm\)\): found a plus before its numbers alone, as \+1.0"):
+        read(tmp_path, text)
+    signed = "\n".join(["x (mm),t (s),F (N)", *(row.replace(",", ",+") for row in rows)])
+    printed = "\n".join(["x (mm),t (s),F (N)", *(f"+{x:07.3f},{t},{f:.2f}" for x, t, f in READINGS)])
+    assert read(tmp_path, printed).rows[-1][1] == 2.0  # by an instrument
+    for said in (read(tmp_path, text, mapping=("x (mm)=displacement [mm]",)), read(tmp_path, signed)):
+        assert [row[1] for row in said.rows] == [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]

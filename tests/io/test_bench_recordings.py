@@ -292,3 +292,25 @@ def test_a_move_in_a_pause_of_the_recording_has_no_duration(pause_s, recorded_mo
     assert imported["warnings"] == []
     assert ("each hold begins at its first reading, for no move to one was recorded" in notes) != recorded_move
     assert ("moves took 0.1 s (median)" in notes) == recorded_move
+
+
+@pytest.mark.parametrize(("turns", "named"), [([], False), ([5.0, 0.0, 5.0, 0.0], True), ([4.5], False), ([7.0], True)])
+def test_cycles_before_a_hold_are_no_part_of_the_move_to_it(tmp_path, turns, named):
+    """At 1 mm/s, to 4 mm and later to 8 mm; an overshoot of an eighth is one of the move."""
+    places = [0.0, *turns, 4.0]
+    legs = [np.linspace(a, b, int(2 * abs(b - a)) + 1)[1:] for a, b in zip(places, places[1:], strict=False)]
+    way = np.concatenate(legs)
+    x = np.concatenate([[0.0], way, np.full(400, 4.0), np.linspace(4.0, 8.0, 9)[1:], np.full(400, 8.0)])
+    time = 0.5 * np.arange(len(x))
+    path = tmp_path / "raw.csv"
+    path.write_text(
+        "t (s),x (mm),F (N)\n" + "\n".join(f"{t},{place},{5 * place + 1}" for t, place in zip(time, x, strict=True))
+    )
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    first = made.experiment.holds[0]
+    middle = 0.5 * len(way) - 2.0 if turns in ([], [5.0, 0.0, 5.0, 0.0]) else None
+    assert made.recording is not None
+    if middle is not None:
+        assert made.recording.start_s[0] == pytest.approx(middle, abs=0.3)
+    assert first.setting == 4.0
+    assert any("went to and fro between" in notice.text for notice in made.warnings) == named

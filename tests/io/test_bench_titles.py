@@ -31,6 +31,7 @@ def tension(i, t):
     [
         ["Step 1: 2 mm", "Step 2: 4 mm", "Step 3: 3.5 mm"],
         ["2mm", "4mm", "3.5mm"],
+        ["Hold at 2 mm for 120 s", "Hold at 4 mm for 120 s"],
         ["Hold 1\nDisplacement (mm): 2\nRate: 10 mm/min", "Hold 2\nDisplacement (mm): 4\nRate: 20 mm/min"],
         ["Hold 1\nDisplacement,2,mm\nGauge length,1 mm", "Hold 2\nDisplacement,4,mm\nGauge length,3 mm"],
         ["# Step 1: 2 mm", "# Step 2: 4 mm"],
@@ -61,6 +62,8 @@ def test_weights_stand_above_their_blocks(tmp_path):
         ["Step 1: 2 to 3 mm, 4 mm", "Step 2: 3 to 5 mm, 6 mm"],  # two measures
         ["Step 1: 2 mm/min", "Step 2: 4 mm/min"],  # of something else
         ["Rope 2 mm", "Rope 4 mm"],  # a thickness
+        ["Step 1: +2 mm", "Step 2: +3 mm"],  # a change
+        ["Stretch (mm): +2", "Stretch (mm): +3"],
     ],
 )
 def test_titles_that_do_not_say_one_displacement_leave_it_open(tmp_path, titles):

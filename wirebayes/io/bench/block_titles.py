@@ -22,7 +22,7 @@ _LAST = re.compile(rf"(.*?)[\s:=]+({_NUMBER})")
 _OF_TITLES = {
     "level", "niveau", "phase", "block", "run", "test", "versuch", "messung", "essai", "mesure", "prueba", "prova",
     "part", "teil", "no", "nr", "at", "bei", "a", "to", "auf", "bis", "target", "soll", "set", "setpoint", "held",
-    "constant",
+    "constant", "for", "of", "in", "fur", "pendant",
 }  # fmt: skip
 Said = dict[str, tuple[str, str]]  # by a line without its numbers: what it says, and the unit of that
 
@@ -121,11 +121,11 @@ def _settings(line: str, role: Role) -> Said:
     if not may_state_a_setting(line):
         return said
     for place, found in enumerate(_MEASURE.finditer(line)):
-        if quantity_unit(found[2], role):
+        if quantity_unit(found[2], role) and not found[1].startswith("+"):  # a change is no setting
             said[f"{place} {_without_numbers(line)}"] = found[1], found[2]
     last = _LAST.fullmatch(line)
     unit = name_and_unit(last[1], role)[1] if last else None
-    if last and unit and not said:
+    if last and unit and not said and not last[2].startswith("+"):
         said[_without_numbers(line)] = last[2], unit.text
     return said
 

@@ -12,13 +12,14 @@ from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
 from wirebayes.io.bench.recorded import CONTINUOUS, PAUSE, Cut, Readings, level_of
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats, Ints
-from wirebayes.sentences import counted
+from wirebayes.sentences import counted, lasting
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
 LONG = 10  # times as many readings: shorter holds have none to spare
 # of a hold at most is left out after a slow move; of slower ones k2 is off by up to 5 standard deviations
 AFTER_MOVE = 0.1
 SLACK = 0.05  # of what is read in the hold: a rest before it with less says nothing of the wire
+TURN = 0.5  # of the way to a hold: smaller ones are an overshoot or a drive that hunts
 COVERED = 0.5  # of the readings in holds; a recording with less is a pull, not a test of holds
 
 
@@ -46,16 +47,53 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
     notes = [*resets, *_notes(readings, len(rows), kept, float(np.median(moves)))]
     slow = _slow(np.array(moves), np.array([time[p.end - 1] - time[p.begin] for p in found_holds]))
     levels = [level_of(x[r]) for r in rows]
-    return Cut(rows, list(range(1, len(rows) + 1)), levels, since, ends, True, notes, time, slow)
+    warnings = (*slow, *_to_and_fro(readings, found_holds))
+    return Cut(rows, list(range(1, len(rows) + 1)), levels, since, ends, True, notes, time, warnings)
 
 
 def _moves_to(x: Floats, time: Floats, found_holds: Sequence[Plateau]) -> tuple[list[float], list[float]]:
     """How long the move to each hold took, and when the hold begins."""
-    lefts = [0, *(p.left - 1 for p in found_holds[:-1])]
+    lefts = [_last_turn(x, left, p) for left, p in zip(_lefts(found_holds), found_holds, strict=True)]
     zeros = [_moved(x, time, left, p) for p, left in zip(found_holds, lefts, strict=True)]
     moves = [_lasted(time, left, p, zero) for p, left, zero in zip(found_holds, lefts, zeros, strict=True)]
     moves[0] = min(moves[0], 2.0 * (float(time[found_holds[0].begin]) - zeros[0]))  # without a rest before the test
     return moves, zeros
+
+
+def _lefts(found_holds: Sequence[Plateau]) -> list[int]:
+    """The last reading before what lies between each hold and the one before."""
+    return [0, *(p.left - 1 for p in found_holds[:-1])]
+
+
+def _to_and_fro(readings: Readings, found_holds: Sequence[Plateau]) -> tuple[Notice, ...]:
+    """That the wire was cycled before holds, which has no place in a test of holds."""
+    x, time, notices = readings.setting, readings.time_s, []
+    for number, (left, hold) in enumerate(zip(_lefts(found_holds), found_holds, strict=True), start=1):
+        turn = _last_turn(x, left, hold)
+        if turn > left:
+            low, high = float(x[left : turn + 1].min()), float(x[left : turn + 1].max())
+            notices.append(
+                f"before hold {number} the {readings.role} went to and fro between {low:.4g} and {high:.4g} "
+                f"{readings.unit} for {lasting(float(time[turn] - time[left]))}: that is no part of the test, and what "
+                "the wire crept there biases k1 and creep; let it recover before the hold, or state that time as "
+                "unrecorded_holds"
+            )
+    return tuple(Notice("left-out", text) for text in notices)
+
+
+def _last_turn(x: Floats, left: int, hold: Plateau) -> int:
+    """The reading at which the last move to a hold began: `left`, or after cycles without holds where the last turned.
+
+    A turn counts that is as far from the hold as half of what lies between, as an overshoot is not.
+    """
+    away = np.abs(hold.level - x[left : hold.begin + 1])
+    farthest = len(away) - 1
+    for i in range(len(away) - 1, -1, -1):
+        if away[i] > away[farthest]:
+            farthest = i
+        if away[farthest] >= TURN * away.max() and away[i] < (1.0 - TURN) * away[farthest] and i < farthest:
+            return left + farthest
+    return left
 
 
 def _lasted(time: Floats, left: int, hold: Plateau, zero_s: float) -> float:

@@ -13,6 +13,7 @@ _FACTOR = re.compile(
     r"|(?<![\w.,])(?P<before>10+)\s?[x×](?!\w)"  # Force 10x, and no box of 2x
     r"|(?<![\d\s])\s?/\s?(?P<divisor>[2-9]|\d{2,})(?!\w)"  # Force/2, and no sensor 1/2
 )
+DECIMALS = 1  # of a change that somebody makes
 _ANY = {"log", "lg", "ln", "increment", "inkrement", "added", "additional"}
 # A change in length is a displacement, one of the force is no force.
 _WORDS: dict[Role, set[str]] = {
@@ -58,6 +59,24 @@ def check_itself(table: RawTable, index: int, role: Role, unit: Unit) -> None:
         word = min(doubtful)
         answers = {f"{map_to} [{unit.text}]": f"it is the {role}, whatever its name"}
         raise Undecided(f"{place}: found {word!r} in the name", f"that it is the {role} itself", answers)
+    if role in ("displacement", "tension") and _are_signed(table, index):
+        cell = next(cell for cell in table.column(index) if cell.startswith("+"))
+        answers = {f"{map_to} [{unit.text}]": f"it is the {role} itself, and no change of it"}
+        raise Undecided(f"{place}: found a plus before its numbers alone, as {cell}", f"that it is the {role}", answers)
+
+
+def _are_signed(table: RawTable, index: int) -> bool:
+    """Whether one column alone has a sign before all its numbers but zero, as people write changes."""
+    signed = [i for i in range(len(table.header)) if _has_signs([cell for cell in table.column(i) if cell])]
+    return signed == [index]
+
+
+def _has_signs(cells: list[str]) -> bool:
+    """Whether cells have signs, and so few decimals as people write; instruments print signs, too."""
+    with_plus = any(cell.startswith("+") for cell in cells)
+    if any(len(re.split("[.,]", cell)[-1]) > DECIMALS for cell in cells if re.search("[.,]", cell)):
+        return False
+    return with_plus and all(cell[0] in "+-\u2212" or not cell.strip("0.,") for cell in cells)
 
 
 def _factor_of(found: re.Match[str]) -> float:
