@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
+import wirebayes as wb
 from wirebayes import cli
 from wirebayes.commands.wires import read_robot, wire_draws
 from wirebayes.inference.fit import fit_problem
@@ -64,6 +65,22 @@ def predicted(fits: Path, protocol: Path, *more: str, likelihood: str = "chain")
     name = () if "--experiment" in more else ("--experiment", "roc-line-1.71m")
     assert cli.main(["predict", str(fits / likelihood), str(protocol), "--output", str(out), *name, *more]) == 0
     return list(csv.DictReader(out.read_text().splitlines()))
+
+
+def test_a_prediction_is_saved_as_the_command_writes_and_prints_it(
+    fits: Path, protocol: Callable[..., Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = predicted(fits, protocol([7, 9]), "--json")
+    printed = json.loads(capsys.readouterr().out)
+    found = wb.predict(fits / "chain", tmp_path / "protocol.csv", experiment="roc-line-1.71m")
+    assert found.summary() == printed and len(printed["readings"]) == len(rows)
+    folder = found.save(tmp_path / "kept")
+    assert (folder / "predicted.csv").read_bytes() == (tmp_path / "predicted.csv").read_bytes()
+    assert json.loads((folder / "predicted.json").read_text()) == printed
+    assert found.save(folder) == folder
+    for other in (tmp_path, tmp_path / "predicted.csv"):
+        with pytest.raises(wb.InputError, match="expected a new or empty folder"):
+            found.save(other)
 
 
 def test_a_row_for_each_row_with_ordered_quantiles(fits: Path, protocol: Callable[..., Path]) -> None:

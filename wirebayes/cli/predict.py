@@ -52,7 +52,6 @@ def predict_command(
     fit's. A first reading in tension_N conditions its hold and those after it.
     """
     from wirebayes.answers.lines import for_terminal
-    from wirebayes.commands.predict import as_json as json_of
     from wirebayes.commands.predict import predict as run
     from wirebayes.json_files.plain import plain
     from wirebayes.report.pages.predict import in_a_sentence, write_beside
@@ -70,7 +69,7 @@ def predict_command(
     )
     page = write_beside(predicted, table)
     if as_json:
-        typer.echo(json.dumps(plain(json_of(predicted)), indent=2, ensure_ascii=False, allow_nan=False))
+        typer.echo(json.dumps(plain(predicted.summary()), indent=2, ensure_ascii=False, allow_nan=False))
     elif not quiet:
         typer.echo("\n".join(for_terminal([in_a_sentence(predicted)])))
     warnings = [f"warning: {warning}" for warning in predicted.attrs.get("warnings", [])]

@@ -3,14 +3,13 @@
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from wirebayes.commands.options import check_choice, check_seed, path_of
 from wirebayes.errors import InputError
 from wirebayes.io.arrays import protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
-from wirebayes.json_files.prediction import PredictionJson
 from wirebayes.notice import to_json
 from wirebayes.prediction.request import request_of
 from wirebayes.prediction.table import (
@@ -28,9 +27,6 @@ from wirebayes.strict.columns import is_table
 from wirebayes.strict.files import PathLike
 from wirebayes.views.findings import Findings
 from wirebayes.views.posterior import Posterior, Posteriors
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def predict(
@@ -123,27 +119,6 @@ def predict(
         attributes["warnings"] = [notice["text"] for notice in notices]
         attributes["warning_kinds"] = [notice["kind"] for notice in notices]
     return dataset(rows, attributes, control)
-
-
-def as_json(predicted: "xr.Dataset") -> PredictionJson:
-    """A prediction as plain values: what was predicted, a row for each reading, and the warnings.
-
-    Parameters
-    ----------
-    predicted : xarray.Dataset
-        What `predict` returned.
-    """
-    about = predicted.attrs
-    columns = {str(name): values.values.tolist() for name, values in predicted.reset_coords().data_vars.items()}
-    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-    warned = zip(about.get("warning_kinds", ()), about.get("warnings", ()), strict=True)
-    return {
-        "experiment": about["experiment"],
-        "prediction": about["prediction"],
-        "seed": int(about["seed"]),
-        "readings": rows,
-        "warnings": [{"kind": kind, "text": text} for kind, text in warned],
-    }
 
 
 def stored_posteriors(

@@ -2,19 +2,24 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.readings import READ, SET
+from wirebayes.io.run_folder import read_json, writable, write_csv, write_json
+from wirebayes.json_files.prediction import PredictionJson
 from wirebayes.notice import Notice
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import draw_predictive
 from wirebayes.prediction.request import ProtocolRequest
 from wirebayes.results.read_back import Stored
+from wirebayes.strict.files import PathLike
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control
 
@@ -131,6 +136,50 @@ class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __ini
     """
 
     __slots__ = ()
+
+    def summary(self) -> PredictionJson:
+        """The prediction as plain values: what was predicted, a row for each reading, and the warnings."""
+        columns = {str(name): values.values.tolist() for name, values in self.reset_coords().data_vars.items()}
+        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        warned = zip(self.attrs.get("warning_kinds", ()), self.attrs.get("warnings", ()), strict=True)
+        return {
+            "experiment": self.attrs["experiment"],
+            "prediction": self.attrs["prediction"],
+            "seed": int(self.attrs["seed"]),
+            "readings": rows,
+            "warnings": [{"kind": kind, "text": text} for kind, text in warned],
+        }
+
+    def save(self, folder: PathLike) -> Path:
+        """Store the table as ``predict`` writes it, ``predicted.csv``, and the summary, ``predicted.json``.
+
+        Parameters
+        ----------
+        folder : str or Path
+            A new or empty folder, or one that holds this prediction already.
+
+        Returns
+        -------
+        Path
+            The folder.
+
+        Raises
+        ------
+        InputError
+            The folder holds something else, or cannot be written.
+        """
+        target, found = Path(folder), self.summary()
+        summary = target / "predicted.json"
+        kept = summary.is_file() and read_json(summary) == found
+        if target.exists() and not (kept or (target.is_dir() and not any(target.iterdir()))):
+            raise InputError(f"{target}: found something else, expected a new or empty folder")
+        columns = header("displacement" if "mean_N" in self else "force")
+        rows = [[found["experiment"], *(row[name] for name in columns[1:])] for row in found["readings"]]
+        with writable(target):
+            target.mkdir(parents=True, exist_ok=True)
+            write_csv(target / "predicted.csv", columns, rows)
+            write_json(summary, found)
+        return target
 
     def plot(self, axes: Any = None) -> Any:  # type: ignore[override]  # xarray's own draws no bands
         """Draw the median and the 90 % band against the time in the hold, a colour for each hold.
