@@ -66,14 +66,16 @@ def _table_of_effects(_app: object) -> None:
 
 
 def _pages_of_commands(_app: object) -> None:
-    """A page for every command, with its help as a terminal of 100 columns shows it."""
+    """A page for every command, with its help as a terminal of 80 columns shows it."""
     folder = Path(__file__).parent / "commands"
     folder.mkdir(exist_ok=True)
     for name, command in COMMANDS.items():
         with redirect_stdout(StringIO()) as said:
             main([name, "--help"])
         shown = "\n".join(f"   {line}".rstrip() for line in said.getvalue().splitlines())
-        page = f"{name}\n{'=' * len(name)}\n\n{command.summary}\n\n.. code-block:: text\n\n{shown}\n"
+        page = (
+            f"{name}\n{'=' * len(name)}\n\n{command.summary}\n\n.. code-block:: text\n   :class: columns\n\n{shown}\n"
+        )
         (folder / f"{name}.rst").write_text(page, encoding="utf-8")
 
 

@@ -28,7 +28,7 @@ from wirebayes.report.pictures.discover import left_over
 from wirebayes.results.read_back import Stored, load_posterior
 
 DOCS = Path(__file__).parent
-COLUMNS = 96
+COLUMNS = 80  # as many as a page of the documentation shows in a line
 README = DOCS.parent / "README.md"
 CONTROLLERS = {
     "hooke_only": "ignores creep",

@@ -289,3 +289,14 @@ def test_corrections_are_offered_only_where_there_are_some(
     (tmp_path / "corrections.csv").unlink()
     alone = stored(Pose, tmp_path, "pose.json", found).next_step()
     assert alone.startswith("wirebayes calibrate" if end else "another pose or payload")
+
+
+def test_a_notebook_shows_what_the_terminal_says(tmp_path: Path) -> None:
+    named = SLIP | {"verdict": "named"}
+    findings = stored(Findings, tmp_path, "discovery.json", {"experiments": {"a": named}, "warnings": []})
+    shown = findings._repr_html_()
+    assert "grip slip 0.310 mm (0.250 … 0.380)" in shown and "p &lt; 0.001" in shown
+    rounded = {"q05": [1e-13, 1.0], "q50": [2e-13, 1.5], "q95": [7e-13, 2.0]}
+    drift = {"distance_mm": rounded, "times_s": [0.0, 60.0], "specimen_spread": 0.0}
+    content = {"robot": "r", "feasible": True, "drift": [drift], "wires": {}, "warnings": []}
+    assert "<td>0 to 0</td>" in stored(Pose, tmp_path, "pose.json", content)._repr_html_()

@@ -142,7 +142,9 @@ class _TestPage:
                 length = ui.number("Length without tension, mm", value=about.get("length_mm"), min=0)
                 material = ui.input("Material", value=about.get("material", ""))
                 control = ui.select(CONTROLS, value=about.get("control", ""), label="What was set")
-                area = ui.number("Cross-section, mm²", value=about.get("area_mm2"), min=0)
+                area = ui.number("Cross-section, mm²", value=about.get("area_mm2"), min=0).props(
+                    'hint="for stresses only"'
+                )
             if asked:
                 ui.label("The file can be read in more than one way. Please say:").classes("warning")
             menus = [
@@ -158,7 +160,7 @@ class _TestPage:
 
             def read() -> None:
                 if not length.value or length.value <= 0:
-                    ui.notify("Say the zero-tension length of the sample, in mm")
+                    length.error = "Needed: no file of a bench has it"
                     return
                 said = [_option(line) for line in (columns.value or "").splitlines() if line.strip()]
                 said += [menu.value for menu in menus if menu.value]

@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from wirebayes.answers import terminal
 from wirebayes.errors import InputError
-from wirebayes.json_files.discovery import DiscoveryJson
+from wirebayes.json_files.discovery import DiscoveryJson, ExperimentFindings
 from wirebayes.results import read_back
+from wirebayes.sentences import p_in_words, quantity, spoken
 
 if TYPE_CHECKING:
     import xarray as xr
 
 from wirebayes.views.posterior import Posterior, after_a_model
-from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
+from wirebayes.views.result import NOTHING, Given, Result, html_table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,7 +113,14 @@ class Findings(Result[DiscoveryJson]):
 
     def _repr_html_(self) -> str:
         rows = [
-            [name, found["verdict"], ", ".join(found["effects"]) or "-", figure(found["p_global"])]
+            [name, found["verdict"], _sizes(found) or "-", p_in_words(found["p_global"], found["p_simulations"])]
             for name, found in self.report["experiments"].items()
         ]
-        return html_table("What the plain model is missing", ["experiment", "verdict", "effects", "p"], rows)
+        header = ["experiment", "verdict", "effects, 90 % interval", "p"]
+        return html_table("What the plain model is missing", header, rows, self.messages)
+
+
+def _sizes(found: ExperimentFindings) -> str:
+    """The effects with their sizes."""
+    sizes = found["amplitudes"].items()
+    return ", ".join(f"{spoken(e)} {quantity(a['mean'], a['q05'], a['q95'], a['unit'])}" for e, a in sizes)

@@ -56,10 +56,15 @@ class Pose(Result[PoseJson | PoseHistoryJson]):
         drift = found["drift"][0]
         far = drift["distance_mm"]
         rows = [
-            [figure(t), figure(far["q50"][i]), f"{figure(far['q05'][i])} to {figure(far['q95'][i])}"]
+            [figure(t), _mm(far["q50"][i]), f"{_mm(far['q05'][i])} to {_mm(far['q95'][i])}"]
             for i, t in enumerate(drift["times_s"])
         ]
         return html_table(repr(self), ["time, s", "drift, mm", "90 % interval"], rows, self.messages)
+
+
+def _mm(value: float | None) -> str:
+    """A distance; what rounding of numbers leaves of none is none."""
+    return figure(value if value is None else round(value, 6))
 
 
 def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path, given: Given) -> str:
