@@ -248,12 +248,12 @@ def _pieces(n: int) -> list[int]:
 def _strike_gross_errors(
     block: LaplaceFit, trials: list[Probe], candidates: list[Candidate], i: int, rng: Generator
 ) -> tuple[LaplaceFit, list[GrossError]]:
+    """The block refitted without its gross errors, and these; `i` is its number among all."""
     struck: list[GrossError] = []
     most = max(1, int(gross_errors.MOST * gross_errors.readings_of(block.experiments)))
     while len(struck) < most:
-        own = [c for c in candidates if i in c.blocks]
         here = scan(expand(block.target, block.z, trials))
-        rival = max((float(here.effects[0, c.probe]) for c in own), default=0.0)
+        rival = max((float(here.effects[0, c.probe]) for c in candidates if i in c.blocks), default=0.0)
         found = gross_errors.suspect(block, max(rival, float(here.flexible[0])))
         if found is None:
             break

@@ -54,6 +54,23 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
     """
     if own is None:
         return CATALOGUE
+    effects = {}
+    for effect in _effects_in(own):
+        lacking = [a for a in ("name", "place", "scope", "amplitudes", "sentence") if not hasattr(effect, a)]
+        if lacking:
+            found = f"the effect {effect.__name__} that lacks {', '.join(lacking)}"
+            raise InputError(f"{own}: found {found}, expected all of them")
+        if effect.name in CATALOGUE:
+            taken = f"the effect {effect.__name__} with the name {effect.name} of the catalogue"
+            raise InputError(f"{own}: found {taken}, expected another name")
+        effects[effect.name] = effect
+    if not effects:
+        raise InputError(f"{own}: found no effect in it, expected a class derived from wirebayes.wire.effect.Effect")
+    return CATALOGUE | effects
+
+
+def _effects_in(own: Path) -> list[type[Effect]]:
+    """The classes of effects that a file defines, which is run for it."""
     if not os.path.isfile(own):
         raise InputError(f"{own}: found no such file, expected a Python file with effects")
     spec = importlib.util.spec_from_file_location(f"wirebayes_own_{own.stem}", own)
@@ -67,23 +84,8 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
         raise InputError(
             f"{own}: cannot be run ({type(error).__name__}: {error}), expected a Python file with effects"
         ) from None
-    found = [
-        v for v in vars(module).values() if isinstance(v, type) and issubclass(v, Effect) and v.__module__ == spec.name
-    ]
-    effects = {}
-    for effect in found:
-        lacking = [a for a in ("name", "place", "scope", "amplitudes", "sentence") if not hasattr(effect, a)]
-        if lacking:
-            raise InputError(
-                f"{own}: found the effect {effect.__name__} that lacks {', '.join(lacking)}, expected all of them"
-            )
-        if effect.name in CATALOGUE:
-            taken = f"the effect {effect.__name__} with the name {effect.name} of the catalogue"
-            raise InputError(f"{own}: found {taken}, expected another name")
-        effects[effect.name] = effect
-    if not effects:
-        raise InputError(f"{own}: found no effect in it, expected a class derived from wirebayes.wire.effect.Effect")
-    return CATALOGUE | effects
+    classes = [value for value in vars(module).values() if isinstance(value, type) and issubclass(value, Effect)]
+    return [kind for kind in classes if kind.__module__ == spec.name]  # not those that the file imports
 
 
 def source_of(own: Path | None) -> str | None:

@@ -39,7 +39,7 @@ def save_posterior(
 
 
 def save_summary(fit: Fit, folder: Path, *, sample: Sample | None = None) -> SummaryJson:
-    """Write ``summary.json`` alone, the same as `save` does, and return it.
+    """Write ``summary.json`` alone, the same as `save_posterior` does, and return it.
 
     Parameters
     ----------

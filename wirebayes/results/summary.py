@@ -75,6 +75,7 @@ def _hold_ends(fit: Fit) -> HoldEnds | None:
 
 
 def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
+    """What ``summary.json`` says of a fit: of one of its samples, or, where None, of all together."""
     first = sample or fit.problem.samples[0]
     controls = [s.protocol.control for s in ([sample] if sample else fit.problem.samples)]
     parameters: dict[str, Parameter] = {}

@@ -56,18 +56,13 @@ class Protocol:
         if not longer.any():
             return
         end = self.last_reading + 1
-        if end[longer].max() == self.mask.shape[1]:
-            padded = {name: np.pad(getattr(self, name), [(0, 0), (0, 1)]) for name in ("time_s", "mask")}
-            if self.warming_K is not None:
-                padded["warming_K"] = np.pad(self.warming_K, [(0, 0), (0, 1)])
-        else:
-            padded = {"time_s": self.time_s.copy()}
-            if self.warming_K is not None:
-                padded["warming_K"] = self.warming_K.copy()
-        rows = np.flatnonzero(longer)
-        padded["time_s"][rows, end[rows]] = self.duration_s[rows]
+        more = int(end[longer].max() == self.mask.shape[1])
+        arrays = {"time_s": self.time_s, "mask": self.mask, "warming_K": self.warming_K}
+        padded = {name: np.pad(array, [(0, 0), (0, more)]) for name, array in arrays.items() if array is not None}
+        rows, at = np.flatnonzero(longer), end[longer]
+        padded["time_s"][rows, at] = self.duration_s[rows]
         if "warming_K" in padded:  # the wire keeps the temperature that was read last
-            padded["warming_K"][rows, end[rows]] = padded["warming_K"][rows, end[rows] - 1]
+            padded["warming_K"][rows, at] = padded["warming_K"][rows, at - 1]
         for name, array in padded.items():
             object.__setattr__(self, name, array)
 

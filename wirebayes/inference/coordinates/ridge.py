@@ -191,7 +191,7 @@ def ridges_of(problem: Problem, columns: ColumnMap, for_draws: bool) -> list[Rid
 
     Parameters
     ----------
-    columns : Columns
+    columns : ColumnMap
         How each parameter is measured by itself.
     for_draws : bool
         Whether U, and amounts that add to others, have coordinates in which proposals suit them better.

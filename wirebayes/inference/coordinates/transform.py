@@ -106,7 +106,7 @@ class Transformation:
 
     Attributes
     ----------
-    columns : Columns
+    columns : ColumnMap
         Each parameter by itself.
     steps : list of Step
         What follows, in this order.

@@ -112,22 +112,21 @@ def sample_posterior(
         )
         progress(_share(state, policy))
         resume.save_state(state, checkpoint, of_fit)
-    assert state.diagnostics is not None
-    found_, counted = state.diagnostics, state.all_kept
-    z, log_density = (by_ensemble(blocks, policy) for blocks in (counted.z, counted.log_density))
+    diagnostics, kept_draws = state.diagnostics, state.all_kept
+    assert diagnostics is not None
     return Chains(
-        z,
-        log_density,
-        found_.autocorrelation,
-        found_.ess,
-        found_.r_hat,
-        state.converged,
-        state.why,
-        state.evaluations,
-        counted.evaluations,
-        counted.accepted / max(counted.proposed, 1),
-        state.learned.trusted,
-        state.learned.modes,
+        z=by_ensemble(kept_draws.z, policy),
+        log_density=by_ensemble(kept_draws.log_density, policy),
+        autocorrelation_steps=diagnostics.autocorrelation,
+        ess=diagnostics.ess,
+        r_hat=diagnostics.r_hat,
+        converged=state.converged,
+        why=state.why,
+        evaluations=state.evaluations,
+        kept_evaluations=kept_draws.evaluations,
+        acceptance=kept_draws.accepted / max(kept_draws.proposed, 1),
+        learned=state.learned.trusted,
+        modes=state.learned.modes,
     )
 
 

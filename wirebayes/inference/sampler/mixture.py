@@ -157,7 +157,7 @@ def fit_around(points: WeightedPoints, of: Mixture, rng: Generator, *, most: int
 
     Parameters
     ----------
-    points : Points
+    points : WeightedPoints
         However few.
     of : Mixture
         Of what the points lie around.

@@ -136,7 +136,7 @@ def fit_proposal(
 
     Parameters
     ----------
-    hot, cold : Points
+    hot, cold : WeightedPoints
         Of the posterior to a power below one, which reach its tails, and of the posterior itself.
     start : Mixture
         What was known before any walk.
@@ -179,7 +179,7 @@ def with_excess(of: Proposal, drawn: WeightedPoints, value: Array, rng: Generato
 
     Parameters
     ----------
-    drawn : Points
+    drawn : WeightedPoints
         Places (n, d) by posterior mass.
     value : (n,) array
         Their log posterior densities.

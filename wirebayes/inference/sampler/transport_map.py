@@ -12,7 +12,7 @@ References
 M. C. Jones and A. Pewsey, Sinh-arcsinh distributions, Biometrika 96 (2009).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -138,6 +138,22 @@ def fit_map(points: WeightedPoints, order: Ints) -> Straight:
     left = np.column_stack([one.left for one in found])
     if not np.isfinite(left).all():
         raise np.linalg.LinAlgError("the points do not settle the scales")
+    return Straight(
+        order=order,
+        centre=centre,
+        scale=scale,
+        low=v.min(axis=0),
+        high=v.max(axis=0),
+        least=spread.min(axis=0),
+        most=spread.max(axis=0),
+        shape=_shapes(left, weight),
+        **_coefficients(found),
+    )
+
+
+def _coefficients(found: Sequence["_Straightened"]) -> dict[str, Array]:
+    """Those of all coordinates, each in one array, under their names in `Straight`."""
+    d = len(found)
     constant = np.zeros(d)
     linear = np.zeros((d, d))
     quadratic = np.zeros((d, d, d))
@@ -149,20 +165,7 @@ def fit_map(points: WeightedPoints, order: Ints) -> Straight:
         np.add.at(quadratic[j], (of.one, of.other), products)
         np.add.at(quadratic[j], (of.other, of.one), products)
         log_scale[j, : j + 1] = of.of_scale
-    return Straight(
-        order,
-        centre,
-        scale,
-        v.min(axis=0),
-        v.max(axis=0),
-        constant,
-        linear,
-        quadratic,
-        log_scale,
-        spread.min(axis=0),
-        spread.max(axis=0),
-        _shapes(left, weight),
-    )
+    return {"constant": constant, "linear": linear, "quadratic": quadratic, "log_scale": log_scale}
 
 
 @dataclass(frozen=True)
