@@ -74,7 +74,7 @@ def history_warnings(
     out += draws.wire_warnings(robot, line, found.track.tension_N, longest, lengths)
     plain = found.plain
     out += plausible.robot_notices(robot) + plausible.strain_notices(robot, line, plain.tension_N[0, -1])
-    return out + sag.sag_warnings(robot, plain.position_m[0, -1], plain.rotation[0, -1], plain.tension_N[0, -1])
+    return out + sag.sag_warnings_of_poses(robot, plain.position_m[0], plain.rotation[0], plain.tension_N[0])
 
 
 def _lost(times_s: Floats, track: Track) -> list[Notice]:

@@ -11,7 +11,7 @@ References
 import numpy as np
 
 from wirebayes.notice import Notice
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.sentences import counted, short
@@ -19,10 +19,15 @@ from wirebayes.sentences import counted, short
 # Weight by tension from which on sag is reported: a level wire is then longer than its chord by a ten-thousandth, as
 # much as minutes of creep.
 _REPORTED = 0.05
+# Least mass by length and highest tension: of the lightest ropes, Dyneema, at a fifth of the tension that breaks them
+# (2 mm: 2.3 g/m, 4.1 kN). A rope of steel has ten times as much.
+_LIGHTEST_KG_M_N = 2.8e-6
 
 
 def sag(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> tuple[Floats, Floats, Floats]:
     """Weight by tension ``w L / T``, depth below the chord and extra length of every wire, ``(w,)``, 1, m and m.
+
+    A wire whose mass is not stated has that of the lightest rope for the robot's highest tension; a slack one has none.
 
     Parameters
     ----------
@@ -30,13 +35,46 @@ def sag(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -
     position_m, rotation : (3,), (3, 3) arrays
     tension_N : (w,) array
     """
-    mass = np.zeros(robot.legs) if robot.mass_kg_m is None else robot.mass_kg_m
+    mass = _mass_kg_m(robot)
     shape = geometry(robot, position_m[:, None], rotation[..., None])
     length, direction = shape.distance_m[:, 0], shape.direction[:, :, 0]
     level = np.hypot(direction[0], direction[1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(mass > 0, mass * GRAVITY * length / tension_N, 0.0)
+    taut = tension_N > 0
+    share = np.where(taut, mass * GRAVITY * length / np.where(taut, tension_N, 1.0), 0.0)
     return share, share * level * length / 8.0, length * (share * level) ** 2 / 24.0
+
+
+def _stated(robot: Robot) -> Bools:
+    """(w,) whether a wire's mass is in the robot's file."""
+    return np.zeros(robot.legs, bool) if robot.mass_kg_m is None else robot.mass_kg_m > 0
+
+
+def _mass_kg_m(robot: Robot) -> Floats:
+    """(w,) mass of every wire by length, as stated or of the lightest rope."""
+    lightest = np.full(robot.legs, _LIGHTEST_KG_M_N * robot.rule.highest_N)
+    return lightest if robot.mass_kg_m is None else np.where(_stated(robot), robot.mass_kg_m, lightest)
+
+
+def sag_warnings_of_poses(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[Notice]:
+    """`sag_warnings` for the middle tension of every wire, at the pose where the heaviest has about that tension.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m : (p, 3) array
+    rotation : (p, 3, 3) array
+    tension_N : (p, w) array
+        One that errors of a sensor took below zero, or of a wire that is slack for once, is not the middle.
+    """
+    placed = np.isfinite(position_m).all(1) & np.isfinite(rotation).all((1, 2)) & np.isfinite(tension_N).all(1)
+    if not placed.any():
+        return []
+    position_m, rotation, tension_N = position_m[placed], rotation[placed], tension_N[placed]
+    middle_N = np.median(tension_N, axis=0)
+    taut = middle_N > 0
+    heaviest = int(np.argmax(np.where(taut, _mass_kg_m(robot) / np.where(taut, middle_N, 1.0), 0.0)))
+    k = int(np.argmin(np.abs(tension_N[:, heaviest] - middle_N[heaviest])))
+    return sag_warnings(robot, position_m[k], rotation[k], middle_N)
 
 
 def sag_warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[Notice]:
@@ -66,8 +104,14 @@ def sag_warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: 
         others = (
             f"; {counted(heavy.size - 1, 'more wire')} weigh{'s' * (heavy.size == 2)} more than {100 * _REPORTED:g} %"
         )
+    weighs = f"wire {i + 1} weighs"
+    if not _stated(robot)[i]:
+        weighs = (
+            f"no mass_kg_m is stated of wire {i + 1}, and even the lightest rope for tension.highest_N, of "
+            f"{short(1e3 * _mass_kg_m(robot)[i], 2)} g/m, weighs"
+        )
     text = (
-        f"wire {i + 1} weighs {short(100 * share[i], 2)} % of its tension: it sags by {short(1e3 * depth[i], 2)} mm "
+        f"{weighs} {short(100 * share[i], 2)} % of its tension: it sags by {short(1e3 * depth[i], 2)} mm "
         f"and is {short(1e3 * extra[i], 2)} mm longer than the straight line it is taken for{others}"
     )
     return [Notice("sag", text)]

@@ -19,6 +19,7 @@ from wirebayes.progress import Progress, silent
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
+from wirebayes.robot.mechanics.sag import sag_warnings_of_poses
 from wirebayes.robot.motion import control, hanging, home, inverse, plausible
 from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
@@ -98,12 +99,20 @@ def lengths_report(
                 *tension_notices(robot, session, readings),
                 *sensors.sensor_notices(at_fault),
                 *plausible.robot_notices(robot),
+                *_sag(robot, session, readings),
                 *home.home_notices(robot),
                 *doubts(robot, prior.line),
             ]
         ),
     }
     return content, calibrated(robot, prior, session, known)
+
+
+def _sag(robot: Robot, session: Session, readings: Floats) -> list[Notice]:
+    """What the wires' weight does where tensions ``(r,)``, standardised, were read; the platform as it was sent."""
+    read = session.read
+    tension_N = readings[: int(read.sum()) * robot.legs].reshape(-1, robot.legs) * session.tension_sd_N
+    return sag_warnings_of_poses(robot, session.position_m[read], session.rotation[read], tension_N)
 
 
 def usable(known: LengthPosterior) -> bool:

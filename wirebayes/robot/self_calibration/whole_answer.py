@@ -19,6 +19,7 @@ from wirebayes.progress import Progress, silent
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
+from wirebayes.robot.mechanics.sag import sag_warnings_of_poses
 from wirebayes.robot.motion import home, inverse, plausible
 from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated
@@ -248,6 +249,7 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
         out.append(Notice("not-converged", text))
     else:
         out += odd_hold(found, search.holds.session)
+        out += sag_warnings_of_poses(robot, found.state.position_m, found.state.rotation, found.state.pull_N)
     if search.requested:
         text = (
             "the stated poses are those that the joint values were computed for, or contradict the readings: they are "
