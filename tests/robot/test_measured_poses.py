@@ -10,6 +10,8 @@ from scipy.optimize import root
 from tests.robot.test_commands import fitted  # noqa: F401 - a fixture
 from wirebayes.cli import main
 from wirebayes.io.run_folder import read_json
+from wirebayes.robot.mechanics import schema
+from wirebayes.robot.self_calibration.mistaken import column_notices
 
 STIFF_N, MASS_KG, GRAVITY = 3000.0, 1.0, 9.80665
 PLOTTER = np.array([[-0.6, 0.0, 1.2], [0.6, 0.0, 1.2]])
@@ -123,3 +125,35 @@ def test_joint_values_that_err_by_a_third_of_a_millimetre_are_found_to(fitted, t
     assert found["usable"] and 0.1 < found["joint_sd_mm"] < 0.6
     low, high = (np.array(found["poses"][end])[:, [0, 2]] for end in ("q05", "q95"))
     assert ((low < places[:, [0, 2]]) & (places[:, [0, 2]] < high)).mean() > 0.7
+
+
+def _swapped(log):
+    """A log whose last and third last columns are in the place of each other."""
+    head, *rows = (line.split(",") for line in log.splitlines())
+    rows = [[*row[:-3], row[-1], row[-2], row[-3]] for row in rows]
+    return "\n".join(",".join(row) for row in [head, *rows]) + "\n"
+
+
+@pytest.mark.parametrize("mixed", [True, False])
+def test_columns_of_tensions_in_each_others_place_are_named_where_no_pose_is_known(fitted, tmp_path, mixed):  # noqa: F811
+    """Joint values lead to the poses; there the tensions of sound logs carry the weight."""
+    log, _, _ = _log(OPPOSED, np.random.default_rng(2), 40.0, 0.1, 0.0, marks=0)
+    found = _calibrated(fitted, tmp_path, OPPOSED, 40.0, _swapped(log) if mixed else log)
+    said = "columns tension_1_N and tension_3_N: found tensions that leave"
+    assert any(one["text"].startswith(said) for one in found["warnings"]) is mixed
+    assert found["usable"] is not mixed
+
+
+@pytest.mark.parametrize(("times", "holds", "said"), [(0.1, 3, True), (0.1, 2, False), (1.0, 3, False)])
+def test_another_unit_is_named_by_estimated_poses(tmp_path, times, holds, said):
+    file = tmp_path / "flat.toml"
+    file.write_text(_robot(PLOTTER, 0.1))
+    places, tension = [], []
+    for place in PLACES[:holds]:
+        there, pull = _rests(PLOTTER, _ways(PLOTTER, np.array(place))[0] / 1.002, place)
+        places.append(there)
+        tension.append(times * pull)
+    turn = np.tile(np.eye(3), (holds, 1, 1))
+    found = column_notices(schema.read_robot_file(file), np.array(places), turn, np.array(tension))
+    assert bool(found) is said
+    assert all("tension_1_N to tension_2_N: found tensions that are, all together, 0.1" in one.text for one in found)

@@ -92,20 +92,54 @@ def _refuse_lengths(robot: Robot, session: Session, rows: Bools, table: CsvTable
         there = apart(_swapped(robot.legs, i, j))[[i, j]].max()
         if as_read[[i, j]].min() > max(_APART * robot.span_m, _BETTER * there):
             found = f"{joints[i]} as far as {number(as_read[i])} m from the lengths to the stated poses"
-            raise _mixed_up(table, (joints[i], joints[j]), found, f"{number(there)} m")
+            expected = _in_place(f"{number(there)} m")
+            raise InputError(f"{table.path}, columns {joints[i]} and {joints[j]}: found {found}, expected {expected}")
 
 
 def _refuse_tensions(robot: Robot, session: Session, tension_N: Floats, rows: Bools, table: CsvTable) -> None:
     """Tensions in another unit, and two columns that are the tensions of each other's wires."""
-    turn = np.moveaxis(session.rotation[rows], 0, -1)
-    shape = statics.geometry(robot, session.position_m[rows].T, turn)
+    mistake = _tension_mistake(robot, session.position_m[rows], session.rotation[rows], tension_N[rows])
+    if mistake is not None:
+        raise InputError(f"{table.path}, {mistake[0]}: found {mistake[1]}, expected {mistake[2]}")
+
+
+def column_notices(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[Notice]:
+    """That tensions are those of another unit or order, by the poses that a calibration has found.
+
+    Parameters
+    ----------
+    robot : Robot
+    position_m : (p, 3) array
+    rotation : (p, 3, 3) array
+    tension_N : (p, w) array
+        As they were read, NaN where they were not.
+    """
+    read = np.isfinite(tension_N).all(1)
+    if robot.winch is not None or read.sum() < _FEWEST:
+        return []
+    mistake = _tension_mistake(robot, position_m[read], rotation[read], tension_N[read])
+    if mistake is None:
+        return []
+    columns, found, expected = mistake
+    return [Notice("data", f"{columns}: found {found} at the poses that were estimated, expected {expected}")]
+
+
+def _tension_mistake(
+    robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats
+) -> tuple[str, str, str] | None:
+    """Which columns do not carry the platform at its poses, though in another unit or order they would.
+
+    The columns, what was found and what was expected.
+    """
+    turn = np.moveaxis(rotation, 0, -1)
+    shape = statics.geometry(robot, position_m.T, turn)
     force, load = -statics.wire_jacobian(robot, shape), -statics.weight(robot, turn)
     scale = np.where(np.arange(len(load)) < 3, 1.0, 1.0 / robot.size_m)[:, None]
     load = scale * load
     names = [f"tension_{i}_N" for i in range(1, robot.legs + 1)]
 
     def pulled(order: Sequence[int]) -> Floats:
-        return scale * (force * tension_N[rows][:, order].T).sum(1)
+        return scale * (force * tension_N[:, order].T).sum(1)
 
     def left(pull: Floats) -> float:
         return float(np.linalg.norm(pull - load) / np.linalg.norm(load))
@@ -114,16 +148,15 @@ def _refuse_tensions(robot: Robot, session: Session, tension_N: Floats, rows: Bo
     times = float((pull * load).sum() / max((pull * pull).sum(), 1e-300))
     if not 1 / _ANOTHER_UNIT < times < _ANOTHER_UNIT and left(times * pull) < _EVEN:
         found = f"tensions that are, all together, {number(1 / times)} times what carries the platform's weight"
-        raise InputError(
-            f"{table.path}, {names[0]} to {names[-1]}: found {found}, expected newtons (or another mass_kg)"
-        )
+        return f"{names[0]} to {names[-1]}", found, "newtons (or another mass_kg)"
     if left(pull) < _EVEN:
-        return
+        return None
     for i, j in combinations(range(robot.legs), 2):
         other = left(pulled(_swapped(robot.legs, i, j)))
         if _BETTER * other < left(pull):
             found = f"tensions that leave {100 * left(pull):.2g} % of the weight unbalanced"
-            raise _mixed_up(table, (names[i], names[j]), found, f"{100 * other:.2g} %")
+            return f"columns {names[i]} and {names[j]}", found, _in_place(f"{100 * other:.2g} %")
+    return None
 
 
 def _swapped(count: int, i: int, j: int) -> list[int]:
@@ -133,9 +166,6 @@ def _swapped(count: int, i: int, j: int) -> list[int]:
     return order
 
 
-def _mixed_up(table: CsvTable, pair: tuple[str, str], found: str, otherwise: str) -> InputError:
-    """The error for two columns, what they leave, and what they would leave in each other's place."""
-    return InputError(
-        f"{table.path}, columns {pair[0]} and {pair[1]}: found {found}, expected the two in the place of each other, "
-        f"which leaves {otherwise}"
-    )
+def _in_place(otherwise: str) -> str:
+    """What is expected of two columns that are mixed up, and what that leaves."""
+    return f"the two in the place of each other, which leaves {otherwise}"

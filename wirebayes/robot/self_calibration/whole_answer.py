@@ -25,7 +25,7 @@ from wirebayes.robot.self_calibration import sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated
 from wirebayes.robot.self_calibration.equations import Holds, moved
 from wirebayes.robot.self_calibration.identified import Identified, identified
-from wirebayes.robot.self_calibration.mistaken import tension_notices
+from wirebayes.robot.self_calibration.mistaken import column_notices, tension_notices
 from wirebayes.robot.self_calibration.next_poses import NextPoses, next_poses
 from wirebayes.robot.self_calibration.open_where import most_open, odd_hold
 from wirebayes.robot.self_calibration.posterior import Whole
@@ -134,6 +134,7 @@ def calibration_report(
             [
                 *_warnings(verdict),
                 *tension_notices(robot, session, readings),
+                *([] if verdict.usable else _columns(search)),
                 *sensors.sensor_notices(search.at_fault),
                 *doubts(robot, prior.line),
             ]
@@ -273,6 +274,12 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
         )
         out.append(Notice("misfit", text))
     return out
+
+
+def _columns(search: Searched) -> list[Notice]:
+    """Tensions that do not carry the platform at the poses found, though in another unit or order they would."""
+    state = search.found.state
+    return column_notices(search.found.unknowns.robot, state.position_m, state.rotation, search.holds.tension_N)
 
 
 def _not_converged(found: Whole, session: Session) -> str:
