@@ -119,7 +119,8 @@ ABSURD = {
     "NUL": CSV.replace("0.90", "0.9\x00"),
     "columns": "\n".join(line + ",0" * 20_000 for line in LINES),
     "one line": "1" * 3_000_000,
-    "quotes": CSV.replace("0.90", '"0.90"'),
+    "half a quote": CSV.replace("0.90", '"0.90'),
+    "a decimal comma in quotes": CSV.replace("0.90", '"0,90"'),
     "too many holds": "\n".join([LINES[0], *(f"{h},1,{t},2" for h in range(400) for t in range(400 * (h == 7) + 1))]),
 }
 

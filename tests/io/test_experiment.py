@@ -103,8 +103,9 @@ def test_temperature_counts_from_the_first_logged_reading(experiment_file, tmp_p
         lambda raw: raw + b"\n  \n\r\n",
         lambda raw: raw.replace(b",", b" , "),
         lambda raw: raw.rstrip(),
+        lambda raw: b"\n".join(b",".join(b"\x22%b\x22" % c for c in line.split(b",")) for line in raw.split()),
     ],
-    ids=["byte-order mark", "CRLF", "CR", "blank lines at the end", "spaces", "no newline at the end"],
+    ids=["byte-order mark", "CRLF", "CR", "blank lines at the end", "spaces", "no newline at the end", "quotes"],
 )
 def test_harmless_spellings_of_a_csv_are_read_alike(experiment_file, tmp_path, change):
     path = experiment_file()
@@ -130,7 +131,7 @@ BAD_CSV = [
     ("1,1,60,0.90", "", "line 3, column 1: found a blank line"),
     ("1,1,60,0.90", "# slack", "line 3, column 1: found 1 field, expected 4"),
     ("1,1,60,0.90", "1,1,60,0.9O", "line 3, column 4 (tension_N): found '0.9O', expected a finite decimal number"),
-    ("1,1,60,0.90", '1,1,60,"0.9"', "line 3, column 4 (tension_N): found '\"0.9\"'"),
+    ("1,1,60,0.90", '1,1,60,"0.9', "line 3, column 4 (tension_N): found '\"0.9'"),
     ("1,1,60,0.90", "1,1,60,nan", "line 3, column 4 (tension_N): found 'nan'"),
     ("1,1,60,0.90", "1,1,60,1e999", "line 3, column 4 (tension_N): found '1e999'"),
     ("1,1,60,0.90", "1,1,6_0,0.90", "line 3, column 3 (time_s): found '6_0'"),

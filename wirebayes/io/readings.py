@@ -1,8 +1,8 @@
 """The strict reader of a readings' CSV: every error names the file, the line and the column.
 
 The format: UTF-8 (a byte-order mark is accepted), one header line with the columns in any order, one reading per line,
-fields separated by commas, plain decimal numbers with optional spaces around them, any line ending, blank lines only at
-the end. There are no comments and no quotes. A row whose read value is empty says that its hold lasted until then.
+fields separated by commas, plain decimal numbers with optional spaces or double quotes around them, any line ending,
+blank lines only at the end, no comments. A row whose read value is empty says that its hold lasted until then.
 """
 
 from collections.abc import Sequence

@@ -216,13 +216,18 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> 
     lines = _NEWLINE.split(read_text(path, f"a header of {header} and a line for each reading"))
     while not lines[-1].strip():
         lines.pop()
-    cells = [[cell.strip() for cell in line.split(",")] for line in lines]
+    cells = [[_unquoted(cell.strip()) for cell in line.split(",")] for line in lines]
     table = CsvTable(path, cells[0], cells[1:])
     table.check_header(header)
     _check_lengths(table)
     if not table.rows:
         raise InputError(f"{path}, line 2: found no readings, expected at least one")
     return table
+
+
+def _unquoted(cell: str) -> str:
+    """A cell without the quotes around it, as R writes the names of columns."""
+    return cell[1:-1] if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell
 
 
 def csv_table(source: Path, text: str) -> CsvTable:
