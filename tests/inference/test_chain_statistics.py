@@ -83,6 +83,13 @@ def test_a_tail_of_too_few_draws_or_of_one_value_has_no_shape() -> None:
     assert np.isnan(k) and np.exp(weight).sum() == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("on_the_threshold", "known"), [(4, True), (5, False)])
+def test_a_tail_of_which_a_quarter_stands_on_the_threshold_has_no_shape(on_the_threshold: int, known: bool) -> None:
+    excess = np.maximum(np.arange(20.0) - on_the_threshold + 1.0, 0.0)
+    with np.errstate(all="raise"):
+        assert np.isfinite(pareto_fit(excess)).all() == known
+
+
 def test_a_known_tail() -> None:
     """Of ten thousand values of a generalised Pareto distribution of shape 0.4 and scale 2."""
     level = (np.arange(10_000) + 0.5) / 10_000

@@ -185,10 +185,17 @@ def pareto_fit(excess: Array) -> tuple[float, float]:
     ----------
     excess : (n,) array
         Values above the threshold, in ascending order.
+
+    Returns
+    -------
+    float, float
+        NaN where a quarter of the values stand on the threshold: then there is no such tail.
     """
     n = len(excess)
     steps = 30 + int(np.sqrt(n))
     quartile = excess[int(n / 4 + 0.5) - 1]
+    if not quartile > 0.0:
+        return np.nan, np.nan
     below_one = 1.0 - np.sqrt(steps / (np.arange(steps) + 0.5))
     rates = below_one / (3.0 * quartile) + 1.0 / excess[-1]
     shapes = np.log1p(-rates[:, None] * excess).mean(axis=1)

@@ -250,7 +250,8 @@ def _damped(
 
 def _half_decrement(slope: Array, eigen: Array) -> Array:
     """(n,) what a Newton step gains where slopes (n, d) and curvatures (n, d), along its own axes, are right."""
-    return np.asarray(0.5 * (slope**2 / eigen).sum(axis=1))
+    with np.errstate(over="ignore"):  # far out, it may gain without bound
+        return np.asarray(0.5 * (slope**2 / eigen).sum(axis=1))
 
 
 def _step(slope: Array, eigen: Array, vectors: Array, damping: Array) -> Array:
