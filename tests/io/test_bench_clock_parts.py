@@ -64,6 +64,26 @@ def test_one_time_in_two_units_is_no_parts(tmp_path):
         read(tmp_path, "Time (min),Time (s)", lambda hold, t: f"{t // 60},{t % 100}")  # nobody counts to 60
 
 
+def test_columns_of_two_names_are_no_parts(tmp_path):
+    """How long holds are to last, beside the time; minutes of the test beside seconds of the hold."""
+    found, notes = read(tmp_path, "Duration (h),Time (min)", lambda hold, t: f"2,{READ_S.index(t)}")
+    assert found == [[0, 60, 120, 180, 240]] * 2
+    assert "not read: 'Duration (h)'" in notes
+    with pytest.raises(InputError, match=r"Time \(min\)"):
+        read(tmp_path, "Time (min),t in hold (s)", lambda hold, t: f"{2 * hold},{10 * READ_S.index(t)}")
+
+
+def test_a_mass_and_a_way_are_no_minutes_and_seconds(tmp_path):
+    path = tmp_path / "raw.csv"
+    rows = [f"{kg},{kg + t / 1e4:.5f},{t}" for kg in (5, 10) for t in READ_S]
+    path.write_text("\n".join(["m,s,t", "kg,mm,s", *rows]))
+    made = convert(path, ABOUT, Choices(mapping=("m=tension",)))
+    assert [row[2] for row in made.rows if row[1] is not None] == [*READ_S, *READ_S]
+    path.write_text("\n".join(["mm,s,N", *(f"{x},{t},{5 * x}" for x in (1, 2) for t in (0, 30, 50))]))
+    with pytest.raises(InputError, match="among mm, s, N"):
+        convert(path, ABOUT, Choices())
+
+
 def test_columns_that_the_user_names_are_read_as_they_are_called(tmp_path):
     mapping = ("Time (s)=time", "Time (min)=ignore")
     found, _ = read(

@@ -6,6 +6,7 @@ import pytest
 from tests.io.bench_files import convert
 from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
+from wirebayes.io.bench.convert import convert as convert_all
 from wirebayes.io.bench.undecided import Choices, Undecided
 
 ABOUT = About("wire", "line", 1000.0)
@@ -36,6 +37,18 @@ def test_of_one_force_in_two_units_the_finer_is_read(tmp_path, off, asked):
         assert "tension from 'Load (lbf)'" in made.notes[0]
 
 
+@pytest.mark.parametrize(("places", "asked"), [(1, True), (3, False)])
+def test_sensors_of_two_names_are_one_only_to_fine_steps(tmp_path, places, asked):
+    """At 2 % less, to a tenth, an extensometer looks like a crosshead; to a thousandth both say the same or do not."""
+    rows = [f"{x:.{places}f},{x * (0.98 if asked else 1.0) / 25.4:.5f},{t},{f}" for x, t, f in READINGS]
+    header = "Crosshead (mm),Extension (in),t (s),Load (N)"
+    if asked:
+        with pytest.raises(Undecided, match=r"Crosshead \(mm\) and Extension \(in\), each of which"):
+            read(tmp_path, header, rows)
+    else:
+        assert of_readings(read(tmp_path, header, rows)) == [pytest.approx(r, abs=3e-4) for r in READINGS]
+
+
 def test_a_constant_beside_a_force_is_none(tmp_path):
     rows = [f"220,{x},{t},{f:.2f}" for x, t, f in READINGS]
     assert of_readings(read(tmp_path, "Breaking load (N),x (mm),t (s),Load (N)", rows)) == [
@@ -47,13 +60,35 @@ def test_a_constant_beside_a_force_is_none(tmp_path):
 
 @pytest.mark.parametrize("labels", [("low", "high"), ("1", "2")])
 def test_labels_of_levels_that_come_again_number_no_holds(tmp_path, labels):
-    rows = [f"{labels[i % 2]},{1 + i % 2},{t},{5 + i % 2 - t / 100}" for i in range(4) for t in (0, 30, 60)]
+    rows = [f"{labels[i % 2]},{1 + i % 2},{t + 90 * i},{5 + i % 2 - t / 100}" for i in range(4) for t in (0, 30, 60)]
     made = read(tmp_path, "Stage,x (mm),t (s),F (N)", rows)
     assert [hold.number for hold in made.experiment.holds] == [1, 2, 3, 4]
     assert any("numbered in order: what numbers or names them comes again" in note for note in made.notes)
     same = [row.replace(",2,", ",1,", 1) if i in (3, 4, 5) else row for i, row in enumerate(rows)]
     with pytest.raises(InputError, match="expected a hold number above"):  # a misprint at one displacement
         read(tmp_path, "Stage,x (mm),t (s),F (N)", same)
+
+
+@pytest.mark.parametrize("round_s", [0, 270])
+def test_numbers_of_holds_that_begin_again_with_the_clock_may_be_of_another_specimen(tmp_path, round_s):
+    """The second test differs by 1 N; on a clock that goes on it is a second cycle of the same wire."""
+    rows = [
+        f"{x},{x},{t + 90 * x + i * round_s},{5 * x + i - t / 100}"
+        for i in (0, 1)
+        for x in (1, 2, 3)
+        for t in (0, 30, 60)
+    ]
+    header = "Hold,x (mm),t (s),F (N)"
+    if round_s:
+        assert [hold.number for hold in read(tmp_path, header, rows).experiment.holds] == [1, 2, 3, 4, 5, 6]
+        return
+    with pytest.raises(Undecided, match="found '1' after '3' where the displacement begins again") as asked:
+        read(tmp_path, header, rows)
+    assert set(asked.value.answers) == {"--specimens several", "--specimens one"}
+    assert len(read(tmp_path, header, rows, specimens="one").experiment.holds) == 6
+    several = convert_all(tmp_path / "raw.csv", ABOUT, Choices(specimens="several", time_since="test"))
+    assert [made.experiment.name for made in several] == ["wire-1", "wire-2"]
+    assert [made.rows[0][3] for made in several] == [5.0, 6.0]
 
 
 @pytest.mark.parametrize("numbered", [True, False])

@@ -7,6 +7,7 @@ import pytest
 from tests.io.bench_files import convert
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.header import name_and_unit
+from wirebayes.io.bench.quantities import quantity_unit
 from wirebayes.io.bench.undecided import Choices, Undecided
 
 ABOUT = About("wire", "line", 1000.0)
@@ -31,6 +32,7 @@ def of_readings(made):
         ("F.N", "tension", "F", "N"),
         ("t.s", "time", "t", "s"),
         ("Force No.2", "tension", "Force No.2", None),
+        ("Force (N)/Area (mm2)", "tension", "Force (N)/Area (mm2)", None),  # a stress
         ("(N) alone", "tension", "(N) alone", None),  # a unit is no name
     ],
 )
@@ -178,3 +180,8 @@ def test_a_plus_before_displacements_alone_may_mean_changes(tmp_path):
     assert read(tmp_path, printed).rows[-1][1] == 2.0  # by an instrument
     for said in (read(tmp_path, text, mapping=("x (mm)=displacement [mm]",)), read(tmp_path, signed)):
         assert [row[1] for row in said.rows] == [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+
+
+def test_ten_grams_and_a_day_have_one_name():
+    assert quantity_unit("dag", "tension").factor == pytest.approx(0.0980665)
+    assert quantity_unit("dag", "time").factor == 86400.0

@@ -1,7 +1,7 @@
 """Hours, minutes and seconds in columns of their own, or year, month and day: joined to one clock, one date.
 
-Parts stand side by side, the largest first. Two columns of time that tell the same in two units are no parts: minutes
-of a clock count in whole numbers, and seconds to 59.
+Parts stand side by side, the largest first, under one name. Two columns of time that tell the same in two units are no
+parts: minutes of a clock count in whole numbers, and seconds to 59.
 """
 
 import re
@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from wirebayes.io.bench.compound_times import HOURS, MINUTES, SECONDS
-from wirebayes.io.bench.header import name_and_unit
+from wirebayes.io.bench.header import NO_UNIT, name_and_unit
+from wirebayes.io.bench.quantities import quantity_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.words import plain_letters
 
@@ -75,7 +76,9 @@ def _of_clock(table: RawTable, free: Sequence[int]) -> _Parts | None:
     for wanted in ((3600.0, 60.0, 1.0), (3600.0, 60.0), (60.0, 1.0)):
         for i in free:
             columns = tuple(range(i, i + len(wanted)))
-            if [unit_s.get(k) for k in columns] == list(wanted) and _count_to_59(table, columns, wanted[-1] == 1.0):
+            if [unit_s.get(k) for k in columns] != list(wanted) or not _are_of_one_name(table, columns):
+                continue
+            if _count_to_59(table, columns, wanted[-1] == 1.0):
                 written = ", ".join({3600.0: "h", 60.0: "min", 1.0: "s"}[unit] for unit in wanted)
                 return _Parts(columns, f"time ({written})", ":", ":00" if wanted[-1] == 60.0 else "")
     return None
@@ -83,11 +86,25 @@ def _of_clock(table: RawTable, free: Sequence[int]) -> _Parts | None:
 
 def _part_s(table: RawTable, column: int) -> float | None:
     """Seconds of one of what a column counts, by its unit or its whole name: an hour, a minute, a second."""
-    header = table.header[column]
-    called = next((unit_s for unit_s, names in _CLOCK.items() if names.fullmatch(header)), None)
+    header, below = table.header[column], table.units[column]
     _, unit = name_and_unit(header, "time")
-    _, under = name_and_unit(f"time [{table.units[column]}]", "time")
-    return called or next((u.factor for u in (unit, under) if u is not None and u.clock is None), None)
+    under = quantity_unit(below, "time")
+    called = next((unit_s for unit_s, names in _CLOCK.items() if names.fullmatch(header)), None)
+    if called and (under or below in NO_UNIT):  # m over kg is a mass
+        return called
+    return next((u.factor for u in (unit, under) if u is not None and u.clock is None), None)
+
+
+def _are_of_one_name(table: RawTable, columns: Sequence[int]) -> bool:
+    """Whether columns have one name beside their units, where they have one: a duration and a time are no clock.
+
+    Minutes without hours before them have more than one letter: m and mm are lengths, and m a mass.
+    """
+    headers = [table.header[i] for i in columns]
+    called = [any(names.fullmatch(header) for names in _CLOCK.values()) for header in headers]
+    names = {name_and_unit(header, "time")[0] for header, is_unit in zip(headers, called, strict=True) if not is_unit}
+    are_lengths = quantity_unit(headers[0], "displacement") is not None and headers[1].lower() != "ss"
+    return len(names) <= 1 and not are_lengths
 
 
 def _count_to_59(table: RawTable, columns: Sequence[int], to_seconds: bool) -> bool:

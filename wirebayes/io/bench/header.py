@@ -15,6 +15,7 @@ _UNIT_FIRST = re.compile(
     re.I,
 )
 _BRACKET = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+_OPERATOR = re.compile(r"\s*[/*·×^:]")  # what stands behind a unit of which another one is made: Force (N)/Area (mm2)
 _BEFORE_UNIT = re.compile(r"\s*/\s*|,\s*|\s+in\s+|[_\s.]+")
 _DIVIDED = re.compile(r"/\s*\d+$")  # what stands before a unit that may be a share of it: Weg/10 mm
 # what a unit in brackets may begin with: durations in minutes
@@ -59,7 +60,7 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
         return bracket[1], in_brackets
     for inside in _BRACKET.finditer(header):  # Force (N) run 1
         unit = unit_in_header(inside[1].strip(), role)
-        if unit and inside.start():
+        if unit and inside.start() and not _OPERATOR.match(header[inside.end() :]):
             return f"{header[: inside.start()].strip()} {header[inside.end() :].strip()}".strip(), unit
     if bracket and not any(unit_in_header(bracket[2], other) for other in ROLES):  # Force, N (serial number 7)
         name, unit = name_and_unit(bracket[1], role)

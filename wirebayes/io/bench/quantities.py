@@ -23,7 +23,7 @@ OF_SAMPLE: dict[Role, tuple[str, ...]] = {"displacement": ("mm/mm", "%", "mm"), 
 # Spellings that pint does not know, or knows as something else.
 _SPELLINGS = {
     "tag": "d", "tage": "d", "jour": "d", "jours": "d", "dia": "d", "dias": "d", "días": "d", "giorno": "d",
-    "giorni": "d", "dag": "d", "dagen": "d", "woche": "week", "wochen": "week", "semaines": "week", "semanas": "week",
+    "giorni": "d", "dagen": "d", "woche": "week", "wochen": "week", "semaines": "week", "semanas": "week",
     "sek": "s", "sek.": "s", "sekunden": "s", "sekunde": "s", "secs": "s", "sec.": "s", "segundos": "s",
     "secondes": "s",
     "min.": "min", "mins": "min", "minuten": "min", "minutos": "min", "std": "h", "std.": "h", "hrs": "h",
@@ -35,6 +35,7 @@ _SPELLINGS = {
     "мм": "mm", "см": "cm", "м": "m", "мкм": "µm", "с": "s", "сек": "s", "мин": "min", "ч": "h", "мс": "ms", "н": "N",
     "кн": "kN", "кгс": "kgf", "гс": "gf", "кг": "kg", "г": "g",
 }  # fmt: skip
+_DAY = "dag"  # in Dutch and the Scandinavian languages; ten grams elsewhere
 _TEMPERATURES = {
     "c": "degC", "°c": "degC", "ºc": "degC", "℃": "degC", "degc": "degC", "deg c": "degC", "celsius": "degC",
     "f": "degF", "°f": "degF", "ºf": "degF", "℉": "degF", "degf": "degF", "deg f": "degF", "fahrenheit": "degF",
@@ -110,7 +111,10 @@ def quantity_unit(text: str, role: Role) -> Unit | None:
         return Unit(text, sign * share, of_sample=True)
     if not _UNIT.fullmatch(text):
         return None
-    name = _TEMPERATURES.get(bare.lower()) if role == "temperature" else _spelling(bare)
+    if role == "temperature":
+        name = _TEMPERATURES.get(bare.lower())
+    else:
+        name = "d" if role == "time" and bare.lower() == _DAY else _spelling(bare)
     found = None if name is None else _converted(name, role)
     if found is None:
         return None

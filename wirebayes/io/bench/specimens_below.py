@@ -1,4 +1,4 @@
-"""Specimens whose tests follow each other in one table: told apart by a column that names them."""
+"""Specimens whose tests follow each other in one table: told apart by a column that names them, or numbers holds."""
 
 import re
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ import numpy as np
 
 from wirebayes.errors import shown
 from wirebayes.io.bench.columns import ignored
+from wirebayes.io.bench.sheet import is_number
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.table_numbers import Recorded
 from wirebayes.io.bench.undecided import Specimens, Undecided
@@ -25,7 +26,8 @@ def tests_of_specimens(recorded: Recorded, mapping: Sequence[str], stated: Speci
 
     A column tells them apart whose header or cells speak of specimens, and that changes where the displacement begins
     again, after a test of about the same range. Where it does not, but times begin again, the user is asked; and where
-    the column speaks of no specimens, but holds words, and both begin again: a number may be a cycle's.
+    the column speaks of no specimens, but holds words, and both begin again: a number may be a cycle's. So is the user
+    where numbers of holds begin again together with the displacement and times.
 
     Parameters
     ----------
@@ -63,15 +65,39 @@ def tests_of_specimens(recorded: Recorded, mapping: Sequence[str], stated: Speci
             if stated == "several":
                 return _tables(table, index, changes, names)
             raise _which(table, index, int(changes[0]), names, is_repeated)
-    return [table]
+    return _by_hold_numbers(recorded, stated) if stated != "one" else [table]
+
+
+def _by_hold_numbers(recorded: Recorded, stated: Specimens | None) -> list[RawTable]:
+    """The table of each specimen, where the numbers of holds begin again with times and with what is set."""
+    table, time = recorded.table, recorded.values["time"]
+    if recorded.hold is None:
+        return [table]
+    index = recorded.columns["hold"].index
+    changes = np.flatnonzero(np.diff(recorded.hold) < 0) + 1
+    labels = table.column(index)
+    are_numbers = all(map(is_number, labels))  # words name levels
+    if not len(changes) or not are_numbers or not (time[changes] < time[changes - 1]).all():
+        return [table]
+    if not _begins_again(recorded, changes):
+        return [table]
+    if stated == "several":
+        return _split(table, changes, [str(i + 1) for i in range(len(changes) + 1)])
+    row = int(changes[0])
+    raise _which(table, index, row, labels[row - 1 : row + 1], is_repeated=True)
 
 
 def _tables(table: RawTable, index: int, changes: Ints, names: Sequence[str]) -> list[RawTable]:
     """The rows between changes of a column, each under the name of a specimen, without that column."""
     header = tuple("" if i == index else name for i, name in enumerate(table.header))
+    return _split(replace(table, header=header), changes, names)
+
+
+def _split(table: RawTable, changes: Ints, names: Sequence[str]) -> list[RawTable]:
+    """The rows from each change to the next, each under the name of a specimen."""
     rows = np.split(np.arange(len(table.rows)), changes)
     return [
-        replace(table, header=header, rows=tuple(table.rows[i] for i in own), specimen=name)
+        replace(table, rows=tuple(table.rows[i] for i in own), specimen=name)
         for own, name in zip(rows, names, strict=True)
     ]
 

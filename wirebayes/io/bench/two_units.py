@@ -10,6 +10,7 @@ from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.table import RawTable
 from wirebayes.numeric.typing import Floats
 
+FINE = 0.005  # of the range: rounded to larger steps, sensors of two names look alike though they differ
 ROUNDED = 0.51  # of a step: by how much a number was rounded, and a last binary digit
 SAME_UNIT = 1e-4  # of a number: factors between units are printed to a few digits
 FEWEST = 2  # different numbers, to compare
@@ -17,6 +18,8 @@ FEWEST = 2  # different numbers, to compare
 
 def finest_of_same(table: RawTable, likely: Sequence[int], role: Role) -> list[int]:
     """The column that is written to the finest step, if all say the same in different units; else all of them.
+
+    A crosshead and an extensometer may agree but for the coarser one's rounding: other names need fine steps.
 
     Parameters
     ----------
@@ -30,6 +33,9 @@ def finest_of_same(table: RawTable, likely: Sequence[int], role: Role) -> list[i
     if len(columns) < len(likely) or len({factor for _, _, factor in columns}) < len(columns):
         return [*likely]
     first, step, _ = columns[0]
+    names = {name_and_unit(table.header[i], role)[0].strip().lower() for i in likely}
+    if len(names) > 1 and max(own for _, own, _ in columns) > FINE * np.ptp(first):
+        return [*likely]
     alike = all(
         (np.abs(values - first) <= ROUNDED * (own + step) + SAME_UNIT * np.abs(first)).all()
         for values, own, _ in columns
