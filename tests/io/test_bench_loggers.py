@@ -185,3 +185,14 @@ def test_a_plus_before_displacements_alone_may_mean_changes(tmp_path):
 def test_ten_grams_and_a_day_have_one_name():
     assert quantity_unit("dag", "tension").factor == pytest.approx(0.0980665)
     assert quantity_unit("dag", "time").factor == 86400.0
+
+
+def test_a_letter_of_weights_is_read_where_no_other_column_is_a_force(tmp_path):
+    rows = [f"{x},{t},{f:.2f},{20 + x}" for x, t, f in READINGS]
+    for header in ("m (g)", "w (kg)", "P (N)"):
+        assert of_readings(read(tmp_path, "\n".join([f"x (mm),t (s),F (N),{header}", *rows]))) == [
+            pytest.approx(r) for r in READINGS
+        ]
+    assert of_readings(read(tmp_path, "\n".join(["x (mm),t (s),P (N),n", *rows]))) == [
+        pytest.approx(r) for r in READINGS
+    ]

@@ -62,6 +62,7 @@ def test_weights_stand_above_their_blocks(tmp_path):
         ["Step 1: 2 to 3 mm, 4 mm", "Step 2: 3 to 5 mm, 6 mm"],  # two measures
         ["Step 1: 2 mm/min", "Step 2: 4 mm/min"],  # of something else
         ["Rope 2 mm", "Rope 4 mm"],  # a thickness
+        ["Length 200 mm", "Length 400 mm"],  # of two ropes
         ["Step 1: +2 mm", "Step 2: +3 mm"],  # a change
         ["Stretch (mm): +2", "Stretch (mm): +3"],
     ],

@@ -13,7 +13,7 @@ from wirebayes.io.bench.quantities import ROLES, Role, quantity_unit
 from wirebayes.io.bench.sheet import is_measured
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.unread import names_a_specimen
-from wirebayes.io.bench.words import are_a_statistic, speaks_of_a_quantity, words_in
+from wirebayes.io.bench.words import LENGTHS, are_a_statistic, speaks_of_a_quantity, words_in
 
 _NUMBER = r"[+\-\u2212]?\d+(?:[.,]\d+)?"
 _MEASURE = re.compile(rf"(?<![\w.,])({_NUMBER})[ _]?([^\W\d_]+)(?=$|[\s,;:.)\]])")
@@ -112,6 +112,8 @@ def may_state_a_setting(title: str) -> bool:
     """Whether all words of a title are those of quantities, of units, or of parts of a test."""
     words = words_in(title)
     units = {word for word in words if any(quantity_unit(word, role) for role in ROLES)}
+    if words & set(LENGTHS):  # of a specimen
+        return False
     return all(word in _OF_TITLES or speaks_of_a_quantity(word) for word in words - units)
 
 

@@ -6,7 +6,16 @@ from wirebayes.io.bench.compound_times import announced
 from wirebayes.io.bench.multiples import unit_in_header
 from wirebayes.io.bench.quantities import ROLES, Role, Unit, is_foreign, quantity_unit
 from wirebayes.io.bench.table import RawTable
-from wirebayes.io.bench.words import LETTERS, RIG_WORDS, SAMPLE_WORDS, last_named, plain_letters, speaks_of, words_in
+from wirebayes.io.bench.words import (
+    LETTERS,
+    RIG_LETTERS,
+    RIG_WORDS,
+    SAMPLE_WORDS,
+    last_named,
+    plain_letters,
+    speaks_of,
+    words_in,
+)
 
 NO_UNIT = ("", "-", "–", "1")  # what stands in a row of units where there is none
 UNIT_IN_BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*$")
@@ -119,7 +128,7 @@ def may_be(table: RawTable, index: int, role: Role) -> bool:
 
 
 def is_of_rig(table: RawTable, index: int, role: Role) -> bool:
-    """Whether a column with a unit of the quantity has a name of `RIG_WORDS`.
+    """Whether a column with a unit of the quantity has a name of `RIG_WORDS`, or a letter of `RIG_LETTERS`.
 
     Parameters
     ----------
@@ -131,7 +140,7 @@ def is_of_rig(table: RawTable, index: int, role: Role) -> bool:
     name, unit = name_and_unit(table.header[index], role)
     unit = unit_in_header(table.units[index], role) or unit
     named = words_in(name) & {word for known in RIG_WORDS.get(role, ()) for word in (known, known + "s")}
-    return unit is not None and bool(named)
+    return unit is not None and (bool(named) or plain_letters(name) in RIG_LETTERS.get(role, ()))
 
 
 def is_called_of_sample(table: RawTable, index: int, role: Role) -> bool:

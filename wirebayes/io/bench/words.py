@@ -47,7 +47,7 @@ WORDS: dict[Role, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 LETTERS: dict[Role, tuple[str, ...]] = {  # mean something beside the right unit only
-    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t", "x_value"), "tension": ("f", "t", "p", "w", "m"),
+    "displacement": ("x", "d", "s", "u", "dl", "δl"), "time": ("t", "x_value"), "tension": ("f", "t"),
     "temperature": ("t", "ϑ"),
 }  # fmt: skip
 # What a strain or a stress is called; only beside a unit of one, for other quantities have these names too.
@@ -61,17 +61,20 @@ SAMPLE_WORDS: dict[Role, tuple[str, ...]] = {
         "应力", "応力",
     ),
 }  # fmt: skip
+# Of the wire, which grows, or of a specimen, which does not.
+LENGTHS = ("length", "l", "lange", "laenge", "longueur", "longitud", "lunghezza", "comprimento", "lengte")
 # What a rig calls its weights, the gauge that reads the wire, and how long a weight has hung: only where no column
 # speaks of the quantity itself.
 RIG_WORDS: dict[Role, tuple[str, ...]] = {
     "displacement": ("dial", "indicator", "messuhr", "comparateur", "comparador", "comparatore", "meetklok", "distance",
                      "entfernung", "langenanderung", "ruler", "lineal", "regle", "regla", "righello", "regua",
-                     "liniaal", "length", "l", "lange", "laenge", "longueur", "longitud", "lunghezza", "comprimento",
-                     "lengte"),
+                     "liniaal", *LENGTHS),
     "tension": ("mass", "weight", "masse", "gewicht", "poids", "peso", "massa", "masa", "waga"),
     "time": ("day", "tag", "jour", "dia", "giorno", "dag", "week", "woche",
              "duration", "dauer", "durata", "duracion", "duracao", "duur"),
 }  # fmt: skip
+# A load or its mass beside the right unit, where no other column is one.
+RIG_LETTERS: dict[Role, tuple[str, ...]] = {"tension": ("p", "w", "m")}
 # What stands before a statistic of a column, below its readings.
 STATISTICS = {
     "mean", "average", "avg", "median", "max", "maximum", "min", "minimum", "sum", "total", "std", "stdev", "sd",
@@ -84,7 +87,7 @@ _COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg 
 
 def speaks_of_a_quantity(word: str) -> bool:
     """Whether a word, or a letter, is the name of a quantity."""
-    letters = {letter for known in LETTERS.values() for letter in known}
+    letters = {letter for names in (LETTERS, RIG_LETTERS) for known in names.values() for letter in known}
     of_rig = {name for names in RIG_WORDS.values() for name in names}
     return plain_letters(word) in letters | of_rig or any(speaks_of(word, role) for role in ROLES)
 
