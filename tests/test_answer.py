@@ -195,6 +195,11 @@ def test_a_line_is_as_wide_as_the_terminal_and_a_number_stays_with_its_interval(
     assert 70 < max(map(len, for_terminal([line]))) <= 100
     monkeypatch.setattr(sys.stdout, "isatty", lambda: False)  # as in a pipe
     assert for_terminal([line]) == [line]
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert len(for_terminal([line], sys.stderr)) > 1
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: False)  # warnings that go to a file, the answer to the terminal
+    assert for_terminal([line], sys.stderr) == [line]
 
 
 def test_a_command_stays_in_one_line_to_be_copied(monkeypatch) -> None:

@@ -5,6 +5,7 @@ import shutil
 import sys
 from collections.abc import Iterable
 from textwrap import wrap
+from typing import TextIO
 
 LETTERS = 100  # in a line at most, on terminals that have room for more: longer ones are hard to read
 # not to be broken: a value with its interval and unit, a number with its unit, a unit in brackets
@@ -13,14 +14,16 @@ _COMMAND = re.compile(r"(Next|  or): wirebayes ")
 _FIXED = "\u00a0"  # stands for a space at which no line is broken
 
 
-def for_terminal(lines: Iterable[str]) -> list[str]:
-    """Lines as wide as the terminal at most; whole where none is, as in a pipe.
+def for_terminal(lines: Iterable[str], stream: TextIO | None = None) -> list[str]:
+    """Lines as wide as the terminal at most; whole where none is, as in a pipe or a file.
 
     Parameters
     ----------
     lines : iterable of str
+    stream : text stream, optional
+        To which they go; standard output when left out.
     """
-    if not sys.stdout.isatty():
+    if not (stream or sys.stdout).isatty():
         return list(lines)
     columns = min(shutil.get_terminal_size().columns, LETTERS)
     return [part for line in lines for part in in_columns(line, columns)]

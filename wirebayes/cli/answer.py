@@ -82,7 +82,8 @@ def print_answer(
         print(json.dumps(plain(result.summary()), indent=2, ensure_ascii=False, allow_nan=False))
     if shown:
         print(result, flush=True)  # before the warnings, which go another way
-    for line in for_terminal(message for message in result.messages if message not in said):
+    unsaid = [message for message in result.messages if message not in said]
+    for line in for_terminal(unsaid, sys.stderr):
         print(line, file=sys.stderr, flush=True)
     if shown:
         print("\n".join([*(_where(result) if kept else []), *next_lines(result.next_step(given))]))

@@ -1,5 +1,6 @@
 """`wirebayes compare`: laws, histories, likelihoods and effects side by side."""
 
+import sys
 from typing import Annotated
 
 import typer
@@ -62,7 +63,7 @@ def compare_command(
         seed=seed,
     )
     said = [f"warning: {notice.text}" for notice in planned.warnings]
-    for line in for_terminal(said):  # before the work, which takes minutes
+    for line in for_terminal(said, sys.stderr):  # before the work, which takes minutes
         typer.echo(line, err=True)
     with progress() as report:
         found = carry_out(planned, folder_for("compare", file, output), report)

@@ -1,6 +1,7 @@
 """`wirebayes predict`: the readings a posterior expects of a protocol."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -73,7 +74,7 @@ def predict_command(
     elif not quiet:
         typer.echo("\n".join(for_terminal([in_a_sentence(predicted)])))
     warnings = [f"warning: {warning}" for warning in predicted.attrs.get("warnings", [])]
-    for line in for_terminal([*warnings, f"{protocol}: {predicted.attrs['prediction']}"]):
+    for line in for_terminal([*warnings, f"{protocol}: {predicted.attrs['prediction']}"], sys.stderr):
         typer.echo(line, err=True)
     if not (as_json or quiet):
         typer.echo(f"Results: {table} (open {page})")
