@@ -62,7 +62,10 @@ def import_command(
     ] = None,
     specimens: Annotated[
         Literal["several", "one"] | None,
-        typer.Option("--specimens", help="Whose columns of one quantity stand side by side, where it is not evident."),
+        typer.Option(
+            "--specimens",
+            help="Whose columns side by side, or tests one below another, these are, where it is not evident.",
+        ),
     ] = None,
     each_file: Annotated[
         str | None,
@@ -79,8 +82,8 @@ def import_command(
 ) -> None:
     """Turn files of test benches into experiment files: DIR/N.toml, DIR/N.csv, and DIR/N.svg to look at.
 
-    Each file is one experiment, named N after it, or one for each of the specimens that stand side by side in it;
-    several also stand together in DIR/experiments.toml. With --each-file hold they are holds of one test.
+    Each file is one experiment, named N after it, or one for each of the specimens in it; several also stand
+    together in DIR/experiments.toml. With --each-file hold they are holds of one test.
     Delimiter, decimal comma, encoding, preamble, units and columns are recognised, times of the whole test and
     continuous recordings are divided into holds. Ambiguous input leads to a question on a terminal and to an error
     elsewhere.

@@ -58,13 +58,13 @@ def import_bench(
     ----------
     raw : path, or sequence of paths
         Text with columns (CSV and its kin) or xlsx workbooks, or folders of such: one experiment each, or one for each
-        of the specimens that stand side by side in it.
+        of the specimens in it, side by side or one below another.
     length_mm : float
         Zero-tension length of the samples before the test.
     material : str, optional
         Samples of one material may be fitted together; the name of each experiment when left out.
     name : str, optional
-        Of the experiment, where there is one file; else each has the name of its file. Specimens side by side have
+        Of the experiment, where there is one file; else each has the name of its file. Specimens of one file have
         the names that the file gives them, or numbers after this one.
     mapping : sequence of str
         ``HEADER=COLUMN`` with COLUMN one of hold, displacement, time, tension, temperature, or ignore. The unit is
@@ -83,7 +83,8 @@ def import_bench(
     control : {"displacement", "force"}, optional
         What was set in each hold, where the readings leave it open.
     specimens : {"several", "one"}, optional
-        Whether columns of one quantity side by side are of several specimens, where the file leaves it open.
+        Whether columns side by side, or tests one below another, are of several specimens, where the file leaves it
+        open.
     each_file : str, optional
         What each of several files is: ``test``, or a ``hold`` of one test; or what was set in each of these holds:
         ``1 mm, 2 mm, 3 mm``.

@@ -32,7 +32,7 @@ class Choices:
     control : {"displacement", "force"} or None
         What was set in each hold.
     specimens : {"several", "one"} or None
-        Of which columns stand side by side.
+        Of which columns stand side by side, or tests one below another.
     each_file : str or None
         What each of several files is: hold or test, or the setting of the hold in each.
     drop_breaks : bool

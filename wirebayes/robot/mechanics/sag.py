@@ -107,7 +107,7 @@ def sag_warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: 
     weighs = f"wire {i + 1} weighs"
     if not _stated(robot)[i]:
         weighs = (
-            f"no mass_kg_m is stated of wire {i + 1}, and even the lightest rope for tension.highest_N, of "
+            f"no mass_kg_m above 0 is stated of wire {i + 1}, and even the lightest rope for tension.highest_N, of "
             f"{short(1e3 * _mass_kg_m(robot)[i], 2)} g/m, weighs"
         )
     text = (
