@@ -122,6 +122,13 @@ def test_dates_and_days_alone_are_the_time(tmp_path, header, cell, day_s):
     assert [row[2] / day_s for row in made.rows if row[1] is not None] == [0, 1, 3, 8, 0, 1, 3, 8]
 
 
+@pytest.mark.parametrize("header", ["Hour", "h"])
+def test_dates_beside_a_part_of_their_times_are_not_taken_for_midnights(tmp_path, header):
+    rows = [f"2026-06-{1 + d:02d},{8 + d % 3},{5 if d < 4 else 10},{5 + d / 10}" for d in range(8)]
+    with pytest.raises(Undecided, match="found no column of time"):
+        read(tmp_path, f"Date,{header},Load (kg),Elongation (mm)", rows)
+
+
 def test_a_day_beside_another_clock_is_no_clock(tmp_path):
     rows = [f"2026-06-{1 + x},{x},{t},{5 * x - t / 100}" for x in (1, 2) for t in (0, 30, 60)]
     assert [row[2] for row in read(tmp_path, "Date,x (mm),t (s),F (N)", rows).rows] == [0, 30, 60] * 2

@@ -8,6 +8,7 @@ from itertools import pairwise
 from wirebayes.io.bench.clock import are_moments
 from wirebayes.io.bench.compound_times import is_spelt
 from wirebayes.io.bench.header import is_of
+from wirebayes.io.bench.quantities import quantity_unit
 from wirebayes.io.bench.sheet import moment
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import TimeSince
@@ -31,13 +32,19 @@ def with_dates(table: RawTable, time_since: TimeSince | None) -> RawTable:
     """
     clocks = [i for i, name in enumerate(table.header) if name and _are_clocks(table, i)]
     dates = [i for i, name in enumerate(table.header) if name and _are_dates(table, i)]
-    of_time = [i for i in range(len(table.header)) if is_of(table, i, "time") or are_moments(table, i)]
+    of_time = [i for i in range(len(table.header)) if _tells_time(table, i)]
     of_days = len(dates) == 1 and 2 * len(set(table.column(dates[0]))) > len(table.rows)
     if of_days and not clocks and set(of_time) <= set(dates):
         return _at_midnight(table, dates[0])
     if time_since == "hold" or any(_count_from_zero(table, i) for i in clocks):
         return table
     return dated(table)
+
+
+def _tells_time(table: RawTable, column: int) -> bool:
+    """Whether a column may be a time or a part of one, as one of hours beside dates."""
+    is_counted = quantity_unit(table.header[column], "time") is not None
+    return is_counted or is_of(table, column, "time") or are_moments(table, column)
 
 
 def _at_midnight(table: RawTable, column: int) -> RawTable:
