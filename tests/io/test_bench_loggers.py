@@ -173,7 +173,7 @@ def test_a_fraction_of_millimetres_or_of_another_number_is_none(tmp_path):
 def test_a_plus_before_displacements_alone_may_mean_changes(tmp_path):
     rows = [f"+{x},{t},{f:.2f}" for x, t, f in READINGS]
     text = "\n".join(["x (mm),t (s),F (N)", *rows])
-    with pytest.raises(Undecided, match=r"column 1 \(x \(mm\)\): found a plus before its numbers alone, as \+1.0"):
+    with pytest.raises(Undecided, match=r"column 1 \(x \(mm\)\): found \+1.0, with a sign as before a change"):
         read(tmp_path, text)
     signed = "\n".join(["x (mm),t (s),F (N)", *(row.replace(",", ",+") for row in rows)])
     printed = "\n".join(["x (mm),t (s),F (N)", *(f"+{x:07.3f},{t},{f:.2f}" for x, t, f in READINGS)])

@@ -91,8 +91,12 @@ def dated(table: RawTable) -> RawTable:
 def _are_dates(table: RawTable, column: int) -> bool:
     """Whether a column holds dates without times, the first row one of them."""
     cells = table.column(column)
-    found = [moment(cell.removesuffix(_MIDNIGHT).strip()) for cell in cells if cell]
-    return bool(cells and cells[0]) and all(m is not None and m["date"] and not m["first"] for m in found)
+    return bool(cells and cells[0]) and all(_is_date(cell) for cell in cells if cell)
+
+
+def _is_date(cell: str) -> bool:
+    found = moment(cell.removesuffix(_MIDNIGHT).strip())
+    return found is not None and bool(found["date"]) and not found["first"]
 
 
 def _are_days(table: RawTable, column: int) -> bool:

@@ -62,7 +62,8 @@ def check_itself(table: RawTable, index: int, role: Role, unit: Unit) -> None:
     if role in ("displacement", "tension") and _are_signed(table, index):
         cell = next(cell for cell in table.column(index) if cell.startswith("+"))
         answers = {f"{map_to} [{unit.text}]": f"it is the {role} itself, and no change of it"}
-        raise Undecided(f"{place}: found a plus before its numbers alone, as {cell}", f"that it is the {role}", answers)
+        found_sign = f"found {cell}, with a sign as before a change, and in no other column"
+        raise Undecided(f"{place}: {found_sign}", f"that it is the {role}", answers)
 
 
 def _are_signed(table: RawTable, index: int) -> bool:
