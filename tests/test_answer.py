@@ -8,9 +8,13 @@ from typing import Any
 
 import pytest
 
+import wirebayes as wb
+from tests.simulated import simulated_tests
+from wirebayes.answers import terminal
 from wirebayes.answers.lines import for_terminal
 from wirebayes.cli import answer
 from wirebayes.sentences import p_in_words, spoken
+from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.views.calibration import Calibration
 from wirebayes.views.comparison import Comparison
 from wirebayes.views.findings import Findings
@@ -305,3 +309,13 @@ def test_a_notebook_shows_what_the_terminal_says(tmp_path: Path) -> None:
     drift = {"distance_mm": rounded, "times_s": [0.0, 60.0], "specimen_spread": 0.0}
     content = {"robot": "r", "feasible": True, "drift": [drift], "wires": {}, "warnings": []}
     assert "<td>0 to 0</td>" in stored(Pose, tmp_path, "pose.json", content)._repr_html_()
+
+
+def test_a_fit_says_nothing_of_parameters_that_it_does_not_have(tmp_path: Path) -> None:
+    """Hold by hold, elongations under weights do not depend on k1."""
+    bench = Bench(weights_N=(2.0, 4.0, 6.0, 8.0), times_s=(5.0, 30.0, 100.0, 300.0), resolution_mm=0.01)
+    (experiment,) = simulated_tests([bench], Truth({"k1": 900.0}), seed=3)
+    posterior = wb.fit(experiment, likelihood="hold", check=False, output=tmp_path / "out")
+    lines = terminal.of_fit(posterior.summary())
+    assert [line.split(":")[0] for line in lines] == ["simulated", "  creep after 2 min at 4 N", "  creep law"]
+    assert all(line.partition(": ")[2] for line in lines)

@@ -43,24 +43,23 @@ def of_fit(summary: SummaryJson) -> list[str]:
     passed = summary["model_check"]["passed"] if "model_check" in summary else None
     checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
     creep = f"creep after 2 min at {short(derived['tension_N'])} N: {_band(derived['creep_2min_mm'])} mm"
-    lines = [
+    return [
         f"{summary['experiment']}: {state}, {checked} (medians, 90 % intervals)",
-        f"  stiffness: {_parameters(summary, ('k1',))}",
+        *_parameters(summary, "stiffness", ("k1",)),
         f"  {creep}",
-        f"  creep law: {_parameters(summary, ('B', 'U', 'k2', 'N'))}",
+        *_parameters(summary, "creep law", ("B", "U", "k2", "N")),
+        *_parameters(summary, "effects", [key.split("@")[0] for key in summary["effects"]]),
     ]
-    if summary["effects"]:
-        lines.append(f"  effects: {_parameters(summary, [key.split('@')[0] for key in summary['effects']])}")
-    return lines
 
 
 _SHOWN = ("k1", "B", "U", "k2", "N")
 
 
-def _parameters(summary: SummaryJson, wanted: Sequence[str]) -> str:
-    """Parameters with their intervals: those named, and those of effects and of experiments that are named."""
+def _parameters(summary: SummaryJson, title: str, wanted: Sequence[str]) -> list[str]:
+    """A line of parameters with their intervals, those of named effects too; none where nothing of it was sampled."""
     names = [name for name in summary["parameters"] if name.split("[")[0].split(".")[0] in wanted]
-    return ", ".join(f"{name} {_with_unit(summary['parameters'][name])}" for name in names)
+    each = [f"{name} {_with_unit(summary['parameters'][name])}" for name in names]
+    return [f"  {title}: {', '.join(each)}"] if each else []
 
 
 def of_findings(name: str, report: ExperimentFindings) -> list[str]:
