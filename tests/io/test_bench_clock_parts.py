@@ -31,7 +31,17 @@ def parts(of_test, begin=0, days=""):
     return cells
 
 
-@pytest.mark.parametrize("header", ["h,min,s", "Hours,Minutes,Seconds", "Time (h),Time (min),Time (s)", "HH,MM,SS"])
+@pytest.mark.parametrize(
+    "header",
+    [
+        "h,min,s",
+        "Hours,Minutes,Seconds",
+        "Hours (h),Minutes (min),Seconds (s)",
+        "Time (h),Time (min),Time (s)",
+        "Time h,min,s",
+        "HH,MM,SS",
+    ],
+)
 @pytest.mark.parametrize("of_test", [False, True])
 def test_parts_of_a_time_side_by_side_are_one(tmp_path, header, of_test):
     found, notes = read(tmp_path, header, parts(of_test))

@@ -82,7 +82,7 @@ def test_numbers_of_holds_that_begin_again_with_the_clock_may_be_of_another_spec
     if round_s:
         assert [hold.number for hold in read(tmp_path, header, rows).experiment.holds] == [1, 2, 3, 4, 5, 6]
         return
-    with pytest.raises(Undecided, match="found '1' after '3' where the displacement begins again") as asked:
+    with pytest.raises(Undecided, match="found '1' after '3' where what was set begins again") as asked:
         read(tmp_path, header, rows)
     assert set(asked.value.answers) == {"--specimens several", "--specimens one"}
     assert len(read(tmp_path, header, rows, specimens="one").experiment.holds) == 6

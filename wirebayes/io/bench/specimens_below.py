@@ -139,7 +139,7 @@ def _are_words(names: Sequence[str]) -> bool:
 
 def _which(table: RawTable, index: int, row: int, names: Sequence[str], is_repeated: bool) -> Undecided:
     place = table.place(table.rows[row].line, index)
-    again = "the displacement begins" if is_repeated else "times begin"
+    again = "what was set begins" if is_repeated else "times begin"
     found = f"found {shown(names[1])} after {shown(names[0])} where {again} again"
     answers = {"--specimens several": "specimens of their own", "--specimens one": "one specimen"}
     return Undecided(f"{table.sheet.path}, {place}: {found}", "what they are of", answers)
