@@ -1,12 +1,15 @@
 """Cells that bear their units: read as if these stood in the header."""
 
 import re
+from pathlib import Path
 
 import pytest
 
 from tests.io.bench_files import convert
 from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
+from wirebayes.io.bench.cell_units import with_units_apart
+from wirebayes.io.bench.sheet import Sheet, SheetRow
 from wirebayes.io.bench.undecided import Choices
 
 ABOUT = About("wire", "line", 1000.0)
@@ -28,6 +31,14 @@ def test_units_of_all_cells_are_those_of_columns(tmp_path, sign, decimal, header
     found, notes = read(tmp_path, text)
     assert found == [pytest.approx(reading) for reading in READINGS]
     assert "units in the cells" in notes[0]
+
+
+@pytest.mark.parametrize(("below", "read_so"), [(99, True), (100, False)])
+def test_units_in_cells_are_looked_for_in_the_last_hundred_lines(below, read_so):
+    cells = [(f"{x} mm", f"{t:g} s", f"{f:.2f} N") for x, t, f in READINGS]
+    rows = [("x", "t", "F"), *cells, *[("end of a part",)] * below]
+    sheet = Sheet(Path("raw.csv"), tuple(SheetRow(line, row) for line, row in enumerate(rows, 1)))
+    assert (with_units_apart(sheet) is not sheet) == read_so
 
 
 def test_columns_may_bear_units_alone_or_under_a_row_of_them(tmp_path):

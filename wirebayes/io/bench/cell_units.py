@@ -15,6 +15,7 @@ from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_number, of
 from wirebayes.io.bench.words import speaks_of
 
 FEWEST = 3  # cells with a unit: one row of them may be the ranges of sensors, or times that run along a header
+_AT_END = 100  # lines, more than what programs write below readings
 _MEASURE = re.compile(r"([+\-\u2212]?\d[\d.,'\u2019\s/\-]*(?:[eE][+-]?\d+)?)(?<!\s)\s*([^\W\d_].*|[°%‰].*)")
 _APART = re.compile(r"(?<!\S)([+\-\u2212]?\d[\d.,]*)\s+([^\W\d_][^\s\d]*|[°%‰][^\s\d]*)(?!\S)")
 
@@ -38,6 +39,9 @@ def joined_measures(line: str) -> str:
 
 def with_units_apart(sheet: Sheet) -> Sheet:
     """The sheet with a row of units above its first reading, where cells bear units; else itself."""
+    # a column of cells with units has them at its end, too: most long files are known by a glance there
+    if not any(_measure(cell) for row in sheet.rows[-_AT_END:] for cell in row.cells):
+        return sheet
     readings = [i for i, row in enumerate(sheet.rows) if not row.comment and is_measured([*map(bare, row.filled)])]
     if not readings:
         return sheet
