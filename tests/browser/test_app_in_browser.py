@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -41,6 +41,16 @@ class Served:
         self.address = first.split()[2]
         self.host = self.address.removeprefix("http://").strip("/")
         assert self.host.startswith("127.0.0.1:"), first
+        self._wait_until_it_answers()
+
+    def _wait_until_it_answers(self) -> None:
+        """The address is said a moment before the server listens."""
+        for _ in range(100):
+            with closing(http.client.HTTPConnection(self.host)) as connection, suppress(ConnectionRefusedError):
+                connection.connect()
+                return
+            time.sleep(0.1)
+        raise TimeoutError(f"nothing answers at {self.address}")
 
 
 @pytest.fixture(scope="module")
