@@ -140,9 +140,8 @@ class FirstStretch:
         """(n,) tension at the beginning that suits readings best, N; its standard deviation in those of a reading."""
         k1, U = self._k1(theta), self.ridge.get(theta, "U")
         longer = np.exp(_of(theta, self.length_exponent) * self.log_ratio)
-        strain_for_one = (
-            self.ridge.get(theta, "B") * longer * self.ridge.reached(theta, self.times_s[:, None]) / self.length
-        )
+        reached = self.ridge.reached(theta, self.times_s[:, None])
+        strain_for_one = self.ridge.get(theta, "B") * longer * reached / self.length
         tension, square = np.full(len(theta), self.read[0]), np.ones(len(theta))
         for _ in range(_REPETITIONS):
             crept = strain_for_one * tension**U

@@ -227,7 +227,8 @@ def _steps(
     before = [step for step in preloads if step.edge.threshold != 0.0 or step.edge.preload in beside]
     level = _read_beside(levels)
     of_stretches = [step for step in levels if isinstance(step, StretchLevel)]
-    crept = [_after_creep(*both) for both in zip(ridges, lasts, strict=True) if "k1" in both[0].shifted]
+    of_ridges = zip(ridges, lasts, strict=True)
+    crept = [_after_creep(ridge, own) for ridge, own in of_ridges if "k1" in ridge.shifted]
     return [
         *before,
         *means,
@@ -277,7 +278,7 @@ def _after_creep(ridge: Ridge, lasts: Sequence[LastReadings]) -> Step | None:
 
 
 def _last_readings(problem: Problem, ridges: Sequence[Ridge]) -> list[list[LastReadings]]:
-    """Those of the tests of each ridge whose stiffness is sampled after its creep, where some do not show its begin."""
+    """Those of the tests of each ridge that samples k1, where some do not show how holds begin."""
     if problem.likelihood != "chain":  # hold by hold there is no preload, and under weights no k1
         return [[] for _ in ridges]
     out = []

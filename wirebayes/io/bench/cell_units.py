@@ -47,24 +47,22 @@ def with_units_apart(sheet: Sheet) -> Sheet:
         return sheet
     first = readings[0]
     head = sheet.rows[first - 1] if first else SheetRow(1, ())
-    columns = dict[int, dict[str, str]]()
-    units = list[str]()
-    for column in range(max(len(sheet.rows[i].cells) for i in readings)):
-        found = (
-            None if speaks_of(head.cell(column), "hold") else _numbers([sheet.rows[i].cell(column) for i in readings])
-        )
-        units.append(found[0] if found else "")
-        if found:
-            columns[column] = found[1]
-    if not columns:
+    width = max(len(sheet.rows[i].cells) for i in readings)
+    units = [""] * width
+    numbers = dict[int, dict[str, str]]()
+    for column in range(width):
+        if speaks_of(head.cell(column), "hold"):
+            continue
+        found = _numbers([sheet.rows[i].cell(column) for i in readings])
+        if found is not None:
+            units[column], numbers[column] = found
+    if not numbers:
         return sheet
-    rows = [_with_numbers(row, columns) for row in sheet.rows[first:]]
-    of_units = (
-        [] if _bears(head, units) else [SheetRow(sheet.rows[first].line, tuple(f"[{u}]" if u else "" for u in units))]
-    )
-    return replace(
-        sheet, rows=(*sheet.rows[:first], *of_units, *rows), described=f"{sheet.described}, units in the cells"
-    )
+    above = list(sheet.rows[:first])
+    if not _bears(head, units):
+        above.append(SheetRow(sheet.rows[first].line, tuple(f"[{unit}]" if unit else "" for unit in units)))
+    below = [_with_numbers(row, numbers) for row in sheet.rows[first:]]
+    return replace(sheet, rows=(*above, *below), described=f"{sheet.described}, units in the cells")
 
 
 def _bears(head: SheetRow, units: Sequence[str]) -> bool:
@@ -72,11 +70,11 @@ def _bears(head: SheetRow, units: Sequence[str]) -> bool:
     return all(head.cell(i).strip("[]() ") == unit for i, unit in enumerate(units) if unit)
 
 
-def _with_numbers(row: SheetRow, columns: dict[int, dict[str, str]]) -> SheetRow:
+def _with_numbers(row: SheetRow, numbers: dict[int, dict[str, str]]) -> SheetRow:
     """A row with the numbers of its measures; a line of one cell may be a title."""
     if row.comment or len(row.filled) < 2:
         return row
-    return replace(row, cells=tuple(columns.get(i, {}).get(cell, cell) for i, cell in enumerate(row.cells)))
+    return replace(row, cells=tuple(numbers.get(i, {}).get(cell, cell) for i, cell in enumerate(row.cells)))
 
 
 def _numbers(cells: Sequence[str]) -> tuple[str, dict[str, str]] | None:
@@ -124,11 +122,10 @@ def in_one_unit(measures: Sequence[tuple[str, str]], role: Role) -> tuple[str, l
 def _measure(cell: str) -> tuple[str, str] | None:
     """Number and unit of a cell that bears one."""
     found = _MEASURE.fullmatch(cell)
-    return (
-        (found[1], found[2])
-        if found and (is_number(found[1]) or of_fraction(found[1])) and _is_unit(found[2])
-        else None
-    )
+    if found is None or not _is_unit(found[2]):
+        return None
+    number, unit = found[1], found[2]
+    return (number, unit) if is_number(number) or of_fraction(number) else None
 
 
 @cache

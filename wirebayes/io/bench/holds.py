@@ -61,7 +61,7 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
     if readings.hold is not None:
         groups = groups_between(changes(readings.hold))
         if not wanders(x, groups):
-            return _ingroups_between(readings, groups, time_since, resets)
+            return _cut_into_groups(readings, groups, time_since, resets)
         if not is_continuous(groups):
             raise _wandering(readings, groups)
         resets = [*resets, f"hold numbers are not used: the {readings.role} changes within them"]
@@ -73,10 +73,10 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
             groups = groups_between(restart)  # a measured setting that scatters
             if wanders(x, groups):
                 raise _wandering(readings, groups)
-        return _ingroups_between(readings, groups, time_since, resets)
+        return _cut_into_groups(readings, groups, time_since, resets)
     groups = groups_between(change)
     if _are_holds(groups):
-        return _ingroups_between(readings, groups, time_since, resets)
+        return _cut_into_groups(readings, groups, time_since, resets)
     return by_plateaus(readings, resets)
 
 
@@ -127,7 +127,7 @@ def _wandering(readings: Readings, groups: Sequence[Rows]) -> InputError:
     return readings.complain(row, readings.role, found, f"one {readings.role} in each hold")
 
 
-def _ingroups_between(
+def _cut_into_groups(
     readings: Readings, groups: list[Rows], time_since: TimeSince | None, resets: Sequence[str]
 ) -> Cut:
     """Holds whose rows are known."""
