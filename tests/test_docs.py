@@ -255,10 +255,11 @@ def test_links_of_the_documentation_lead_to_pages_and_files():
 
 
 def test_every_page_stands_in_one_of_the_five_parts():
-    index = (DOCS / "index.rst").read_text(encoding="utf-8")
-    parts = re.findall(r":caption: (.+)\n   :maxdepth: 1\n\n((?:   \S+\n)+)", index)
+    index, robots = ((DOCS / page).read_text(encoding="utf-8") for page in ("index.rst", "robot.rst"))
+    parts = re.findall(r":caption: (.+)\n   :maxdepth: 1\n   :hidden:\n\n((?:   \S+\n)+)", index)
     assert [name for name, _ in parts] == ["Tutorials", "How-to", "Explanation", "Reference", "Studies"]
-    listed = [page for _, pages in parts for page in pages.split()]
+    under_robots = re.findall(r":hidden:\n\n((?:   \S+\n)+)", robots)
+    listed = [page for pages in [*(pages for _, pages in parts), *under_robots] for page in pages.split()]
     assert sorted(listed) == sorted(path.stem for path in DOCS.glob("*.rst") if path.stem != "index")
 
 
