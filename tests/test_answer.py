@@ -183,8 +183,8 @@ def test_what_is_found_is_used_and_what_is_not_is_measured(tmp_path: Path) -> No
         content = {"experiments": {"a": SLIP | {"verdict": verdict}}}
         first, *others = stored(Findings, tmp_path, "discovery.json", content).next_step().splitlines()
         assert len(others) == steps - 1
-        assert first.startswith("Unload" if steps == 1 else f"wirebayes predict {tmp_path} PROTOCOL.csv")
-        assert steps == 1 or others[0] == f"wirebayes pose ROBOT.toml --wires {tmp_path / 'a' / 'final'}"
+        assert first.startswith("Unload" if steps == 1 else f"wirebayes predict {tmp_path} {tmp_path}/a/next.csv")
+        assert steps == 1 or others[0].startswith(f"wirebayes pose linear-7 --wires {tmp_path / 'a' / 'final'}  (")
 
 
 def test_a_line_is_as_wide_as_the_terminal_and_a_number_stays_with_its_interval(monkeypatch) -> None:

@@ -20,6 +20,7 @@ from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
+from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import open_run, read_json, write_bytes, write_json
 from wirebayes.json_files.discovery import IntervalJson
 from wirebayes.json_files.summary import Parameter, SummaryJson
@@ -133,6 +134,8 @@ def discover(
             experiments, settings, own, place.path, seed, policy or DEFAULT, progress or silent
         )
         write_findings(found, place.path, own)
+        for e in experiments:
+            write_next_hold(e, place.path / e.name)
         opened.finish()
     return Findings(place, own)
 

@@ -21,6 +21,7 @@ from wirebayes.effects import catalogue, effect_named, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
+from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import open_run
 from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
@@ -147,6 +148,8 @@ def fit(
     with open_run(place.path, configuration) as opened:
         if opened.state != "done":
             _compute(jobs, place.path, seed, check, policy or DEFAULT, progress or silent)
+            for name, members in groups.items():
+                write_next_hold(members[0], place.path / name)
             opened.finish()
     return fits_in(place, [job.folder for job in jobs], own, computed=opened.state != "done")
 

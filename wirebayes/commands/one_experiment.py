@@ -18,6 +18,7 @@ from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.effects import catalogue
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
+from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.batch import DiscoveryColumns, FitColumns, Row
 from wirebayes.json_files.summary import SummaryJson
@@ -107,6 +108,8 @@ def do(work: bytes) -> Done:
                     row = {**row, **_discovered(experiment, task, folder)}
                 else:
                     row = {**row, **_fitted(experiment, task, folder)}
+                if task.posteriors:
+                    write_next_hold(experiment, folder / experiment.name)
             except OSError:  # a full disk is not the specimen's fault
                 raise
             except Exception as error:  # no specimen may lose the others

@@ -12,7 +12,7 @@ from wirebayes.results import read_back
 if TYPE_CHECKING:
     import xarray as xr
 
-from wirebayes.views.posterior import POSTERIOR, Posterior
+from wirebayes.views.posterior import POSTERIOR, Posterior, next_prediction
 from wirebayes.views.result import NOTHING, Given, Result, html_table
 
 _MESSAGES = 20  # lines on standard error: what a terminal shows at once
@@ -78,8 +78,10 @@ class Batch(Result[BatchJson]):
         return terminal.of_batch(self.summary())
 
     def next_step(self, given: Given = NOTHING) -> str:
-        predicted = f"wirebayes predict {self.place.path} PROTOCOL.csv --experiment NAME"
-        return f"read {self.place.path / 'summary.csv'}; {predicted}"
+        place = self.place.path
+        look = f"look at {place / 'summary.csv'}"
+        first = next(iter(self.plain), None)
+        return f"{look}\n{next_prediction(place, place / first, f' --experiment {first}')}" if first else look
 
     def _short_form(self) -> list[str]:
         failed = sum(row["error"] is not None for row in self.rows)

@@ -13,7 +13,7 @@ from wirebayes.sentences import p_in_words, quantity, spoken
 if TYPE_CHECKING:
     import xarray as xr
 
-from wirebayes.views.posterior import Posterior, after_a_model
+from wirebayes.views.posterior import Posterior, next_pose, next_prediction
 from wirebayes.views.result import NOTHING, Given, Result, html_table
 
 
@@ -102,7 +102,8 @@ class Findings(Result[DiscoveryJson]):
         measurement = report["next_measurement"]
         if report["verdict"] not in ("named", "nothing-missing"):
             return measurement
-        use = after_a_model(self.place.path, self.place.path / name / "final")
+        place = self.place.path / name
+        use = f"{next_prediction(self.place.path, place)}\n{next_pose(place / 'final')}"
         return use if report["verdict"] == "named" else f"{use}\n{measurement}"
 
     def _short_form(self) -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from wirebayes.answers import terminal
 from wirebayes.errors import InputError
+from wirebayes.io.next_hold import NEXT_HOLD
 from wirebayes.io.run_folder import CONFIGURATION, stored_results
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.notice import Notice, NoticeJson, from_json, to_json
@@ -24,7 +25,6 @@ from wirebayes.views.result import (
     NOTHING,
     Given,
     Result,
-    ResultFolder,
     copy_results,
     figure,
     html_table,
@@ -164,7 +164,7 @@ class Posterior(Result[SummaryJson]):
         return terminal.of_fit(self.summary())
 
     def next_step(self, given: Given = NOTHING) -> str:
-        return _after_fit(self.kinds, self.place, self.folder, given)
+        return _after_fit(self, self.kinds, given)
 
     def _short_form(self) -> list[str]:
         s = self.summary()
@@ -229,7 +229,7 @@ class Posteriors(Result[dict[str, SummaryJson | list[NoticeJson]]], Mapping[str,
         return [line for posterior in self.members.values() for line in posterior.lines()]
 
     def next_step(self, given: Given = NOTHING) -> str:
-        return _after_fit(self.kinds, self.place, next(iter(self.values())).folder, given)
+        return _after_fit(next(iter(self.values())), self.kinds, given)
 
     def _short_form(self) -> list[str]:
         return [repr(posterior) for posterior in self.members.values()]
@@ -238,14 +238,31 @@ class Posteriors(Result[dict[str, SummaryJson | list[NoticeJson]]], Mapping[str,
         return "".join(posterior._repr_html_() for posterior in self.members.values())
 
 
-def _after_fit(kinds: frozenset[str], place: ResultFolder, folder: Path, given: Given) -> str:
-    """What to do with posteriors of a command's folder, of which one lies in `folder`."""
+def _after_fit(posterior: Posterior, kinds: frozenset[str], given: Given) -> str:
+    """What to do with the posteriors of a command, of which one is given with the kinds of the warnings of all."""
     if "model-check" in kinds:
         return f"wirebayes discover {given.file}  (what is the model missing?)"
-    return after_a_model(place.path, folder)
+    several = not posterior.alone or len(posterior.experiments) > 1
+    whose = f" --experiment {posterior.experiments[0]}" if several else ""
+    prediction = next_prediction(posterior.place.path, posterior.folder, whose)
+    return f"{prediction}\n{next_pose(posterior.folder)}"
 
 
-def after_a_model(results: Path, posterior: Path) -> str:
-    """What a model that describes its readings is good for."""
-    protocol = "PROTOCOL.csv  (PROTOCOL.csv: the holds to come)"
-    return f"wirebayes predict {results} {protocol}\nwirebayes pose ROBOT.toml --wires {posterior}"
+def next_prediction(results: Path, around: Path, whose: str = "") -> str:
+    """The command that predicts the example of a hold to come.
+
+    Parameters
+    ----------
+    results : Path
+        What `predict` reads.
+    around : Path
+        The folder with the example.
+    whose : str
+        The option that names one of several experiments.
+    """
+    return f"wirebayes predict {results} {around / NEXT_HOLD}{whose}  (a hold to come: edit the file)"
+
+
+def next_pose(posterior: Path) -> str:
+    """The command that hangs a robot on such wires."""
+    return f"wirebayes pose linear-7 --wires {posterior}  (a shipped robot; or the file of yours)"

@@ -1,0 +1,60 @@
+"""The example of a hold to come that lies beside a fit is what the `Next:` line says: a protocol that predict reads."""
+
+import csv
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import wirebayes as wb
+from wirebayes.cli import main
+from wirebayes.io.next_hold import NEXT_HOLD, write_next_hold
+
+FEW = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
+
+
+def one_test(**options: Any) -> wb.Experiment:
+    (one,) = wb.simulate_tests(**{"seed": 1, "times": [0, 30, 60], "parameters": {"k1": 900}} | options).experiments
+    return one
+
+
+def example_of(experiment: wb.Experiment, folder: Path) -> list[dict[str, str]]:
+    write_next_hold(experiment, folder)
+    with (folder / NEXT_HOLD).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize(
+    ("options", "set_", "value"),
+    [
+        ({"displacements": [1.1, 2.2, 3.3], "unload": 2}, "displacement_mm", "4.4"),  # beyond the largest, not the last
+        ({"displacements": [5.0, 0.5, 7.0, 0.5]}, "displacement_mm", "9.0"),
+        ({"displacements": [4.0]}, "displacement_mm", "4.0"),
+        ({"weights": [5.0, 10.0, 20.0]}, "tension_N", "30.0"),
+    ],
+)
+def test_the_next_hold_is_a_step_beyond_the_furthest(options, set_, value, tmp_path) -> None:
+    experiment = one_test(**options)
+    rows = example_of(experiment, tmp_path)
+    assert [list(row) for row in rows] == [["hold", set_, "time_s"]] * 3
+    assert {row["hold"] for row in rows} == {str(len(experiment.holds) + 1)}
+    assert {row[set_] for row in rows} == {value}
+    assert [row["time_s"] for row in rows] == ["0.0", "30.0", "60.0"]
+
+
+def test_it_goes_on_at_the_last_temperature_and_has_few_of_many_times(tmp_path) -> None:
+    rows = example_of(one_test(times=range(1001), temperature=[20.0, 24.0], displacements=[1, 2]), tmp_path)
+    assert {float(row["temperature_C"]) for row in rows} == {24.0}
+    assert [float(row["time_s"]) for row in rows] == [0.0, 250.0, 500.0, 750.0, 1000.0]
+
+
+@pytest.mark.parametrize(("lengths", "together"), [([1000], False), ([1000, 1500], False), ([1000, 1500], True)])
+def test_the_command_that_the_next_line_names_runs_as_it_stands(lengths, together, tmp_path, capsys) -> None:
+    experiments = wb.simulate_tests(seed=1, displacements=[1, 2, 3], times=[0, 30, 60], lengths=lengths).experiments
+    material = experiments[0].material if together else None
+    found = wb.fit(experiments, together=material, policy=FEW, check=False, output=tmp_path / "out")
+    command = shlex.split(found.next_step().partition("  (")[0])
+    assert command.pop(0) == "wirebayes"
+    assert main(command) == 0
+    assert f"Hold 4 of {experiments[0].name}, at 4 mm" in capsys.readouterr().out

@@ -1,0 +1,38 @@
+"""An example of what `predict` reads, beside a fit: one hold more of the same test, to be edited."""
+
+from pathlib import Path
+
+import numpy as np
+
+from wirebayes.io.experiment import Experiment
+from wirebayes.io.readings import SET, Hold
+from wirebayes.io.run_folder import write_csv
+
+NEXT_HOLD = "next.csv"
+_MOST_READINGS = 5  # of a recording's thousands: enough to see a curve, few enough to edit
+
+
+def write_next_hold(experiment: Experiment, folder: Path) -> None:
+    """Write the protocol of one hold more of a test into the folder of its results."""
+    last = experiment.recorded_holds[-1]
+    header = ["hold", SET[experiment.control], "time_s"]
+    row = [int(last.number or 0) + 1, _one_step_further(experiment)]
+    rows = [[*row, time] for time in _some_of_its_times(last)]
+    if last.temperature_C is not None:
+        header.append("temperature_C")
+        rows = [[*each, float(last.temperature_C[-1])] for each in rows]
+    write_csv(folder / NEXT_HOLD, header, rows)
+
+
+def _one_step_further(experiment: Experiment) -> float:
+    """A setting as far beyond the largest of the test as that lies beyond the second largest."""
+    settings = sorted({hold.setting for hold in experiment.holds})
+    step = settings[-1] - settings[-2] if len(settings) > 1 else 0.0
+    return float(f"{settings[-1] + step:.10g}")
+
+
+def _some_of_its_times(hold: Hold) -> list[float]:
+    """The first and the last reading's time of a hold, and a few between them."""
+    count = hold.time_s.size
+    chosen = np.linspace(0, count - 1, min(count, _MOST_READINGS)).round().astype(int)
+    return [float(time) for time in hold.time_s[chosen]]
