@@ -60,14 +60,28 @@ def test_a_batch_says_a_sentence_a_finding_and_no_plural_of_one() -> None:
     found = {"experiments": rows, "outliers": []}
     assert headline.batch_in_sentences(found) == [  # type: ignore[arg-type]
         "2 tests of one material, 2 converged; median k1 of m 915 N (900 … 930, least to largest specimen).",
-        "Nothing is missing that the readings can show in one test (a).",
-        "Toe: in one test (b).",
+        "In one test (a) nothing is missing that the readings can show.",
+        "Toe is missing in one test (b).",
     ]
     rows.append(row | {"name": "c", "parameters": stiff[2], "material": "other"})
     assert headline.batch_in_sentences(found)[0] == (  # type: ignore[arg-type]
         "3 tests of 2 materials, 3 converged; median k1 of m 915 N (900 … 930, least to largest specimen), "
         "k1 of other 990 N (970 … 1\u202f010, 90 % interval)."
     )
+
+
+def test_a_batch_does_not_say_of_undecided_effects_that_each_is_missing() -> None:
+    row = {"error": None, "check": None, "material": None, "converged": True, "parameters": {}}
+    rows = [
+        row | {"name": "a", "verdict": "ambiguous", "effects": ["toe", "power_strain"]},
+        row | {"name": "b", "verdict": "ambiguous", "effects": ["power_strain", "toe"]},
+        row | {"name": "c", "verdict": "partial", "effects": ["toe"]},
+    ]
+    assert headline.batch_in_sentences({"experiments": rows, "outliers": []})[1:] == [  # type: ignore[arg-type]
+        "Toe is missing in one test (c).",
+        "Power strain or toe is missing in 2 tests (a and b); these readings do not tell which.",
+        "Something that no effect in the catalogue explains is missing in one test (c).",
+    ]
 
 
 def test_times_are_said_in_the_unit_that_people_use() -> None:

@@ -3,9 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import wirebayes as wb
 from tests.robot import cases
 from tests.robot.lines import CORE, line_about
 from tests.wire.test_fresh import Shrinking, Waking
+from wirebayes.commands.wires import wire_draws
 from wirebayes.effects import effect_named
 from wirebayes.effects.rivals import Logarithmic, PowerLaw, TwoModes
 from wirebayes.robot.mechanics import draws, rotation, schema
@@ -253,6 +255,13 @@ def test_bench_quantities_never_enter():
     wires = draws.for_robot(schema.read_robot_file("linear-6"), slip)
     assert set(wires.theta) == set(CORE)
     assert wires.effects == ()
+
+
+def test_the_tested_range_under_weights_is_that_of_the_weights(tmp_path):
+    (test,) = wb.simulate_tests(weights=[10, 20, 40], times=[0, 30, 60], parameters={"k1": 900}, seed=1).experiments
+    few = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
+    posterior = wb.fit(test, policy=few, check=False, output=tmp_path / "fit")
+    assert wire_draws(posterior.stored(), 5).tension_range_N == (10.0, 40.0)  # not the displacements that were read
 
 
 def test_uses_outside_the_tested_range_cause_warnings():

@@ -140,11 +140,28 @@ def of_batch(found: BatchJson) -> list[str]:
 def missing_in(rows: Sequence[Row]) -> list[str]:
     """What is missing in which experiments of a batch, a sentence a finding."""
     clean = [row["name"] for row in rows if row["verdict"] == "nothing-missing"]
-    out = [f"Nothing is missing that the readings can show in {_tests(clean)}."] if clean else []
-    for effect, _ in Counter(effect for row in rows for effect in row["effects"]).most_common():
-        out.append(f"{spoken(effect).capitalize()}: in {_tests([r['name'] for r in rows if effect in r['effects']])}.")
+    out = [f"In {_tests(clean)} nothing is missing that the readings can show."] if clean else []
+    decided = [row for row in rows if row["verdict"] != "ambiguous"]
+    for effect, _ in Counter(effect for row in decided for effect in row["effects"]).most_common():
+        of_these = [row["name"] for row in decided if effect in row["effects"]]
+        out.append(f"{spoken(effect).capitalize()} is missing in {_tests(of_these)}.")
+    for effects, of_these in _undecided_in(rows).items():
+        what = listed([spoken(effect) for effect in effects], "or")
+        where = f"in {_tests(of_these)}; these readings do not tell which"
+        out.append(f"{what.capitalize()} is missing {where}.")
     nameless = [row["name"] for row in rows if row["verdict"] in ("unknown", "partial")]
-    return out + ([f"Something without a name: in {_tests(nameless)}."] if nameless else [])
+    return out + (
+        [f"Something that no effect in the catalogue explains is missing in {_tests(nameless)}."] if nameless else []
+    )
+
+
+def _undecided_in(rows: Sequence[Row]) -> dict[tuple[str, ...], list[str]]:
+    """Names of the experiments that leave the same effects undecided."""
+    out = dict[tuple[str, ...], list[str]]()
+    for row in rows:
+        if row["verdict"] == "ambiguous":
+            out.setdefault(tuple(sorted(row["effects"])), []).append(row["name"])
+    return out
 
 
 def _tests(names: list[str]) -> str:

@@ -311,7 +311,7 @@ def wire_draws(stored: Stored, count: int) -> WireDraws:
     effects = tuple(sample.model.effects)
     names = [*CORE, *(c for e in material(effects) for c in e.columns())]
     pick = evenly(len(stored.draws["k1"]), count)
-    protocol, readings = sample.protocol, sample.readings[..., 0][sample.protocol.mask]
+    protocol, tensions = sample.protocol, sample.tensions_N
     parameters = {name: stored.draws[name][pick] for name in names}
     if stored.length_exponent is not None:
         parameters[LENGTH_EXPONENT] = stored.length_exponent[pick]
@@ -321,7 +321,7 @@ def wire_draws(stored: Stored, count: int) -> WireDraws:
         sample.model.law,
         sample.model.history,
         effects,
-        (float(readings.min()), float(readings.max())),
+        (float(tensions.min()), float(tensions.max())),
         (0.0, float(protocol.duration_s.max())),
         sample.model.tension_ref_N,
         doubts=stored.doubts,

@@ -59,6 +59,13 @@ class Sample:
         return float(np.median(self.protocol.duration_s[self.protocol.recorded])) or 1.0
 
     @property
+    def tensions_N(self) -> Array:
+        """Tensions that were read, or set while something was read."""
+        if self.protocol.control == "force":
+            return self.protocol.setting[self.protocol.recorded]
+        return np.asarray(self.readings[..., 0][self.protocol.mask])
+
+    @property
     def tested_tension_N(self) -> float:
         """Of the tensions with which recorded holds begin, the one nearest to the reference.
 

@@ -107,7 +107,7 @@ def _label(groups: Mapping[str, Group], fit: Fit, members: Sequence[Sample], pro
 def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes of the posterior: experiments, model, range of the readings, sampler."""
     first = members[0]
-    loads = [_tensions(s) for s in members]
+    loads = [s.tensions_N for s in members]
     return {
         "wirebayes_version": __version__,
         "inference_library": "emcee",
@@ -176,13 +176,6 @@ def _name(members: Sequence[Sample], names: Mapping[Control, str], of_both: str)
     """The name of what was set or read; where steps and weights are stored together, one without a unit."""
     controls = _controls(members)
     return names[controls[0]] if len(controls) == 1 else of_both
-
-
-def _tensions(sample: Sample) -> Array:
-    """Tensions that were read, or set while something was read, N."""
-    if sample.protocol.control == "force":
-        return sample.protocol.setting[sample.protocol.recorded]
-    return np.asarray(sample.readings[..., 0][sample.protocol.mask])
 
 
 def _protocols(members: Sequence[Sample]) -> dict[str, Variable]:
