@@ -31,6 +31,13 @@ def lasting(seconds: float) -> str:
     return f"{seconds / size:.3g} {unit}"
 
 
+def to_be_held(seconds: float) -> str:
+    """A time that somebody is to set, to be read exactly: in hours or minutes where it is a whole number of them."""
+    exact = round(seconds, 6)
+    unit, size = next((unit, size) for unit, size in _TIMES if (exact and exact % size == 0) or size == 1.0)
+    return f"{exact / size:g} {unit}"
+
+
 _TIMES = (("h", 3600.0), ("min", 60.0), ("s", 1.0))  # s, the longest first
 
 
@@ -163,7 +170,12 @@ def number(value: Any, digits: int = 3) -> str:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return f"{mantissa}·10{''.join(_RAISED[c] for c in str(int(exponent)))}"
     decimals = max(0, digits - 1 - _order(value, digits))
+    if size >= 10.0**_WHOLE:
+        value = float(f"{value:.{max(digits, _WHOLE) - 1}e}")  # 612 400, not 612 429
     return f"{value:,.{decimals}f}".replace(",", "\u202f").replace("-", "−")
+
+
+_WHOLE = 4  # digits of a large number that are shown at least, for years and newtons read oddly with fewer
 
 
 def _order(value: float, digits: int) -> int:

@@ -3,7 +3,7 @@
 from wirebayes import sentences
 from wirebayes.answers import headline
 from wirebayes.notice import Notice
-from wirebayes.report.blocks import Notices, Page, Section, Text
+from wirebayes.report.blocks import Notices, Page, Section, Table, Text
 from wirebayes.report.page import render
 
 SUMMARY = {
@@ -87,6 +87,24 @@ def test_a_batch_does_not_say_of_undecided_effects_that_each_is_missing() -> Non
 def test_times_are_said_in_the_unit_that_people_use() -> None:
     said = [sentences.lasting(seconds) for seconds in (0.5, 59.0, 60.0, 3599.0, 3600.0, 86400.0)]
     assert said == ["0.5 s", "59 s", "1 min", "60 min", "1 h", "24 h"]
+
+
+def test_times_to_be_set_are_whole_numbers_of_the_longest_unit_or_stay_seconds() -> None:
+    said = [sentences.to_be_held(seconds) for seconds in (0.0, 0.5, 200.0, 1500.0, 5399.9999999999, 5400.0, 162000.0)]
+    assert said == ["0 s", "0.5 s", "200 s", "25 min", "90 min", "90 min", "45 h"]
+
+
+def test_a_large_number_has_the_digits_that_say_something() -> None:
+    said = [
+        sentences.number(value, digits) for value, digits in ((612429.3, 3), (8954.3, 3), (12345.6, 2), (98765.4, 5))
+    ]
+    assert said == ["612\u202f400", "8\u202f954", "12\u202f350", "98\u202f765"]
+
+
+def test_columns_of_words_begin_at_the_left_and_those_with_a_number_at_the_right() -> None:
+    rows = [["a", "Nylon", "1.2", "−3", "–"], ["b", "4 mm rope", "–", "< 0.01", "–"], ["c", "no", "2", "4", "yes"]]
+    assert Table(["name"] * 5, rows).names == {4}
+    assert Table(["name"] * 5, [rows[0], rows[2]]).names == {1, 4}
 
 
 def test_a_platform_that_cannot_tilt_is_not_said_to_tilt() -> None:

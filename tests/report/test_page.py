@@ -352,8 +352,15 @@ def test_a_page_says_of_a_name_that_it_is_the_nearest_of_the_catalogue(changes, 
             {"verdict": "unknown", "effects": [], "probabilities": {}, "warnings": FEW},
             "wire-a: something is missing; so few holds do not say what",
         ),
-        ({"verdict": "partial"}, "the more it is strained), and something else that no effect"),
-        ({"verdict": "partial", "effects": ["toe", "ageing"]}, "toe and ageing are missing, and something else"),
+        (
+            {"verdict": "partial"},
+            "the more it is strained), of size 12.0 (9.00 … 15.0); and so is something that no effect in the catalogue "
+            "explains; with both the error",
+        ),
+        (
+            {"verdict": "partial", "effects": ["toe", "ageing"]},
+            "and so is something that no effect in the catalogue explains; with all of them",
+        ),
         ({}, "remains beside them with a probability of 2 %"),
         (
             {"verdict": "ambiguous", "set": ["toe", "ageing"], "probabilities": {"toe": 0.7, "ageing": 0.25}},

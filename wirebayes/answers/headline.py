@@ -98,8 +98,7 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
         + (f"; its largest part may be {candidates}, and nothing is established" if candidates else ""),
         "ambiguous": undecided(report),
         "named": f"{listed(effects)} {are} missing{meaning}",
-        "partial": f"{listed(effects)} {are} missing{meaning}, and something else that no effect in the catalogue "
-        "explains",
+        "partial": f"{listed(effects)} {are} missing{meaning}",
     }[report["verdict"]]
     sizes = {e: quantity(a["mean"], a["q05"], a["q95"], a["unit"]) for e, a in report["amplitudes"].items()}
     undecided_yet = report["verdict"] == "ambiguous"  # then the model has the most likely of several
@@ -107,6 +106,9 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     with_it = "with them" if effects[1:] else "with it"
     if undecided_yet:
         with_it = f"with {listed([f'{spoken(effect)} of {has}' for effect, has in sizes.items()])}"
+    if report["verdict"] == "partial":
+        size += "; and so is something that no effect in the catalogue explains"
+        with_it = "with all of them" if effects[1:] else "with both"
     gain = _gain_in_words(report, with_it)
     sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
     return f"{name}: {what}{size}{gain}{sure}."
@@ -146,9 +148,8 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
         chance = "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
         against = f", by {by} against {table['base']}{chance}"
     come = "come" if others[1:] else "comes"
-    then = f"; then {come} {listed([spoken(row['name']) for row in others[:3]])}" if others else ""
-    rest = f" and {len(others) - 3} more" if len(others) > 3 else ""
-    return f"{name}: {spoken(best['name'])} predicts left-out holds best{against}{then}{rest}."
+    then = f"; then {come} {some_of([spoken(row['name']) for row in others], 3)}" if others else ""
+    return f"{name}: {spoken(best['name'])} predicts left-out holds best{against}{then}."
 
 
 def batch_in_sentences(found: BatchJson) -> list[str]:
@@ -233,9 +234,9 @@ def plan_in_a_sentence(found: PlanJson) -> str:
     creep = best["creep"]["creep_1h_mm"]
     what = f" ({best['words']})" if best["words"] else ""
     return (
-        f"Do {best['name']}{what}: within {number(best['duration_min'])} min it would make known the creep after an "
+        f"Do {best['name']}{what}: in {short(best['duration_min'])} min it would determine the creep after an "
         f"hour at {number(best['creep']['tension_N'])} N to ± {number(creep['sd'], 2)} mm (now ± "
-        f"{number(creep['guess_sd'], 2)} mm, standard deviations)."
+        f"{number(creep['guess_sd'], 2)} mm; standard deviations)."
     )
 
 

@@ -15,7 +15,7 @@ from wirebayes.model.problem import Problem, with_protocols
 from wirebayes.model.sample import LENGTH_EXPONENT
 from wirebayes.model.scales import NATURAL, Units
 from wirebayes.numeric.typing import Array
-from wirebayes.sentences import spoken
+from wirebayes.sentences import short, spoken, to_be_held
 from wirebayes.wire.control import SET_UNIT
 from wirebayes.wire.protocol import Control, Protocol
 
@@ -73,12 +73,12 @@ def other_measurements(p: Protocol, alone: bool, units: Units = NATURAL, setting
     times = _longest_series(p)
     long = LONGER * (times[-1] or p.duration_s.max() or 1.0)
     log_times = np.concatenate([[0.0], np.geomspace(long / 300.0, long, 24)])
-    ends = list(dict.fromkeys(f"{one * end:g}" for end in (x.min(), x.max())))
+    ends = list(dict.fromkeys(short(one * end) for end in (x.min(), x.max())))
     span = f"{' to '.join(ends)} {unit}" if alone else f"each sample's {settings}"
-    dense = f"{second * long:g} s with 25 readings spaced evenly in the logarithm of time"
-    held = f"each held {second * times[-1]:g} s"
+    dense = f"{to_be_held(second * long)} with 25 readings spaced evenly in the logarithm of time"
+    held = f"each held {to_be_held(second * times[-1])}"
     there_and_back = np.concatenate([x, x[-2::-1] if len(x) > 1 else x])
-    last = f" from {one * x.max():g} to {one * x.min():g} {unit}" if alone else ", of every sample"
+    last = f" from {short(one * x.max())} to {short(one * x.min())} {unit}" if alone else ", of every sample"
     halved, finer = _halved(x, span, held)
     return [
         MeasurementPlan(words, holds, moments, p.length_mm, p.control)

@@ -26,6 +26,7 @@ from wirebayes.sentences import span as span
 from wirebayes.sentences import unit_text as unit_text
 
 _KINDS = {".svg": "image/svg+xml", ".png": "image/png"}
+_A_NUMBER = re.compile(r"[−<±]?\s?\d")
 _SENTENCE = 36  # characters; no number with its interval is longer
 _MOST_LINKS = 40  # of one kind; a list of more is a wall
 _DPI = 120  # of layers drawn as images
@@ -44,6 +45,12 @@ class Table:
     caption: str = ""
     words: dict[str, str] = field(default_factory=dict)
     kind: str = "table"
+
+    @property
+    def names(self) -> frozenset[int]:
+        """Columns of words, none of them a number: they begin at the left as well."""
+        columns = enumerate(zip(*self.rows, strict=True))
+        return frozenset(i for i, cells in columns if i and not any(_A_NUMBER.match(cell) for cell in cells))
 
     @property
     def prose(self) -> frozenset[int]:

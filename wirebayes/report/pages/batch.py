@@ -95,7 +95,7 @@ def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
     )
     rest = f" Not compared, with fewer than {LEAST_SPECIMENS} specimens: {_some(small)}." if small else ""
     if set(small) == set(specimens):
-        none = f"No specimen is compared with others: no material has {LEAST_SPECIMENS}."
+        none = f"None is looked for: that takes {LEAST_SPECIMENS} specimens or more of one material."
         return [Text(none)]
     if not far:
         return [Text("No specimen is an outlier of its material.", strong=True), Text(rule + rest)]

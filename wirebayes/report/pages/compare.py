@@ -24,6 +24,7 @@ from wirebayes.report.blocks import (
     seed_of_page,
 )
 from wirebayes.report.glossary import meaning
+from wirebayes.sentences import spoken
 
 _CAPTIONS = {
     "differences": "How much better (right) or worse (left) each model predicts left-out holds than the base, with two "
@@ -77,12 +78,12 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
         both = (held["free"], held["given_first"]) if held else (None, None)
         errors = (number(s and read_value(s, "rmse"), 2) for s in both)
         scores = (number(v, 2) for v in ((difference["elpd"], difference["se"]) if difference else (None, None)))
-        lines.append([r["name"], _share(r.get("weight")), *scores, *errors, _plain(r.get("meaning") or "")])
+        lines.append([spoken(r["name"]), _share(r.get("weight")), *scores, *errors, _plain(r.get("meaning") or "")])
     blocks.append(
         Table(header, lines, "Best first. The weight is the model's share in the mixture with the best predictions.")
     )
     blocks += [Pictures(pictures[_FIRST:])] if pictures[_FIRST:] else []
-    failed = [[r["name"], str(r["failed"])] for r in rows if r.get("failed") is not None]
+    failed = [[spoken(r["name"]), str(r["failed"])] for r in rows if r.get("failed") is not None]
     if failed:
         blocks.append(Table(["model", "why it was not scored"], failed))
     return Section(name, blocks)

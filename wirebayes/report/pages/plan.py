@@ -29,7 +29,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.plan import is_given
-from wirebayes.sentences import counted, spoken
+from wirebayes.sentences import counted, short, spoken
 
 _AIMS = {
     "parameters": "how much they say about the material",
@@ -42,7 +42,7 @@ def plan_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``plan.json``."""
     found: PlanJson = read_json(folder / "plan.json")
     rows = found["protocols"]
-    columns = Columns([_requested(found), _recommended(found), _reliability(rows)])
+    columns = Columns([_requested(found), _reliability(rows)])
     first = before_the_answer(found)
     picture = picture_file(folder, "plan")
     if picture is not None:
@@ -73,19 +73,8 @@ def _requested(found: PlanJson) -> Points:
     by = _AIMS[aim[0]] if len(aim) == 1 else f"how well {_words(aim[0])} and {_words(aim[1])} would be distinguished"
     points = [f"The guess: {found['guess']['source']}.", f"The tests are ranked by {by}."]
     if found["budget_min"] is not None:
-        points.append(f"Available time: {number(found['budget_min'])} min.")
+        points.append(f"Available time: {short(found['budget_min'])} min.")
     return Points("What was requested", points)
-
-
-def _recommended(found: PlanJson) -> Points:
-    best = found["protocols"][0]
-    points = [f"Do {best['name']}" + (f": {best['words']}." if best["words"] else ".")]
-    creep = best["creep"]["creep_1h_mm"]
-    points.append(
-        f"The creep after an hour at {number(best['creep']['tension_N'])} N would be known to "
-        f"{number(creep['sd'], 2)} mm (guess: {number(creep['guess_sd'], 2)} mm)."
-    )
-    return Points("What to do", points)
 
 
 def _reliability(rows: list[JudgedProtocol]) -> Points:
@@ -123,7 +112,7 @@ def _ranked(row: JudgedProtocol, names: Sequence[str]) -> list[str]:
     return [
         str(row["rank"]),
         row["name"],
-        number(row["duration_min"]),
+        short(row["duration_min"]),
         number(row["information_bits"]),
         *(number(width, 2) for width in widths),
         "yes" if row["within_budget"] else "too long",
@@ -133,7 +122,7 @@ def _ranked(row: JudgedProtocol, names: Sequence[str]) -> list[str]:
 def _protocol(row: JudgedProtocol) -> list[Block]:
     size = f"{counted(row['holds'], 'hold')} with {counted(row['readings'], 'reading')}"
     words = f": {row['words']}" if row["words"] else ""
-    blocks: list[Block] = [Text(f"{size}, {number(row['duration_min'])} min{words}."), _widths(row)]
+    blocks: list[Block] = [Text(f"{size}, {short(row['duration_min'])} min{words}."), _widths(row)]
     if row["effects"]:
         blocks.append(_effects(row))
     if row["not_identifiable"]:

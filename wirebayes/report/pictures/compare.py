@@ -10,6 +10,7 @@ from wirebayes.json_files.comparison import ComparedModel, ComparedModels, Model
 from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.report.blocks import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, logarithmic, panel
+from wirebayes.sentences import spoken
 
 _SEEN = 12.0  # worse by more than this many times the best-known spread is drawn at the edge
 
@@ -33,7 +34,7 @@ def save_pictures(folder: Path, name: str, table: ComparedModels, models: list[M
         save_figure(held_out_errors(name, table), folder / "held-out-errors.svg")
         for way, words in WORDS.items():
             if scores := held_out[way]:
-                title = f"{name} under {best}:\n{words}"
+                title = f"{name} under {spoken(str(best))}:\n{words}"
                 save_figure(bands(title, scores), folder / f"held-out-{way.replace('_', '-')}.svg")
                 save_figure(pit(title, scores), folder / f"pit-{way.replace('_', '-')}.svg")
 
@@ -87,7 +88,7 @@ def held_out_errors(name: str, table: ComparedModels) -> Figure:
 
 
 def _names(axes: Any, rows: list[ComparedModel]) -> None:
-    axes.set_yticks(range(len(rows)), [r["name"] for r in rows], fontsize=8)
+    axes.set_yticks(range(len(rows)), [spoken(r["name"]) for r in rows], fontsize=8)
     axes.set_ylim(len(rows) - 0.4, -0.6)
 
 

@@ -30,7 +30,7 @@ def widths_and_effects(plan: PlanJson, target: Path) -> None:
         The picture to write.
     """
     rows = plan["protocols"][:_MOST]
-    names = [n for n in rows[0]["parameters"] if all(n in row["parameters"] for row in rows)] + ["creep_1h_mm"]
+    names = [*_uncertain(rows), "creep_1h_mm"]
     effects = sorted({effect for row in rows for effect in row["effects"]})
     figure = Figure(figsize=(9.0, 4.0 + 0.13 * len(effects)), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -52,6 +52,13 @@ def widths_and_effects(plan: PlanJson, target: Path) -> None:
         axes.tick_params(axis="x", labelsize=8)
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     save_figure(figure, target)
+
+
+def _uncertain(rows: Sequence[JudgedProtocol]) -> list[str]:
+    """The parameters of every test that the guess does not state exactly."""
+    each = [row["parameters"] for row in rows]
+    shared = [name for name in each[0] if all(name in widths for widths in each)]
+    return [name for name in shared if not all(is_given(widths[name]) for widths in each)]
 
 
 def _draw_widths(axes: Any, row: JudgedProtocol, names: Sequence[str], shift: float, colour: str) -> None:
