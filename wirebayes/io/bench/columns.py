@@ -25,7 +25,7 @@ from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
 from wirebayes.io.bench.two_units import finest_of_same
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.io.bench.words import last_named
+from wirebayes.io.bench.words import last_named, speaks_of
 from wirebayes.sentences import listed
 from wirebayes.strict.hint import hint
 
@@ -186,7 +186,9 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
     if role == "hold":
         return Column(role, index, header, None)
     moments = role == "time" and has_moments(table, index)
-    _, from_header = name_and_unit(header, role)
+    from_header = name_and_unit(header, role)[1]
+    if from_header is None and stated is not None and not speaks_of(header, role):
+        from_header = quantity_unit(header, role)  # --map "kg=tension": the name is nothing but a unit
     row_text = table.units[index]
     from_row = unit_in_header(row_text, role) if row_text else None
     if stated:

@@ -141,7 +141,7 @@ def _cut_into_groups(
         zeros = _between_readings(times)
         at_first = all(zero == of_hold[0] for zero, of_hold in zip(zeros, times, strict=True))
         begins = "at its first reading" if at_first else "between the last reading before it and its first"
-        notes.append(f"times of the whole test: each hold begins {begins}")
+        notes.append(f"times of the whole test: each hold begins {begins} and lasts until the next begins")
         ends, of_resets = _ends(times, zeros)
         if of_resets:
             holds = listed([str(i + 2) for i in of_resets])
