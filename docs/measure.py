@@ -253,14 +253,16 @@ def _four_figures(kept: dict[str, Any]) -> str:
     inside, later = (100 * coverage[f"{of}_coverage"] for of in ("interval", "held_out"))
     wire = kept["real_wires"]["result"]["first holds to the rest"]["roc-line-1m"]
     alarms = _share_in_table("discover-clean.inc", "false alarms on clean files")
+    wires = f"{coverage['intervals']} intervals of 90 % from {coverage['wires']} simulated wires"
     return (
-        f"- [Intervals](docs/intervals-study.rst) of 90 %: {inside:.0f} % of {coverage['intervals']} held the truth, "
-        f"on {coverage['wires']} simulated\n  wires, and {later:.0f} % of later holds' readings lay in their bands.\n"
-        f"- [False alarms](docs/discover-study.rst) on files without an effect, at a level of 4 %: {alarms}.\n"
-        "- [Real wires](docs/models-study.rst): on holds kept out of the fit, the error for the paper's thin line "
-        f"fell\n  from {wire['plain_rmse_N']:.3f} to {wire['final_rmse_N']:.3f} N with what `discover` named.\n"
-        f"- [Robots](docs/robot-study.rst): {robots['cases']} equilibria of drawn poses and wires agree with MuJoCo, "
-        f"or with a\n  minimiser of the energy, within {robots['largest_m']:.0e} m.\n"
+        f"- [Intervals](docs/intervals-study.rst): of {wires}, {inside:.0f} % contain the truth;\n"
+        f"  {later:.0f} % of the readings of later holds lie in their bands.\n"
+        f"- [False alarms](docs/discover-study.rst): `discover` suspects an effect in {alarms} files that\n"
+        "  have none; 4 % are intended.\n"
+        "- [Real wires](docs/models-study.rst): what `discover` named lowers the error on held-out holds of the\n"
+        f"  paper's thin line from {wire['plain_rmse_N']:.3f} to {wire['final_rmse_N']:.3f} N.\n"
+        f"- [Robots](docs/robot-study.rst): {robots['cases']} random equilibria agree with MuJoCo, or a minimiser of\n"
+        f"  the energy, within {robots['largest_m']:.0e} m.\n"
     )
 
 

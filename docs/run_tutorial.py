@@ -61,9 +61,8 @@ def commands(page: str = "tutorial") -> list[list[str]]:
 
 
 def start(folder: Path) -> None:
-    """Put the files that the commands read into an empty folder."""
-    for name in ("bench.csv", "next.csv"):
-        shutil.copy(DOCS / "example" / name, folder)
+    """Put the file that the commands read into an empty folder."""
+    shutil.copy(DOCS / "example" / "bench.csv", folder)
 
 
 def said_by(command: list[str], folder: Path) -> str:
@@ -87,6 +86,7 @@ def follow(folder: Path) -> dict[str, str]:
     """
     start(folder)
     outputs = {f"{command[0]}.txt": said_by(command, folder) for command in commands()}
+    outputs["next.csv"] = (folder / "out/discover/bench/next.csv").read_text(encoding="utf-8")
     outputs["predicted.csv"] = _rounded((folder / "predicted.csv").read_text())
     outputs["pose-error.inc"] = _errors(json.loads((folder / "out/pose/pose.json").read_text()))
     return outputs

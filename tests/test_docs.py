@@ -5,6 +5,7 @@ import importlib.util
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -91,8 +92,33 @@ def test_the_tutorial_says_what_its_commands_say(tmp_path):
     for name, text in said.items():
         assert alike(text, (DOCS / "tutorial" / name).read_text(encoding="utf-8")), name
     assert alike(tutorial.readme(README, tmp_path, said), README)
-    for block in re.findall(r"code-block:: python\n\n((?:   .*\n|\n)+)", (DOCS / "tutorial.rst").read_text()):
-        run("-W", "ignore", "-c", textwrap.dedent(block), cwd=tmp_path)
+    run_python_blocks("tutorial", tmp_path)
+    shutil.copy(DOCS / "own_effect.py", tmp_path)
+    for page in RECIPES:  # they begin where the tutorial has ended
+        for command in tutorial.commands(page):
+            if command[0] != "compare":  # minutes
+                run("-m", "wirebayes", *command, cwd=tmp_path)
+        run_python_blocks(page, tmp_path)
+
+
+RECIPES = ("read-posterior", "predict", "compare", "arviz", "own-effect", "share")
+
+
+def run_python_blocks(page: str, folder: Path) -> None:
+    """Run the Python of a page in a folder, one block after the other."""
+    text = (DOCS / f"{page}.rst").read_text(encoding="utf-8")
+    blocks = re.findall(r"code-block:: python\n\n((?:   .*\n|\n)+)", text)
+    run("-W", "ignore", "-c", "\n".join(map(textwrap.dedent, blocks)), cwd=folder)
+
+
+@pytest.mark.parametrize("page", [*RECIPES, "prior"])
+def test_a_recipe_says_its_task_in_a_line_and_is_short(page):
+    """One task a page: a title that says it, a block within the first screen, and no page to scroll far."""
+    title, underline, *lines = (DOCS / f"{page}.rst").read_text(encoding="utf-8").splitlines()
+    assert title.startswith("How to ") and set(underline) == {"="}
+    first = next(i for i, line in enumerate(lines) if line.startswith(("    ", "1.")) or "::" in line)
+    assert first <= 6
+    assert len(lines) <= 70
 
 
 @pytest.mark.slow

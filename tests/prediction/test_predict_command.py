@@ -106,11 +106,13 @@ def test_later_holds_continue_the_tested_sample_unless_a_fresh_one_is_meant(
 ) -> None:
     after = predicted(fits, protocol([8, 12]))[5:]
     message = capsys.readouterr().err
-    assert message.count("\n") == 1 and "hold 12 predicted as a continuation of the tested sample" in message
-    assert "hold 8 of the training predicted as replicates" in message and "holds 9 to 11 not in its history" in message
+    assert message.count("\n") == 1 and "hold 12 predicted as a continuation of the test" in message
+    assert (
+        "hold 8 predicted as replicates of the tested ones" in message and "holds 9 to 11 not in its history" in message
+    )
     alone = predicted(fits, protocol([12]))
     assert alone == after
-    assert "hold 12 predicted as a continuation of the tested sample" in capsys.readouterr().err
+    assert "hold 12 predicted as a continuation of the test" in capsys.readouterr().err
     fresh = predicted(fits, protocol([12]), "--fresh")
     assert "fresh sample" in capsys.readouterr().err
     # a wire pulled to 12 mm at once has crept less before its first reading there

@@ -59,8 +59,8 @@ def test_holds_to_come_follow_all_that_was_held(tmp_path: Path, stored: Stored) 
     assert prediction.protocol.warming_K[3] == pytest.approx([5.0, 5.0, 6.0])
     assert request.stored is stored
     assert request.sentence == (
-        "hold 3 of the training predicted as replicates; hold 7 predicted as a continuation of the tested sample from "
-        "the end of hold 3 on, given all training readings (--fresh for a fresh sample); "
+        "hold 3 predicted as replicates of the tested ones; hold 7 predicted as a continuation of the test from "
+        "the end of hold 3 on, given all readings of the test (--fresh predicts a fresh sample instead); "
         "nothing is assumed to have happened in between: holds 4 to 6 not in its history"
     )
 
@@ -96,7 +96,7 @@ def test_a_fresh_sample_starts_anew_without_the_others_events(tmp_path: Path, st
 
 def test_replicates_alone_are_said_to_be_that(tmp_path: Path, stored: Stored) -> None:
     text = "hold,displacement_mm,time_s,temperature_C\n1,1,0,20\n1,1,60,20.5\n3,2,0,21\n3,2,60,21.5\n"
-    assert request_of(ask(tmp_path, text), stored).sentence == "holds 1, 3 of the training predicted as replicates"
+    assert request_of(ask(tmp_path, text), stored).sentence == "holds 1, 3 predicted as replicates of the tested ones"
 
 
 @pytest.mark.parametrize(

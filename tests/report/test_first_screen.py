@@ -26,7 +26,7 @@ def test_the_answer_of_a_fit_has_number_unit_and_interval() -> None:
     said = headline.fit_in_a_sentence(SUMMARY)  # type: ignore[arg-type]
     assert said == (
         "kite creeps by 1.23 mm (1.10 … 1.40) within two minutes under 4.5 N, and its stiffness is 882 N "
-        "(850 … 910) per unit of strain; intervals hold 90 %."
+        "(850 … 910) per unit of strain; 90 % intervals in brackets."
     )
     failed = SUMMARY | {"model_check": {"passed": False}}
     assert headline.fit_in_a_sentence(failed).startswith("If the model were right: ")  # type: ignore[arg-type]
@@ -141,5 +141,5 @@ def test_the_size_of_one_of_several_is_not_said_of_all() -> None:
     report |= {"p_global": 0.002, "p_simulations": 499}
     assert headline.findings_in_a_sentence("a", report) == (  # type: ignore[arg-type]
         "a: something is missing; these readings do not tell what: toe (60 %) or power strain (35 %); with toe of "
-        "2.90 mm (2.50 … 3.20) the error on unused holds goes from 0.200 to 0.0200 N (p < 0.01)."
+        "2.90 mm (2.50 … 3.20) the error on held-out holds falls from 0.200 to 0.0200 N (p < 0.01)."
     )

@@ -25,7 +25,7 @@ def rows(holds: int = 2) -> list[list[object]]:
 def test_the_answer_has_number_unit_and_band() -> None:
     assert in_a_sentence(dataset(rows(), ABOUT)) == (
         "Hold 8 of kite, at 12 mm, is expected to read 5.00 N (4.84 … 5.16) after 0 s and 4.50 N (4.34 … 4.66) after "
-        "600 s (bands hold 90 % of such readings); 1 more hold below."
+        "600 s; 90 % intervals in brackets; 1 more hold below."
     )
     assert in_a_sentence(dataset(rows(1)[:1], ABOUT)).count("after") == 1
 

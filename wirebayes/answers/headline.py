@@ -52,7 +52,7 @@ def check_in_a_sentence(name: str, test: CheckedExperiment) -> str:
     shown = sum(effect["shows"] == "yes" for effect in test["effects"].values())
     said.append(f"it would show {shown} of {counted(len(test['effects']), 'effect')}")
     many = f"{counted(test['recorded_holds'], 'hold')} with {counted(test['readings'], 'reading')}"
-    return f"{name}, {many}: {', '.join(said)}; intervals hold 90 %."
+    return f"{name}, {many}: {', '.join(said)}; 90 % intervals in brackets."
 
 
 def fit_in_a_sentence(summary: SummaryJson) -> str:
@@ -73,7 +73,7 @@ def fit_in_a_sentence(summary: SummaryJson) -> str:
     tension = f"{short(derived['tension_N'])} N"
     return (
         f"{doubt}{summary['experiment']} creeps by {stretched} within two minutes under {tension}, and its "
-        f"stiffness is {stiff} per unit of strain; intervals hold 90 %."
+        f"stiffness is {stiff} per unit of strain; 90 % intervals in brackets."
     )
 
 
@@ -121,7 +121,7 @@ def _gain_in_words(report: ExperimentFindings, with_it: str) -> str:
     if not report["effects"] or before is None or after is None:
         return ""
     grows = error_grows(held)
-    goes = f"; {'but ' if grows else ''}{with_it} the error on unused holds {'grows' if grows else 'goes'}"
+    goes = f"; {'but ' if grows else ''}{with_it} the error on held-out holds {'grows' if grows else 'falls'}"
     return f"{goes} from {number(before)} to {number(after)} {unit_read(held['plain'])}"
 
 
@@ -219,7 +219,7 @@ def pose_in_a_sentence(found: PoseJson) -> str:
     tilts = f" and tilts by {turned} degrees" if tilt["q95"][-1] else ""
     return (
         f"The platform of {found['robot']} moves by {moved}{tilts} within {lasting(time)} of standing still, "
-        f"if {specimens_are(drift['specimen_spread'])}; intervals hold 90 %."
+        f"if {specimens_are(drift['specimen_spread'])}; 90 % intervals in brackets."
     )
 
 

@@ -17,5 +17,5 @@ def init_command(
 
     file = run(directory)
     if not quiet:
-        print(f"Written: {file} and {file.with_suffix('.csv').name}, to replace by yours")
+        print(f"Written: {file} and {file.with_suffix('.csv').name}: a small test, to be replaced by yours")
         print(f"Next: wirebayes check {file}")

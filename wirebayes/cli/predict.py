@@ -47,10 +47,10 @@ def predict_command(
 ) -> None:
     """Predict the readings of holds not measured yet.
 
-    Holds of the training are predicted as replicates. Holds with later numbers continue the tested sample: they begin
-    when the last trained hold ended and are predicted given all training readings, whether or not PROTOCOL repeats
-    training holds. With --fresh, PROTOCOL is the whole history of a fresh sample, its preload as uncertain as the
-    fit's. A first reading in tension_N conditions its hold and those after it.
+    Holds of the test are predicted as replicates. Holds with later numbers continue the test: they begin when its last
+    hold ended and are predicted given all its readings, whether or not PROTOCOL repeats holds of the test. With
+    --fresh, PROTOCOL is the whole history of a fresh sample, its preload as uncertain as the fit's. A first reading
+    in tension_N conditions its hold and those after it.
     """
     from wirebayes.answers.lines import for_terminal
     from wirebayes.commands.predict import predict as run

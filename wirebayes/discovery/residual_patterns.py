@@ -180,4 +180,4 @@ def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
             f"{names}: the residuals suggest that {_PARAMETERS[pattern.moves]} {way} with {pattern.covariate}, "
             f"by {size} over two standard deviations of {pattern.covariate} ({chance})."
         )
-    return f"{names}: what the plain model leaves over depends on {pattern.covariate} ({chance})."
+    return f"{names}: the residuals of the plain model depend on {pattern.covariate} ({chance})."

@@ -19,7 +19,7 @@ def creep_of_each_wire(rows: Rows) -> str:
         f"{unbroken(r)} {number(r['q50_mm'])} mm ({span(r['q05_mm'], r['q95_mm'])}) under {r['tension_N']:.1f} N"
         for r in first
     ]
-    return f"Creep within two minutes: {'; '.join(creep)}; intervals hold 90 %."
+    return f"Creep within two minutes: {'; '.join(creep)}; 90 % intervals in brackets."
 
 
 TWO_MINUTES_S = 120.0  # the paper's longest hold

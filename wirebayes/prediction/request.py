@@ -97,19 +97,19 @@ def _of_tested_sample(file: "_File", stored: Stored) -> ProtocolRequest:
     return ProtocolRequest(stored, prediction, file.holds, sentence)
 
 
-_FRESH = "predicted as a fresh sample with no history: the protocol is all that ever happened to it"
+_FRESH = "predicted as a fresh sample with no history: the protocol is all that happens to it"
 
 
 def _tested(replicates: Sequence[int], later: Sequence[int], last: int, likelihood: str) -> str:
     """Which holds of the tested sample are predicted, given what, and which hold numbers its history leaves out."""
     parts = []
     if replicates:
-        parts.append(f"{_listed(_ranges(replicates))} of the training predicted as replicates")
+        parts.append(f"{_listed(_ranges(replicates))} predicted as replicates of the tested ones")
     if later:
-        given = "all training readings" if likelihood == "chain" else "the first reading of each"
+        given = "all readings of the test" if likelihood == "chain" else "the first reading of each"
         parts.append(
-            f"{_listed(_ranges(later))} predicted as a continuation of the tested sample from the end of "
-            f"hold {last} on, given {given} (--fresh for a fresh sample)"
+            f"{_listed(_ranges(later))} predicted as a continuation of the test from the end of hold {last} on, given "
+            f"{given} (--fresh predicts a fresh sample instead)"
         )
         skipped = [(a + 1, b - 1) for a, b in zip([last, *later], later, strict=False) if b > a + 1]
         if skipped:

@@ -260,9 +260,9 @@ def next_prediction(results: Path, around: Path, whose: str = "") -> str:
     whose : str
         The option that names one of several experiments.
     """
-    return f"wirebayes predict {results} {around / NEXT_HOLD}{whose}  (a hold to come: edit the file)"
+    return f"wirebayes predict {results} {around / NEXT_HOLD}{whose}  (one hold more: edit the file for others)"
 
 
 def next_pose(posterior: Path) -> str:
     """The command that hangs a robot on such wires."""
-    return f"wirebayes pose linear-7 --wires {posterior}  (a shipped robot; or the file of yours)"
+    return f"wirebayes pose linear-7 --wires {posterior}  (or the file of your own robot)"

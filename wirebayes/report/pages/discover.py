@@ -106,7 +106,7 @@ def _curves(folder: Path, name: str) -> list[Block]:
     file = picture_file(folder, name)
     if file is None:
         return []
-    alt = f"Readings of {name} with each model's curve through them, and what it leaves over, hold after hold."
+    alt = f"Readings of {name} with each model's curve through them, and what it does not explain, hold after hold."
     return [Pictures([Picture(embedded(file), alt, _BEFORE_AND_AFTER, wide=True)])]
 
 
@@ -165,7 +165,7 @@ def _candidates(v: ExperimentFindings) -> Table:
     )
     rest = v.get("remainder", {}).get("probability")
     if rest is not None:
-        caption += f" Something without a name remains beside them with a probability of {_probability(rest)}."
+        caption += f" Something that none of them explains remains with a probability of {_probability(rest)}."
     return Table(["candidate", "largest share", "missing at all"], lines, caption)
 
 
@@ -271,9 +271,9 @@ def _held_out(v: ExperimentFindings) -> str:
     if not held["holds"]:
         return "No hold was held out: that needs three recorded holds of every test."
     plain, final = (read_value(held[model], "rmse") for model in ("plain", "final"))
-    goes = "grows" if error_grows(held) else "goes"
+    goes = "grows" if error_grows(held) else "falls"
     holds, unit = listed([str(h) for h in held["holds"]]), unit_read(held["plain"])
-    text = f"On the unused holds {holds} the rms error {goes} from {number(plain, 2)} to {number(final, 2)} {unit}"
+    text = f"On the held-out holds {holds} the rms error {goes} from {number(plain, 2)} to {number(final, 2)} {unit}"
     if v["verdict"] == "partial":
         text += " with a smooth discrepancy beside the named effects"
     if v.get("accepted") and (flexible := held.get("flexible")):

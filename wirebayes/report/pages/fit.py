@@ -174,8 +174,8 @@ _CURVE = (
 _READ = "What was read at each displacement: blue when the hold begins, red later."
 _GREW = "What was read under each weight: blue when the hold begins, red later."
 _LEFT = (
-    "What the model leaves over. Where the readings lie outside the band, or show a pattern within it, the model "
-    "misses something."
+    "Measured minus predicted readings. Where they lie outside the band, or show a pattern within it, the model misses "
+    "something."
 )
 _PAIRS = (
     "Every pair of parameters: half of the draws lie in the dark region, 90 % in the light one. A narrow ridge means "

@@ -90,8 +90,8 @@ def in_a_sentence(predicted: Prediction) -> str:
     others = len(np.unique(holds)) - 1
     more = f"; {counted(others, 'more hold')} below" if others else ""
     return (
-        f"Hold {holds[0]} of {predicted.attrs['experiment']}, at {setting}, is expected to read {course} "
-        f"(bands hold 90 % of such readings){more}."
+        f"Hold {holds[0]} of {predicted.attrs['experiment']}, at {setting}, is expected to read {course}; "
+        f"90 % intervals in brackets{more}."
     )
 
 
