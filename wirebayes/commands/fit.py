@@ -148,8 +148,6 @@ def fit(
     with open_run(place.path, configuration) as opened:
         if opened.state != "done":
             _compute(jobs, place.path, seed, check, policy or DEFAULT, progress or silent)
-            for name, members in groups.items():
-                write_next_hold(members[0], place.path / name)
             opened.finish()
     return fits_in(place, [job.folder for job in jobs], own, computed=opened.state != "done")
 
@@ -178,11 +176,13 @@ def _compute(jobs: Sequence[Job], folder: Path, seed: int, check: bool, policy: 
         if check and len(jobs) == 1:
             with checked_meanwhile(jobs[0], folder, seed):
                 run(jobs, folder, seed, policy=policy, report=report)
-            return
-        with workers(len(jobs), partial(catalogue, jobs[0].own_effects)) as parallel_map:
-            run(jobs, folder, seed, policy=policy, report=report, parallel_map=parallel_map)
-            if check:
-                write_checks(jobs, folder, seed, report, parallel_map)
+        else:
+            with workers(len(jobs), partial(catalogue, jobs[0].own_effects)) as parallel_map:
+                run(jobs, folder, seed, policy=policy, report=report, parallel_map=parallel_map)
+                if check:
+                    write_checks(jobs, folder, seed, report, parallel_map)
+    for job in jobs:
+        write_next_hold(job.experiments[0], folder / job.folder)
 
 
 def fits_in(
