@@ -11,6 +11,7 @@ import sys
 import textwrap
 from pathlib import Path
 from types import ModuleType
+from typing import get_type_hints
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from analyses.project import readmes
 from wirebayes.cli import COMMANDS, command_function, main
 from wirebayes.effects import CATALOGUE
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.robot.mechanics import schema
 from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire import compiled
@@ -278,6 +280,13 @@ def test_links_of_the_documentation_lead_to_pages_and_files():
         files = re.findall(r"(?:image|figure|literalinclude|include):: (\S+)|:download:`[^`<]*<([^`>]+)>`", text)
         files = [name for pair in files for name in pair if name and not name.startswith("generated/")]
         assert [name for name in files if not (DOCS / name).is_file()] == [], path.name
+
+
+def test_the_page_on_discover_has_every_key_of_what_it_writes():
+    page = (DOCS / "discover.rst").read_text(encoding="utf-8")
+    table = page[page.index("What it writes") : page.index("How it decides, in detail")]
+    named = set(re.findall(r"``(\w+)``", table))
+    assert set(get_type_hints(ExperimentFindings)) - named == set()
 
 
 def test_every_page_stands_in_one_of_the_five_parts():

@@ -108,8 +108,15 @@ def draw(lines: dict[str, dict[str, Any]], result: dict[str, Any], path: Path) -
 
     names = dict.fromkeys(quantity for quantities in lines.values() for quantity in quantities)
     colours = {quantity: f"C{number}" for number, quantity in enumerate(names)}
-    figure, axes = plt.subplots(1, len(lines), figsize=(3.4 * len(lines), 3.4), sharey=True, layout="constrained")
-    for axis, (name, quantities) in zip(np.atleast_1d(axes), lines.items(), strict=True):
+    columns = min(len(lines), 3)
+    rows = -(-len(lines) // columns)
+    size = (3.4 * columns, 2.8 * rows)
+    figure, axes = plt.subplots(
+        rows, columns, figsize=size, sharex=True, sharey=True, layout="constrained", squeeze=False
+    )
+    for axis in axes.flat[len(lines) :]:
+        axis.set_axis_off()
+    for axis, (name, quantities) in zip(axes.flat, lines.items(), strict=False):
         n = len(next(iter(quantities.values())))
         levels = result["threshold"] if str(n) in result["threshold"] else result["broken"]["threshold"]
         points, lower, upper = band(n, levels[str(n)])
@@ -119,9 +126,11 @@ def draw(lines: dict[str, dict[str, Any]], result: dict[str, Any], path: Path) -
             axis.plot(points, counted - points, lw=1, label=quantity, color=colours[quantity])
         axis.axhline(0, color="0.4", lw=0.5)
         axis.set_title(f"{name}, {n} data sets", fontsize=9)
-        axis.set_xlabel("share of the posterior below the truth")
-    np.atleast_1d(axes)[0].set_ylabel("empirical minus uniform distribution")
-    np.atleast_1d(axes)[0].legend(fontsize=6, ncols=2)
+        axis.tick_params(labelbottom=True)
+    figure.supxlabel("share of the posterior below the truth")
+    figure.supylabel("empirical minus uniform distribution")
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right upper")
     figure.savefig(path, dpi=130, metadata={"Software": None})
     plt.close(figure)
 
