@@ -398,12 +398,13 @@ def _calibration(kept: dict[str, Any]) -> str:
     sound = {name: count for name, count in found["data_sets"].items() if not name.endswith("broken")}
     stopped = sum(len(found["not_converged"][name]) for name in sound)
     caught = ", ".join(found["broken"]["outside"])
+    tail, joint = found["extremeness"][worst], 100 * found["joint"]
     return (
         f"{_run_of(kept)} takes {len(sound)} times {min(sound.values())} wires. {inside} inside a band that contains "
-        f"all of them jointly with probability {100 * found['joint']:.0f} %; the most extreme is {worst} (tail probability "
-        f"{found['extremeness'][worst]:.1g}, while the edge of the band is at {edge:.1g}). {stopped} of the "
-        f"{sum(sound.values())} fits did not converge; they are counted among the ranks all the same. Fits whose "
-        f"likelihood omits the setting error (the last panel) are detected by {caught}.\n"
+        f"all jointly with probability {joint:.0f} %; the most extreme is {worst} (tail probability {tail:.1g}; "
+        f"the edge of the band is at {edge:.1g}). {stopped} of the {sum(sound.values())} fits did not converge; "
+        "they are counted among the ranks all the same. Fits whose likelihood omits the setting error (the last panel) "
+        f"are detected by {caught}.\n"
     )
 
 
