@@ -1,7 +1,7 @@
 """What a page says first: grave warnings, then the answer with number, unit and interval."""
 
 from wirebayes import sentences
-from wirebayes.answers import headline
+from wirebayes.answers import headline, terminal
 from wirebayes.notice import Notice
 from wirebayes.report.blocks import Notices, Page, Section, Table, Text
 from wirebayes.report.page import render
@@ -25,9 +25,17 @@ def test_grave_warnings_stand_before_the_answer_and_once() -> None:
 def test_the_answer_of_a_fit_has_number_unit_and_interval() -> None:
     said = headline.fit_in_a_sentence(SUMMARY)  # type: ignore[arg-type]
     assert said == (
-        "kite creeps by 1.23 mm (1.10 … 1.40) within two minutes under 4.5 N, and its stiffness is 882 N "
+        "kite creeps by 1.23 mm (1.10 … 1.40) within 2 min under 4.5 N, and its stiffness is 882 N "
         "(850 … 910) per unit of strain; 90 % intervals in brackets."
     )
+    bands = {
+        f"creep_{time}_mm": {"q50": q, "q05": q, "q95": q} for time, q in (("2min", 1.0), ("1h", 2.0), ("1day", 3.0))
+    }
+    for held_s, within in ((3599.0, "1.00 mm (1.00 … 1.00) within 2 min"), (3600.0, "(2.00 … 2.00) within 1 h")):
+        long = SUMMARY | {"longest_hold_s": held_s, "derived": bands | {"tension_N": 4.5}}
+        assert within in headline.fit_in_a_sentence(long)  # type: ignore[arg-type]
+        (creep,) = (line for line in terminal.of_fit(long | {"effects": []}) if "creep after" in line)
+        assert f"creep after {within.rpartition('within ')[2]} at 4.5 N" in creep
     failed = SUMMARY | {"model_check": {"passed": False}}
     assert headline.fit_in_a_sentence(failed).startswith("If the model were right: ")  # type: ignore[arg-type]
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wirebayes.answers.creep import creep_as_long_as_held
 from wirebayes.answers.terminal import MOST_OUTLIERS, missing_in
 from wirebayes.answers.verdict import verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
@@ -65,14 +66,14 @@ def fit_in_a_sentence(summary: SummaryJson) -> str:
     derived, k1 = summary["derived"], summary["parameters"].get("k1")
     trusted = summary["converged"] and summary.get("model_check", {}).get("passed") is not False
     doubt = "" if trusted else "If the model were right: "
-    creep = derived["creep_2min_mm"]
+    time, creep = creep_as_long_as_held(summary)
     if creep is None or k1 is None:
         return f"{doubt}{summary['experiment']}: the readings do not say how much this wire creeps."
     stretched = quantity(creep["q50"], creep["q05"], creep["q95"], "mm")
     stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
     tension = f"{short(derived['tension_N'])} N"
     return (
-        f"{doubt}{summary['experiment']} creeps by {stretched} within two minutes under {tension}, and its "
+        f"{doubt}{summary['experiment']} creeps by {stretched} within {time} under {tension}, and its "
         f"stiffness is {stiff} per unit of strain; 90 % intervals in brackets."
     )
 

@@ -6,6 +6,7 @@ from typing import Literal, cast
 
 import numpy as np
 
+from wirebayes.answers.creep import creep_as_long_as_held
 from wirebayes.answers.verdict import verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.calibrate import CalibrateJson
@@ -38,11 +39,11 @@ from wirebayes.sentences import (
 
 def of_fit(summary: SummaryJson) -> list[str]:
     """Of a fit: its state, the parameters and the creep, with units and 90 % intervals."""
-    derived = summary["derived"]
     state = "converged" if summary["converged"] else "NOT CONVERGED"
     passed = summary["model_check"]["passed"] if "model_check" in summary else None
     checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
-    creep = f"creep after 2 min at {short(derived['tension_N'])} N: {_band(derived['creep_2min_mm'])} mm"
+    time, elongation = creep_as_long_as_held(summary)
+    creep = f"creep after {time} at {short(summary['derived']['tension_N'])} N: {_band(elongation)} mm"
     return [
         f"{summary['experiment']}: {state}, {checked} (medians, 90 % intervals)",
         *_parameters(summary, "stiffness", ("k1",)),

@@ -108,8 +108,6 @@ def do(work: bytes) -> Done:
                     row = {**row, **_discovered(experiment, task, folder)}
                 else:
                     row = {**row, **_fitted(experiment, task, folder)}
-                if task.posteriors:
-                    write_next_hold(experiment, folder / experiment.name)
             except OSError:  # a full disk is not the specimen's fault
                 raise
             except Exception as error:  # no specimen may lose the others
@@ -144,6 +142,8 @@ def _fitted(experiment: Experiment, task: BatchTask, folder: Path) -> FitColumns
     about = {"data_file": experiment.source.name, "version": __version__, "data_sha256": _hash(experiment)}
     job = Job(experiment.name, (experiment,), (), task.own_effects, task.spec, about)
     _fit_and_store(job, folder, task, draws=task.posteriors)
+    if task.posteriors:
+        write_next_hold(experiment, folder / experiment.name)
     if task.check:
         write_checks([job], folder, task.seed, silent, map, task.simulations)
     summary: SummaryJson = read_json(folder / experiment.name / SUMMARY)
@@ -165,6 +165,8 @@ def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> Discov
     for job in jobs:
         _fit_and_store(job, folder, task, draws=True)  # pictures show them
     write_findings(found, folder, task.own_effects)
+    if task.posteriors:
+        write_next_hold(experiment, folder / experiment.name)
     report = found.report["experiments"][experiment.name]
     # the check of a fit is this global test
     p = report["p_global"]

@@ -108,6 +108,7 @@ class SummaryJson(Warned):
     convergence: str
     parameters: dict[str, Parameter]
     derived: Derived
+    longest_hold_s: float
     identifiability: dict[str, Identifiability]
     extrapolation: ExtrapolatedCreep
     hold_ends: HoldEnds | None

@@ -81,12 +81,12 @@ def _wider(distribution: Any) -> Any:
 
 
 def _notice(deciding: Sequence[str], moved: Sequence[str]) -> Notice:
-    what = f"the interval of {moved[0]}" if len(moved) == 1 else f"the intervals of {', '.join(moved)}"
+    what = f"the interval of {moved[0]}" if len(moved) == 1 else f"the intervals of {listed(moved)}"
     keys = ", ".join(dict.fromkeys(f"[prior.{_parameter(name)}]" for name in deciding))
     named = listed(deciding)
-    whose, decide = ("prior", "prior decides") if len(deciding) == 1 else ("priors", "priors decide")
+    whose, decides = ("prior", "its prior does") if len(deciding) == 1 else ("priors", "their priors do")
     return Notice(
         "prior",
         f"with the {whose} of {named} twice as wide, {what} would move by more than a standard deviation: the readings "
-        f"leave it open, and the {decide}; state what is known of {named} ({keys})",
+        f"do not decide {named}, {decides}; state what is known of {named} ({keys})",
     )

@@ -102,6 +102,7 @@ def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
         "warnings": _warnings(fit, sample, ends),
         "parameters": parameters,
         "derived": derived(wire, tension),
+        "longest_hold_s": float(first.protocol.duration_s.max()),
         "identifiability": identifiability(fit),
         "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).to_dict(),
         "hold_ends": ends,
