@@ -3,7 +3,9 @@
 import importlib.util
 import os
 import sys
+from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import get_args
 
 from wirebayes.effects import creep, elastic, event, instrument, unknown
@@ -73,19 +75,31 @@ def _effects_in(own: Path) -> list[type[Effect]]:
     """The classes of effects that a file defines, which is run for it."""
     if not os.path.isfile(own):
         raise InputError(f"{own}: found no such file, expected a Python file with effects")
-    spec = importlib.util.spec_from_file_location(f"wirebayes_own_{own.stem}", own)
-    if spec is None or spec.loader is None:
+    if own.suffix != ".py":
         raise InputError(f"{own}: found no Python file by its name, expected one that ends in .py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # so that other processes can be sent its effects
     try:
-        spec.loader.exec_module(module)
+        module = _run(own.resolve(), own.read_bytes())
     except (Exception, SystemExit) as error:  # whatever the user's file raises is reported in one line
         raise InputError(
             f"{own}: cannot be run ({type(error).__name__}: {error}), expected a Python file with effects"
         ) from None
+    sys.modules[module.__name__] = module  # so that other processes can be sent its effects
     classes = [value for value in vars(module).values() if isinstance(value, type) and issubclass(value, Effect)]
-    return [kind for kind in classes if kind.__module__ == spec.name]  # not those that the file imports
+    return [kind for kind in classes if kind.__module__ == module.__name__]  # not those that the file imports
+
+
+@cache
+def _run(own: Path, _content: bytes) -> ModuleType:
+    """The module of a user's file: run once for each content, for two runs make classes that are not the same.
+
+    An effect of one could not be sent to a process while the other stands under the module's name.
+    """
+    spec = importlib.util.spec_from_file_location(f"wirebayes_own_{own.stem}", own)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 def source_of(own: Path | None) -> str | None:
