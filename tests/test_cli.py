@@ -143,14 +143,30 @@ def test_every_command_shows_an_example_that_it_accepts(name, capsys):
         assert (DATA.parent / file).is_file()
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in COMMANDS if name not in ("report", "effects", "init", "import-robot")]
-)
-def test_every_command_that_computes_takes_output_and_seed(name, capsys):
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_takes_output_and_seed(name, capsys):
     assert main([name, "--help"]) == 0
     shown = capsys.readouterr().out
     assert "--output" in shown
     assert "--seed" in shown
+
+
+def test_init_takes_its_folder_as_an_option_too_but_one_folder(tmp_path, capsys):
+    assert main(["init", "--output", str(tmp_path / "a"), "--seed", "3"]) == 0
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == ["my-wire.csv", "my-wire.toml"]
+    assert main(["init"]) == 2 and "found 0 folders" in capsys.readouterr().err
+    assert main(["init", str(tmp_path / "b"), "--output", str(tmp_path / "c")]) == 2
+    assert "found 2 folders, expected one" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def test_effects_are_written_as_they_are_printed(tmp_path, capsys):
+    assert main(["effects", "toe", "--output", str(tmp_path / "new" / "folder"), "--seed", "1"]) == 0
+    assert (tmp_path / "new" / "folder" / "effects.txt").read_text(encoding="utf-8") == capsys.readouterr().out
+    (tmp_path / "file").write_text("")
+    assert main(["effects", "--output", str(tmp_path / "file")]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == "" and "file: cannot be written" in shown.err
 
 
 def test_an_input_error_is_its_text_and_exit_code_2(monkeypatch, capsys):

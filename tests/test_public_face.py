@@ -130,6 +130,7 @@ def test_a_table_without_a_column_is_refused():
         ({"train_holds": 2.5}, "train_holds: found 2.5, expected a whole number"),
         ({"effects": "nope"}, "effect nope: no such effect"),
         ({"experiment": "x"}, "found no experiment 'x'"),
+        ({"experiment": "w", "together": "w"}, "--together w: found --experiment w beside it, expected one of the two"),
     ],
 )
 def test_a_wrong_option_of_fit_is_named(options, message):

@@ -341,16 +341,18 @@ def alternative_models(weights: dict[str, float]) -> tuple[Any, Any, Any]:
     return SimpleNamespace(posterior=space), fits, final
 
 
-def test_more_models_than_three_beside_the_final_one_are_not_listed() -> None:
-    decision, fits, final = alternative_models({"a": 0.3, "b": 0.2, "c": 0.17, "d": 0.13, "e": 0.11, "f": 0.09})
+@pytest.mark.parametrize(("last", "kept"), [(0.012, "bacdef"), (0.008, "bacde")])
+def test_undecided_models_beside_the_final_one_hold_nearly_all_of_its_probability(last: float, kept: str) -> None:
+    decision, fits, final = alternative_models({"a": 0.5, "b": 0.2 - last, "c": 0.17, "d": 0.1, "e": 0.03, "f": last})
     found = alternatives.alternatives(decision, fits, 0, final("b"), "abcdef", False)
-    assert [a.block.effects[0].key for a in found] == ["b", "a", "c", "d"]
+    assert [a.block.effects[0].key for a in found] == list(kept)
     assert sum(a.probability for a in found) == pytest.approx(1.0)
-    assert found[1].probability == pytest.approx(0.3 / 0.8) and not found[1].remains
+    total = 1.0 if "f" in kept else 1.0 - last
+    assert found[1].probability == pytest.approx(0.5 / total) and not found[1].remains
 
 
-def test_improbable_models_and_those_that_differ_elsewhere_are_not_sampled_beside_it() -> None:
-    decision, fits, final = alternative_models({"a": 0.04, "b": 0.9, "c": 0.06, "bd": 0.5})
+def test_models_that_differ_elsewhere_are_not_sampled_beside_it() -> None:
+    decision, fits, final = alternative_models({"a": 0.005, "b": 0.9, "c": 0.095, "bd": 0.5})
     found = alternatives.alternatives(decision, fits, 0, final("b"), "abc", True)
     assert [a.block.effects[0].key for a in found] == ["b", "c"] and all(a.remains for a in found)
     assert alternatives.alternatives(decision, fits, 0, final("b"), "ab", False) == []

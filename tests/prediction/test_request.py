@@ -1,5 +1,6 @@
 """What a protocol file asks: temperatures, absent holds, fresh samples and their events."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,17 @@ def test_a_fresh_sample_starts_anew_without_the_others_events(tmp_path: Path, st
     assert protocol.warming_K is not None and protocol.warming_K[0] == pytest.approx([0.0, 2.0])
     assert [e.key for e in request.stored.sample.model.effects] == ["thermal_expansion"]
     assert "fresh sample with no history" in request.sentence
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+def test_temperatures_are_refused_where_the_training_had_none(tmp_path: Path, stored: Stored, fresh: bool) -> None:
+    protocol = replace(stored.sample.protocol, reference_C=None, warming_K=None)
+    cold = replace(stored, sample=replace(stored.sample, protocol=protocol))
+    text = "hold,displacement_mm,time_s,temperature_C\n7,3,0,24\n7,3,60,26\n"
+    with pytest.raises(InputError, match=r"line 2, column 4 \(temperature_C\): found 24, expected no column temp"):
+        request_of(ask(tmp_path, text), cold, fresh=fresh)
+    without = ask(tmp_path, "hold,displacement_mm,time_s\n7,3,0\n7,3,60\n")
+    assert request_of(without, cold, fresh=fresh).prediction.protocol.warming_K is None
 
 
 def test_replicates_alone_are_said_to_be_that(tmp_path: Path, stored: Stored) -> None:

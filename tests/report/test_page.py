@@ -11,6 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from wirebayes.cli import main
+from wirebayes.errors import InputError
 from wirebayes.inference.policy import Policy
 from wirebayes.io import paper
 from wirebayes.model.spec import ModelSpec
@@ -207,6 +208,23 @@ def test_the_page_of_a_fit_tells_known_from_unknown(fitted):
     assert page.words.count("not checked against the readings") == 2
     assert "What the readings determinek1: " in page.words  # of the chain; hold by hold the prior decides it too
     assert re.search("What the prior still decides.*k1: data and prior", page.words)
+
+
+@pytest.mark.parametrize(("below", "way"), [(".", ""), ("page", "../"), ("../own page", "../out/")])
+def test_a_page_in_another_folder_links_to_the_results(fitted, below, way):
+    path = write_page(fitted, fitted / below)
+    page = read(path)
+    assert path == fitted / below / "report.html" and f"{way}chain/posterior.nc" in page.anchors
+    assert (path.parent / way / "chain" / "posterior.nc").is_file()
+
+
+def test_a_page_that_cannot_be_written_is_refused_in_a_line(fitted, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file: cannot be written"):
+        write_page(fitted, tmp_path / "file")
+    with pytest.raises(InputError, match="found no configuration"):
+        write_page(tmp_path, tmp_path / "new")
+    assert not (tmp_path / "new").exists()
 
 
 def copied(fitted, folder):

@@ -1,27 +1,49 @@
 """``wirebayes effects``: the catalogue, for people."""
 
-from typing import Annotated
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wirebayes.cli.options import OwnEffects
+from wirebayes.cli.options import OwnEffects, Seed
+
+if TYPE_CHECKING:
+    from wirebayes.commands.list_effects import EffectDescription
 
 Name = Annotated[str | None, typer.Argument(metavar="[NAME]", help="Describe this effect only.")]
+Kept = Annotated[Path | None, typer.Option("--output", metavar="DIR", help="Folder for the same as effects.txt.")]
 
 
-def effects_command(name: Name = None, own_effects: OwnEffects = None) -> None:
+def effects_command(name: Name = None, output: Kept = None, seed: Seed = 0, own_effects: OwnEffects = None) -> None:
     """List the effects that a model may be missing; with NAME, describe one in full."""
     from wirebayes.commands.list_effects import list_effects
     from wirebayes.effects import catalogue, effect_named
+    from wirebayes.io.run_folder import writable, write_text
 
     known = list_effects(own_effects)
     if name is None:
-        width = max(len(e.name) for e in known)
-        for e in known:
-            typer.echo(f"{e.name:{width}}  {e.scope:11}  {e.meaning}")
-        return
-    wanted = effect_named(name, catalogue(own_effects)).name  # an unknown name is refused, with those that there are
-    (effect,) = [e for e in known if e.name == wanted]
+        lines = _listed(known)
+    else:
+        wanted = effect_named(
+            name, catalogue(own_effects)
+        ).name  # an unknown name is refused, with those that there are
+        (effect,) = [e for e in known if e.name == wanted]
+        lines = _described(effect)
+    text = "\n".join(lines)
+    if output is not None:
+        with writable(output):
+            output.mkdir(parents=True, exist_ok=True)
+            write_text(output / "effects.txt", f"{text}\n")
+    typer.echo(text)
+
+
+def _listed(known: "Sequence[EffectDescription]") -> list[str]:
+    width = max(len(e.name) for e in known)
+    return [f"{e.name:{width}}  {e.scope:11}  {e.meaning}" for e in known]
+
+
+def _described(effect: "EffectDescription") -> list[str]:
     lines = [
         effect.name,
         f"  formula    {effect.formula}",
@@ -32,4 +54,4 @@ def effects_command(name: Name = None, own_effects: OwnEffects = None) -> None:
     for a in effect.amplitudes:
         neutral = "" if a.is_shape else f", neutral value {a.neutral:g}"
         lines.append(f"  parameter  {effect.name}.{a.name} in {'1' if a.unit == '-' else a.unit}{neutral}")
-    typer.echo("\n".join(lines))
+    return lines

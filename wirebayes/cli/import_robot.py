@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from wirebayes.cli.options import Quiet
+from wirebayes.cli.options import Quiet, Seed
 
 
 def import_robot_command(
@@ -28,6 +28,7 @@ def import_robot_command(
         str | None, typer.Option("--cable-set", metavar="ID", help="Which of CASPR's cable sets.")
     ] = None,
     pulleys: Annotated[bool, typer.Option("--pulleys/--no-pulleys", help="Whether radii of pulleys are meant.")] = True,
+    seed: Seed = 0,
     quiet: Quiet = False,
 ) -> None:
     """Turn a robot of CASPR or WireX, or the settings of a Hangprinter, into a robot file."""

@@ -5,17 +5,24 @@ from typing import Annotated
 
 import typer
 
-from wirebayes.cli.options import Quiet
+from wirebayes.cli.options import Quiet, Seed
 
 
 def init_command(
-    directory: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the files; created if absent.")],
+    directory: Annotated[
+        Path | None, typer.Argument(metavar="DIR", help="Folder for the files; created if absent.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", metavar="DIR", help="The same.")] = None,
+    seed: Seed = 0,
     quiet: Quiet = False,
 ) -> None:
     """Write a commented experiment file and a small CSV to replace: DIR/my-wire.toml and DIR/my-wire.csv."""
     from wirebayes.commands.new_experiment import new_experiment as run
 
-    file = run(directory)
+    given = [folder for folder in (directory, output) if folder is not None]
+    if len(given) != 1:
+        raise typer.BadParameter(f"found {len(given)} folders, expected one: DIR or --output DIR")
+    file = run(given[0])
     if not quiet:
         print(f"Written: {file} and {file.with_suffix('.csv').name}: a small test, to be replaced by yours")
         print(f"Next: wirebayes check {file}")

@@ -114,6 +114,8 @@ def fit(
     spec = model_spec(elastic_law, history, likelihood)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, keys = path_of(own_effects), names_given(effects)
+    if together is not None and experiment is not None:
+        raise InputError(f"--together {together}: found --experiment {experiment} beside it, expected one of the two")
     experiments = _first_holds(experiments_of(source, experiment, drop_breaks=drop_breaks), train_holds)
     file = experiments[0].source
     known = catalogue(own)

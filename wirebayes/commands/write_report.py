@@ -7,7 +7,7 @@ from wirebayes.strict.files import PathLike
 from wirebayes.views.result import Result
 
 
-def write_report(folder: PathLike | Result[Any]) -> Path:
+def write_report(folder: PathLike | Result[Any], *, output: PathLike | None = None) -> Path:
     """Write one self-contained page from a folder of results.
 
     Parameters
@@ -15,16 +15,18 @@ def write_report(folder: PathLike | Result[Any]) -> Path:
     folder : path, or what a function returned
         The folder of a ``fit``, ``compare``, ``discover``, ``batch``, ``plan``, ``pose``, ``calibrate`` or
         ``reproduce``.
+    output : path, optional
+        Folder for the page, made where it is absent; that of the results when left out.
 
     Returns
     -------
     Path
-        Of ``report.html`` in that folder; a temporary folder goes with the results that lie in it.
+        Of ``report.html``; a temporary folder goes with the results that lie in it.
 
     Raises
     ------
     InputError
-        The folder is not one that a command of ours has written.
+        The folder is not one that a command of ours has written, or the page cannot be written.
 
     Examples
     --------
@@ -33,4 +35,5 @@ def write_report(folder: PathLike | Result[Any]) -> Path:
     """
     from wirebayes.report.page import write_page  # matplotlib only where it is needed
 
-    return write_page(folder.place.path if isinstance(folder, Result) else Path(folder))
+    results = folder.place.path if isinstance(folder, Result) else Path(folder)
+    return write_page(results, None if output is None else Path(output))

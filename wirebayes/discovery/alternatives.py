@@ -1,10 +1,10 @@
 """The models between which the readings do not decide."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from wirebayes.discovery.fitted_sets import Fits, Key
-from wirebayes.discovery.settings import LEAST_ALTERNATIVE, MOST_ALTERNATIVES
+from wirebayes.discovery.settings import MIXED
 from wirebayes.discovery.verdict import Decision
 from wirebayes.inference.laplace_fit import LaplaceFit
 
@@ -29,7 +29,9 @@ class Alternative:
 def alternatives(
     decision: Decision, fits: Fits, i: int, final: LaplaceFit, undecided: Sequence[str], remains: bool
 ) -> list[Alternative]:
-    """The final model of block `i` and the others that share the probability with it, at most `MOST_ALTERNATIVES`.
+    """The final model of block `i` and the others that share the probability with it.
+
+    Of these as many as hold `MIXED` of it together, the most probable first.
 
     Parameters
     ----------
@@ -59,14 +61,23 @@ def alternatives(
             weights[s.key] = weights.get(s.key, 0.0) + weight
         elif acting == names:
             weights[names] = weights.get(names, 0.0) + weight
-    total = sum(weights.values())
-    others = sorted(
-        (k for k, w in weights.items() if k != names and w >= LEAST_ALTERNATIVE * total), key=lambda k: -weights[k]
-    )
-    kept = [names, *others[:MOST_ALTERNATIVES]]
     weights.setdefault(names, 0.0)
+    kept = [names, *_others(weights, names)]
     total = sum(weights[k] for k in kept)
     if total <= 0.0 or len(kept) == 1:
         return []
     blocks = [final, *(fits.of(k)[i] for k in kept[1:])]
     return [Alternative(block, remains, weights[k] / total) for block, k in zip(blocks, kept, strict=True)]
+
+
+def _others(weights: Mapping[Key, float], names: Key) -> list[Key]:
+    """The most probable models that hold `MIXED` of the probability with the final one, that of `names`."""
+    missing = (1.0 - MIXED) * sum(weights.values())
+    left_out = sum(weights.values()) - weights[names]
+    found = []
+    for key in sorted((k for k in weights if k != names), key=lambda k: -weights[k]):
+        if left_out <= missing:
+            break
+        found.append(key)
+        left_out -= weights[key]
+    return found

@@ -53,7 +53,8 @@ INCLUSION = 0.9  # probability that one of a family is missing
 REMAINS = 0.5  # probability of a remainder from which the verdict says so
 IN_FAMILY = 0.9  # of a family's probability, that one of its members must have to be its name
 IN_SET = 0.9  # probability that the set of possible names holds together
-MOST_ALTERNATIVES, LEAST_ALTERNATIVE = 3, 0.05  # undecided models sampled beside the final one, and their probability
+LEAST_ALTERNATIVE = 0.05  # probability below which a model's remainder, or its part in a family's gain, is not asked
+MIXED = 0.99  # of the probability of undecided models that those in the predictions hold: quantiles move by .01 at most
 
 
 @dataclass(frozen=True)

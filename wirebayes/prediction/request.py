@@ -155,10 +155,14 @@ class _File:
         return self.table.complain(row, column, found, expected)
 
     def check_temperature(self, logged: bool) -> None:
-        if logged and self.holds[0].temperature_C is None:
+        given = self.holds[0].temperature_C
+        if logged and given is None:
             raise self.complain(
                 0, 0, "temperature_C", "no column temperature_C", "one, because the training data had temperatures"
             )
+        if given is not None and not logged:
+            expected = "no column temperature_C, because the training data had no temperatures"
+            raise self.complain(0, 0, "temperature_C", f"{given[0]:g}", expected)
 
     def check_first_readings(self) -> None:
         for i, hold in enumerate(self.holds):
