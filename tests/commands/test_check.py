@@ -93,3 +93,13 @@ def test_check_of_a_bad_file_is_exit_code_2(start, tmp_path, capsys):
     assert main(["check", str(tmp_path / "my-wire.toml"), "--output", str(tmp_path / "out")]) == 2
     assert "key length_mm: found -1200.0" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("command", ["check", "fit", "discover", "compare", "plan", "batch"])
+def test_a_wrong_prior_is_refused_before_anything_is_written(command, start, tmp_path, capsys):
+    text = start.read_text(encoding="utf-8")
+    wrong = start.with_name("wrong.toml")
+    wrong.write_text(f'{text}\n[experiment.prior]\nk9 = {{ distribution = "normal", mean = 3.0, sd = 1.0 }}\n')
+    assert main([command, str(wrong), "--output", str(tmp_path / "out")]) == 2
+    assert "k9" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -56,7 +56,7 @@ def test_training_takes_recorded_holds_and_the_unrecorded_before_them(experiment
     assert experiment.train(3).data_hash == experiment.data_hash
     assert experiment.train(2).data_hash != experiment.data_hash
     for wrong in (0, 4):
-        with pytest.raises(InputError, match=rf"experiment wire-a: found {wrong} .* expected 1 to 3"):
+        with pytest.raises(InputError, match=rf"experiment wire-a: found --train-holds {wrong}, expected 1 to 3"):
             experiment.train(wrong)
 
 
@@ -288,7 +288,7 @@ def test_training_asked_for_by_a_user_has_enough_readings_too(experiment_file):
     assert len(experiment.first(2).recorded_holds) == 2
     with pytest.raises(InputError, match="found 1 hold with 2 readings in the first 1 of 3 .*, expected at least one"):
         experiment.first(1)
-    with pytest.raises(InputError, match="found 4 training holds requested, expected 1 to 3"):
+    with pytest.raises(InputError, match="found --train-holds 4, expected 1 to 3"):
         experiment.first(4)
 
 

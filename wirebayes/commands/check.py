@@ -13,6 +13,7 @@ from wirebayes.io.readings import Hold
 from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
 from wirebayes.json_files.read_units import in_unit
+from wirebayes.model.build import build
 from wirebayes.notice import notices_by_part, to_json
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
@@ -78,6 +79,8 @@ def check(
     seed, own, report = check_seed(seed), path_of(own_effects), progress or silent
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     kinds = catalogue(own)
+    for e in experiments:
+        build([e])  # checks priors
     configuration = {
         "command": "check",
         "version": __version__,

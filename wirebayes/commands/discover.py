@@ -24,6 +24,7 @@ from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import open_run, read_json, write_bytes, write_json
 from wirebayes.json_files.discovery import IntervalJson
 from wirebayes.json_files.summary import Parameter, SummaryJson
+from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
 from wirebayes.notice import from_json, notices_by_part, to_json
 from wirebayes.processes.copies import loaded_meanwhile, prepared_copy
@@ -111,6 +112,7 @@ def discover(
     if train_holds is not None:
         experiments = [e.first(train_holds) for e in experiments]
     kinds = catalogue_without(left_out, catalogue(own))
+    build(experiments, (), spec)  # checks priors
     configuration = {
         "command": "discover",
         "version": __version__,

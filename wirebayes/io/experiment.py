@@ -134,8 +134,8 @@ class Experiment:
         places = [place for place, hold in enumerate(self.holds) if hold.recorded]
         if not 1 <= holds <= len(places):
             raise InputError(
-                f"{self.source}, experiment {self.name}: found {holds} training holds requested, "
-                f"expected 1 to {len(places)}, the recorded ones"
+                f"{self.source}, experiment {self.name}: found --train-holds {holds}, "
+                f"expected 1 to {len(places)}, the recorded holds"
             )
         return replace(self, holds=self.holds[: places[holds - 1] + 1])
 
