@@ -8,7 +8,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from analyses.project.measures import homonyms, local_names, nodes, trees
+from analyses.project.density import Body, functions_of, local_names, nodes
+from analyses.project.measures import homonyms, trees
 
 ROOT = Path(__file__).parent.parent
 SOURCES = {path: path.read_text() for path in sorted((ROOT / "wirebayes").rglob("*.py"))}
@@ -150,6 +151,14 @@ def test_what_is_dense_is_found():
     assert is_dense(nodes(many), len(local_names(many)))
     assert len(local_names(packed)) == 0
     assert is_dense(nodes(packed), 0)
+
+
+def test_a_body_has_neither_signature_nor_annotations_comments_or_blank_lines():
+    plain = "def f(a):\n    b = a\n    return b"
+    dressed = "def f(a: dict[str, int]) -> int:\n    b: int = a\n\n    # why\n    return b"
+    bodies = [Body.of(function) for text in (plain, dressed) for function in functions_of([ast.parse(text)])]
+    assert [(body.lines, body.statements, body.names) for body in bodies] == [(2, 2, 1)] * 2
+    assert bodies[0].nodes == bodies[1].nodes == 8
 
 
 def test_no_public_name_stands_for_two_things():

@@ -3,9 +3,12 @@
     python -m analyses.project.measures [CHECKOUT] [--static]
 
 Density is counted in syntax nodes, which wrapping a packed expression over more lines does not change; docstrings do
-not count. A function counts from `LONG_ENOUGH` lines on. The walk follows one process through small runs of fit,
-discover and pose with the package of the checkout: which functions are called, in which files, and how often the next
-function that is called for the first time stands in another file than the one before.
+not count. A function counts from `LONG_ENOUGH` lines on. A table sets bodies without signatures and annotations, which
+are nodes but hardly lines, beside those of libraries that many people read (`analyses/project/density.py`).
+
+The walk follows one process through small runs of fit, discover and pose with the package of the checkout: which
+functions are called, in which files, and how often the next function that is called for the first time stands in
+another file than the one before.
 """
 
 import argparse
@@ -21,8 +24,19 @@ from statistics import median
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from analyses.project.density import (
+    LONG_ENOUGH,
+    beside_peers,
+    code_lines,
+    functions_of,
+    local_names,
+    nodes,
+    parsed,
+    sources,
+    statements,
+)
+
 HERE = Path(__file__).parents[2]
-LONG_ENOUGH = 12  # lines: shorter functions are read at a glance, whatever their density
 LONG_FILE = 400  # lines: more than one idea, by experience with this code
 PAPER = "data/paper/experiments.toml"
 WIRE = "roc-line-1m"
@@ -31,40 +45,7 @@ ALL = Path("wirebayes/__init__.py")
 
 def trees(root: Path) -> dict[Path, ast.Module]:
     """The syntax of every file of the package, without docstrings."""
-    found = {}
-    for path in sorted((root / "wirebayes").rglob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
-                node.body = node.body[1:]
-        found[path.relative_to(root)] = tree
-    return found
-
-
-def nodes(tree: ast.AST) -> int:
-    return sum(1 for _ in ast.walk(tree))
-
-
-def code_lines(function: ast.FunctionDef) -> int:
-    """Lines of a function from its first statement on, the signature counted as one."""
-    if not function.body:
-        return 1
-    return 1 + (function.end_lineno or 0) - function.body[0].lineno + 1
-
-
-def local_names(function: ast.AST) -> set[str]:
-    return {n.id for n in ast.walk(function) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-
-
-def statements(function: ast.AST) -> int:
-    return sum(isinstance(node, ast.stmt) for node in ast.walk(function))
-
-
-def functions(files: dict[Path, ast.Module]) -> Iterator[tuple[str, ast.FunctionDef]]:
-    for path, tree in files.items():
-        for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef):
-                yield f"{path}:{node.name}", node
+    return {path.relative_to(root): parsed(path) for path in sources(root / "wirebayes")}
 
 
 def module_name(path: Path) -> str:
@@ -123,18 +104,18 @@ def on_paper(root: Path) -> dict[str, Any]:
     texts = {path: (root / path).read_text(encoding="utf-8") for path in files}
     known = {module_name(path): path for path in files}
     uses = {path: imported(tree, known) for path, tree in files.items()}
-    kept = [(name, f) for name, f in functions(files) if code_lines(f) >= LONG_ENOUGH]
+    kept = [function for function in functions_of(files.values()) if code_lines(function) >= LONG_ENOUGH]
     long_files = {str(path): n for path, text in texts.items() if (n := len(text.splitlines())) > LONG_FILE}
     return {
         "files": len(files),
         "lines": sum(len(text.splitlines()) for text in texts.values()),
         "nodes": sum(map(nodes, files.values())),
         "functions of 12 lines or more": len(kept),
-        "nodes a line, median": round(median(nodes(f) / code_lines(f) for _, f in kept), 1),
-        "nodes a statement, median": round(median(nodes(f) / statements(f) for _, f in kept), 1),
-        "names a function, median": median(len(local_names(f)) for _, f in kept),
-        "functions of more than 500 nodes": sum(nodes(f) > 500 for _, f in kept),
-        "functions of more than 20 names": sum(len(local_names(f)) > 20 for _, f in kept),
+        "nodes a line, median": round(median(nodes(f) / code_lines(f) for f in kept), 1),
+        "nodes a statement, median": round(median(nodes(f) / statements(f) for f in kept), 1),
+        "names a function, median": median(len(local_names(f)) for f in kept),
+        "functions of more than 500 nodes": sum(nodes(f) > 500 for f in kept),
+        "functions of more than 20 names": sum(len(local_names(f)) > 20 for f in kept),
         "circles": [[str(path) for path in group] for group in circles(uses)],
         "circles that do not pass through wirebayes/__init__.py": [
             [str(path) for path in group] for group in circles({file: uses[file] - {ALL} for file in uses})
@@ -142,6 +123,7 @@ def on_paper(root: Path) -> dict[str, Any]:
         "fmt: skip": sum(text.count("# fmt: skip") for text in texts.values()),
         "files over 400 lines": long_files,
         "public names twice": homonyms(files),
+        "bodies": beside_peers(root),
     }
 
 
@@ -198,7 +180,9 @@ def walks(root: Path, folder: Path) -> dict[str, dict[str, int]]:
 def text(found: dict[str, Any]) -> Iterator[str]:
     """A line for each measure; under lists how many there are, then each."""
     for name, value in found.items():
-        if name == "walks":
+        if name == "bodies":
+            yield from value
+        elif name == "walks":
             yield from (f"{command}: {counts}" for command, counts in value.items())
         elif isinstance(value, dict):
             yield f"{name}: {len(value)}"
