@@ -88,7 +88,7 @@ class Body:
     @classmethod
     def of(cls, function: ast.FunctionDef) -> "Body":
         parts = [part for statement in function.body for part in executable(statement)]
-        places = [part for part in parts if hasattr(part, "lineno")]
+        places = [part for part in parts if isinstance(part, ast.stmt | ast.expr)]
         begun, ended = {part.lineno for part in places}, {part.end_lineno for part in places}
         return cls(
             len(parts),
