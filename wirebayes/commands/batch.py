@@ -12,7 +12,15 @@ from typing import Any
 
 from wirebayes._version import __version__
 from wirebayes.commands.one_experiment import QUANTITIES, BatchTask, Done, do, first_columns, packed
-from wirebayes.commands.options import check_seed, check_train_holds, model_spec, names_given, path_of
+from wirebayes.commands.options import (
+    check_seed,
+    check_train_holds,
+    data_of,
+    model_spec,
+    names_given,
+    other_effort,
+    path_of,
+)
 from wirebayes.discovery.search import catalogue_without
 from wirebayes.discovery.settings import SIMULATIONS
 from wirebayes.effects import catalogue, source_of
@@ -144,12 +152,10 @@ def batch(
         "without": sorted(left_out),
         "own_effects": source_of(own),
         "train_holds": train_holds,
-        "priors": {e.name: e.priors for e, _ in read},
-        "data_sha256": {e.name: e.data_hash for e, _ in read},
+        **data_of(e for e, _ in read),
         "unreadable": unreadable,
+        **other_effort(policy, simulations),
     }
-    configuration |= {} if policy is None else {"policy": vars(policy)}
-    configuration |= {} if simulations is None else {"simulations": simulations}
     place = ResultFolder.at(output)
     if check_run(place.path, configuration) == "done":
         return Batch(place, own, computed=False)

@@ -3,7 +3,13 @@
 import numpy as np
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import Source, check_seed, experiments_of, path_of
+from wirebayes.commands.options import (
+    Source,
+    check_seed,
+    data_of,
+    experiments_of,
+    path_of,
+)
 from wirebayes.discovery.preview import preview
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.fit import seed_of
@@ -86,8 +92,7 @@ def check(
         "version": __version__,
         "seed": seed,
         "own_effects": source_of(own),
-        "priors": {e.name: e.priors for e in experiments},
-        "data_sha256": {e.name: e.data_hash for e in experiments},
+        **data_of(experiments),
     }
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as run:

@@ -10,9 +10,11 @@ from wirebayes.commands.options import (
     Source,
     check_seed,
     check_train_holds,
+    data_of,
     experiments_of,
     model_spec,
     names_given,
+    other_effort,
     path_of,
 )
 from wirebayes.comparison.candidates import BASE, ModelToCompare, candidates, problem_of
@@ -186,11 +188,9 @@ def plan_comparison(
         "likelihood": likelihood,
         "own_effects": source_of(own),
         "models": {one.name: [t.candidate.name for t in tasks if t.experiment is one] for one in experiments},
-        "priors": {one.name: one.priors for one in experiments},
-        "data_sha256": {one.name: one.data_hash for one in experiments},
+        **data_of(experiments),
+        **other_effort(policy),
     }
-    if policy is not None:
-        configuration["policy"] = vars(policy)
     return ComparisonPlan(tasks, experiments, configuration, seed, policy or POLICY, own)
 
 

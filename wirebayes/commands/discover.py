@@ -9,9 +9,11 @@ from wirebayes.commands.options import (
     Source,
     check_seed,
     check_train_holds,
+    data_of,
     experiments_of,
     model_spec,
     names_given,
+    other_effort,
     path_of,
 )
 from wirebayes.discovery.investigation import Investigation, JointModel, alternative_models, final_models
@@ -108,9 +110,7 @@ def discover(
     spec = model_spec(elastic_law, history)
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, left_out = path_of(own_effects), names_given(without)
-    experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
-    if train_holds is not None:
-        experiments = [e.first(train_holds) for e in experiments]
+    experiments = experiments_of(source, experiment, train_holds=train_holds, drop_breaks=drop_breaks)
     kinds = catalogue_without(left_out, catalogue(own))
     build(experiments, (), spec)  # checks priors
     configuration = {
@@ -122,11 +122,9 @@ def discover(
         "without": sorted(left_out),
         "own_effects": source_of(own),
         "train_holds": train_holds,
-        "priors": {e.name: e.priors for e in experiments},
-        "data_sha256": {e.name: e.data_hash for e in experiments},
+        **data_of(experiments),
+        **other_effort(policy, simulations),
     }
-    configuration |= {} if policy is None else {"policy": vars(policy)}
-    configuration |= {} if simulations is None else {"simulations": simulations}
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as opened:
         if opened.state == "done":

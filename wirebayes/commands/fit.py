@@ -11,9 +11,11 @@ from wirebayes.commands.options import (
     Source,
     check_seed,
     check_train_holds,
+    data_of,
     experiments_of,
     model_spec,
     names_given,
+    other_effort,
     path_of,
 )
 from wirebayes.discovery.model_check import checked_meanwhile, write_checks
@@ -116,7 +118,7 @@ def fit(
     own, keys = path_of(own_effects), names_given(effects)
     if together is not None and experiment is not None:
         raise InputError(f"--together {together}: found --experiment {experiment} beside it, expected one of the two")
-    experiments = _first_holds(experiments_of(source, experiment, drop_breaks=drop_breaks), train_holds)
+    experiments = experiments_of(source, experiment, train_holds=train_holds, drop_breaks=drop_breaks)
     file = experiments[0].source
     known = catalogue(own)
     added = _effects_of(keys, known)
@@ -141,21 +143,15 @@ def fit(
         "train_holds": train_holds,
         "together": together,
         "check": check,
-        "priors": {e.name: e.priors for e in fitted},
-        "data_sha256": {e.name: e.data_hash for e in fitted},
+        **data_of(fitted),
+        **other_effort(policy),
     }
-    if policy is not None:
-        configuration["policy"] = vars(policy)
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as opened:
         if opened.state != "done":
             _compute(jobs, place.path, seed, check, policy or DEFAULT, progress or silent)
             opened.finish()
     return fits_in(place, [job.folder for job in jobs], own, computed=opened.state != "done")
-
-
-def _first_holds(experiments: Sequence[Experiment], count: int | None) -> Sequence[Experiment]:
-    return experiments if count is None else [e.first(count) for e in experiments]
 
 
 def _effects_of(keys: Sequence[str], known: Mapping[str, type[Effect]]) -> list[Effect]:

@@ -8,6 +8,7 @@ from typing import Any, get_args
 import numpy as np
 
 from wirebayes.errors import InputError
+from wirebayes.inference.policy import Policy
 from wirebayes.io import gross_events
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings
 from wirebayes.io.experiment_file import read_experiments, select
@@ -33,13 +34,17 @@ def names_given(value: str | Iterable[str] | None) -> tuple[str, ...]:
     return (value,) if isinstance(value, str) else tuple(value or ())
 
 
-def experiments_of(source: Source, name: str | None = None, *, drop_breaks: bool = False) -> list[Experiment]:
+def experiments_of(
+    source: Source, name: str | None = None, *, train_holds: int | None = None, drop_breaks: bool = False
+) -> list[Experiment]:
     """The experiments of a file, or those given, or the named one of them.
 
     Parameters
     ----------
     source : path, Experiment, or sequence of Experiment
     name : str, optional
+    train_holds : int, optional
+        How many of the first recorded holds are kept; all when left out.
     drop_breaks : bool
         Whether readings of breaks, limits and dropouts are left out.
 
@@ -49,7 +54,24 @@ def experiments_of(source: Source, name: str | None = None, *, drop_breaks: bool
         The file is wrong, there is no such experiment, or two have one name; what is left out leaves too few readings.
     """
     experiments = _experiments_of(source, name)
-    return [without_breaks(e) for e in experiments] if drop_breaks else experiments
+    if drop_breaks:
+        experiments = [without_breaks(e) for e in experiments]
+    return experiments if train_holds is None else [e.first(train_holds) for e in experiments]
+
+
+def data_of(experiments: Iterable[Experiment]) -> dict[str, dict[str, Any]]:
+    """What a configuration says of the experiments: the priors of their files, and hashes of what was read."""
+    experiments = list(experiments)
+    return {
+        "priors": {e.name: e.priors for e in experiments},
+        "data_sha256": {e.name: e.data_hash for e in experiments},
+    }
+
+
+def other_effort(policy: Policy | None, simulations: int | None = None) -> dict[str, Any]:
+    """What a configuration says of the numbers of draws and simulations, where they are not the command's own."""
+    found: dict[str, Any] = {} if policy is None else {"policy": vars(policy)}
+    return found if simulations is None else found | {"simulations": simulations}
 
 
 def without_breaks(experiment: Experiment) -> Experiment:

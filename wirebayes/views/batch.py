@@ -2,24 +2,18 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar, Literal
 
 from wirebayes.answers import terminal
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
-from wirebayes.results import read_back
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-from wirebayes.views.posterior import POSTERIOR, Posterior, next_prediction
-from wirebayes.views.result import NOTHING, Given, Result, html_table
+from wirebayes.views.posterior import POSTERIOR, PlainAndFinal, Posterior, next_prediction
+from wirebayes.views.result import NOTHING, Given, html_table
 
 _MESSAGES = 20  # lines on standard error: what a terminal shows at once
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Batch(Result[BatchJson]):
+class Batch(PlainAndFinal[BatchJson]):
     """Many experiments, each fitted and discovered on its own.
 
     Examples
@@ -44,21 +38,6 @@ class Batch(Result[BatchJson]):
         """Parameters of specimens that lie far from those of their material's others, farthest first."""
         return list(self.summary()["outliers"])
 
-    @cached_property
-    def plain(self) -> dict[str, Posterior]:
-        """Posteriors of the plain model, by experiment; none where the draws were not kept."""
-        return self._posteriors(".") | self._posteriors("plain")
-
-    @cached_property
-    def final(self) -> dict[str, Posterior]:
-        """Posteriors of the model with what was found missing, by experiment; none where nothing was discovered."""
-        return self._posteriors("final")
-
-    def to_datatree(self) -> "xr.DataTree":
-        """One tree with a branch for each stored posterior."""
-        both = [*self.plain.values(), *self.final.values()]
-        return read_back.datatrees({posterior.within: posterior.folder for posterior in both})
-
     @property
     def messages(self) -> tuple[str, ...]:
         """The gravest warnings, where there are many."""
@@ -66,13 +45,14 @@ class Batch(Result[BatchJson]):
         more = f"and {len(lines) - _MESSAGES} more warnings: see summary.csv, columns warnings and error"
         return (*lines[:_MESSAGES], *([more] if len(lines) > _MESSAGES else []))
 
-    def _posteriors(self, model: str) -> dict[str, Posterior]:
-        within = {row["name"]: (Path(row["name"]) / model).as_posix() for row in self.rows if row["parameters"]}
-        return {
-            name: Posterior(self.place, self.own_effects, self.computed, name, folder, alone=False)
-            for name, folder in within.items()
-            if (self.folder / folder / POSTERIOR).is_file()
-        }
+    def _posteriors(self, model: Literal["plain", "final"]) -> dict[str, Posterior]:
+        found = {}
+        for name in [row["name"] for row in self.rows if row["parameters"]]:
+            fitted_alone = [name] if model == "plain" else []  # where nothing was looked for
+            for within in [*fitted_alone, f"{name}/{model}"]:
+                if (self.folder / within / POSTERIOR).is_file():
+                    found[name] = self._posterior(name, within)
+        return found
 
     def lines(self) -> list[str]:
         return terminal.of_batch(self.summary())

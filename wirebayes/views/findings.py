@@ -2,23 +2,18 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from wirebayes.answers import terminal
 from wirebayes.errors import InputError
 from wirebayes.json_files.discovery import DiscoveryJson, ExperimentFindings
-from wirebayes.results import read_back
 from wirebayes.sentences import p_in_words, quantity, spoken
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-from wirebayes.views.posterior import Posterior, next_pose, next_prediction
-from wirebayes.views.result import NOTHING, Given, Result, html_table
+from wirebayes.views.posterior import PlainAndFinal, Posterior, next_pose, next_prediction
+from wirebayes.views.result import NOTHING, Given, html_table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Findings(Result[DiscoveryJson]):
+class Findings(PlainAndFinal[DiscoveryJson]):
     """What the plain model is missing in each experiment of a file.
 
     Examples
@@ -35,21 +30,6 @@ class Findings(Result[DiscoveryJson]):
     def report(self) -> DiscoveryJson:
         """The content of ``discovery.json``."""
         return self.summary()
-
-    @cached_property
-    def plain(self) -> dict[str, Posterior]:
-        """Posteriors of the plain model, by experiment."""
-        return self._posteriors("plain")
-
-    @cached_property
-    def final(self) -> dict[str, Posterior]:
-        """Posteriors of the model with what was found missing, by experiment."""
-        return self._posteriors("final")
-
-    def to_datatree(self) -> "xr.DataTree":
-        """One tree with a branch ``NAME/plain`` and ``NAME/final`` for each experiment."""
-        both = [*self.plain.values(), *self.final.values()]
-        return read_back.datatrees({posterior.within: posterior.folder for posterior in both})
 
     def plot(self, experiment: str | None = None, axes: Any = None) -> Any:
         """Draw an experiment's readings with the curves of the plain and of the final model through them.
@@ -84,11 +64,8 @@ class Findings(Result[DiscoveryJson]):
             raise InputError(f"experiment: found {experiment!r}, expected one of {', '.join(names)}")
         return both_on_axes(self.plain[experiment].stored(), self.final[experiment].stored(), axes)
 
-    def _posteriors(self, model: str) -> dict[str, Posterior]:
-        return {
-            name: Posterior(self.place, self.own_effects, self.computed, name, f"{name}/{model}", alone=False)
-            for name in self.report["experiments"]
-        }
+    def _posteriors(self, model: Literal["plain", "final"]) -> dict[str, Posterior]:
+        return {name: self._posterior(name, f"{name}/{model}") for name in self.report["experiments"]}
 
     def lines(self) -> list[str]:
         found = self.summary()["experiments"]

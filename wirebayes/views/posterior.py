@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from wirebayes.answers import terminal
 from wirebayes.errors import InputError
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 from wirebayes.views.result import (
     NOTHING,
+    Content,
     Given,
     Result,
     copy_results,
@@ -236,6 +237,32 @@ class Posteriors(Result[dict[str, SummaryJson | list[NoticeJson]]], Mapping[str,
 
     def _repr_html_(self) -> str:
         return "".join(posterior._repr_html_() for posterior in self.members.values())
+
+
+class PlainAndFinal(Result[Content]):
+    """Results whose experiments have a posterior of the plain model and one of the model with what was missing."""
+
+    @cached_property
+    def plain(self) -> dict[str, Posterior]:
+        """Posteriors of the plain model, by experiment; none where the draws were not kept."""
+        return self._posteriors("plain")
+
+    @cached_property
+    def final(self) -> dict[str, Posterior]:
+        """Posteriors of the model with what was found missing, by experiment; none where nothing was looked for."""
+        return self._posteriors("final")
+
+    def to_datatree(self) -> "xr.DataTree":
+        """One tree with a branch ``NAME/plain`` and ``NAME/final`` for each experiment."""
+        both = [*self.plain.values(), *self.final.values()]
+        return read_back.datatrees({posterior.within: posterior.folder for posterior in both})
+
+    def _posteriors(self, model: Literal["plain", "final"]) -> dict[str, Posterior]:
+        raise NotImplementedError
+
+    def _posterior(self, name: str, within: str) -> Posterior:
+        """The one of an experiment, in this folder."""
+        return Posterior(self.place, self.own_effects, self.computed, name, within, alone=False)
 
 
 def _after_fit(posterior: Posterior, kinds: frozenset[str], given: Given) -> str:
