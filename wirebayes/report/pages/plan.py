@@ -84,7 +84,7 @@ def _reliability(rows: list[JudgedProtocol]) -> Points:
         [
             f"Each test was simulated and fitted {least} times or more, with the priors of the later fit. Half of the "
             "tests would do better than a median, half worse; the range says by how much.",
-            "They hold if the wire is as guessed and nothing is missing in the model.",
+            "These figures hold if the wire is as guessed and the model is missing nothing.",
         ],
     )
 
