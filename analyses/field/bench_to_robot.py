@@ -32,6 +32,7 @@ from wirebayes.discovery.investigation import final_models
 from wirebayes.discovery.search import investigate
 from wirebayes.discovery.settings import ALPHA, Settings
 from wirebayes.effects import CATALOGUE
+from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment import Experiment
@@ -102,7 +103,10 @@ def invent(index: int) -> tuple[Bench, Truth, int, Simulated]:
         for effect in effects:
             values |= amplitude(effect, rng)
         truth, seed = Truth(values, effects), int(rng.integers(2**31))
-        simulated = draw([made], truth, seed)
+        try:
+            simulated = draw([made], truth, seed)
+        except InputError:  # a constant that no fit of such a protocol may have, as a period longer than it
+            continue
         if is_sound(simulated):
             return made, truth, seed, simulated
 
