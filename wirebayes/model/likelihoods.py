@@ -6,10 +6,18 @@ factors hold by hold in linear time: a Kalman filter whose state is that number.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wirebayes.model.hold_filter import (
+    HoldRead,
+    Later,
+    ReadingNoise,
+    carried_unread,
+    filter_hold,
+    information_of,
+)
 from wirebayes.numeric.typing import Array
 from wirebayes.wire import compiled
 from wirebayes.wire.staircase import Linearised
@@ -17,7 +25,7 @@ from wirebayes.wire.staircase import Linearised
 if TYPE_CHECKING:
     from wirebayes.wire._kernel import Staircases
 
-LOG_2PI = float(np.log(2.0 * np.pi))
+_ABSURD = 1e13  # sum of squared residuals in variances: its rounding reaches some hundredths of a nat
 
 
 @dataclass(frozen=True)
@@ -62,16 +70,20 @@ def chain(
         return Filtered(*compiled.kernel.chain(*_compiled(line, readings, mask, variance, setting_sd)))
     assert isinstance(line, Linearised)  # nothing is streamed without the kernel
     holds, _, n = line.reading.shape
-    out = np.zeros((holds, n))
-    mean, var = np.zeros((holds + 1, n)), np.zeros((holds + 1, n))
-    noise = _Noise.of(variance, setting_sd)
+    log_likelihood = np.zeros((holds, n))
+    mean = np.zeros((holds + 1, n))
+    var = np.zeros((holds + 1, n))
+    noise = ReadingNoise.of(variance, setting_sd)
     for j in range(holds):
         if mask[j].any():
-            found = _hold(line, j, readings[j], mask[j], mean[j], var[j], noise.where_read(readings[j], mask[j]))
-            out[j], mean[j + 1], var[j + 1] = found.log_density, found.mean, found.var
+            known_noise = noise.where_read(readings[j], mask[j])
+            found = filter_hold(line, j, readings[j], mask[j], mean[j], var[j], known_noise)
+            log_likelihood[j] = found.log_density
+            mean[j + 1] = found.mean
+            var[j + 1] = found.var
         else:
-            mean[j + 1], var[j + 1] = _unread(line, j, mean[j], var[j], noise)
-    return Filtered(out, mean, var)
+            mean[j + 1], var[j + 1] = carried_unread(line, j, mean[j], var[j], noise)
+    return Filtered(log_likelihood, mean, var)
 
 
 def standardised(
@@ -96,20 +108,31 @@ def standardised(
         return compiled.kernel.standardised(*_compiled(line, readings, mask, variance, setting_sd))
     assert isinstance(line, Linearised)  # nothing is streamed without the kernel
     n = line.reading.shape[2]
-    noise, total, out = _Noise.of(variance, setting_sd), np.zeros(n), []
-    mean, var = np.zeros(n), np.zeros(n)
+    noise = ReadingNoise.of(variance, setting_sd)
+    log_likelihood, mean, var = np.zeros(n), np.zeros(n), np.zeros(n)
+    residuals: list[Array] = []
     for j in range(len(mask)):
         if mask[j].any():
-            read = noise.where_read(readings[j], mask[j])
-            here = _hold(line, j, readings[j], mask[j], mean, var, read)
-            best = np.sqrt(var) * here.pull_c, np.sqrt(noise.setting_var) * here.pull_s
-            known = var * here.cc, noise.setting_var * here.ss
-            log_sd = np.sqrt(len(here.left)) * read.log_variance, *(np.log1p(k) for k in known)
-            out += [here.left * np.sqrt(read.weight), *(b[None] for b in best), *(0.5 * s[None] for s in log_sd)]
-            total, mean, var = total + here.log_density, here.mean, here.var
+            known_noise = noise.where_read(readings[j], mask[j])
+            found = filter_hold(line, j, readings[j], mask[j], mean, var, known_noise)
+            residuals += _residuals(found, var, known_noise)
+            log_likelihood = log_likelihood + found.log_density
+            mean, var = found.mean, found.var
         else:
-            mean, var = _unread(line, j, mean, var, noise)
-    return total, np.concatenate(out)
+            mean, var = carried_unread(line, j, mean, var, noise)
+    return log_likelihood, np.concatenate(residuals)
+
+
+def _residuals(found: "HoldRead", carried_var: Array, noise: "ReadingNoise") -> list[Array]:
+    """The parts of `standardised` from one hold, (r, n) each."""
+    in_sensor_errors = found.left * np.sqrt(noise.weight)
+    creep = np.sqrt(carried_var) * found.pull_c
+    setting = np.sqrt(noise.setting_var) * found.pull_s
+    log_sensor = np.sqrt(len(found.left)) * noise.log_variance
+    log_creep = np.log1p(carried_var * found.cc)
+    log_setting = np.log1p(noise.setting_var * found.ss)
+    log_sd = [0.5 * part[None] for part in (log_sensor, log_creep, log_setting)]
+    return [in_sensor_errors, creep[None], setting[None], *log_sd]
 
 
 def _compiled(
@@ -151,107 +174,13 @@ def held_out_density(
     (h, n) array
         A row for each hold in the mask.
     """
-    noise, (mean, var) = _Noise.of(variance, setting_sd), (filtered.carried_mean, filtered.carried_var)
-    holds = np.flatnonzero(mask.any(axis=1)).tolist()
-    return np.array([_hold(line, j, readings[j], mask[j], mean[j], var[j], noise).log_density for j in holds])
-
-
-@dataclass(frozen=True, slots=True)
-class _Noise:
-    """Of each of n parameter sets: 1 / variance of a reading, its log normal density's constant, setting variance."""
-
-    weight: Array
-    log_variance: Array
-    setting_var: Array
-
-    @classmethod
-    def of(cls, variance: Array, setting_sd: Array) -> "_Noise":
-        return cls(1.0 / variance, np.log(variance) + LOG_2PI, setting_sd * setting_sd)
-
-    def where_read(self, readings: Array, mask: Array) -> "_Noise":
-        """The same, with readings (R, n) of a hold that are NaN as if their errors were without bound."""
-        unread = np.isnan(readings[int(np.argmax(mask))])
-        if not unread.any():
-            return self
-        weight, log_variance = (np.where(unread, 0.0, v) for v in (self.weight, self.log_variance))
-        return _Noise(weight, log_variance, self.setting_var)
-
-
-def _unread(line: Linearised, j: int, m: Array, p: Array, noise: _Noise) -> tuple[Array, Array]:
-    """Mean and variance of the creep that a hold without readings carries on."""
-    a, c = line.carry_by_creep[j], line.carry_by_setting[j]
-    return a * m, a * a * p + c * c * noise.setting_var
-
-
-class _Read(NamedTuple):
-    """What the readings of one hold say.
-
-    The log density (n,) of the readings; mean and variance (n,) of the creep carried on; what the readings leave over
-    (R, n); by how much they pull at the creep carried in and at the setting error, and what they know of either (n,).
-    """
-
-    log_density: Array
-    mean: Array
-    var: Array
-    left: Array
-    pull_c: Array
-    pull_s: Array
-    cc: Array
-    ss: Array
-
-
-def _hold(line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: Array, noise: _Noise) -> _Read:
-    """Filter one hold's readings (R, n), the creep carried into it having mean `m` and variance `p`.
-
-    Readings whose weight is zero do not count, whatever they are.
-    """
-    keep = slice(None) if mask.all() else mask
-    by_c, by_s = line.by_creep[j][keep], line.by_setting[j][keep]
-    r = np.where(noise.weight > 0, readings[keep], 0.0) - line.reading[j][keep] - by_c * m
-    known = _learned(by_c, by_s, noise.weight, p, noise.setting_var)
-    cr = np.einsum("rn,rn->n", by_c, r) * noise.weight
-    sr = np.einsum("rn,rn->n", by_s, r) * noise.weight
-    creep, setting = known.errors(cr, sr)
-    pull_c = ((1.0 + noise.setting_var * known.ss) * cr - noise.setting_var * known.cs * sr) / known.det
-    pull_s = ((1.0 + p * known.cc) * sr - p * known.cs * cr) / known.det
-    # a sum of squares: the shorter difference of products can turn negative at absurd parameters
-    left = r - by_c * creep - by_s * setting
-    square = np.einsum("rn,rn->n", left, left) * noise.weight + p * pull_c**2 + noise.setting_var * pull_s**2
-    log_density = -0.5 * (square + r.shape[0] * noise.log_variance + np.log(known.det))
-    a, c = line.carry_by_creep[j], line.carry_by_setting[j]
-    mean = a * (m + creep) + c * setting
-    var = a * a * known.v_cc + 2.0 * a * c * known.v_cs + c * c * known.v_ss
-    return _Read(log_density, mean, var, left, pull_c, pull_s, known.cc, known.ss)
-
-
-class _Learned(NamedTuple):
-    """What a hold says about the creep carried in, c, and its setting error, s; all (n,).
-
-    Products of the slopes, the determinant by which the readings' covariance exceeds that of sensor errors alone, and
-    the covariance of the two given the readings.
-    """
-
-    cc: Array
-    cs: Array
-    ss: Array
-    det: Array
-    v_cc: Array
-    v_cs: Array
-    v_ss: Array
-
-    def errors(self, along_c: Array, along_s: Array) -> tuple[Array, Array]:
-        """Both errors by what readings have along their slopes, divided by the variance of a reading."""
-        return self.v_cc * along_c + self.v_cs * along_s, self.v_cs * along_c + self.v_ss * along_s
-
-
-def _learned(by_c: Array, by_s: Array, weight: Array, p: Array, q: Array) -> _Learned:
-    """What a hold's slopes (R, n) say, with variances before: p of the creep carried in, q of the setting error."""
-    cc = np.einsum("rn,rn->n", by_c, by_c) * weight
-    cs = np.einsum("rn,rn->n", by_c, by_s) * weight
-    ss = np.einsum("rn,rn->n", by_s, by_s) * weight
-    # the difference of two products may come out below zero by rounding
-    det = 1.0 + p * cc + q * ss + p * q * np.maximum(cc * ss - cs * cs, 0.0)
-    return _Learned(cc, cs, ss, det, p * (1.0 + q * ss) / det, -p * q * cs / det, q * (1.0 + p * cc) / det)
+    noise = ReadingNoise.of(variance, setting_sd)
+    densities = []
+    for j in np.flatnonzero(mask.any(axis=1)).tolist():
+        mean, var = filtered.carried_mean[j], filtered.carried_var[j]
+        found = filter_hold(line, j, readings[j], mask[j], mean, var, noise)
+        densities.append(found.log_density)
+    return np.array(densities)
 
 
 def seen(
@@ -279,25 +208,46 @@ def seen(
         shapesᵀ V⁻¹ shapes and shapesᵀ V⁻¹ (readings - line.reading).
     """
     if compiled.kernel is not None:
-        observed = _observed(line.reading.shape[2], readings, mask, variance, setting_sd)
-        beside = (np.ascontiguousarray(a, float) for a in (filtered.carried_mean, filtered.carried_var, shapes))
-        return compiled.kernel.seen(*_flat(line), *observed, *beside)
+        return compiled.kernel.seen(*_seen_by(line, filtered, readings, shapes, mask, variance, setting_sd))
     n, k = line.reading.shape[2], shapes.shape[2]
-    gram, along = np.zeros((k, k, n)), np.zeros((k, n))
+    gram = np.zeros((k, k, n))
+    along = np.zeros((k, n))
     mean = np.zeros((k, n))  # of the carried creep, had the shapes been the readings
     for j, keep in enumerate(mask):
-        slopes = np.stack([line.by_creep[j][keep], line.by_setting[j][keep]])
-        known = _learned(*slopes, 1.0 / variance, filtered.carried_var[j], setting_sd * setting_sd)
-        reading = readings[j][keep] - line.reading[j][keep] - slopes[0] * filtered.carried_mean[j]
-        # What is left of the shapes beside the creep that they would have carried in.
-        left = shapes[j][keep][:, :, None] - slopes[0][:, None] * mean
-        left_along = np.einsum("srn,rkn->skn", slopes, left) / variance
-        errors = np.stack(known.errors(*left_along))
-        gram += np.einsum("rkn,rln->kln", left, left) / variance - np.einsum("skn,sln->kln", left_along, errors)
-        left -= np.einsum("skn,srn->rkn", errors, slopes)
-        along += np.einsum("rkn,rn->kn", left, reading) / variance
-        mean = line.carry_by_creep[j] * (mean + errors[0]) + line.carry_by_setting[j] * errors[1]
+        by_creep = line.by_creep[j][keep]
+        by_setting = line.by_setting[j][keep]
+        known = information_of(by_creep, by_setting, 1.0 / variance, filtered.carried_var[j], setting_sd * setting_sd)
+        surprise = readings[j][keep] - line.reading[j][keep] - by_creep * filtered.carried_mean[j]
+        # what is left of the shapes beside the creep that they would have carried in
+        left = shapes[j][keep][:, :, None] - by_creep[:, None] * mean
+        along_c, along_s = (_along(slopes, left) / variance for slopes in (by_creep, by_setting))
+        creep, setting = known.errors(along_c, along_s)
+        gram += np.einsum("rkn,rln->kln", left, left) / variance
+        gram -= np.einsum("kn,ln->kln", along_c, creep) + np.einsum("kn,ln->kln", along_s, setting)
+        left -= creep * by_creep[:, None] + setting * by_setting[:, None]
+        along += _along(surprise, left) / variance
+        mean = line.carry_by_creep[j] * (mean + creep) + line.carry_by_setting[j] * setting
     return np.moveaxis(gram, -1, 0), along.T
+
+
+def _seen_by(
+    line: Linearised,
+    filtered: Filtered,
+    readings: Array,
+    shapes: Array,
+    mask: Array,
+    variance: Array,
+    setting_sd: Array,
+) -> tuple[Array, ...]:
+    """What the compiled `seen` is called with."""
+    observed = _observed(line.reading.shape[2], readings, mask, variance, setting_sd)
+    beside = (filtered.carried_mean, filtered.carried_var, shapes)
+    return *_flat(line), *observed, *(np.ascontiguousarray(part, float) for part in beside)
+
+
+def _along(slopes: Array, shapes: Array) -> Array:
+    """(k, n) sums over the readings of slopes (R, n) times shapes (R, k, n)."""
+    return np.asarray(np.einsum("rn,rkn->kn", slopes, shapes))
 
 
 def setting_jacobian(line: Linearised) -> Array:
@@ -335,58 +285,12 @@ def without_each_hold(
         Log densities.
     """
     holds, _, n = line.reading.shape
-    noise, out = _Noise.of(variance, setting_sd), np.zeros((holds, n))
+    noise, out = ReadingNoise.of(variance, setting_sd), np.zeros((holds, n))
     out[1:] = np.cumsum(filtered.log_likelihood[:-1], axis=0)
-    later = _Later(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n))
+    later = Later(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n))
     for j in reversed(range(holds)):
         m, p = filtered.carried_mean[j], filtered.carried_var[j]
-        a, c = line.carry_by_creep[j], line.carry_by_setting[j]
-        out[j] += later.log_density(a * m, a * a * p + c * c * noise.setting_var)
-        out[j] = np.where(later.square < _ABSURD, out[j], -np.inf)
-        later = later.with_hold(line, j, readings[j], mask[j], noise)
+        log_density = out[j] + later.log_density(*carried_unread(line, j, m, p, noise))
+        out[j] = np.where(later.square < _ABSURD, log_density, -np.inf)
+        later = later.withfilter_hold(line, j, readings[j], mask[j], noise)
     return out
-
-
-@dataclass(frozen=True, slots=True)
-class _Later:
-    """Log density of the later holds' readings by the creep x carried into them: constant + pull x - precision x² / 2.
-
-    Each (n,), and the sum of their squared residuals, in variances, whose rounding the density bears.
-    """
-
-    precision: Array
-    pull: Array
-    constant: Array
-    square: Array
-
-    def log_density(self, mean: Array, var: Array) -> Array:
-        """Of those readings, the carried creep being normal with this mean and variance."""
-        wider = 1.0 + self.precision * var
-        square = self.precision * mean**2 - 2.0 * self.pull * mean - self.pull**2 * var
-        return np.asarray(self.constant - 0.5 * (square / wider + np.log(wider)))
-
-    def with_hold(self, line: Linearised, j: int, readings: Array, mask: Array, noise: _Noise) -> "_Later":
-        """The same with the readings (R, n) of hold j, the one before them, by the creep carried into that hold.
-
-        Parameters
-        ----------
-        readings : (R, n) or (R, 1) array
-        mask : (R,) bool array
-        """
-        a, c, q = line.carry_by_creep[j], line.carry_by_setting[j], noise.setting_var
-        by_c, by_s = line.by_creep[j][mask], line.by_setting[j][mask]
-        r = readings[mask] - line.reading[j][mask]
-        cc, cs, ss, cr, sr, rr = (
-            np.einsum("rn,rn->n", one, other) * noise.weight
-            for one, other in ((by_c, by_c), (by_c, by_s), (by_s, by_s), (by_c, r), (by_s, r), (r, r))
-        )
-        # jointly in the carried creep and the setting error, which is then integrated out
-        cross, pull_s = cs + self.precision * a * c, sr + self.pull * c
-        wider = 1.0 + q * (ss + self.precision * c * c)
-        precision = cc + self.precision * a * a - q * cross * cross / wider
-        constant = self.constant - 0.5 * (rr + len(r) * noise.log_variance + np.log(wider) - q * pull_s**2 / wider)
-        pull = cr + self.pull * a - q * cross * pull_s / wider
-        return _Later(np.maximum(precision, 0.0), pull, constant, self.square + rr)
-
-
-_ABSURD = 1e13  # sum of squared residuals in variances: its rounding reaches some hundredths of a nat

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wirebayes.model.likelihoods import LOG_2PI
+from wirebayes.model.hold_filter import LOG_2PI
 from wirebayes.numeric.typing import Array
 from wirebayes.wire import compiled
 from wirebayes.wire.model import Model
