@@ -118,8 +118,8 @@ def test_falls_are_found_at_their_time_and_reported(kind, seed):
     report = stability.summary(course)
     assert report["fall_probability"] == 1.0
     assert report["fall_time_s"]["first"] == ours
-    warnings = stability.stability_warnings(course, 0.0)
-    assert "falls in 100 % of the draws" in warnings[0].text
+    warnings = stability.stability_warnings({0.0: course})
+    assert "in 100 % of the draws" in warnings[0].text
 
 
 def test_where_a_fall_is_within_a_step_is_looked_for_once_the_step_is_short(monkeypatch):

@@ -150,10 +150,7 @@ def _courses(held: _Held, rng: Generator) -> dict[float, Course]:
 
 def _warnings(held: _Held, courses: dict[float, Course], stable: bool, turned: Orientation) -> list[Notice]:
     """What speaks against the answer: weak wires, falls, what is not had, the robot's file, what was never tested."""
-    out = _weak(held.commands)
-    for spread, course in courses.items():
-        out += stability.stability_warnings(course, spread, stable)
-    out += turned.turned_away
+    out = [*_weak(held.commands), *stability.stability_warnings(courses, stable), *turned.turned_away]
     if turned.refused:
         out.append(Notice("geometry", turned.refused))
     out += plausible.robot_notices(held.robot) + plausible.strain_notices(held.robot, held.line, held.tension_N[0])

@@ -1,5 +1,7 @@
 """Reports of falls: how probable, when, by which wire, and how close a platform that holds comes to one."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from wirebayes.json_files.pose import FallsReport, Times
@@ -60,58 +62,86 @@ def _nearest(falls: Falls, began: Bools) -> int:
     return int(np.bincount(share.argmin(1), minlength=share.shape[1]).argmax())
 
 
-def stability_warnings(course: Course, spread: float, stable: bool = True) -> list[Notice]:
+def stability_warnings(courses: dict[float, Course], stable: bool = True) -> list[Notice]:
     """One warning for each way in which the platform may lose its hold, the worst first.
 
     Parameters
     ----------
-    course : Course
-    spread : float
-        The specimen spread it was computed for, to be named.
+    courses : dict of float to Course
+        By the specimen spread that each was computed for. A warning says them beside each other.
     stable : bool
         Whether the commanded pose is a stable equilibrium at all.
     """
-    found, out = summary(course), list[Notice]()
-    who = f"specimens differing by {100 * spread:g} %" if spread else "specimens alike"
-    last = course.times_s[-1]
-    if found["began"] < 1:
-        reason = "the pose is balanced but not stable" if not stable else "no stable equilibrium is found there"
-        text = f"{_percent(1 - found['began'])} of the draws cannot begin at the pose ({who}): {reason}"
-        out.append(Notice("fall", text))
-    if not found["began"]:
-        return out
+    last = max(course.times_s[-1] for course in courses.values())
+    found = {_who(spread): summary(course) for spread, course in courses.items()}
+    began = {who: one for who, one in found.items() if one["began"]}
+    reason = "no stable equilibrium is found there" if stable else "the pose is balanced but not stable"
+    slack = _told(began, _slack)
+    told = [
+        ("fall", f"draws cannot begin at the pose, {reason}", _told(found, _not_begun)),
+        ("fall", f"the platform falls within {last:g} s", _told(began, _fallen)),
+        ("slack", f"wires go slack within {last:g} s", slack),
+        ("slack", f"a wire may keep little of its tension within {last:g} s", {} if slack else _told(began, _weak)),
+        ("fall", f"the stiffness against the softest motion may fall within {last:g} s", _told(began, _loose)),
+    ]
+    return [Notice(kind, f"{head}: {_beside(by_who)}") for kind, head, by_who in told if by_who]
+
+
+def _who(spread: float) -> str:
+    return f"specimens differing by {100 * spread:g} %" if spread else "specimens alike"
+
+
+def _told(found: dict[str, FallsReport], words: Callable[[FallsReport], str | None]) -> dict[str, str]:
+    """What there is to say of each of the courses, by whose they are."""
+    said = {who: words(one) for who, one in found.items()}
+    return {who: text for who, text in said.items() if text is not None}
+
+
+def _beside(told: dict[str, str]) -> str:
+    """What is said of the courses beside each other; once, where it is the same."""
+    by_text: dict[str, list[str]] = {}
+    for who, text in told.items():
+        by_text.setdefault(text, []).append(who)
+    return "; ".join(f"{text} ({' or '.join(who)})" for text, who in by_text.items())
+
+
+def _not_begun(found: FallsReport) -> str | None:
+    return f"{_percent(1 - found['began'])} of them" if found["began"] < 1 else None
+
+
+def _fallen(found: FallsReport) -> str | None:
     times, drop = found["fall_time_s"], found["fall_distance_mm"]
-    if times is not None:
-        wire = int(np.argmax(found["fall_wires"])) + 1
-        fall = f"; it drops {drop['median']:.3g} mm" if drop else "; nothing catches it nearby"
-        text = (
-            f"the platform falls in {_percent(found['fall_probability'])} of the draws within {last:g} s ({who}), "
-            f"first after {times['first']:.3g} s, in the median after {times['median']:.3g} s, wire {wire} giving "
-            f"way{fall}"
-        )
-        out.append(Notice("fall", text))
-    return [*out, *_margin_warnings(found, last, who)]
+    if times is None:
+        return None
+    wire = int(np.argmax(found["fall_wires"])) + 1
+    end = f"dropping {drop['median']:.3g} mm" if drop else "nothing catching it nearby"
+    return (
+        f"in {_percent(found['fall_probability'])} of the draws, first after {times['first']:.3g} s, in the median "
+        f"after {times['median']:.3g} s, wire {wire} giving way, {end}"
+    )
 
 
-def _margin_warnings(found: FallsReport, last: float, who: str) -> list[Notice]:
-    """Wires that go slack or nearly so, and a platform that comes loose, within the last time (s) for these draws."""
-    slack = [
+def _slack(found: FallsReport) -> str | None:
+    each = [
         f"wire {i + 1} in {_percent(p)} of the draws, first after {t['first']:.3g} s"
         for i, (p, t) in enumerate(zip(found["slack_probability"], found["slack_time_s"], strict=True))
         if t is not None
     ]
-    out = []
-    tension, stiffness = found["least_tension_share"]["q05"], found["stiffness_share"]["q05"]
-    if slack:
-        out.append(Notice("slack", f"wires go slack within {last:g} s ({who}): {'; '.join(slack)}"))
-    elif tension is not None and tension < NEAR_SLACK:
-        wire, left = found["least_tension_wire"], _percent(float(tension))
-        out.append(Notice("slack", f"wire {wire} may keep only {left} of its tension within {last:g} s ({who})"))
-    if stiffness is not None and stiffness < NEAR_LOOSE:
-        left = _percent(max(float(stiffness), 0.0))
-        text = f"the stiffness against the softest motion may fall to {left} within {last:g} s ({who})"
-        out.append(Notice("fall", text))
-    return out
+    return ", ".join(each) or None
+
+
+def _weak(found: FallsReport) -> str | None:
+    tension = found["least_tension_share"]["q05"]
+    if tension is None or tension >= NEAR_SLACK:
+        return None
+    return f"wire {found['least_tension_wire']} {_percent(float(tension))}"
+
+
+def _loose(found: FallsReport) -> str | None:
+    stiffness = found["stiffness_share"]["q05"]
+    if stiffness is None or stiffness >= NEAR_LOOSE:
+        return None
+    return f"to {_percent(max(float(stiffness), 0.0))}"
 
 
 def _percent(share: float) -> str:
