@@ -309,21 +309,26 @@ def _empty(file: str, error: str) -> Row:
 def _tabulate(rows: Sequence[Row], far: Sequence[OutlierRow], folder: Path) -> None:
     """``batch.json``, ``summary.csv`` and, where pyarrow is installed, ``summary.parquet``."""
     names = [n for n in (*MATERIAL, *SAMPLE) if any(n in row["parameters"] for row in rows)]
-    header = [*_FIRST, *(f"{n}_{q}" for n in names for q in QUANTITIES), *_LAST]
-    outlying: dict[str, list[str]] = {}
-    for outlier in far:
-        outlying.setdefault(outlier["experiment"], []).append(outlier["parameter"])
-    table = []
-    for row in rows:
-        own: dict[str, Any] = dict(row["parameters"])
-        texts = [notice["text"] for notice in row["warnings"]]
-        listed = {"effects": row["effects"], "outlier": outlying.get(row["name"], []), "warnings": texts}
-        cells = {**row, **{key: "; ".join(value) or None for key, value in listed.items()}}
-        values = [own.get(n, {}).get(q) for n in names for q in QUANTITIES]
-        table.append([*(cells[c] for c in _FIRST), *values, *(cells[c] for c in _LAST)])
+    columns = [f"{name}_{quantile}" for name in names for quantile in QUANTITIES]
+    header = [*_FIRST, *columns, *_LAST]
+    table = [_line(row, far, names) for row in rows]
     write_csv(folder / TABLE, header, table)
     write_parquet(folder / PARQUET, header, table)
     failed = [Notice("failed", f"{row['name']}: {row['error']}") for row in rows if row["error"]]
     warnings = to_json([*failed, *from_json(notices_by_part({row["name"]: row for row in rows}))])
     content: BatchJson = {"version": 1, "experiments": list(rows), "outliers": list(far), "warnings": warnings}
     write_json(folder / Batch._content, content)
+
+
+def _line(row: Row, far: Sequence[OutlierRow], names: Sequence[str]) -> list[Any]:
+    """The cells of an experiment."""
+    lists = {
+        "effects": row["effects"],
+        "outlier": [outlier["parameter"] for outlier in far if outlier["experiment"] == row["name"]],
+        "warnings": [notice["text"] for notice in row["warnings"]],
+    }
+    joined = {key: "; ".join(items) or None for key, items in lists.items()}
+    cells: dict[str, Any] = {**row, **joined}
+    parameters: dict[str, Any] = dict(row["parameters"])
+    values = [parameters.get(name, {}).get(quantile) for name in names for quantile in QUANTITIES]
+    return [*(cells[key] for key in _FIRST), *values, *(cells[key] for key in _LAST)]

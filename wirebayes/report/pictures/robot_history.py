@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
@@ -15,6 +16,7 @@ from wirebayes.report.blocks import svg
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
 from wirebayes.report.pictures.robot import Distance, platform_edges, round_factor
 from wirebayes.robot.history.answer import HistoryAnswer
+from wirebayes.robot.history.follow import Track
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
 
@@ -107,19 +109,32 @@ def _shapes(robot: Robot, found: HistoryAnswer, rows: Indices) -> tuple[Floats, 
     """Platform points meant and drifted, ``(r, w, 3)``, the drift enlarged by a round factor."""
     assert found.found is not None and found.to is not None
     track, to = found.found.track, found.to
+    position, rotation = _mean_pose(track, rows)
+    shift = position - to.position_m[rows]
+    size = float(np.ptp(robot.exit_m, axis=0).max())
+    largest = float(np.nanmax(np.linalg.norm(shift, axis=1), initial=0.0))
+    factor = round_factor(0.07 * size / max(largest, 1e-12))
+    turned = to.rotation[rows] + factor * (rotation - to.rotation[rows])
+    meant = _platform_points(robot, to.position_m[rows], to.rotation[rows])
+    moved = _platform_points(robot, to.position_m[rows] + factor * shift, turned)
+    return meant, moved, factor
+
+
+def _mean_pose(track: Track, rows: Indices) -> tuple[Floats, Floats]:
+    """Mean positions ``(r, 3)`` and rotations ``(r, 3, 3)`` of draws that hold the platform; NaN where none does."""
     held = track.held[:, rows]
     count = np.maximum(held.sum(0), 1)[:, None]
-    x = np.where(held[..., None], track.position_m[:, rows], 0.0).sum(0) / count
-    R = np.where(held[..., None, None], track.rotation[:, rows], 0.0).sum(0) / count[..., None]
+    position = np.where(held[..., None], track.position_m[:, rows], 0.0).sum(0) / count
+    rotation = np.where(held[..., None, None], track.rotation[:, rows], 0.0).sum(0) / count[..., None]
     gone = ~held.any(0)
-    x[gone], R[gone] = np.nan, np.nan
-    size = float(np.ptp(robot.exit_m, axis=0).max())
-    shift = x - to.position_m[rows]
-    factor = round_factor(0.07 * size / max(float(np.nanmax(np.linalg.norm(shift, axis=1), initial=0.0)), 1e-12))
-    meant = to.position_m[rows][:, None] + robot.platform_m @ np.swapaxes(to.rotation[rows], 1, 2)
-    turned = to.rotation[rows] + factor * (R - to.rotation[rows])
-    moved = (to.position_m[rows] + factor * shift)[:, None] + robot.platform_m @ np.swapaxes(turned, 1, 2)
-    return meant, moved, factor
+    position[gone] = np.nan
+    rotation[gone] = np.nan
+    return position, rotation
+
+
+def _platform_points(robot: Robot, position_m: Floats, rotation: Floats) -> Floats:
+    """Where the wires meet the platform, ``(r, w, 3)``."""
+    return np.asarray(position_m[:, None] + robot.platform_m @ np.swapaxes(rotation, 1, 2))
 
 
 def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
@@ -136,20 +151,29 @@ def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
     figure = Figure(figsize=(2.1 * len(rows), 2.75), layout="constrained")
     figure.suptitle(f"{robot.name}: mean drift enlarged {factor:g} times", fontsize=10.5, color=INK, x=0.01, ha="left")
     exits = robot.exit_m @ _OBLIQUE.T
-    for axes, here, there, k in zip(np.atleast_1d(figure.subplots(1, len(rows))), meant, moved, rows, strict=True):
-        for a, p, q in zip(exits, here @ _OBLIQUE.T, there @ _OBLIQUE.T, strict=True):
-            axes.plot(*np.stack([a, p], 1), color=QUIET, lw=0.8)
-            axes.plot(*np.stack([a, q], 1), color=HOLD, lw=0.6, ls=":")
-        for points, colour in ((here @ _OBLIQUE.T, CHAIN), (there @ _OBLIQUE.T, HOLD)):
-            for i, j in platform_edges(robot.platform_m):
-                axes.plot(*points[[i, j]].T, color=colour, lw=1.4)
-            axes.plot(*points.T, color=colour, lw=0, marker="o", ms=2.5)
+    panels = np.atleast_1d(figure.subplots(1, len(rows)))
+    for axes, here, there, k in zip(panels, meant @ _OBLIQUE.T, moved @ _OBLIQUE.T, rows, strict=True):
+        _draw_wires(axes, exits, here, color=QUIET, lw=0.8)
+        _draw_wires(axes, exits, there, color=HOLD, lw=0.6, ls=":")
+        _draw_platform(axes, robot, here, CHAIN)
+        _draw_platform(axes, robot, there, HOLD)
         axes.scatter(*exits.T, color=INK, s=7)
         axes.set_aspect("equal")
         axes.set_axis_off()
         carried = f", {history.payload_kg[k]:g} kg" if history.payload_kg.max() > 0 else ""
         axes.set_title(f"{history.times_s[k]:g} s{carried}", fontsize=9, color=INK)
     return figure
+
+
+def _draw_wires(axes: Axes, exits: Floats, points: Floats, **style: Any) -> None:
+    for exit_point, point in zip(exits, points, strict=True):
+        axes.plot(*np.stack([exit_point, point], 1), **style)
+
+
+def _draw_platform(axes: Axes, robot: Robot, points: Floats, colour: str) -> None:
+    for i, j in platform_edges(robot.platform_m):
+        axes.plot(*points[[i, j]].T, color=colour, lw=1.4)
+    axes.plot(*points.T, color=colour, lw=0, marker="o", ms=2.5)
 
 
 def moving(robot: Robot, history: History, found: HistoryAnswer) -> str:
