@@ -97,6 +97,14 @@ def test_the_tested_ranges_are_each_lines_own():
     assert message == [Notice("extrapolation", "wire thick: tensions 5 N leave the tested range 0 to 1 N")]
 
 
+@pytest.mark.parametrize(("least", "said"), [(0.0149, "0 to 15"), (0.0151, "0.0151 to 15")])
+def test_a_tension_that_vanishes_beside_the_largest_is_none(least, said):
+    robot = schema.read_robot_file("linear-6")
+    line = replace(_line(2), tension_range_N=(1.0, 9.0))
+    (message,) = draws.wire_warnings(robot, line, np.array([[least, *[15.0] * 5]]), 60.0, np.ones((1, 6)))
+    assert message.text == f"tensions {said} N leave the tested range 1 to 9 N"
+
+
 def test_only_lines_that_legs_hang_on_warn():
     one = GivenWire({"k1": 800.0, "B": 0.3, "U": 1.0, "k2": 0.03, "N": 0.6}, 1000.0)
     robot = replace(_mixed(schema.read_robot_file("linear-6"), range(6)), given={THICK: one})

@@ -339,9 +339,13 @@ def wire_warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: floa
 
 
 def _span(values: Floats, form: str) -> str:
-    """The least and the largest of values, once where they look alike."""
-    least, largest = format(values.min(), form), format(values.max(), form)
-    return least if least == largest else f"{least} to {largest}"
+    """The least and the largest of positive values, once where they look alike; 0 for one that vanishes beside it."""
+    least, largest = float(values.min()), float(values.max())
+    ends = [format(end if end >= _VANISHES * largest else 0.0, form) for end in (least, largest)]
+    return " to ".join(dict.fromkeys(ends))
+
+
+_VANISHES = 1e-3  # share of the largest value: its third digit
 
 
 def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[Notice]:
