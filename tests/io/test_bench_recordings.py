@@ -291,6 +291,7 @@ def test_a_move_in_a_pause_of_the_recording_has_no_duration(pause_s, recorded_mo
     notes = " ".join(imported["experiments"]["raw"]["notes"])
     assert imported["warnings"] == []
     assert ("each hold begins at its first reading, for no move to one was recorded" in notes) != recorded_move
+    assert ("fit with --effect late_clock" in notes) != recorded_move
     assert ("moves took 0.1 s (median)" in notes) == recorded_move
 
 

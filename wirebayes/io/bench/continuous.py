@@ -121,7 +121,10 @@ def _notes(readings: Readings, holds: int, kept: int, move_s: float) -> list[str
     """What was understood and done."""
     noise = noise_of(readings.setting, readings.step)
     count = len(readings.setting)
-    begins = "each hold begins at its first reading, for no move to one was recorded"
+    begins = (
+        "each hold begins at its first reading, for no move to one was recorded; if it had begun some seconds before, fit "
+        "with --effect late_clock, which estimates how many: without it k2 and N would be wrong"
+    )
     if move_s > 0.0:
         begins = (
             "each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
