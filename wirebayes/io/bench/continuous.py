@@ -122,7 +122,7 @@ def _notes(readings: Readings, holds: int, kept: int, move_s: float) -> list[str
     noise = noise_of(readings.setting, readings.step)
     count = len(readings.setting)
     begins = (
-        "each hold begins at its first reading, for no move to one was recorded; if it had begun some seconds before, fit "
+        "each hold begins at its first reading, for no move to one was recorded; if it had begun seconds before, fit "
         "with --effect late_clock, which estimates how many: without it k2 and N would be wrong"
     )
     if move_s > 0.0:
