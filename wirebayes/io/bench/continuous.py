@@ -9,7 +9,7 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
-from wirebayes.io.bench.recorded import CONTINUOUS, PAUSE, Cut, Readings, level_of
+from wirebayes.io.bench.recorded import BEGUN_BEFORE, CONTINUOUS, PAUSE, Cut, Readings, level_of
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.sentences import counted, lasting
@@ -121,10 +121,7 @@ def _notes(readings: Readings, holds: int, kept: int, move_s: float) -> list[str
     """What was understood and done."""
     noise = noise_of(readings.setting, readings.step)
     count = len(readings.setting)
-    begins = (
-        "each hold begins at its first reading, for no move to one was recorded; if it had begun seconds before, fit "
-        "with --effect late_clock, which estimates how many: without it k2 and N would be wrong"
-    )
+    begins = f"each hold begins at its first reading, for no move to one was recorded; {BEGUN_BEFORE}"
     if move_s > 0.0:
         begins = (
             "each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "

@@ -15,6 +15,7 @@ from wirebayes.io.bench.control import BY_CHANCE as TREND_BY_CHANCE
 from wirebayes.io.bench.control import trend_by_chance
 from wirebayes.io.bench.plateaus import FEWEST, plateaus
 from wirebayes.io.bench.recorded import (
+    BEGUN_BEFORE,
     CONTINUOUS,
     PAUSE,
     Cut,
@@ -141,7 +142,8 @@ def _cut_into_groups(
         zeros = _between_readings(times)
         at_first = all(zero == of_hold[0] for zero, of_hold in zip(zeros, times, strict=True))
         begins = "at its first reading" if at_first else "between the last reading before it and its first"
-        notes.append(f"times of the whole test: each hold begins {begins} and lasts until the next begins")
+        before = f"; {BEGUN_BEFORE}" if at_first else ""
+        notes.append(f"times of the whole test: each hold begins {begins} and lasts until the next begins{before}")
         ends, of_resets = _ends(times, zeros)
         if of_resets:
             holds = listed([str(i + 2) for i in of_resets])

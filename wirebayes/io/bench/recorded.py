@@ -17,6 +17,10 @@ Rows = Ints
 CONTINUOUS = 30  # readings of the usual hold that nobody writes by hand
 PAUSE = 1.5  # of the usual interval between readings: a longer one is a pause in the recording
 STEADY = 0.25  # of the smallest step: less scatter in a hold is the encoder's
+BEGUN_BEFORE = (
+    "if it had begun seconds before, fit with --effect late_clock, which estimates how many: without it k2 and N would "
+    "be wrong"
+)
 
 
 @dataclass(frozen=True)
