@@ -212,7 +212,7 @@ def test_command_refuses_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixtu
     file = str(FOLDER / "experiments.toml")
     for words, message in (
         (["--only", "springy", "--experiment", "kite-1.5m"], "--only springy"),
-        (["--train-holds", "40"], "found 40 training holds"),
+        (["--train-holds", "40"], "found --train-holds 40"),
         (["--experiment", "kite"], "did you mean kite-1.5m"),
     ):
         assert cli.main(["compare", file, "--output", str(tmp_path / "no"), *words]) == 2
