@@ -196,6 +196,12 @@ def span(low: Any, high: Any, digits: int | None = None) -> str:
     return " … ".join(ends)
 
 
+def from_to(low: float, high: float) -> str:
+    """The least and the largest of several standard errors, to two digits; one number where they agree."""
+    ends = number(low, 2), number(high, 2)
+    return ends[0] if ends[0] == ends[1] else " … ".join(ends)
+
+
 def middle_and_span(middle: float | None, low: float | None, high: float | None) -> list[str]:
     """A median and its interval, as two cells of a table.
 

@@ -19,6 +19,7 @@ from wirebayes.json_files.summary import SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.sentences import (
     counted,
+    from_to,
     lasting,
     likely,
     listed,
@@ -252,13 +253,13 @@ def calibration_in_a_sentence(found: CalibrateJson) -> str:
     if not known["converged"]:
         return "Not converged: there are no lengths to use."
     sd = [1e3 * value for value in known["length_m"]["sd"]]
-    lengths = f"{span(min(sd), max(sd), 2)} mm (standard errors), from {found['read']} of "
+    lengths = f"{from_to(min(sd), max(sd))} mm (standard errors), from {found['read']} of "
     lengths += f"{counted(found['holds'], 'hold')}."
     points = 1e3 * np.array(found["exit_points_m"]["sd"], float)
     if not np.any(points > 0):
         return f"The zero-tension lengths of {found['robot']}'s {len(sd)} wires are known to {lengths}"
     before = found["prior"].get("anchor_sd_mm", 0.0)
     return (
-        f"The exit points of {found['robot']}'s {len(sd)} wires are known to {span(points.min(), points.max(), 2)} mm "
+        f"The exit points of {found['robot']}'s {len(sd)} wires are known to {from_to(points.min(), points.max())} mm "
         f"(before: {number(before)} mm), their zero-tension lengths to {lengths}"
     )

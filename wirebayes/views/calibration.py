@@ -1,14 +1,10 @@
 """Lengths of a robot's wires, estimated from its own sensors."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from wirebayes.answers import terminal
 from wirebayes.json_files.calibrate import CalibrateJson
-
-if TYPE_CHECKING:
-    pass
-
 from wirebayes.views.result import NOTHING, Given, Result, html_table
 
 
@@ -33,7 +29,7 @@ class Calibration(Result[CalibrateJson]):
             again = "with more poses, or once readings, stated errors and --anchor-sd are checked"
             return f"wirebayes calibrate {given.file} {again}"
         if robot.is_file():
-            settings = f"wirebayes export {robot} --wires {given.wires}  (the controller's settings)"
+            settings = f"wirebayes export {robot} --wires {given.wires}  (for controllers and simulators)"
             return f"{settings}, with the references of {lengths}"
         return f"set the lengths of {lengths} in the controller"
 

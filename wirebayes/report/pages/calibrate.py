@@ -24,13 +24,12 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     seed_of_page,
-    span,
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pictures.calibrate import reference_errors
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
-from wirebayes.sentences import counted
+from wirebayes.sentences import coordinates, counted, from_to
 
 
 def calibrate_page(folder: Path, configuration: dict[str, Any]) -> Page:
@@ -139,8 +138,8 @@ def _known(found: CalibrateJson) -> Points:
     if found["pose_now"] is None:
         return Points("What is known", ["Neither the lengths nor the pose.", found["observability"]["sentence"]])
     sd = [1e3 * v for v in found["with_creep_model"]["length_m"]["sd"]]
-    place = ", ".join(number(v) for v in found["pose_now"]["position_m"])
-    text = f"Every length is known to {span(min(sd), max(sd), 2)} mm (standard error)."
+    place = coordinates(found["pose_now"]["position_m"])
+    text = f"Every length is known to {from_to(min(sd), max(sd))} mm (standard error)."
     return Points("What is known", [text, f"The platform is at ({place}) m.", found["observability"]["sentence"]])
 
 
@@ -201,7 +200,7 @@ def _biases(creep: EstimatedLengths) -> list[Block]:
 
 def _milli(value: float | None) -> str:
     """Thousandths; a search that did not converge may leave none."""
-    return "–" if value is None else f"{1e3 * value:.2f}"
+    return "–" if value is None else f"{1e3 * value:z.2f}"
 
 
 def _next(found: CalibrateJson) -> list[Block]:

@@ -30,6 +30,7 @@ from wirebayes.report.blocks import (
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages import pose_history
 from wirebayes.report.pages.robot_view import robot_view
+from wirebayes.report.pages.wires_known import wires_known
 from wirebayes.report.pictures.robot import CONTROLLERS
 from wirebayes.robot.mechanics.draws import specimens_in_words
 from wirebayes.sentences import lasting, quantity, specimens_are
@@ -107,10 +108,7 @@ def _requested(pose: PoseJson) -> Points:
     if "plane" in pose:
         points.append(pose["plane"]["sentence"])
     if wires:
-        tested = f"{wires['tested_length_mm']:g} mm"
-        effects = wires["effects"]
-        model = f"the plain model with {', '.join(effects).replace('_', ' ')}" if effects else "the plain model"
-        points.append(f"Wires known from {wires['draws']} posterior draws of a sample of {tested}: {model}.")
+        points.append(wires_known(wires))
         points += specimens_in_words(wires)
         if pose.get("inverse"):
             low, high = (f(pose["inverse"]["tension_N"]) for f in (min, max))

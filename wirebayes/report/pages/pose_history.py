@@ -25,8 +25,9 @@ from wirebayes.report.blocks import (
     span,
 )
 from wirebayes.report.glossary import meaning
+from wirebayes.report.pages.wires_known import wires_known
 from wirebayes.robot.mechanics.draws import specimens_in_words
-from wirebayes.sentences import counted, spoken
+from wirebayes.sentences import counted, from_to
 
 _CAPTIONS = {
     "motion": "The whole history: where the platform is meant to be (blue) and, enlarged, where it is (red).",
@@ -82,15 +83,13 @@ def pose_history_page(folder: Path, configuration: dict[str, Any], pose: PoseHis
 
 def _requested(pose: PoseHistoryJson) -> list[str]:
     history, wires = pose["history"], pose["wires"]
-    effects = ", ".join(map(spoken, wires["effects"]))
-    model = f"the plain model with {effects}" if effects else "the plain model"
     kind = "measured joint values" if history["kind"] == "measured" else "commanded poses"
     out = [
         f"{counted(history['rows'], 'row')} of {kind} over {number(float(history['duration_s']))} s; platform of "
         f"{pose['mass_kg']:g} kg"
         + (f", payload up to {history['highest_payload_kg']:g} kg." if history["highest_payload_kg"] else "."),
-        f"Wires known from {wires['draws']} posterior draws of a sample of {wires['tested_length_mm']:g} mm: {model}. "
-        f"Specimens of one line differ by {100 * history['specimen_spread']:g} %. {_began(history)}",
+        f"{wires_known(wires)} Specimens of one line differ by {100 * history['specimen_spread']:g} %. "
+        f"{_began(history)}",
     ]
     out += specimens_in_words(wires)
     started = f"The wires' clocks started {counted(history['holds'], 'time')}"
@@ -121,7 +120,7 @@ def _began(history: HistoryOfRobot) -> str:
     return (
         f"The history goes on where a calibration of {counted(known['holds'], 'hold')} and "
         f"{_seconds(known['duration_s'])} s ended: its posterior gives the wires, their creep so far and their "
-        f"reference lengths, which it knows to {span(min(sd), max(sd), 2)} mm (standard error)."
+        f"reference lengths, which it knows to {from_to(min(sd), max(sd))} mm (standard error)."
     )
 
 
