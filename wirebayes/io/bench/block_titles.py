@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from wirebayes.io.bench.header import name_and_unit
 from wirebayes.io.bench.joined import lacking
 from wirebayes.io.bench.quantities import ROLES, Role, quantity_unit
-from wirebayes.io.bench.sheet import is_measured
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.unread import names_a_specimen
 from wirebayes.io.bench.words import LENGTHS, are_a_statistic, speaks_of_a_quantity, words_in
@@ -68,7 +67,7 @@ def _blocks(table: RawTable) -> list[_Block]:
     above: list[str] = []
     in_block = False
     for row in table.sheet.rows:
-        is_reading = row.line > table.header_line and is_measured(row.filled) and not row.comment
+        is_reading = row.line > table.header_line and row.may_be_a_reading and not row.comment
         if is_reading and not are_a_statistic(row.filled):
             if not in_block:
                 blocks.append(_Block(row.line, above))
@@ -94,7 +93,7 @@ def _with_column(table: RawTable, blocks: Sequence[_Block], name: str, said: Cal
     rows = []
     for row in table.rows:
         block = max((i for i, b in enumerate(blocks) if b.begin <= row.line), default=0)
-        cells = *(row.cell(i) for i in range(width)), values[block][0] if is_measured(row.filled) else ""
+        cells = *(row.cell(i) for i in range(width)), values[block][0] if row.may_be_a_reading else ""
         rows.append(replace(row, cells=cells))
     first, last = (" ".join(filter(None, value)) for value in (values[0], values[-1]))
     described = f"{table.sheet.described}, the {name} of each block from the line above it ({first} to {last})"

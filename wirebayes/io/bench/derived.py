@@ -74,10 +74,11 @@ def _are_signed(table: RawTable, index: int) -> bool:
 
 def _has_signs(cells: list[str]) -> bool:
     """Whether cells have signs, and so few decimals as people write; instruments print signs, too."""
-    with_plus = any(cell.startswith("+") for cell in cells)
+    if not any(cell.startswith("+") for cell in cells):
+        return False
     if any(len(re.split("[.,]", cell)[-1]) > DECIMALS for cell in cells if re.search("[.,]", cell)):
         return False
-    return with_plus and all(cell[0] in "+-\u2212" or not cell.strip("0.,") for cell in cells)
+    return all(cell[0] in "+-\u2212" or not cell.strip("0.,") for cell in cells)
 
 
 def _factor_of(found: re.Match[str]) -> float:

@@ -3,12 +3,15 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from wirebayes.io.bench.compound_times import is_spelt
 
 _SPACES = " \u00a0\u2009\u202f"
-_NUMBER = re.compile(rf"[+\-\u2212]?(\d{{1,3}}([.,'\u2019{_SPACES}]\d{{3}})+|\d*)([.,]\d*)?([eE][+-]?\d+)?")
+_NUMBER = re.compile(  # with a digit before its exponent
+    rf"(?=[^eE]*\d)[+\-\u2212]?(\d{{1,3}}([.,'\u2019{_SPACES}]\d{{3}})+|\d*)([.,]\d*)?([eE][+-]?\d+)?"
+)
 _OF_INCH = re.compile(r"(?:(\d+)[ -])?(\d+)/(2|4|8|16|32|64)")
 # By the first three letters of their names in English and German.
 MONTHS = {
@@ -26,6 +29,7 @@ _CLOCK = (
 )
 # 2026年6月14日 9時58分0秒 in Japanese, and in Chinese
 _EAST_ASIAN = str.maketrans({"年": "-", "月": "-", "日": " ", "時": ":", "时": ":", "点": ":", "分": ":", "秒": " "})
+_EAST_ASIAN_SIGNS = {"年", "時", "时"}
 _MOMENT = re.compile(rf"(?P<date>{_DATE})([T ]+{_CLOCK})?", re.IGNORECASE)
 _BARE_CLOCK = re.compile(rf"(?P<date>(?!))?{_CLOCK}", re.IGNORECASE)  # the same groups, without a date
 
@@ -52,6 +56,11 @@ class SheetRow:
     def filled(self) -> list[str]:
         """The cells that hold something."""
         return [cell for cell in self.cells if cell]
+
+    @cached_property
+    def may_be_a_reading(self) -> bool:
+        """Whether its cells are measured, as `is_measured` says; asked several times of every row."""
+        return is_measured(self.filled)
 
     def cell(self, column: int) -> str:
         """A cell, empty where the line is shorter."""
@@ -97,7 +106,7 @@ def letters(column: int) -> str:
 
 def is_number(cell: str) -> bool:
     """Whether a cell looks like a number in any country's writing."""
-    return bool(_NUMBER.fullmatch(cell)) and any(c.isdigit() for c in cell.lower().partition("e")[0])
+    return _NUMBER.fullmatch(cell) is not None
 
 
 def of_fraction(cell: str) -> str | None:
@@ -108,7 +117,9 @@ def of_fraction(cell: str) -> str | None:
 
 def moment(cell: str) -> re.Match[str] | None:
     """The parts of a cell that is a clock, a date, or both: the groups of the patterns above; None where it is none."""
-    if any(sign in cell for sign in "年時时"):
+    if is_number(cell):  # as most cells of long files are
+        return None
+    if not _EAST_ASIAN_SIGNS.isdisjoint(cell):
         cell = cell.translate(_EAST_ASIAN).strip(" :")
     return _BARE_CLOCK.fullmatch(cell) or _MOMENT.fullmatch(cell)
 

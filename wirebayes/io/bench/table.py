@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import ROLES, quantity_unit
-from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
+from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
 from wirebayes.io.bench.words import are_a_statistic, speaks_of_a_quantity
 
 _ALIKE = 3  # rows that begin the readings: a preamble has a line of numbers now and then
@@ -87,7 +87,7 @@ class RawTable:
 
     def column(self, column: int) -> list[str]:
         """The cells of a column."""
-        return [row.cell(column) for row in self.rows]
+        return [row.cells[column] if column < len(row.cells) else "" for row in self.rows]
 
     def check_names(self) -> None:
         """Refuse two columns of one name.
@@ -220,7 +220,7 @@ def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: 
     named = len(head.cells)
     for row in body:
         too_long = len(row.cells) > width or any(map(is_value, row.cells[named:]))
-        if too_long and is_measured(row.filled):
+        if too_long and row.may_be_a_reading:
             sign = " (a comma as decimal sign needs another sign between cells)" if "comma" in sheet.described else ""
             raise InputError(
                 f"{sheet.path}, line {row.line}, column {sheet.column_name(named)}: found {len(row.cells)} cells, "
@@ -231,7 +231,7 @@ def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: 
 def _check_headers_repeat(sheet: Sheet, above: Sequence[SheetRow], head: SheetRow, body: Sequence[SheetRow]) -> None:
     """Refuse a header between readings, or its row of units, that is another than the one above the first of them."""
     known = {_in_small_letters(row) for row in above}
-    readings = [i for i, row in enumerate(body) if is_measured(row.filled) and not are_a_statistic(row.filled)]
+    readings = [i for i, row in enumerate(body) if row.may_be_a_reading and not are_a_statistic(row.filled)]
     for row in body[: max(readings, default=0)]:
         if len(row.filled) == 1 or any(map(is_value, row.filled)) or _in_small_letters(row) in known:
             continue
@@ -249,7 +249,7 @@ def _in_small_letters(row: SheetRow) -> tuple[str, ...]:
 def _first(rows: tuple[SheetRow, ...]) -> int | None:
     """The first row of readings: one that is followed by rows like it, in one of which a reading may be missing."""
     of_table = [i for i, row in enumerate(rows) if not row.comment]
-    measured = {i: is_measured(rows[i].filled) for i in of_table}
+    measured = {i: rows[i].may_be_a_reading for i in of_table}
     for place, i in enumerate(of_table):
         following = of_table[place : place + _ALIKE]
         gaps = [k for k in following if not measured[k]]
