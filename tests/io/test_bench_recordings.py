@@ -308,10 +308,44 @@ def test_cycles_before_a_hold_are_no_part_of_the_move_to_it(tmp_path, turns, nam
         "t (s),x (mm),F (N)\n" + "\n".join(f"{t},{place},{5 * place + 1}" for t, place in zip(time, x, strict=True))
     )
     made = convert(path, About("wire", "line", 1000.0), Choices())
-    first = made.experiment.holds[0]
+    first = made.experiment.recorded_holds[0]
     middle = 0.5 * len(way) - 2.0 if turns in ([], [5.0, 0.0, 5.0, 0.0]) else None
     assert made.recording is not None
     if middle is not None:
-        assert made.recording.start_s[0] == pytest.approx(middle, abs=0.3)
+        assert made.recording.start_s[int(named)] == pytest.approx(middle, abs=0.3)
     assert first.setting == 4.0
-    assert any("went to and fro between" in notice.text for notice in made.warnings) == named
+    assert any("went to and fro between" in note for note in made.notes) == named
+    assert len(made.unrecorded) == named
+
+
+@pytest.mark.parametrize(("low", "pulls_as_at"), [(0.0, 2.0), (-4.0, 1.0)])
+@pytest.mark.parametrize("before_hold", [1, 2])
+def test_cycles_are_a_hold_without_readings_where_the_wire_pulls_as_in_their_mean(
+    tmp_path, low, pulls_as_at, before_hold
+):
+    """Ten times from 0 or -4 to 4 mm, as fast as the moves: where it is slack the wire pulls with nothing, not less."""
+    way = np.linspace(low, 4.0, 41)
+    cycles = np.tile(np.concatenate([way, way[-2:0:-1]]), 10)
+    low_again = [low]
+    held = [np.full(900, 2.0), np.full(900, 3.0)]
+    pieces = [np.full(10, low), np.linspace(low, 2.0, 21)[1:-1], held[0], np.linspace(2.0, 3.0, 11)[1:-1], held[1]]
+    if before_hold == 1:
+        pieces[1:1] = [cycles, low_again]
+    else:
+        pieces[3:4] = [np.linspace(2.0, low, 21)[1:-1], cycles, low_again, np.linspace(low, 3.0, 31)[1:-1]]
+    x = np.concatenate(pieces)
+    rows = [f"{0.5 * i},{place:.4f},{max(5.0 * place, 0.0):.4f}" for i, place in enumerate(x)]
+    path = tmp_path / "raw.csv"
+    path.write_text("t (s),x (mm),F (N)\n" + "\n".join(rows))
+    made = convert(path, About("wire", "line", 1000.0), Choices())
+    (stated,) = made.unrecorded
+    assert stated["before_hold"] == before_hold
+    assert stated["displacement_mm"] == pytest.approx(pulls_as_at, abs=0.1)
+    assert stated["duration_s"] == pytest.approx(0.5 * len(cycles), abs=25.0)
+    durations = [hold.duration_s for hold in made.experiment.holds]
+    assert sum(durations) == pytest.approx(0.5 * len(x), abs=60.0)
+    assert [hold.recorded for hold in made.experiment.holds].index(False) == before_hold - 1
+    imported = wb.import_bench(path, length_mm=1000.0, name="wire", output=tmp_path / "out")
+    written = wb.read_experiments(tmp_path / "out" / "wire.toml")[0]
+    assert [h.setting for h in written.holds] == [h.setting for h in imported.experiments[0].holds]
+    assert [h.duration_s for h in written.holds] == pytest.approx(durations)

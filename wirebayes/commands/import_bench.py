@@ -288,7 +288,7 @@ def _write(folder: Path, tests: Sequence[tuple[str, Converted]]) -> None:
         experiment = test.experiment
         write_csv(folder / f"{experiment.name}.csv", test.header, test.rows)
         sentences = [f"{note[:1].upper()}{note[1:]}." for note in (f"from {raw}", *test.notes)]
-        tables.append(toml_of(experiment, sentences))
+        tables.append(toml_of(experiment, sentences, test.unrecorded))
         understood(experiment, folder / f"{experiment.name}.svg", test.recording)
         steps = experiment.control == "displacement"
         content["experiments"][experiment.name] = {

@@ -11,16 +11,19 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.columns import Column
 from wirebayes.io.bench.quantities import UNITS, Role
+from wirebayes.io.bench.recorded import Cycles
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.table_numbers import COLUMN_ROLES
 from wirebayes.io.bench.undecided import Undecided, quoted
 from wirebayes.io.data_checks import falls
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import experiment_of
+from wirebayes.io.readings import SET
 from wirebayes.strict.table import CsvTable
 from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control
 
+Entry = dict[str, float]  # of a hold without a record: before_hold, what was set, duration_s
 RESOLUTION: dict[Control, str] = {"displacement": "resolution_N", "force": "resolution_mm"}
 
 
@@ -82,6 +85,7 @@ def as_experiment(
     about: About,
     resolution: float | None,
     control: Control,
+    unrecorded: Sequence[Entry] = (),
 ) -> Experiment:
     """The experiment checked as the reader of files checks its own, blaming the raw file's lines.
 
@@ -98,10 +102,13 @@ def as_experiment(
     resolution : float or None
         Step of what is read, N or mm.
     control : {"displacement", "force"}
+    unrecorded : sequence of dict
+        Holds without a record, as an experiment file states them.
     """
     keys = {"name": about.name, "material": about.material or about.name, "length_mm": about.length_mm}
     extra: dict[str, Any] = {"control": control} if control != "displacement" else {}
     extra |= {RESOLUTION[control]: resolution} if resolution else {}
+    extra |= {"unrecorded_holds": list(unrecorded)} if unrecorded else {}
 
     def readings() -> CsvTable:
         texts = [["" if value is None else repr(value) for value in row] for row in rows]
@@ -140,8 +147,24 @@ class _Options(Keys):
         return InputError(f"--{key.replace('_', '-')}: found {found}, expected {expected}")
 
 
-def toml_of(experiment: Experiment, comments: Sequence[str] = ()) -> str:
-    """The experiment file of a test whose readings stand in ``NAME.csv`` beside it."""
+def entries_of(cycles: Sequence[Cycles], control: Control) -> list[Entry]:
+    """Cycles as an experiment file states holds without a record."""
+    return [
+        {"before_hold": c.before_hold, SET[control]: c.setting, "duration_s": round(c.end_s - c.begin_s, 3)}
+        for c in cycles
+    ]
+
+
+def toml_of(experiment: Experiment, comments: Sequence[str] = (), unrecorded: Sequence[Entry] = ()) -> str:
+    """The experiment file of a test whose readings stand in ``NAME.csv`` beside it.
+
+    Parameters
+    ----------
+    comments : sequence of str
+        Sentences at its head.
+    unrecorded : sequence of dict
+        Holds without a record.
+    """
     lines = [f"# {comment}" for comment in comments]
     lines += ["[[experiment]]", f"name = {_string(experiment.name)}", f"material = {_string(experiment.material)}"]
     lines.append(f"length_mm = {experiment.length_mm!r}")
@@ -150,6 +173,9 @@ def toml_of(experiment: Experiment, comments: Sequence[str] = ()) -> str:
     if experiment.resolution:
         lines.append(f"{RESOLUTION[experiment.control]} = {experiment.resolution!r}")
     lines.append(f"readings = {_string(experiment.name + '.csv')}")
+    if unrecorded:
+        entries = (", ".join(f"{key} = {value!r}" for key, value in entry.items()) for entry in unrecorded)
+        lines.append(f"unrecorded_holds = [{', '.join(f'{{ {entry} }}' for entry in entries)}]")
     return "\n".join(lines) + "\n"
 
 

@@ -8,11 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from wirebayes.errors import InputError
+from wirebayes.io.bench.cycles import cycles_before
 from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
-from wirebayes.io.bench.recorded import BEGUN_BEFORE, CONTINUOUS, PAUSE, Cut, Readings, level_of
+from wirebayes.io.bench.recorded import BEGUN_BEFORE, CONTINUOUS, PAUSE, Cut, Cycles, Readings, level_of
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats, Ints
-from wirebayes.sentences import counted, lasting
+from wirebayes.sentences import counted
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
 LONG = 10  # times as many readings: shorter holds have none to spare
@@ -32,30 +33,46 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
         The setting never stays, a stretch of it would be dropped, or times do not rise.
     """
     x, time = readings.setting, readings.time_s
+    found_holds = _found(readings)
+    lefts = _lefts(found_holds)
+    turns = [_last_turn(x, left, p) for left, p in zip(lefts, found_holds, strict=True)]
+    moves, zeros = _moves_to(x, time, found_holds, turns)
+    cycles = _cycles(readings, lefts, turns, zeros)
+    rows = [_after_move(time, p, move) for p, move in zip(found_holds, moves, strict=True)]
+    since = [time[r] - zero for r, zero in zip(rows, zeros, strict=True)]
+    ends = _lengths(zeros, cycles, float(time[found_holds[-1].left - 1]))
+    notes = [*resets, *_notes(readings, found_holds, float(np.median(moves))), *(c.sentence for c in cycles)]
+    slow = _slow(np.array(moves), np.array([time[p.end - 1] - time[p.begin] for p in found_holds]))
+    levels = [level_of(x[r]) for r in rows]
+    return Cut(rows, list(range(1, len(rows) + 1)), levels, since, ends, True, notes, time, slow, cycles=cycles)
+
+
+def _found(readings: Readings) -> Sequence[Plateau]:
+    """The holds, which have to be most of the recording."""
     _check_rising(readings)
-    found_holds = plateaus(x, time, readings.step)
+    found_holds = plateaus(readings.setting, readings.time_s, readings.step)
     kept = sum(p.end - p.begin for p in found_holds)
-    if not found_holds or kept < COVERED * len(x):
+    if not found_holds or kept < COVERED * len(readings.setting):
         raise _too_few(readings, found_holds, kept)
     if len(found_holds) == 1:
         _check_only_hold(readings, found_holds[0])
-    moves, zeros = _moves_to(x, time, found_holds)
-    rows = [_after_move(time, p, move) for p, move in zip(found_holds, moves, strict=True)]
-    since = [time[r] - zero for r, zero in zip(rows, zeros, strict=True)]
-    last_s = float(time[found_holds[-1].left - 1])
-    ends: list[float | None] = [end - zero for end, zero in zip([*zeros[1:], last_s], zeros, strict=True)]
-    notes = [*resets, *_notes(readings, len(rows), kept, float(np.median(moves)))]
-    slow = _slow(np.array(moves), np.array([time[p.end - 1] - time[p.begin] for p in found_holds]))
-    levels = [level_of(x[r]) for r in rows]
-    warnings = (*slow, *_to_and_fro(readings, found_holds))
-    return Cut(rows, list(range(1, len(rows) + 1)), levels, since, ends, True, notes, time, warnings)
+    return found_holds
 
 
-def _moves_to(x: Floats, time: Floats, found_holds: Sequence[Plateau]) -> tuple[list[float], list[float]]:
-    """How long the move to each hold took, and when the hold begins."""
-    lefts = [_last_turn(x, left, p) for left, p in zip(_lefts(found_holds), found_holds, strict=True)]
-    zeros = [_moved(x, time, left, p) for p, left in zip(found_holds, lefts, strict=True)]
-    moves = [_lasted(time, left, p, zero) for p, left, zero in zip(found_holds, lefts, zeros, strict=True)]
+def _moves_to(
+    x: Floats, time: Floats, found_holds: Sequence[Plateau], turns: Sequence[int]
+) -> tuple[list[float], list[float]]:
+    """How long the move to each hold took, and when the hold begins.
+
+    Parameters
+    ----------
+    x, time : (r,) array
+    found_holds : sequence of Plateau
+    turns : sequence of int
+        The reading at which the move to each began.
+    """
+    zeros = [_moved(x, time, turn, p) for p, turn in zip(found_holds, turns, strict=True)]
+    moves = [_lasted(time, turn, p, zero) for p, turn, zero in zip(found_holds, turns, zeros, strict=True)]
     moves[0] = min(moves[0], 2.0 * (float(time[found_holds[0].begin]) - zeros[0]))  # without a rest before the test
     return moves, zeros
 
@@ -65,20 +82,26 @@ def _lefts(found_holds: Sequence[Plateau]) -> list[int]:
     return [0, *(p.left - 1 for p in found_holds[:-1])]
 
 
-def _to_and_fro(readings: Readings, found_holds: Sequence[Plateau]) -> tuple[Notice, ...]:
-    """That the wire was cycled before holds, which has no place in a test of holds."""
-    x, time, notices = readings.setting, readings.time_s, []
-    for number, (left, hold) in enumerate(zip(_lefts(found_holds), found_holds, strict=True), start=1):
-        turn = _last_turn(x, left, hold)
-        if turn > left:
-            low, high = float(x[left : turn + 1].min()), float(x[left : turn + 1].max())
-            notices.append(
-                f"before hold {number} the {readings.role} went to and fro between {low:.4g} and {high:.4g} "
-                f"{readings.unit} for {lasting(float(time[turn] - time[left]))}: that is no part of the test, and what "
-                "the wire crept there biases k1 and creep; let it recover before the hold, or state that time as "
-                "unrecorded_holds"
-            )
-    return tuple(Notice("left-out", text) for text in notices)
+def _cycles(
+    readings: Readings, lefts: Sequence[int], turns: Sequence[int], zeros: Sequence[float]
+) -> tuple[Cycles, ...]:
+    """The cycles before holds.
+
+    Parameters
+    ----------
+    lefts, turns, zeros : sequences
+        Of each hold the last reading before what lies before it, the one at which the last move to it began, and when
+        it begins.
+    """
+    before = enumerate(zip(lefts, turns, zeros, strict=True), start=1)
+    return tuple(cycles_before(readings, hold, left, turn, zero) for hold, (left, turn, zero) in before if turn > left)
+
+
+def _lengths(zeros: Sequence[float], cycles: Sequence[Cycles], last_s: float) -> list[float | None]:
+    """How long each hold lasts: until the next one begins, or the cycles before that."""
+    cycled = {c.before_hold: c.begin_s for c in cycles}
+    next_begins = [cycled.get(hold, zero) for hold, zero in enumerate(zeros[1:], start=2)]
+    return [end - zero for end, zero in zip([*next_begins, last_s], zeros, strict=True)]
 
 
 def _last_turn(x: Floats, left: int, hold: Plateau) -> int:
@@ -117,8 +140,9 @@ def _check_rising(readings: Readings) -> None:
         raise readings.complain(row, "time", f"{time[row]:g} s after {time[row - 1]:g} s", "times that rise")
 
 
-def _notes(readings: Readings, holds: int, kept: int, move_s: float) -> list[str]:
+def _notes(readings: Readings, found_holds: Sequence[Plateau], move_s: float) -> list[str]:
     """What was understood and done."""
+    kept = sum(p.end - p.begin for p in found_holds)
     noise = noise_of(readings.setting, readings.step)
     count = len(readings.setting)
     begins = f"each hold begins at its first reading, for no move to one was recorded; {BEGUN_BEFORE}"
@@ -128,8 +152,8 @@ def _notes(readings: Readings, holds: int, kept: int, move_s: float) -> list[str
             f"{move_s:.3g} s (median), and readings as soon after one are left out, up to a tenth of the hold"
         )
     return [
-        f"a continuous recording of {count} readings: {counted(holds, 'hold')} where the {readings.role} stays within "
-        f"{noise:.2g} {readings.unit} or so, {count - kept} readings of moves dropped",
+        f"a continuous recording of {count} readings: {counted(len(found_holds), 'hold')} where the {readings.role} "
+        f"stays within {noise:.2g} {readings.unit} or so, {count - kept} readings of moves dropped",
         begins,
     ]
 

@@ -11,7 +11,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.bench import workbook
 from wirebayes.io.bench.about import About, name_from
-from wirebayes.io.bench.as_experiment import as_experiment, check_direction
+from wirebayes.io.bench.as_experiment import Entry, as_experiment, check_direction, entries_of
 from wirebayes.io.bench.block_titles import with_titles_as_columns
 from wirebayes.io.bench.cell_units import with_units_apart
 from wirebayes.io.bench.clock_parts import with_joined_parts
@@ -60,6 +60,8 @@ class Converted:
         Everything that was recorded, where the file counts time from the beginning of the test.
     warnings : tuple of Notice
         What of the recording has no place in the experiment.
+    unrecorded : sequence of dict
+        Holds without a record, as an experiment file states them.
     """
 
     experiment: Experiment
@@ -68,6 +70,7 @@ class Converted:
     notes: list[str]
     recording: "Recording | None"
     warnings: tuple[Notice, ...]
+    unrecorded: Sequence[Entry] = ()
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ class Recording:
     time_s, displacement_mm, tension_N : (r,) array
         Time since the first reading.
     start_s : (H,) array
-        When each hold begins.
+        When each hold begins, those without a record among them.
     """
 
     time_s: Floats
@@ -196,17 +199,19 @@ def _convert(recorded: Recorded, notes: list[str], about: About, choices: Choice
         notes.append(f"{read}s are written in steps of {resolution:.3g} {unit}: that is their resolution")
     header = (*REQUIRED, *(OPTIONAL if "temperature" in values else ()))
     rows, origin = _rows(holds, values, control)
-    experiment = as_experiment(table, columns, header, rows, origin, about, resolution, control)
+    unrecorded = entries_of(holds.cycles, control)
+    experiment = as_experiment(table, columns, header, rows, origin, about, resolution, control, unrecorded)
     check_direction(table, columns["displacement"], experiment, choices.mapping)
     recording = _recording(holds, values) if holds.of_test else None
-    return Converted(experiment, rows, header, notes, recording, holds.warnings)
+    return Converted(experiment, rows, header, notes, recording, holds.warnings, unrecorded)
 
 
 def _recording(holds: Cut, values: Mapping[Any, Floats]) -> Recording:
     """Everything that was recorded, with the moments at which holds begin."""
     since = holds.clock_s - holds.clock_s[0]
-    starts = np.array([since[of_hold[0]] - t[0] for of_hold, t in zip(holds.rows, holds.time_s, strict=True)])
-    return Recording(since, values["displacement"], values["tension"], starts)
+    starts = [since[of_hold[0]] - t[0] for of_hold, t in zip(holds.rows, holds.time_s, strict=True)]
+    of_cycles = [cycles.begin_s - holds.clock_s[0] for cycles in holds.cycles]
+    return Recording(since, values["displacement"], values["tension"], np.sort([*starts, *of_cycles]))
 
 
 def _control(recorded: Recorded) -> Control:

@@ -45,6 +45,7 @@ def without_weight(holds: Cut, tension_N: Floats) -> Cut:
         end_s=holds.end_s[first:end],
         notes=[*holds.notes, *_notes(first, len(free) - end, [holds.number[i] for i in rests])],
         unread=frozenset(holds.number[i] for i in rests),
+        cycles=tuple(cycles for cycles in holds.cycles if cycles.before_hold <= holds.number[end - 1]),
     )
 
 

@@ -59,6 +59,28 @@ class Readings:
 
 
 @dataclass(frozen=True)
+class Cycles:
+    """Loading and unloading before a hold.
+
+    Attributes
+    ----------
+    before_hold : int
+    setting : float
+        At which a hold as long would have made the wire creep as much.
+    begin_s, end_s : float
+        On the clock of the recording.
+    sentence : str
+        What was recorded and what is made of it.
+    """
+
+    before_hold: int
+    setting: float
+    begin_s: float
+    end_s: float
+    sentence: str
+
+
+@dataclass(frozen=True)
 class Cut:
     """Readings cut into holds.
 
@@ -83,6 +105,7 @@ class Cut:
         What of the recording has no place in holds.
     unread : frozenset of int
         Numbers of holds of which no reading is used.
+    cycles : tuple of Cycles
     """
 
     rows: list[Ints]
@@ -95,6 +118,7 @@ class Cut:
     clock_s: Floats
     warnings: tuple[Notice, ...] = ()
     unread: frozenset[int] = frozenset()
+    cycles: tuple[Cycles, ...] = ()
 
 
 def restarts(readings: Readings) -> Bools:

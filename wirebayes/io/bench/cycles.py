@@ -1,0 +1,65 @@
+"""Cycles of loading and unloading in a recording, as a preconditioning makes them: what the wire creeps under them.
+
+They become a hold that was not recorded. The wire creeps as much as at their mean, to first order in the duration of
+one of them beside the time that the creep takes.
+"""
+
+import numpy as np
+
+from wirebayes.io.bench.no_weight import NEXT_TO_NOTHING
+from wirebayes.io.bench.recorded import Cycles, Readings
+from wirebayes.numeric.typing import Floats
+from wirebayes.sentences import lasting
+
+DEPARTS = 0.05  # of the range of the cycles: nearer to where the wire was before them it still rests there
+TAUT = 0.05  # of the largest reading: at less, an unloaded wire pulls with next to nothing however far it is let go
+
+
+def cycles_before(readings: Readings, before_hold: int, left: int, turn: int, end_s: float) -> Cycles:
+    """The cycles between two readings.
+
+    Parameters
+    ----------
+    readings : Readings
+    before_hold : int
+        Its number.
+    left, turn : int
+        The last reading before what lies between the holds, and the one at which the last move to this hold began.
+    end_s : float
+        When that move was half made: until then the wire counts as where it turned.
+    """
+    x, time = readings.setting[left : turn + 1], readings.time_s[left : turn + 1]
+    low, high = float(x.min()), float(x.max())
+    begin = max(int((np.abs(x - x[0]) > DEPARTS * (high - low)).argmax()) - 1, 0)
+    setting = _equivalent(readings, left + begin, turn, end_s)
+    if readings.role == "tension":
+        setting = max(setting, NEXT_TO_NOTHING * high)
+    begin_s = float(time[begin])
+    sentence = (
+        f"before hold {before_hold} the {readings.role} went to and fro between {low:.4g} and {high:.4g} "
+        f"{readings.unit} for {lasting(end_s - begin_s)}: what the wire crept meanwhile is that of a hold without "
+        f"readings at {setting:.4g} {readings.unit}, where it pulls as in the mean of the cycles"
+    )
+    return Cycles(before_hold, float(f"{setting:.6g}"), begin_s, end_s, sentence)
+
+
+def _equivalent(readings: Readings, begin: int, turn: int, end_s: float) -> float:
+    """The setting at which the wire pulls as in the mean of the cycles; of tensions their mean.
+
+    Displacements at which it pulls with nothing are alike, so their own mean says too little.
+    """
+    rows = slice(begin, turn + 1)
+    time = np.append(readings.time_s[rows], end_s)
+    setting = _mean(readings.setting[rows], time)
+    read = readings.read[rows]
+    taut = read > TAUT * read.max()
+    if readings.role == "tension" or taut.all() or taut.sum() < 2 or np.ptp(read[taut]) == 0.0:
+        return setting
+    slope, at_zero = np.polyfit(read[taut], readings.setting[rows][taut], 1)
+    return float(at_zero + slope * _mean(read, time))
+
+
+def _mean(values: Floats, time_s: Floats) -> float:
+    """The mean over time (r + 1,) of values (r,), the last of which stays until the end."""
+    stays = np.append(values, values[-1])
+    return float(np.trapezoid(stays, time_s) / (time_s[-1] - time_s[0]))
