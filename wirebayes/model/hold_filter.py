@@ -178,7 +178,7 @@ class Later:
         square = self.precision * mean**2 - 2.0 * self.pull * mean - self.pull**2 * var
         return np.asarray(self.constant - 0.5 * (square / wider + np.log(wider)))
 
-    def withfilter_hold(self, line: Linearised, j: int, readings: Array, mask: Array, noise: ReadingNoise) -> "Later":
+    def with_hold(self, line: Linearised, j: int, readings: Array, mask: Array, noise: ReadingNoise) -> "Later":
         """The same with the readings (R, n) of hold j, the one before them, by the creep carried into that hold.
 
         Parameters

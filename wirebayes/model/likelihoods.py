@@ -292,5 +292,5 @@ def without_each_hold(
         m, p = filtered.carried_mean[j], filtered.carried_var[j]
         log_density = out[j] + later.log_density(*carried_unread(line, j, m, p, noise))
         out[j] = np.where(later.square < _ABSURD, log_density, -np.inf)
-        later = later.withfilter_hold(line, j, readings[j], mask[j], noise)
+        later = later.with_hold(line, j, readings[j], mask[j], noise)
     return out
