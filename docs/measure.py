@@ -43,6 +43,7 @@ STUDIES = {
         "wires.json",
     ),
     "coverage": ("-m analyses.posterior.coverage --wires 400 --output {folder}", "coverage.json"),
+    "any_protocol": ("-m analyses.posterior.any_protocol --workers 2 --output {folder}", "any_protocol.json"),
     "robot_agreement": ("analyses/robots/agreement.py 10 --output {folder}/agreement.json", "agreement.json"),
     "robot_calibration": (
         "-m analyses.robots.whole_calibration coverage 200 --seed 4000 --output {folder}/it.json",
@@ -119,6 +120,7 @@ def texts() -> dict[Path, str]:
         DOCS / "calibration.inc": _calibration(kept["calibration"]),
         DOCS / "wires-before.inc": _wires_before(kept["wires_before"]),
         DOCS / "coverage.inc": _coverage(kept["coverage"]),
+        DOCS / "any-protocol.inc": _any_protocol(kept["any_protocol"]),
         DOCS / "robot-calibration.inc": _robot_calibration(kept["robot_calibration"])
         + _lengths_alone(kept["robot_lengths_alone"])
         + _exact_geometry(kept["robot_exact_geometry"]),
@@ -346,6 +348,22 @@ def _coverage(kept: dict[str, Any]) -> str:
         f"the holds contained {100 * found['held_out_coverage']:.1f} % of {found['held_out_readings']} readings. "
         f"{found['not_converged']} of {found['wires']} did not converge.\n"
     )
+
+
+def _any_protocol(kept: dict[str, Any]) -> str:
+    """A paragraph and a table of intervals by protocol, and by whether the wire went slack."""
+    found = kept["result"]
+    names = [name for name in found["shares"]["taut throughout"] if name != "tests"]
+    lines = [
+        f"{_run_of(kept)}; {found['not_converged']} of {found['tests']} did not converge; a fit takes",
+        f"{found['median_evaluations']:.0f} evaluations in the median and {found['most_evaluations']} at most. Shares of",
+        "90 % intervals that hold the truth, in %:",
+        "",
+        *_head("tests", "number", *names),
+    ]
+    for group, shares in found["shares"].items():
+        lines += _row(group, shares["tests"], *(f"{100 * shares[name]:.0f}" for name in names))
+    return "\n".join(lines) + "\n"
 
 
 def _clean_any_scale(kept: dict[str, Any]) -> str:
