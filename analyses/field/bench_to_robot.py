@@ -39,11 +39,11 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import write_csv
+from wirebayes.json_files.summary import CREEP_TIMES_S
 from wirebayes.prediction.request import request_of
 from wirebayes.prediction.table import mixture_table
 from wirebayes.results.jobs import Job, one
 from wirebayes.results.read_back import Stored, load_posterior
-from wirebayes.results.summary import CREEP_TIMES_S
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot

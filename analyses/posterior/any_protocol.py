@@ -1,4 +1,4 @@
-"""Do fits converge, and 90 % intervals hold the truth, whatever the protocol: two holds or forty, few readings or many?
+"""Do fits converge, and 90 % intervals hold the truth, whatever the protocol: few holds or many, few readings or many?
 
 ``python -m analyses.posterior.any_protocol --output out/any_protocol`` draws 600 tests: 2 to 24 holds of 10 s to a day
 with 2 to 24 readings at random times, at displacements (with a way back, with rests) or under weights, each wire from
@@ -75,9 +75,12 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """What the study found."""
     converged = [row for row in rows if row["converged"]]
     evaluations = [row["evaluations"] for row in rows]
-    groups = {kind: [row for row in converged if row["kind"] == kind and not row["slack"]] for kind in KINDS}
-    groups = {"taut throughout": [row for row in converged if not row["slack"]], **groups}
-    groups["slack in a hold"] = [row for row in converged if row["slack"]]
+    taut = [row for row in converged if not row["slack"]]
+    groups = {
+        "taut throughout": taut,
+        **{kind: [row for row in taut if row["kind"] == kind] for kind in KINDS},
+        "slack in a hold": [row for row in converged if row["slack"]],
+    }
     return {
         "tests": len(rows),
         "not_converged": len(rows) - len(converged),

@@ -31,7 +31,12 @@ def test_the_answer_of_a_fit_has_number_unit_and_interval() -> None:
     bands = {
         f"creep_{time}_mm": {"q50": q, "q05": q, "q95": q} for time, q in (("2min", 1.0), ("1h", 2.0), ("1day", 3.0))
     }
-    for held_s, within in ((3599.0, "1.00 mm (1.00 … 1.00) within 2 min"), (3600.0, "(2.00 … 2.00) within 1 h")):
+    for held_s, within in (
+        (3599.0, "1.00 mm (1.00 … 1.00) within 2 min"),
+        (3600.0, "(2.00 … 2.00) within 1 h"),
+        (86399.0, "(2.00 … 2.00) within 1 h"),
+        (86400.0, "(3.00 … 3.00) within 24 h"),
+    ):
         long = SUMMARY | {"longest_hold_s": held_s, "derived": bands | {"tension_N": 4.5}}
         assert within in headline.fit_in_a_sentence(long)  # type: ignore[arg-type]
         (creep,) = (line for line in terminal.of_fit(long | {"effects": []}) if "creep after" in line)

@@ -10,10 +10,10 @@ from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment_file import read_experiments
+from wirebayes.json_files.summary import CREEP_TIMES_S
 from wirebayes.model.build import build
 from wirebayes.results import jobs, read_back, store
 from wirebayes.results.jobs import Job
-from wirebayes.results.summary import CREEP_TIMES_S
 from wirebayes.simulation.synthetic import Bench, Truth, draw, write_tests
 from wirebayes.wire.staircase import simulate
 

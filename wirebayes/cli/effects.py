@@ -25,9 +25,8 @@ def effects_command(name: Name = None, output: Kept = None, seed: Seed = 0, own_
     if name is None:
         lines = _listed(known)
     else:
-        wanted = effect_named(
-            name, catalogue(own_effects)
-        ).name  # an unknown name is refused, with those that there are
+        # an unknown name is refused, with those that there are
+        wanted = effect_named(name, catalogue(own_effects)).name
         (effect,) = [e for e in known if e.name == wanted]
         lines = _described(effect)
     text = "\n".join(lines)

@@ -3,13 +3,7 @@
 import numpy as np
 
 from wirebayes._version import __version__
-from wirebayes.commands.options import (
-    Source,
-    check_seed,
-    data_of,
-    experiments_of,
-    path_of,
-)
+from wirebayes.commands.options import Source, check_seed, data_of, experiments_of, path_of
 from wirebayes.discovery.preview import preview
 from wirebayes.effects import catalogue, source_of
 from wirebayes.inference.fit import seed_of

@@ -72,11 +72,12 @@ def alternatives(
 
 def _others(weights: Mapping[Key, float], names: Key) -> list[Key]:
     """The most probable models that hold `MIXED` of the probability with the final one, that of `names`."""
-    missing = (1.0 - MIXED) * sum(weights.values())
-    left_out = sum(weights.values()) - weights[names]
+    total = sum(weights.values())
+    may_miss = (1.0 - MIXED) * total
+    left_out = total - weights[names]
     found = []
     for key in sorted((k for k in weights if k != names), key=lambda k: -weights[k]):
-        if left_out <= missing:
+        if left_out <= may_miss:
             break
         found.append(key)
         left_out -= weights[key]

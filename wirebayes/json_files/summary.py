@@ -7,6 +7,9 @@ from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.values import Numbers, Statistics
 from wirebayes.notice import Warned
 
+# a hold of the paper, and what a robot on the wire works through
+CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
+
 
 class Mixed(Statistics):
     """Of draws of several chains, and how well these have mixed."""

@@ -9,11 +9,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from wirebayes.json_files.summary import CREEP_TIMES_S
 from wirebayes.model.sample import MATERIAL
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import MOST, contraction, interval
 from wirebayes.results.parameters import unit_of
-from wirebayes.results.summary import CREEP_TIMES_S
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.model import Model
 

@@ -5,7 +5,7 @@ import numpy as np
 from wirebayes.inference.chain_statistics import bulk_ess, r_hat, tail_ess
 from wirebayes.inference.fit import Fit
 from wirebayes.json_files.hold_ends import HoldEnds
-from wirebayes.json_files.summary import Derived, Mixed, Parameter, SummaryJson
+from wirebayes.json_files.summary import CREEP_TIMES_S, Derived, Mixed, Parameter, SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.sample import Sample
 from wirebayes.notice import Notice, NoticeJson, to_json
@@ -14,9 +14,6 @@ from wirebayes.results import hold_ends, posterior_checks
 from wirebayes.results.identifiability import extrapolation, identifiability
 from wirebayes.results.parameters import unit_of, variables
 from wirebayes.wire.fresh import FreshSample
-
-# a hold of the paper, and what a robot on the wire works through
-CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}
 
 
 def derived(wire: FreshSample, tension_N: float) -> Derived:
