@@ -276,7 +276,11 @@ def _without_breaks(test: Converted) -> Converted:
         rows.append([None if gone and column == read else value for column, value in enumerate(row)])
     while count - 1 in dropped and rows[-1][read] is None:
         rows.pop()
-    return replace(test, experiment=kept, rows=rows, notes=[*test.notes, *(f"left out: {e.text}" for e in events)])
+    recording = test.recording
+    if recording is not None:  # holds without a reading at the end are gone
+        recording = replace(recording, start_s=recording.start_s[: len(kept.holds)])
+    notes = [*test.notes, *(f"left out: {e.text}" for e in events)]
+    return replace(test, experiment=kept, rows=rows, notes=notes, recording=recording)
 
 
 def _write(folder: Path, tests: Sequence[tuple[str, Converted]]) -> None:

@@ -13,6 +13,7 @@ from wirebayes.io.bench import clock
 from wirebayes.io.bench.about import About
 from wirebayes.io.bench.columns import Column, understand
 from wirebayes.io.bench.complete_rows import WHERE_MISSING, complete_rows
+from wirebayes.io.bench.marks import without_marks
 from wirebayes.io.bench.numerals import decimal_sign, plain_number
 from wirebayes.io.bench.quantities import UNITS, Role, quantity_unit
 from wirebayes.io.bench.recorded import Readings
@@ -137,7 +138,8 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     not_read = not_read if not_read in {row.line for row in table.rows} else None  # below the readings
     numbers = {role: column for role, column in columns.items() if not _is_of_clocks(table, column)}
     decimal = decimal_sign(table, [column.index for column in numbers.values()], choices.decimal)
-    notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes]
+    table, left_out = without_marks(table, numbers, decimal, choices.drop_breaks)
+    notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes, *left_out]
     texts: dict[Role, list[str]] = {
         role: _numbers(table, column, decimal) for role, column in numbers.items() if role != "hold"
     }
