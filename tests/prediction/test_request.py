@@ -111,10 +111,36 @@ def test_replicates_alone_are_said_to_be_that(tmp_path: Path, stored: Stored) ->
     assert request_of(ask(tmp_path, text), stored).sentence == "holds 1, 3 predicted as replicates of the tested ones"
 
 
+@pytest.mark.parametrize("temperature", ["", "20", "21.5"])
+def test_the_row_that_says_when_a_tested_hold_ended_may_be_repeated(tmp_path: Path, temperature: str) -> None:
+    (tmp_path / "warm.csv").write_text(TRAINED.replace("4,3,0", f"3,2,90,,{temperature}\n4,3,0"))
+    (tmp_path / "warm.toml").write_text(TOML)
+    (experiment,) = read_experiments(tmp_path / "warm.toml")
+    stored = Stored({"k1": np.ones(3)}, build([experiment.train(2)]).samples[0], "chain")
+    text = f"hold,displacement_mm,time_s,temperature_C\n3,2,0,21.0\n3,2,60,21.5\n3,2,90,{temperature}\n"
+    request = request_of(ask(tmp_path, text), stored)
+    assert list(request.prediction.requested) == [False, False, True]
+
+
+@pytest.mark.parametrize(("fresh", "line"), [(False, 4), (True, 3)])
+def test_a_hold_to_come_needs_its_temperature_at_all_times(
+    tmp_path: Path, stored: Stored, fresh: bool, line: int
+) -> None:
+    repeated = "" if fresh else "1,1,0,20\n1,1,60,20.5\n"
+    rows = "7,4,10,25\n7,4,90,\n" if fresh else "7,4,10,\n7,4,90,26\n"
+    table = ask(tmp_path, f"hold,displacement_mm,time_s,temperature_C\n{repeated}{rows}")
+    with pytest.raises(InputError, match=rf"line {line}, column 4 \(temperature_C\): found an empty cell, expected a"):
+        request_of(table, stored, fresh=fresh)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("hold,displacement_mm,time_s\n3,2,0\n3,2,60\n", "no column temperature_C"),
+        (
+            "hold,displacement_mm,time_s,temperature_C\n3,2,0,21.0\n3,2,60,\n",
+            "line 3, column 4 (temperature_C): found an empty cell, expected 21.5, as hold 3 was trained on",
+        ),
         (
             "hold,displacement_mm,time_s,temperature_C\n1,1,0,20\n1,1,60,20.5\n3,2,0,21\n3,2,60,23\n",
             "line 5, column 4 (temperature_C): found 23, expected 21.5",

@@ -68,6 +68,8 @@ def request_of(table: CsvTable, stored: Stored, *, fresh: bool = False) -> Proto
 
 def _of_fresh_sample(file: "_File", stored: Stored) -> ProtocolRequest:
     """The holds are all that ever happens to another sample."""
+    for i in range(len(file.holds)):
+        file.check_temperatures_given(i)
     temperature_C = file.holds[0].temperature_C
     began_at = None if temperature_C is None else float(temperature_C[0])
     alone = protocol_of(file.holds, stored.sample.protocol.length_mm, began_at)
@@ -185,18 +187,27 @@ class _File:
                 known = ", ".join(str(n) for n in sorted(row_of))
                 expected = f"one of the trained holds ({known}), or one after hold {last}, or --fresh"
                 raise self.complain(i, 0, "hold", str(number), expected)
+            else:
+                self.check_temperatures_given(i)
+
+    def check_temperatures_given(self, i: int) -> None:
+        """Refuse a hold to come whose temperature is not known at all times."""
+        temperature_C = self.holds[i].temperature_C
+        if temperature_C is not None and np.isnan(temperature_C).any():
+            k = int(np.flatnonzero(np.isnan(temperature_C))[0])
+            raise self.complain(i, k, "temperature_C", "an empty cell", "a temperature in °C")
 
     def _check_repeat(self, i: int, trained: Protocol, row: int) -> None:
         hold = self.holds[i]
         if hold.setting != trained.setting[row]:
             expected = f"{trained.setting[row]:g}, as hold {hold.number} was trained on"
             raise self.complain(i, 0, SET[hold.control], f"{hold.setting:g}", expected)
-        times = trained.time_s[row][trained.mask[row]]
+        times = read = trained.time_s[row][trained.mask[row]]
         if len(hold.time_s) == len(times) + 1 and trained.duration_s[row] > times[-1]:
             times = np.append(times, trained.duration_s[row])  # the row that says when the hold ended
         self._check_times(i, times)
         if trained.warming_K is not None and trained.reference_C is not None:
-            self._check_temperatures(i, trained.reference_C + trained.warming_K[row][: len(times)])
+            self._check_temperatures(i, trained.reference_C + trained.warming_K[row][: len(read)])
 
     def _check_times(self, i: int, times: Floats) -> None:
         hold = self.holds[i]
@@ -213,11 +224,13 @@ class _File:
         hold = self.holds[i]
         if hold.temperature_C is None:
             return
-        wrong = np.flatnonzero(np.abs(hold.temperature_C - logged) > _SAME_K)
-        if len(wrong):
-            k = int(wrong[0])
+        same = np.abs(hold.temperature_C[: len(logged)] - logged) <= _SAME_K  # an empty cell, NaN, is not the same
+        if not same.all():
+            k = int(np.flatnonzero(~same)[0])
+            empty = np.isnan(hold.temperature_C[k])
+            found = "an empty cell" if empty else f"{hold.temperature_C[k]:g}"
             expected = f"{logged[k]:g}, as hold {hold.number} was trained on"
-            raise self.complain(i, k, "temperature_C", f"{hold.temperature_C[k]:g}", expected)
+            raise self.complain(i, k, "temperature_C", found, expected)
 
 
 _SAME_K = 1e-6  # kelvin: readings are stored as differences from the first, so only rounding is forgiven
