@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analyses.benchmarks import measure, model
+from analyses.benchmarks import cost, measure, model
 from analyses.benchmarks.plain import ours
 from wirebayes.io import paper
 from wirebayes.model.build import build
@@ -22,6 +22,15 @@ def test_a_fit_is_timed_in_its_parts():
 def test_peers_sample_the_same_posterior(wire, likelihood):
     problem = build([paper.experiments()[wire]], spec=ModelSpec(likelihood=likelihood))
     assert model.difference(np, problem, 0) < 1e-8
+
+
+def test_numpy_is_compared_with_compiled_code_by_effect_and_batch(monkeypatch, capsys):
+    monkeypatch.setattr(cost, "BATCHES", (2, 4))
+    monkeypatch.setattr(cost, "REPEATS", 1)
+    found = cost.against_numpy(paper.experiments()[0])
+    assert found.keys() == {"none", *cost.DEAREST}
+    assert all(len(ratios) == 2 and min(ratios) > 0 for ratios in found.values())
+    assert capsys.readouterr().out.count("\n") == 5  # a blank line, a header, a line a model
 
 
 @pytest.mark.parametrize("walkers", [1, 64])

@@ -31,6 +31,7 @@ from wirebayes.model.spec import ModelSpec
 from wirebayes.wire import compiled
 
 BATCH, REPEATS, SEEDS = 256, 7, 20
+DEAREST = ("toe", "superposition")  # effects whose evaluations cost most
 BATCHES = (64, 256, 1024)  # the sampler cuts larger ones into pieces
 PER_EVALUATION = tuple(
     f"{of}_per_{which}" for of in ("ess", "ess_of_means") for which in ("kept_evaluation", "evaluation")
@@ -115,18 +116,25 @@ def against_numpy(wire):
     """Print and return processor time where numpy computes over that of compiled code, by effect and batch."""
     print(f"\n{'numpy over compiled':28s}" + "".join(f"{n:>8d}" for n in BATCHES))
     out = {}
-    for key in ("", "toe", "memory"):
-        problem, out[key or "none"] = build([wire], [effect_named(key)] if key else []), []
-        for n in BATCHES:
-            theta = problem.prior.rvs(n, np.random.default_rng(0))
-            compute, best = partial(problem.log_likelihood, theta), []
-            for kernel in (compiled.kernel, None):
-                with patch.object(compiled, "kernel", kernel):
-                    compute()
-                    best.append(min(timeit.repeat(compute, number=5, repeat=REPEATS, timer=time.process_time)))
-            out[key or "none"].append(best[1] / best[0])
-        print(f"  {key or 'none':26s}" + "".join(f"{ratio:8.1f}" for ratio in out[key or "none"]), flush=True)
+    models = {"none": build([wire])} | {key: build([wire], [effect_named(key)]) for key in DEAREST}
+    for key, problem in models.items():
+        out[key] = [_numpy_over_compiled(partial(problem.log_likelihood, _prior_draws(problem, n))) for n in BATCHES]
+        print(f"  {key:26s}" + "".join(f"{ratio:8.1f}" for ratio in out[key]), flush=True)
     return out
+
+
+def _numpy_over_compiled(compute):
+    """Processor time of a function without the compiled kernel over that with it."""
+    best = []
+    for kernel in (compiled.kernel, None):
+        with patch.object(compiled, "kernel", kernel):
+            compute()
+            best.append(min(timeit.repeat(compute, number=5, repeat=REPEATS, timer=time.process_time)))
+    return best[1] / best[0]
+
+
+def _prior_draws(problem, count):
+    return problem.prior.rvs(count, np.random.default_rng(0))
 
 
 def with_effects(keys):
