@@ -256,6 +256,24 @@ def test_a_top_outside_is_followed_outwards_six_times_at_most(monkeypatch: pytes
     assert outwards(tried(monkeypatch, 1e9, at_end)) == []  # the end of the prior is the end
 
 
+def test_climbs_that_bring_no_news_are_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Outwards of the least amplitude lies what has just been tried; beyond an end, climbs that converge nowhere."""
+    assert len(outwards(tried(monkeypatch, 0.1, effect_named("toe")))) == 1
+    grid, rounds = np.array([1.0, 2.0, 3.0]), []
+
+    def climbed(amplitudes: np.ndarray, begin: Any) -> Profile:
+        rounds.append(amplitudes.tolist())
+        return Profile(amplitudes, np.full(len(amplitudes), -np.inf), [])
+
+    nowhere: Any = SimpleNamespace(
+        low=-np.inf, high=np.inf, neutral=0.0, per_delta=1.0, one_sided=True, outwards=lambda at: 2.0 * at + grid
+    )
+    nowhere.climbed = climbed
+    profile = Profile(grid, 9.0 * grid, [])
+    assert refit._looked_closer(nowhere, profile) is profile
+    assert rounds == [[7.0, 8.0, 9.0], pytest.approx(np.linspace(2.0, 3.0, 8)[1:-1])]
+
+
 def test_around_the_best_lie_six_between_its_neighbours_or_beyond_an_end() -> None:
     grid = np.array([1.0, 3.0, 4.0])
 

@@ -181,16 +181,28 @@ def _looked_closer(amplitude: _Amplitude, profile: Profile) -> Profile:
     while closer < _CLOSER and not (closer and has_near_neighbours(profile)):
         at = float(profile.amplitude[profile.best])
         at_end = profile.best in (0, len(profile.amplitude) - 1)
-        if at_end and amplitude.low < at < amplitude.high and at != amplitude.neutral and outward < _OUTWARD:
+        goes_on = at_end and amplitude.low < at < amplitude.high and at != amplitude.neutral and outward < _OUTWARD
+        if goes_on:
             # The scan's unit was too small, or climbs from afar ended nowhere: go on outwards before looking closer.
             finer = amplitude.outwards(at)
             outward += 1
         else:
             finer = _around(profile, amplitude.neutral if amplitude.one_sided else None, amplitude.per_delta)
             closer += 1
-        begin = [_between(profile.amplitude, ends.z, profile.best, finer) for ends in profile.ends]
-        profile = profile.joined(amplitude.climbed(finer, begin)).known()
+        found = _with_news(amplitude, profile, finer)
+        if found is profile:  # nor would the same climbs again bring any
+            outward, closer = (_OUTWARD, closer) if goes_on else (outward, _CLOSER)
+        profile = found
     return profile
+
+
+def _with_news(amplitude: _Amplitude, profile: Profile, finer: Array) -> Profile:
+    """The profile with further amplitudes; itself where these are known, or no climb at a new one converges."""
+    if np.isin(finer, profile.amplitude).all():
+        return profile
+    begin = [_between(profile.amplitude, ends.z, profile.best, finer) for ends in profile.ends]
+    found = profile.joined(amplitude.climbed(finer, begin)).known()
+    return profile if np.array_equal(found.amplitude, profile.amplitude) else found
 
 
 def _followed(amplitude: _Amplitude, profile: Profile) -> Profile:
