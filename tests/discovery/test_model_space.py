@@ -221,3 +221,14 @@ def test_sums_over_the_sets_are_those_over_all_that_may_be_true_in_a_material() 
         missing = sum(first.values())
         assert missing == pytest.approx(1.0 - nothing)
         assert found.shares[b] == pytest.approx({n: share / missing for n, share in first.items()})
+
+
+def test_no_probability_exceeds_one_however_much_evidence_there_is() -> None:
+    """Evidence of ten thousand nats leaves rounding errors in the sums; they are probabilities all the same."""
+    rng = np.random.default_rng(5)
+    for trial in range(200):
+        certain = np.array([30.0 + 10.0 * rng.random()])
+        sets = [a_set("a" + more, 1e4 + rng.normal(), certain) for more in ("", "b", "c", "d", "bc")]
+        found = judged([a_set("", 0.0), *sets], families=[("b", "c")])
+        sums = [*found.nothing, *found.remainder, *np.ravel(list(found.inclusion.values())), *np.ravel(found.together)]
+        assert max(*sums, *found.shares[0].values()) <= 1.0, trial

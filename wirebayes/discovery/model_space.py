@@ -183,6 +183,8 @@ def posterior(
     """
     total = logsumexp([*without, *beside])
     p_without, p_beside = np.exp(without - total), np.exp(beside - total)
+    whole = p_without.sum() + p_beside.sum()  # one but for rounding, which grows with the log weights
+    p_without, p_beside = p_without / whole, p_beside / whole
     own = dict.fromkeys(name for s in sets for name in s.names)
     sums = _Sums.over(own, tuple(dict.fromkeys(family_of(name, families) for name in own)), blocks)
     for s, bare, more in zip(sets, p_without, p_beside, strict=True):
@@ -192,13 +194,18 @@ def posterior(
         tuple(sets),
         p_without,
         p_beside,
-        sums.nothing,
-        sums.remainder,
-        sums.inclusion,
+        _at_most_one(sums.nothing),
+        _at_most_one(sums.remainder),
+        {name: _at_most_one(value) for name, value in sums.inclusion.items()},
         tuple(sums.together),
-        list(sums.together.values()),
+        [_at_most_one(value) for value in sums.together.values()],
         shares,
     )
+
+
+def _at_most_one(probability: Array) -> Array:
+    """Sums of many probabilities that are one but for rounding."""
+    return np.minimum(probability, 1.0)
 
 
 @dataclass(frozen=True)
