@@ -64,8 +64,8 @@ def test_whatever_the_evidence_the_order_of_verdicts_holds(found: Evidence) -> N
     elif judged.verdict == "ambiguous":
         assert found.shares["unknown"] <= 0.1 and found.best_gain is not None and found.best_gain > 4.0
         assert judged.undecided and "unknown" not in judged.undecided
-        total = sum(found.shares.values())
-        assert sum(found.shares[name] for name in judged.undecided) >= min(0.9, total) - found.shares["unknown"] - 1e-9
+        named = sum(found.shares.values()) - found.shares["unknown"]
+        assert sum(found.shares[name] for name in judged.undecided) >= min(0.9, named) - 1e-9
     else:
         assert judged.verdict == "unknown"
 
@@ -94,6 +94,12 @@ def test_whatever_the_evidence_the_order_of_verdicts_holds(found: Evidence) -> N
 )
 def test_verdicts_turn_at_their_thresholds(changes: dict, verdict: str) -> None:
     assert verdict_on(replace(EVIDENCE, **changes)).verdict == verdict
+
+
+def test_effects_alone_hold_nine_tenths_of_the_probability_where_none_is_established() -> None:
+    """Whether something unknown is the second or the last of the probabilities."""
+    shares = {"a": 0.86, "unknown": 0.08, "b": 0.05, "c": 0.01}
+    assert verdict_on(replace(EVIDENCE, families=(), shares=shares)).undecided == ("a", "b")
 
 
 def test_a_family_is_undecided_where_no_member_holds_nine_tenths_of_it() -> None:

@@ -111,7 +111,7 @@ def verdict_on(found: Evidence) -> Judgement:
     if established:
         return Judgement("ambiguous", undecided) if undecided else Judgement("named")
     predicts = found.best_gain is not None and found.best_gain > KEEP_ELPD
-    likely = tuple(name for name in smallest_set(found.shares) if name != "unknown")
+    likely = tuple(smallest_set({name: share for name, share in found.shares.items() if name != "unknown"}))
     if predicts and likely and found.shares.get("unknown", 0.0) <= 1.0 - IN_SET:
         return Judgement("ambiguous", likely)
     return Judgement("unknown")
