@@ -152,7 +152,9 @@ def _check_no_cell_is_empty(rows: list[SheetRow], table: RawTable, columns: dict
     for row in rows:
         for role, column in columns.items():
             if not row.cells[column.index]:
-                missing = (
-                    f"a number{WHERE_MISSING}" if role in ("time", "tension") else "a value here or in a line above"
-                )
-                raise table.complain(row.line, column.index, "an empty cell", missing)
+                expected = "a value here or in a line above"
+                if role in ("time", "tension"):
+                    expected = f"a number{WHERE_MISSING}"
+                elif role == "temperature":
+                    expected = f'a number, or --map "{column.header}=ignore" to go without temperatures'
+                raise table.complain(row.line, column.index, "an empty cell", expected)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench import json_records, keyed_lines, labview, serial_monitor
+from wirebayes.io.bench.aligned import with_gaps
 from wirebayes.io.bench.cell_units import bare, joined_measures
 from wirebayes.io.bench.decode import UNICODE
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
@@ -68,10 +69,11 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     if not stated and scores[best][0] <= 0.0:
         line = next((i for i, content in enumerate(lines, start=1) if content.strip()), 1)
         raise InputError(f"{path}, line {line}: found no columns of numbers, expected {_wanted(sample)}")
-    described = f"{_NAMES.get(best, best)} between cells"
+    rows, of_width = _rows(lines, best)
+    described = "columns of fixed width" if of_width else f"{_NAMES.get(best, best)} between cells"
     if encoding in UNICODE:
-        return Sheet(path, _rows(lines, best), described=described)
-    return Sheet(path, _rows(lines, best), described=f"{described}, {encoding.upper()}", encoding=encoding)
+        return Sheet(path, rows, described=described)
+    return Sheet(path, rows, described=f"{described}, {encoding.upper()}", encoding=encoding)
 
 
 def _whole_lines(lines: list[str]) -> list[str]:
@@ -120,14 +122,16 @@ def _cells(line: str, sign: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])]
 
 
-def _rows(lines: list[str], sign: str) -> tuple[SheetRow, ...]:
+def _rows(lines: list[str], sign: str) -> tuple[tuple[SheetRow, ...], bool]:
+    """The rows of lines, and whether columns of fixed width told which cells are empty."""
+    comments = [_COMMENT.match(line) for line in lines]
+    contents = [line[found.end() :] if found else line for line, found in zip(lines, comments, strict=True)]
+    split = [_cells(content, sign) for content in contents]
+    placed = with_gaps(contents, split) if sign == " " else None
     rows = []
-    for number, line in enumerate(lines, start=1):
-        sign_of_comment = _COMMENT.match(line)
-        content = line[sign_of_comment.end() :] if sign_of_comment else line
-        cells = _cells(content, sign)
+    for number, (cells, comment) in enumerate(zip(placed or split, comments, strict=True), start=1):
         while cells and not cells[-1]:
             cells.pop()
         if cells and not all(map(_UNDER_A_HEADER.fullmatch, cells[cells[0] == "" :])):
-            rows.append(SheetRow(number, tuple(cells), bool(sign_of_comment)))
-    return tuple(rows)
+            rows.append(SheetRow(number, tuple(cells), bool(comment)))
+    return tuple(rows), placed is not None

@@ -130,6 +130,7 @@ def find_table(sheet: Sheet) -> RawTable:
     names = tuple(above[-2].cell(column) for column in every) if len(above) > 1 else ()
     body = tuple(row for row in rows[first:] if not row.comment)
     _check_width(sheet, head, body, width)
+    _check_gaps(sheet, head, body)
     _check_headers_repeat(sheet, rows[:first], head, body)
     return RawTable(sheet, header, padded, body, head.line, names)
 
@@ -218,14 +219,29 @@ def _check_names_are_short(sheet: Sheet, head: SheetRow) -> None:
 def _check_width(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow], width: int) -> None:
     """Refuse values to the right of the header."""
     named = len(head.cells)
+    remarks = sheet.described.startswith("spaces")  # one at the end of a line is as many cells as it has words
     for row in body:
-        too_long = len(row.cells) > width or any(map(is_value, row.cells[named:]))
+        too_long = (len(row.cells) > width and not remarks) or any(map(is_value, row.cells[named:]))
         if too_long and row.may_be_a_reading:
             sign = " (a comma as decimal sign needs another sign between cells)" if "comma" in sheet.described else ""
             raise InputError(
                 f"{sheet.path}, line {row.line}, column {sheet.column_name(named)}: found {len(row.cells)} cells, "
                 f"expected {named} as in the header of line {head.line}{sign}"
             )
+
+
+def _check_gaps(sheet: Sheet, head: SheetRow, body: Sequence[SheetRow]) -> None:
+    """Refuse fewer numbers than elsewhere between spaces that stand in no columns: which is missing is not known."""
+    named = len(head.cells)
+    if not sheet.described.startswith("spaces"):
+        return
+    of_numbers = [row for row in body if row.may_be_a_reading and all(map(is_value, row.cells))]
+    short = next((row for row in of_numbers if len(row.cells) < named), None)
+    if short is not None and any(len(row.cells) == named for row in of_numbers):
+        raise InputError(
+            f"{sheet.path}, line {short.line}: found {len(short.cells)} numbers between spaces, expected {named} as in "
+            f"the header of line {head.line}, for which of them is missing cannot be seen; write NaN in its place"
+        )
 
 
 def _check_headers_repeat(sheet: Sheet, above: Sequence[SheetRow], head: SheetRow, body: Sequence[SheetRow]) -> None:
