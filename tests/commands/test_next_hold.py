@@ -49,6 +49,21 @@ def test_it_goes_on_at_the_last_temperature_and_has_few_of_many_times(tmp_path) 
     assert [float(row["time_s"]) for row in rows] == [0.0, 250.0, 500.0, 750.0, 1000.0]
 
 
+@pytest.mark.parametrize("options", [{"displacements": [1, 2, 3, 2]}, {"weights": [2.0, 5.0, 9.0, 1.0]}])
+def test_hold_by_hold_the_next_hold_has_its_first_reading_and_runs_too(options, tmp_path, capsys) -> None:
+    experiment = one_test(**options)
+    found = wb.fit(experiment, likelihood="hold", policy=FEW, check=False, output=tmp_path / "out")
+    command = shlex.split(found.next_step().partition("  (")[0])[1:]
+    assert main(command) == 0
+    highest = experiment.holds[2]
+    assert f"{highest.readings[0]:.3g}" in capsys.readouterr().out
+    with Path(command[2]).open(newline="") as file:
+        first, *others = csv.DictReader(file)
+    read = "tension_N" if "displacements" in options else "displacement_mm"
+    assert float(first[read]) == highest.readings[0] and {row[read] for row in others} == {""}
+    assert {row["hold"] for row in (first, *others)} == {"5"}
+
+
 @pytest.mark.parametrize(("lengths", "together"), [([1000], False), ([1000, 1500], False), ([1000, 1500], True)])
 def test_the_command_that_the_next_line_names_runs_as_it_stands(lengths, together, tmp_path, capsys) -> None:
     experiments = wb.simulate_tests(seed=1, displacements=[1, 2, 3], times=[0, 30, 60], lengths=lengths).experiments

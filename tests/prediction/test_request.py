@@ -11,6 +11,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.io.readings import protocol_table
 from wirebayes.model.build import build
+from wirebayes.model.spec import ModelSpec
 from wirebayes.prediction.request import request_of
 from wirebayes.results.read_back import Stored
 from wirebayes.strict.table import CsvTable
@@ -131,6 +132,23 @@ def test_a_hold_to_come_needs_its_temperature_at_all_times(
     table = ask(tmp_path, f"hold,displacement_mm,time_s,temperature_C\n{repeated}{rows}")
     with pytest.raises(InputError, match=rf"line {line}, column 4 \(temperature_C\): found an empty cell, expected a"):
         request_of(table, stored, fresh=fresh)
+
+
+def test_a_weight_that_no_wire_can_bear_by_the_modified_law_is_refused(tmp_path: Path) -> None:
+    rows = "".join(f"{number},{x},{t},{number}\n" for number, x in ((1, 1.0), (2, 2.0)) for t in (0, 60))
+    (tmp_path / "warm.csv").write_text("hold,displacement_mm,time_s,tension_N\n" + rows)
+    keys = 'name = "warm"\nmaterial = "line"\nlength_mm = 1000.0\nreadings = "warm.csv"\ncontrol = "force"\n'
+    (tmp_path / "warm.toml").write_text("[[experiment]]\n" + keys)
+    sample = build(read_experiments(tmp_path / "warm.toml"), spec=ModelSpec("modified")).samples[0]
+    stored = Stored({"k1": np.array([900.0, 1000.0]), "setting_sd": np.array([0.1, 0.1])}, sample, "chain")
+    path = tmp_path / "protocol.csv"
+    path.write_text("hold,tension_N,time_s\n5,800,0\n6,900,0\n")
+    with pytest.raises(
+        InputError, match=r"line 3, column 2 \(tension_N\): found 900, expected a tension below 899.4 N"
+    ):
+        request_of(protocol_table(path, "force"), stored)
+    linear = replace(stored, sample=replace(sample, model=replace(sample.model, law="hooke")))
+    assert request_of(protocol_table(path, "force"), linear).prediction.requested[-2:].all()
 
 
 @pytest.mark.parametrize(

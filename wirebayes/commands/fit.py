@@ -180,7 +180,8 @@ def _compute(jobs: Sequence[Job], folder: Path, seed: int, check: bool, policy: 
                 if check:
                     write_checks(jobs, folder, seed, report, parallel_map)
     for job in jobs:
-        write_next_hold(job.experiments[0], folder / job.folder)
+        hold_by_hold = job.spec.likelihood == "hold"
+        write_next_hold(job.experiments[0], folder / job.folder, hold_by_hold=hold_by_hold)
 
 
 def fits_in(

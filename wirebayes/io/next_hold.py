@@ -5,22 +5,36 @@ from pathlib import Path
 import numpy as np
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import SET, Hold
+from wirebayes.io.readings import READ, SET, Hold
 from wirebayes.io.run_folder import write_csv
 
 NEXT_HOLD = "next.csv"
 _MOST_READINGS = 5  # of a recording's thousands: enough to see a curve, few enough to edit
 
 
-def write_next_hold(experiment: Experiment, folder: Path) -> None:
-    """Write the protocol of one hold more of a test into the folder of its results."""
+def write_next_hold(experiment: Experiment, folder: Path, *, hold_by_hold: bool = False) -> None:
+    """Write the protocol of one hold more of a test into the folder of its results.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    folder : Path
+    hold_by_hold : bool
+        Whether it was fitted so: a hold is then predicted from its first reading, and the example is a tested hold
+        once more, from where that began.
+    """
     last = experiment.recorded_holds[-1]
+    example = max(experiment.recorded_holds, key=lambda hold: float(hold.readings[0])) if hold_by_hold else last
+    setting = example.setting if hold_by_hold else _one_step_further(experiment)
     header = ["hold", SET[experiment.control], "time_s"]
-    row = [int(last.number or 0) + 1, _one_step_further(experiment)]
-    rows = [[*row, time] for time in _some_of_its_times(last)]
+    rows: list[list[object]] = [[int(last.number or 0) + 1, setting, time] for time in _some_of_its_times(example)]
     if last.temperature_C is not None:
         header.append("temperature_C")
-        rows = [[*each, float(last.temperature_C[-1])] for each in rows]
+        rows = [[*row, float(last.temperature_C[-1])] for row in rows]
+    if hold_by_hold:
+        header.append(READ[experiment.control])
+        given: list[object] = [float(example.readings[0]), *[""] * (len(rows) - 1)]
+        rows = [[*row, value] for row, value in zip(rows, given, strict=True)]
     write_csv(folder / NEXT_HOLD, header, rows)
 
 

@@ -63,6 +63,8 @@ def request_of(table: CsvTable, stored: Stored, *, fresh: bool = False) -> Proto
     file.check_temperature(trained.reference_C is not None)
     if stored.likelihood == "hold":
         file.check_first_readings()
+    elif trained.control == "force" and stored.sample.model.law == "modified":
+        file.check_weights(stored)
     return _of_fresh_sample(file, stored) if fresh else _of_tested_sample(file, stored)
 
 
@@ -176,6 +178,14 @@ class _File:
                 expected = "the hold's first reading, above 0 N, because the posterior is hold by hold"
                 raise self.complain(i, 0, column, shown(float(first)), expected)
 
+    def check_weights(self, stored: Stored) -> None:
+        """Refuse weights that by eq (3) no wire as stiff as the posterior says can bear."""
+        limit = float(np.min(stored.draws["k1"] - _WEIGHT_SDS * stored.draws["setting_sd"]))
+        for i, hold in enumerate(self.holds):
+            if hold.setting >= limit:
+                expected = f"a tension below {limit:.4g} N: eq (3) allows none as large as k1"
+                raise self.complain(i, 0, SET[hold.control], f"{hold.setting:g}", expected)
+
     def check_repeats(self, trained: Protocol, row_of: dict[int, int]) -> None:
         """Refuse holds between the trained ones, and repeated ones that are not as they were trained on."""
         last = max(row_of)
@@ -233,6 +243,7 @@ class _File:
             raise self.complain(i, k, "temperature_C", found, expected)
 
 
+_WEIGHT_SDS = 6.0  # standard deviations of a weight's error: among millions of draws none is further off
 _SAME_K = 1e-6  # kelvin: readings are stored as differences from the first, so only rounding is forgiven
 
 
