@@ -96,6 +96,17 @@ def test_a_parameter_is_that_of_the_sample_or_of_the_material_or_of_all() -> Non
         lacking.parameters(np.zeros((3, len(rest))), sample)
 
 
+def test_where_parameters_stand_is_known_of_the_sample_that_was_asked_for() -> None:
+    """Not of another one that had its place in memory before, or in another process."""
+    effect = effect_named("steady_creep")
+    plain, larger = build([short()]), build([short()], [effect])
+    before = plain.parameters(np.ones((1, len(plain.names))), plain.samples[0])
+    [known] = plain._known_places.values()
+    larger._known_places[id(larger.samples[0])] = known
+    own = larger.parameters(np.ones((1, len(larger.names))), larger.samples[0])
+    assert set(own) == {*before, *effect.columns()}
+
+
 @pytest.mark.parametrize("likelihood", ["chain", "hold"])
 def test_parameters_are_named_by_what_shares_them(likelihood: Likelihood) -> None:
     """Of one test plainly; of several by sample and by material, where there are several; amplitudes by their scope."""

@@ -5,7 +5,7 @@ Every row is an optimisation of its own; rows may also have their own readings (
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -191,13 +191,17 @@ def climb(
             break
         local = look(climbs.ahead[rows], rows, climbs.eigen[rows], climbs.vectors[rows])
         kept = climbs.gain_enough(rows, local.value)
-        astray = rows[~kept]
-        at_start = climbs.arrived[astray]
-        climbs.done[astray[at_start]] = True  # there is no density where they are
-        climbs.lead_damped(density, astray[~at_start])
-        here = rows[kept]
-        climbs.take_step(here, local.rows(kept), tolerance)
+        here = rows
+        if not kept.all():
+            astray = rows[~kept]
+            at_start = climbs.arrived[astray]
+            climbs.done[astray[at_start]] = True  # there is no density where they are
+            climbs.lead_damped(density, astray[~at_start])
+            here, local = rows[kept], local.rows(kept)
+        climbs.take_step(here, local, tolerance)
         left = rows[~climbs.done[rows]]
+        if reach == np.inf and of is None:
+            continue
         hopeless = climbs.most_promised(left) < _best(climbs.value, group)[left] - reach
         if of is not None:
             ended = here[climbs.converged[here]]
@@ -269,20 +273,22 @@ def _composed(eigen: Array, vectors: Array) -> Array:
 def _positive(matrices: Array) -> tuple[Array, Array]:
     """Eigenvalues, made positive, and vectors of symmetric matrices (n, d, d)."""
     eigen, vectors = np.linalg.eigh(matrices)
-    scale = np.maximum(np.abs(eigen).max(axis=1, keepdims=True), 1e-8)
-    return np.maximum(np.abs(eigen), 1e-9 * scale), vectors
+    size = np.abs(eigen)
+    scale = np.maximum(size.max(axis=1, keepdims=True), 1e-8)
+    return np.maximum(size, 1e-9 * scale), vectors
 
 
 def _by_residuals(residuals: Residuals, z: Array, rows: Ints, *_: Array) -> _Local:
     """Curvature as the expected information, and the gradient, from one more evaluation a coordinate."""
     n, d = z.shape
-    moves = np.concatenate([np.zeros((1, d)), _NEAR * np.eye(d)])
-    points = z[:, None] + moves
+    points = z[:, None] + _moves(d)
     flat, each = residuals(points.reshape(-1, d), np.repeat(rows, d + 1))
     values = flat.reshape(n, d + 1)
     each = each.reshape(-1, n, d + 1)
     with np.errstate(all="ignore"):
-        slopes = _finite(np.moveaxis(each[..., 1:] - each[..., :1], 0, 1) / _NEAR)
+        moved = each[..., 1:] - each[..., :1]
+        moved /= _NEAR
+        slopes = _finite(np.moveaxis(moved, 0, 1))
         curvature = np.swapaxes(slopes, 1, 2) @ slopes
         one_sided = (values[:, 1:] - values[:, :1]) / _NEAR
         put_right = 0.5 * _NEAR * np.einsum("nii->ni", curvature)
@@ -290,8 +296,15 @@ def _by_residuals(residuals: Residuals, z: Array, rows: Ints, *_: Array) -> _Loc
     return _Local(values[:, 0], gradient, curvature)
 
 
+@cache
+def _moves(d: int) -> Array:
+    """(d + 1, d) none, and one along each coordinate."""
+    return np.concatenate([np.zeros((1, d)), _NEAR * np.eye(d)])
+
+
 def _finite(values: Array) -> Array:
-    return np.where(np.isfinite(values), values, 0.0)
+    """The values, 0 where they are no numbers; no other array where all are."""
+    return values if np.isfinite(values.sum()) else np.where(np.isfinite(values), values, 0.0)
 
 
 def _by_differences(density: Density, z: Array, rows: Ints, eigen: Array, vectors: Array) -> _Local:

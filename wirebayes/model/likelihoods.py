@@ -151,8 +151,13 @@ def _flat(line: Linearised) -> tuple[Array, ...]:
 
 def _observed(n: int, readings: Array, mask: Array, variance: Array, setting_sd: Array) -> tuple[Array, ...]:
     """Readings, which of them were taken, and the noise of n columns, in the types of compiled code."""
-    noise = (np.full(n, v, float) for v in (variance, setting_sd))
+    noise = (v if _is_column(v, n) else np.full(n, v, float) for v in (variance, setting_sd))
     return np.asarray(readings, float), np.ascontiguousarray(mask).view(np.uint8), *noise
+
+
+def _is_column(values: Any, n: int) -> bool:
+    """Whether values are n numbers as compiled code takes them."""
+    return values.shape == (n,) and values.dtype == float and values.flags.c_contiguous
 
 
 def held_out_density(

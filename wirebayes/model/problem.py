@@ -4,8 +4,9 @@ Columns are named ``k1``, ``preload`` …, effect amplitudes ``effect.parameter`
 a column of one sample is ``preload[sample]`` and one of a material ``k1[material]``; the most specific name is used.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -73,18 +74,30 @@ class Problem:
 
     def parameters(self, theta: Array, sample: Sample) -> dict[str, Array]:
         """The parameters of one sample, each (n,), from an (n, d) array of all columns."""
-        columns = dict(zip(self.names, np.ascontiguousarray(theta.T), strict=True))
-        n = len(theta)
+        columns, n = np.ascontiguousarray(theta.T), len(theta)
 
-        def find(name: str) -> Array:
-            column = self.column(name, sample)
-            return columns[column] if column in columns else np.full(n, self.prior.fixed[column])
+        def find(place: int | float) -> Array:
+            return columns[place] if isinstance(place, int) else np.full(n, place)
 
-        out = {name: find(name) for name in sample.parameters(self.likelihood)}
-        for effect in sample.model.effects:
-            out |= {column: find(column) for column in effect.columns()}
+        out = {name: find(place) for name, place in self._places(sample).items()}
         ratio = sample.protocol.length_mm / (sample.model.length_ref_mm or sample.protocol.length_mm)
-        return out if ratio == 1.0 else at_length(out, sample.model.effects, ratio, find(LENGTH_EXPONENT))
+        if ratio == 1.0:
+            return out
+        return at_length(out, sample.model.effects, ratio, find(self.place(LENGTH_EXPONENT, sample)))
+
+    def _places(self, sample: Sample) -> Mapping[str, int | float]:
+        """Where each parameter of a sample stands (see `place`), found once: every evaluation asks for it."""
+        known = self._known_places.get(id(sample))
+        if known is None or known[0] is not sample:  # a number may be that of another sample that is gone
+            columns = [column for effect in sample.model.effects for column in effect.columns()]
+            names = (*sample.parameters(self.likelihood), *columns)
+            known = sample, {name: self.place(name, sample) for name in names}
+            self._known_places[id(sample)] = known
+        return known[1]
+
+    @cached_property
+    def _known_places(self) -> dict[int, tuple[Sample, Mapping[str, int | float]]]:
+        return {}
 
     def hold_log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> list[Array]:
         """Per sample the (H, n) log-likelihood of each hold, given those before (chain) or its first reading (hold).

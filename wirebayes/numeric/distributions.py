@@ -358,6 +358,9 @@ def log_normal(sd_log: Any, median: Any) -> Function:
 
     def evaluate(x: Array) -> Array:
         inside = x > 0
+        if inside.all():
+            log_x = np.log(x)
+            return -0.5 * ((log_x - middle) / sd_log) ** 2 - log_x - constant
         log_x = np.log(np.where(inside, x, 1.0))
         return np.where(inside, -0.5 * ((log_x - middle) / sd_log) ** 2 - log_x - constant, -np.inf)
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import Effect
 from wirebayes.wire.protocol import Protocol
 
 if TYPE_CHECKING:
@@ -43,14 +42,10 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
     ----------
     theta : mapping of name to (n,) array
     """
-    if kernel is None or len(model.effects) > kernel.MOST_EFFECTS:
+    if kernel is None or len(model.effects) > kernel.MOST_EFFECTS or model.compiled is None:
         return None
-    names, formulas = list(_PLAIN), []
-    for effect in model.effects:
-        if not has_formula(effect):
-            return None
-        names += effect.columns()
-        formulas.append((effect.formula, len(effect.amplitudes), effect.formula_constant))
+    columns, formulas = model.compiled
+    names = (*_PLAIN, *columns)
     rows = [theta[name] for name in names]
     if any(row.dtype.kind == "c" for row in rows):
         return None
@@ -59,7 +54,7 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
         packed[i] = row
     log_ratio = float(np.log(protocol.length_mm / (model.length_ref_mm or protocol.length_mm)))
     kept = 1.0 if model.history == "saturating" else 0.0
-    law = _law(model.law == "modified", kept, model.tension_ref_N, log_ratio, tuple(formulas))
+    law = _law(model.law == "modified", kept, model.tension_ref_N, log_ratio, formulas)
     remembers = any(name == "superposition" for name, _, _ in formulas)
     test = kernel.Test(**(protocol.flat_with_ages if remembers else protocol.flat))
     return Call(test, law, packed)
@@ -74,11 +69,3 @@ def _law(
         if name not in kernel.FORMULAS:
             raise LookupError(f"the compiled kernel has no formula {name!r}: build it again, as CONTRIBUTING says")
     return kernel.Law(modified, kept, tension_ref_N, log_ratio, formulas)
-
-
-def has_formula(effect: Effect) -> bool:
-    """Whether the kernel computes an effect: a subclass with an `apply` of its own has lost its parent's formula."""
-    kinds = type(effect).__mro__
-    return bool(effect.formula) and next(k for k in kinds if "apply" in vars(k)) is next(
-        k for k in kinds if "formula" in vars(k)
-    )

@@ -198,6 +198,13 @@ class Effect:
         return self.name if self.control is None else f"{self.name}@{self.control}"
 
     @property
+    def has_formula(self) -> bool:
+        """Whether the compiled twin computes it: a subclass with an `apply` of its own has lost that of its parent."""
+        kinds = type(self).__mro__
+        applied = next(kind for kind in kinds if "apply" in vars(kind))
+        return bool(self.formula) and applied is next(kind for kind in kinds if "formula" in vars(kind))
+
+    @property
     def formula_constant(self) -> float:
         """A number that the compiled twin refers to beside the amplitudes, such as the hold of an event."""
         return 0.0

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,6 +34,17 @@ class Model:
     effects: tuple[Effect, ...] = ()
     tension_ref_N: float = 1.0
     length_ref_mm: float = 0.0
+
+    @cached_property
+    def compiled(self) -> tuple[tuple[str, ...], tuple[tuple[str, int, float], ...]] | None:
+        """Columns of the effects' amplitudes, and what the compiled twin knows the effects by; None where it does not.
+
+        Every evaluation asks for it.
+        """
+        if not all(effect.has_formula for effect in self.effects):
+            return None
+        columns = tuple(column for effect in self.effects for column in effect.columns())
+        return columns, tuple((e.formula, len(e.amplitudes), e.formula_constant) for e in self.effects)
 
     def at(self, place: str) -> list[Effect]:
         """The effects at one place, in the order they compose."""

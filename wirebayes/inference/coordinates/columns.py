@@ -9,7 +9,7 @@ import numpy as np
 from wirebayes.inference.coordinates.edges import Edge, edge
 from wirebayes.model.problem import Problem
 from wirebayes.numeric.distributions import LogitNormal
-from wirebayes.numeric.typing import Array, Bools
+from wirebayes.numeric.typing import Array, Bools, Ints
 
 ONE_SD = np.array([0.15865525393145707, 0.8413447460685429])  # shares of a normal below -1 and 1
 
@@ -42,13 +42,19 @@ class ColumnMap:
     def _log_scale(self) -> float:
         return float(np.log(self.scale).sum())
 
+    @cached_property
+    def _logarithmic(self) -> tuple[Ints, Array]:
+        """Numbers of the positive columns, and the largest value of each."""
+        return np.flatnonzero(self.positive), self.most[self.positive]
+
     def is_linear(self, column: int) -> bool:
         """Whether a parameter is only divided by its scale."""
         return not self.positive[column] and column not in self.edges
 
     def logarithms(self, theta: Array) -> Array:
         """(n, k) logarithms of the positive parameters, of those with a largest value the log odds of reaching it."""
-        return _log_odds(theta[:, self.positive], self.most[self.positive])
+        columns, most = self._logarithmic
+        return _log_odds(theta[:, columns], most)
 
     def coordinate(self, theta: Array, column: int) -> Array:
         """(n,) coordinate of a parameter that is not sampled by its logarithm."""
@@ -66,8 +72,9 @@ class ColumnMap:
     def to_natural(self, z: Array) -> Array:
         """(n, d) natural parameters of coordinates (n, d)."""
         theta = z * self.scale
-        odds = np.exp(z[:, self.positive])
-        theta[:, self.positive] = odds / (1.0 + odds / self.most[self.positive])
+        columns, most = self._logarithmic
+        odds = np.exp(z[:, columns])
+        theta[:, columns] = odds / (1.0 + odds / most)
         for i, at in self.edges.items():
             theta[:, i] = at.value(z[:, i])
         return theta
@@ -82,8 +89,9 @@ class ColumnMap:
         replaced : list of int
             Columns with an edge that have another coordinate in the end.
         """
-        value = theta[:, self.positive]
-        total = (np.log(value) + np.log1p(-value / self.most[self.positive])).sum(axis=1) + self._log_scale
+        columns, most = self._logarithmic
+        value = theta[:, columns]
+        total = (np.log(value) + np.log1p(-value / most)).sum(axis=1) + self._log_scale
         for i, at in self.edges.items():
             if i not in replaced:
                 total = total + at.log_slope(theta[:, i])

@@ -263,7 +263,7 @@ def _ridge(
     shifted: frozenset[str],
     for_draws: bool,
 ) -> Ridge:
-    effects = tuple(e for e in sample.model.at("amount") if compiled.has_formula(e))  # others may ask for B
+    effects = tuple(e for e in sample.model.at("amount") if e.has_formula)  # others may ask for B
     for column in (c for e in effects for c in e.columns()):
         name = problem.column(column, sample)
         if name in problem.names:
