@@ -20,6 +20,7 @@ from wirebayes.io.bench.control import recognised, recognised_of_pairs
 from wirebayes.io.bench.dates_apart import with_dates
 from wirebayes.io.bench.decode import decode, read_raw
 from wirebayes.io.bench.delimited import sheet_of_text
+from wirebayes.io.bench.glitches import without_glitches
 from wirebayes.io.bench.holds import cut, stretches
 from wirebayes.io.bench.joined import HOLD, lacking, one_table
 from wirebayes.io.bench.no_weight import without_weight
@@ -182,8 +183,9 @@ def _names_of(specimens: Sequence[str], about: About) -> list[str]:
 
 def _convert(recorded: Recorded, notes: list[str], about: About, choices: Choices) -> Converted:
     """The experiment of one specimen, of which it is known what was recorded and, in sentences, understood."""
-    table, columns, values = recorded.table, recorded.columns, recorded.values
     control = choices.control or _control(recorded)
+    recorded, left_out = without_glitches(recorded, control, choices.drop_breaks)
+    table, columns, values = recorded.table, recorded.columns, recorded.values
     if control == "displacement" and choices.zero_mm is None:
         recorded.check_zero(about.length_mm)
     if control == "force" and recorded.not_read is not None:  # a setting goes on, a reading does not
@@ -192,7 +194,7 @@ def _convert(recorded: Recorded, notes: list[str], about: About, choices: Choice
     if control == "force":
         holds = without_weight(holds, values["tension"])
     holds, thin = _thin(holds)
-    notes += _what_was_set(control) + recorded.numbering + holds.notes + thin + _missing_holds(holds)
+    notes += left_out + _what_was_set(control) + recorded.numbering + holds.notes + thin + _missing_holds(holds)
     resolution = _resolution(columns[READS[control]], recorded.texts[READS[control]])
     if resolution:
         read, unit = READS[control], UNITS[READS[control]]

@@ -8,6 +8,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench import json_records, keyed_lines, labview, serial_monitor
 from wirebayes.io.bench.aligned import with_gaps
 from wirebayes.io.bench.cell_units import bare, joined_measures
+from wirebayes.io.bench.cut_off import without_cut_line
 from wirebayes.io.bench.decode import UNICODE
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_value
 
@@ -24,6 +25,7 @@ _OPEN_CELL = re.compile(
     r'^(?:[^"]|"[^"]*")*(?:^|[,;\t|])\s*"[^"]*$'
 )  # a quote that begins a cell, and none that ends it
 _CLOSED_CELL = re.compile(r'[^"]*"\s*([,;\t|]|$)')
+_ENDS = ("\n", "\r", "\x1a")  # of a file whose last line was finished
 MOST_BREAKS = 20  # of the cells of one line: a name and a unit in each of twenty columns
 _SEPARATOR = re.compile(
     r"\ufeff?\"?sep=([^\w\s\"']|\t)\"?\s*", re.IGNORECASE
@@ -52,13 +54,11 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
         return json_records.sheet_of_records(path, text, encoding)
     if serial_monitor.is_log(lines):
         sent, arrivals = serial_monitor.without_stamps(lines)
-        return serial_monitor.with_arrivals(sheet_of_text(path, "\n".join(sent), encoding), arrivals)
+        end = "\n" if text.endswith("\n") else ""
+        return serial_monitor.with_arrivals(sheet_of_text(path, "\n".join(sent) + end, encoding), arrivals)
     if keyed_lines.are_keyed(lines):
         return keyed_lines.sheet_of_keyed(path, lines, encoding)
-    longest = max(range(len(lines)), key=lambda i: len(lines[i]))
-    if len(lines[longest]) > LONGEST_LINE:
-        found = f"a line of {len(lines[longest])} characters"
-        raise InputError(f"{path}, line {longest + 1}: found {found}, expected at most {LONGEST_LINE}")
+    _check_lengths(path, lines)
     stated = _SEPARATOR.fullmatch(lines[0])
     if stated:
         lines[0] = ""
@@ -69,11 +69,27 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     if not stated and scores[best][0] <= 0.0:
         line = next((i for i, content in enumerate(lines, start=1) if content.strip()), 1)
         raise InputError(f"{path}, line {line}: found no columns of numbers, expected {_wanted(sample)}")
-    rows, of_width = _rows(lines, best)
-    described = "columns of fixed width" if of_width else f"{_NAMES.get(best, best)} between cells"
+    return _sheet_of_cells(path, lines, best, is_finished=text[-1:] in _ENDS, encoding=encoding)
+
+
+def _sheet_of_cells(path: Path, lines: list[str], sign: str, *, is_finished: bool, encoding: str) -> Sheet:
+    """The sheet of lines whose cells a sign divides, without a last line that was not finished."""
+    rows, of_width = _rows(lines, sign)
+    described = "columns of fixed width" if of_width else f"{_NAMES.get(sign, sign)} between cells"
+    if not is_finished:
+        rows, is_cut = without_cut_line(rows)
+        described += ", the last line left out, which is cut off" * is_cut
     if encoding in UNICODE:
         return Sheet(path, rows, described=described)
     return Sheet(path, rows, described=f"{described}, {encoding.upper()}", encoding=encoding)
+
+
+def _check_lengths(path: Path, lines: list[str]) -> None:
+    """Refuse a line that is too long for one of a table."""
+    longest = max(range(len(lines)), key=lambda i: len(lines[i]))
+    if len(lines[longest]) > LONGEST_LINE:
+        found = f"a line of {len(lines[longest])} characters"
+        raise InputError(f"{path}, line {longest + 1}: found {found}, expected at most {LONGEST_LINE}")
 
 
 def _whole_lines(lines: list[str]) -> list[str]:

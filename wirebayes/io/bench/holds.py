@@ -5,6 +5,7 @@ each hold began: its first reading, or the middle of a move that is recorded.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -197,7 +198,16 @@ def _scatter(readings: Readings, groups: Sequence[Rows]) -> str:
 
 
 def _check_resets(readings: Readings, groups: Sequence[Rows]) -> None:
-    """Refuse a clock of the test that starts again within a hold: how long the hold lasted is not known."""
+    """Refuse a clock of the test that starts again within a hold: how long the hold lasted is not known.
+
+    One that falls to times between two earlier holds was not started again: the rows of that hold stand elsewhere.
+    """
+    spans = [(readings.time_s[rows[0]], readings.time_s[rows[-1]]) for rows in groups]
+    for j, (begin, end) in enumerate(spans):
+        earlier = pairwise(spans[:j])
+        if any(before[1] < begin and end < after[0] for before, after in earlier):
+            found = f"{begin:g} s after {spans[j - 1][1]:g} s, which is between two holds above"
+            raise readings.complain(int(groups[j][0]), "time", found, "rows in the order of time, the oldest first")
     for before, after in zip(groups, groups[1:], strict=False):
         x, row = readings.setting, int(after[0])
         same_hold = x[row] == x[before[-1]] and readings.hold is None

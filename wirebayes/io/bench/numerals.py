@@ -8,6 +8,8 @@ hour and a half, and ``14.06`` a day.
 import re
 from collections.abc import Sequence
 
+import numpy as np
+
 from wirebayes.io.bench.sheet import is_number
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Decimal, Undecided
@@ -19,6 +21,8 @@ _COUNT = re.compile(
     r"[+\-\u2212]?(\d+|[1-9]\d{0,2}(['\u2019 \u00a0\u2009\u202f]\d{3})+"
     r"|[1-9]\d{0,2}(?P<sign>[.,])\d{3}((?P=sign)\d{3})+)"
 )
+_SELDOM = 0.1  # of the cells of a column: a misprint is no habit
+_BEYOND = 10.0  # times the largest of the other numbers, which readings do not grow by from one to the next
 _SIGNS: dict[Decimal, str] = {"point": ".", "comma": ","}
 
 
@@ -59,6 +63,39 @@ def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None
         "which",
         {f"--decimal {sign}": f"{cell} is {fraction}", f"--decimal {other}": f"{cell} is {whole}"},
     )
+
+
+def check_signs(table: RawTable, columns: Sequence[int], decimal: Decimal) -> None:
+    """Refuse a number with the other sign whose thousands are far beyond all other numbers: its fraction is not.
+
+    Parameters
+    ----------
+    table : RawTable
+    columns : sequence of int
+        Those of which numbers are read.
+    decimal : {"point", "comma"}
+        The decimal sign of the table.
+
+    Raises
+    ------
+    InputError
+    """
+    other: Decimal = "point" if decimal == "comma" else "comma"
+    either = re.compile(_EITHER.format(sign=re.escape(_SIGNS[other])))
+    for column in columns:
+        cells = table.column(column)
+        grouped = [i for i, cell in enumerate(cells) if either.fullmatch(cell)]
+        others = [cell for cell in cells if not either.fullmatch(cell)]
+        with_fraction = sum(_SIGNS[decimal] in cell for cell in others)
+        if not 0 < len(grouped) < _SELDOM * len(cells) or 2 * with_fraction < len(others):
+            continue
+        numbers = [float(number) for cell in others if (number := plain_number(cell, decimal)) is not None]
+        largest = float(np.abs(numbers).max(initial=0.0))
+        for i in grouped:
+            whole, fraction = (abs(float(plain_number(cells[i], sign) or 0.0)) for sign in (decimal, other))
+            if whole > _BEYOND * largest >= _BEYOND * fraction:
+                expected = f"the decimal {decimal}, as elsewhere in the file"
+                raise table.complain(table.rows[i].line, column, repr(cells[i]), expected)
 
 
 def is_count(cell: str) -> bool:

@@ -14,7 +14,7 @@ from wirebayes.io.bench.about import About
 from wirebayes.io.bench.columns import Column, understand
 from wirebayes.io.bench.complete_rows import WHERE_MISSING, complete_rows
 from wirebayes.io.bench.marks import without_marks
-from wirebayes.io.bench.numerals import decimal_sign, plain_number
+from wirebayes.io.bench.numerals import check_signs, decimal_sign, plain_number
 from wirebayes.io.bench.quantities import UNITS, Role, quantity_unit
 from wirebayes.io.bench.recorded import Readings
 from wirebayes.io.bench.resolution import evident_step
@@ -23,7 +23,7 @@ from wirebayes.io.bench.stamps import is_coarse, spread
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Choices, Decimal, Undecided
 from wirebayes.io.bench.unread import unread
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.sentences import listed
 from wirebayes.strict.table import LARGEST
 from wirebayes.wire.protocol import Control
@@ -87,6 +87,16 @@ class Recorded:
         """
         return self.table.complain(self.table.rows[row].line, self.columns[role].index, found, expected)  # type: ignore[index]
 
+    def of_rows(self, kept: Ints) -> "Recorded":
+        """The same of some rows."""
+        return replace(
+            self,
+            table=replace(self.table, rows=tuple(self.table.rows[i] for i in kept)),
+            texts={role: [texts[i] for i in kept] for role, texts in self.texts.items()},
+            values={role: values[kept] for role, values in self.values.items()},
+            hold=None if self.hold is None else self.hold[kept],
+        )
+
     def check_zero(self, length_mm: float) -> None:
         """Refuse steps of a machine's position: how far they stretch the wire is not known. Weights pull from any zero.
 
@@ -138,6 +148,7 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     not_read = not_read if not_read in {row.line for row in table.rows} else None  # below the readings
     numbers = {role: column for role, column in columns.items() if not _is_of_clocks(table, column)}
     decimal = decimal_sign(table, [column.index for column in numbers.values()], choices.decimal)
+    check_signs(table, [column.index for column in numbers.values()], decimal)
     table, left_out = without_marks(table, numbers, decimal, choices.drop_breaks)
     notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes, *left_out]
     texts: dict[Role, list[str]] = {
@@ -160,16 +171,10 @@ def _from_zero_on(recorded: Recorded, notes: list[str]) -> tuple[Recorded, list[
     before = time < 0.0
     if not before.any() or not (np.diff(time) < 0.0).any():
         return recorded, notes
-    kept = np.flatnonzero(~before)
-    rows = tuple(recorded.table.rows[i] for i in kept)
-    without = replace(
-        recorded,
-        table=replace(recorded.table, rows=rows),
-        texts={role: [texts[i] for i in kept] for role, texts in recorded.texts.items()},
-        values={role: values[kept] for role, values in recorded.values.items()},
-        hold=None if recorded.hold is None else recorded.hold[kept],
-    )
-    return without, [*notes, f"readings before time zero left out: {int(before.sum())}"]
+    return recorded.of_rows(np.flatnonzero(~before)), [
+        *notes,
+        f"readings before time zero left out: {int(before.sum())}",
+    ]
 
 
 def _of_sample(table: RawTable, columns: dict[Role, Column], about: About) -> dict[Role, Column]:
