@@ -337,3 +337,22 @@ def test_a_hold_whose_readings_are_nan_is_one_without_readings(kernel, hold, mon
         log_likelihood, rest = likelihoods.standardised(line, y[..., None], mask, *noise)
         assert value[row] == pytest.approx(log_likelihood[row], rel=1e-12)
         assert (residuals[:, row] ** 2).sum() == pytest.approx((rest[:, row] ** 2).sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("kernel", [compiled.kernel, None], ids=["compiled", "numpy"])
+@pytest.mark.parametrize("p", [LOADING, WEIGHTS], ids=["steps", "weights"])
+def test_hold_by_hold_too_a_hold_whose_readings_are_nan_says_nothing(p, kernel, monkeypatch):
+    """Whatever was set: searches that leave a hold out see it so."""
+    monkeypatch.setattr(compiled, "kernel", kernel)
+    theta = PLAIN | ERRORS
+    y = measured(p, theta)
+    two = {name: np.repeat(value, 2) for name, value in columns(theta).items()}
+    readings = np.repeat(y[..., None], 2, axis=2)
+    readings[3, :, 1] = np.nan
+    variance = np.full(2, theta["sensor_sd"] ** 2)
+    value, left_out = single_holds.hold_by_hold(p, two, Model(), readings, variance).T
+    assert value[3] != 0.0 and left_out[3] == 0.0
+    assert np.delete(left_out, 3) == pytest.approx(np.delete(value, 3), rel=1e-12)
+    total, residuals = single_holds.standardised_hold_by_hold(p, two, Model(), readings, variance)
+    assert total == pytest.approx([value.sum(), left_out.sum()], rel=1e-12)
+    assert np.isfinite(residuals).all()

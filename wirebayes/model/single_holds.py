@@ -151,7 +151,7 @@ def _under_weights(
     out: list[tuple[Array, Array, Array] | None] = []
     for j, course in enumerate(courses):
         grown = course - course[0]
-        valid = np.isfinite(grown).all(axis=0)
+        valid = np.isfinite(grown).all(axis=0) & np.isfinite(first[j])
         out.append((first[j] + grown, np.ones_like(grown), valid) if protocol.recorded[j] else None)
     return out
 
