@@ -46,6 +46,34 @@ def test_tensions_below_zero_by_more_than_an_offset(sound):
 
 
 @pytest.mark.parametrize(
+    ("slack", "where"), [([], None), ([0], "hold 1 "), ([0, 1, 2], "holds 1, 2 and 3 "), (range(12), None)]
+)
+def test_holds_of_a_slack_wire_are_named(sound, slack, where):
+    protocol, tension = sound
+    tension = tension.copy()
+    tension[slack] = 0.0
+    found = [notice.text for notice in data_checks.warnings(protocol, tension, 0.01) if notice.kind == "slack"]
+    assert len(found) == (where is not None)
+    assert all(where in text for text in found)
+
+
+@pytest.mark.parametrize("share", [0.015, 0.025])
+def test_a_wire_of_two_hundredths_of_the_largest_tension_may_be_slack(sound, share):
+    protocol, tension = sound
+    tension = tension.copy()
+    tension[0] = share * tension[:, 0].max()
+    found = data_checks.warnings(protocol, tension, 0.0)
+    assert any(notice.kind == "slack" for notice in found) == (share < 0.02)
+
+
+def test_under_weights_no_wire_is_slack(sound):
+    protocol, tension = sound
+    weights = replace(protocol, control="force")
+    elongation = tension - tension[0, 0]  # the zero of the gauge is arbitrary
+    assert not any(notice.kind == "slack" for notice in data_checks.warnings(weights, elongation, 0.01))
+
+
+@pytest.mark.parametrize(
     ("change", "words"),
     [
         (lambda t, rng: np.round(5.0 + 0.006 * rng.normal(size=t.shape), 2), "tension stays at 5 N while"),
@@ -158,7 +186,8 @@ def test_clean_simulated_tests_get_no_warning():
             for bench, part in zip(rig.benches, rig.bench_slices, strict=True):
                 tests.append((*_padded(bench, readings[part]), bench.resolution_N or 0.0))
     assert len(tests) == 199
-    assert [warning(*test) for test in tests if warning(*test)] == []
+    found = [notice for test in tests for notice in data_checks.warnings(*test) if notice.kind != "slack"]
+    assert found == []
 
 
 def _padded(bench, readings):

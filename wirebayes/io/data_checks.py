@@ -12,9 +12,10 @@ from wirebayes.io import gross_events
 from wirebayes.io.checked_test import CheckedTest
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import READ, times_run_on
-from wirebayes.io.zero_shifts import zero_shift
+from wirebayes.io.zero_shifts import slack_below, zero_shift
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
+from wirebayes.sentences import some_of
 from wirebayes.wire.protocol import Control, Protocol
 
 RUN_ON = 0.01  # two holds of four readings: rarer orders of honest times are not worth a silence
@@ -62,7 +63,9 @@ def warnings(protocol: Protocol, values: Floats, resolution: float) -> list[Noti
         return gross
     readings = CheckedTest(protocol, values, resolution)
     found = (check(readings) for check in CHECKS[protocol.control])
-    return [*gross, *(Notice("data", sentence) for sentence in found if sentence)]
+    suspicious = [Notice("data", sentence) for sentence in found if sentence]
+    slack = [Notice("slack", sentence) for sentence in [slack_holds(readings)] if sentence]
+    return [*gross, *slack, *suspicious]
 
 
 def of_experiment(experiment: Experiment) -> list[Notice]:
@@ -110,6 +113,21 @@ def negative_tension(readings: CheckedTest) -> str:
     return (
         f"tension falls to {lowest[worst]:.4g} N in hold {readings.number[worst]}, while a wire only pulls and a slack "
         "one reads 0 N: check the sign of tension_N and where it was zeroed"
+    )
+
+
+def slack_holds(readings: CheckedTest) -> str:
+    """Holds in which the wire pulls with next to nothing; where it does so throughout, another check says it."""
+    if readings.protocol.control == "force":
+        return ""
+    least = slack_below(readings)
+    nothing = [bool(np.abs(row).min() <= least) for row in readings.each]  # far below zero is another mistake
+    numbers = [str(number) for number, slack in zip(readings.number, nothing, strict=True) if slack]
+    if len(numbers) in (0, len(readings.each)):
+        return ""
+    return (
+        f"the wire pulls with next to nothing in hold{'s' * (len(numbers) > 1)} {some_of(numbers)} "
+        f"({least:.2g} N or less): a slack wire shows neither stiffness nor creep, so test it where it stays taut"
     )
 
 

@@ -84,12 +84,17 @@ def _moves(readings: CheckedTest, way: float) -> _Moves:
     used &= np.diff(np.flatnonzero(protocol.recorded)) == 1
     used &= ~_late(readings)[1:]
     if protocol.control == "displacement":
-        taut = max(SLACK * float(first.max()), NOISE * readings.noise)
-        used &= np.minimum(first[1:], last[:-1]) > taut
+        used &= np.minimum(first[1:], last[:-1]) > slack_below(readings)
     at = np.flatnonzero(used)
     added = first[1:] - last[:-1]
     inner = second[1:] - last_but_one[:-1]
     return _Moves(at + 1, added[at], inner[at], moved[at], middle[at])
+
+
+def slack_below(readings: CheckedTest) -> float:
+    """Tension, N, with no more than which a wire may be slack."""
+    first = max(float(row[0]) for row in readings.each)
+    return max(SLACK * first, NOISE * readings.noise)
 
 
 def _late(readings: CheckedTest) -> Bools:
