@@ -10,13 +10,16 @@ import numpy as np
 from wirebayes.effects.unknown import Discrepancy
 from wirebayes.inference.fit import Fit
 from wirebayes.io import data_checks
+from wirebayes.io.checked_test import CheckedTest
+from wirebayes.io.zero_shifts import slack_below
 from wirebayes.model.build import FINEST
 from wirebayes.model.sample import Sample
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
 from wirebayes.results.prior_influence import leaning
-from wirebayes.sentences import short
+from wirebayes.sentences import short, some_of
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
+from wirebayes.wire.staircase import linearise
 
 LOOSE_STEPS = 0.35  # setting error over the typical step, which its prior ends at a half of: it presses against that
 NOISY = 0.25  # sensor error over the range of the tensions: half their spread is noise
@@ -24,9 +27,11 @@ QUIET = 2 * FINEST  # sensor and rounding error over the largest tension: finer 
 FAR_OUT = 3.7  # standard deviations from the middle of k1's prior: one line in five thousand, a factor of 260 off
 # decades of time between a tenth of the creep and nine tenths: from a second to three hours, which no hold shows
 ENDLESS = 4.0
+_FEW = 500  # draws are enough for a share of them
 _TENTH, _NINE_TENTHS = np.log(10.0 / 9.0), np.log(10.0)  # of the creep is reached at this hazard k2 t^N
 _CENTURY_S = 100 * 365.25 * 86400  # beyond it seconds say nothing
 _DECADES_TIMES_N = float(np.log10(_NINE_TENTHS / _TENTH))
+NEAR, OFTEN = 2.0, 0.1  # setting errors from slack, and the share of draws in which a hold begins or ends so near it
 LEAST_SHRINKAGE = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
 
 
@@ -77,6 +82,7 @@ def of_posterior(own: Mapping[str, Floats], prior: Mapping[str, Floats], sample:
         Draws of its posterior and of its prior.
     """
     found = [
+        ("slack", near_slack(own, sample)),
         ("data", loose_steps(own, sample)),
         ("data", noise(own, sample)),
         ("prior", unlikely_stiffness(own, prior)),
@@ -99,6 +105,29 @@ def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:
     return (
         f"setting_sd is at least {low:.2g} {unit} while the test steps by {step:.3g} {unit}: the {settings} do not "
         f"explain the {read}; look for holds in the wrong order, readings of two wires mixed, or another unit"
+    )
+
+
+def near_slack(own: Mapping[str, Floats], sample: Sample) -> str:
+    """Holds read as taut that an error of their setting may leave slack, of which the likelihood knows nothing."""
+    protocol = sample.protocol
+    if "setting_sd" not in own or protocol.control == "force":
+        return ""
+    few = {name: draws[:: 1 + len(draws) // _FEW] for name, draws in own.items()}
+    with np.errstate(all="ignore"):
+        line = linearise(protocol, few, sample.model)
+        taut = line.reading > NEAR * few["setting_sd"] * line.by_setting
+    read = np.where(protocol.mask, sample.readings[..., 0], np.inf).min(axis=1)
+    test = CheckedTest(protocol, sample.readings[..., 0], sample.resolution)
+    share = 1.0 - (taut | ~protocol.mask[..., None]).all(axis=1).mean(axis=1)
+    near = (share > OFTEN) & (read > slack_below(test))
+    if not near.any():
+        return ""
+    holds = some_of([str(number) for number in protocol.number[near]])
+    return (
+        f"in hold{'s' * bool(near.sum() > 1)} {holds} the wire is within {NEAR:g} setting errors of being slack "
+        f"({100 * share[near].max():.0f} % of the draws): a slack wire is not linear in such errors, as the likelihood "
+        "is, and intervals may be too narrow; test it where it stays taut"
     )
 
 
