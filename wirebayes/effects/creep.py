@@ -23,6 +23,7 @@ class PermanentCreep(Effect):
     place = "amount"
     formula = "permanent"
     scope = "material"
+    # a share: nothing is known of it but that
     amplitudes = (Amplitude("psi", "-", 0.0, Uniform(0.0, 1.0)),)
     sentence = (
         "A part of the creep is permanent: later holds creep as if it had not occurred. Creep that heads for the "
@@ -72,6 +73,7 @@ class SecondRelaxation(Effect):
     formula = "second_mode"
     scope = "material"
     amplitudes = (
+        # at the typical tension some tenths of a step, in a quarter of a hold within a factor of three
         Amplitude("A", "mm/N", 0.0, HalfNormal(0.4), is_elongation=True),
         Amplitude("T2", "s", 0.25, LogNormal(1.2, 0.25), is_shape=True),
     )
@@ -90,6 +92,7 @@ class SteadyCreep(Effect):
     place = "elongation"
     formula = "flow"
     scope = "material"
+    # at the typical tension up to half a step a hold: more would be the larger part of the creep
     amplitudes = (Amplitude("a", "mm/(N s)", 0.0, HalfNormal(0.5), is_elongation=True),)
     sentence = "The wire also flows steadily under tension and never settles."
     shows = "tail of the hold"
@@ -130,6 +133,7 @@ class TensionDependentRate(Effect):
     place = "rate"
     formula = "rate_power"
     scope = "material"
+    # at ten times the tension the creep is three times as fast or as slow
     amplitudes = (Amplitude("m", "-", 0.0, Normal(0.0, 0.5)),)
     sentence = "The creep runs faster or slower at higher tension."
     shows = "hold shape changes with tension"
@@ -147,6 +151,7 @@ class Ageing(Effect):
     place = "amount"
     formula = "ageing"
     scope = "material"
+    # the tenth hold creeps a third as much as the first, or three times as much
     amplitudes = (Amplitude("a", "-", 0.0, Normal(0.0, 0.5)),)
     sentence = "Each hold relaxes less than the one before, whatever its tension."
     shows = "relaxation amplitude by order, not displacement"
@@ -164,6 +169,7 @@ class CreepThreshold(Effect):
     formula = "threshold"
     no_creep_below = "creep_threshold.tau_c"
     scope = "material"
+    # half the typical tension: a wire that creeps only beyond it hardly creeps in such a test
     amplitudes = (Amplitude("tau_c", "N", 0.0, HalfNormal(0.5)),)
     sentence = "Below a threshold tension the wire does not creep."
     shows = "no relaxation in the first holds"

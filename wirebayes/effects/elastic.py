@@ -22,6 +22,7 @@ class StrainStiffening(Effect):
     place = "strain"
     formula = "stiffening"
     scope = "material"
+    # at a strain of a hundredth the tension is a fifth larger or smaller
     amplitudes = (Amplitude("c", "-", 0.0, Normal(0.0, 20.0)),)
     sentence = "The wire becomes stiffer (or softer) the more it is strained."
     shows = "curved in displacement, constant within a hold"
@@ -118,6 +119,7 @@ class FixtureCompliance(Effect):
     formula = "series"
     scope = "instrument"
     in_series = True
+    # at the typical tension the fixture gives way by most of a step
     amplitudes = (Amplitude("c", "mm/N", 0.0, HalfNormal(0.8)),)
     sentence = "The test bench itself deforms under the tension."
     shows = "k1 differs by length; needs two lengths of one line"
@@ -139,6 +141,7 @@ class ThermalExpansion(Effect):
     place = "zero_length"
     formula = "thermal"
     scope = "material"
+    # plastics expand by about a ten-thousandth a kelvin, drawn fibres less or the other way
     amplitudes = (Amplitude("alpha", "1/K", 0.0, Normal(0.0, 1e-4)),)
     sentence = "The wire grows or shrinks with the logged temperature."
     shows = "follows the logged temperature"
@@ -163,6 +166,7 @@ class LengthDependence(Effect):
     formula = "length_power"
     scope = "material"
     compares_lengths = True
+    # either way about in proportion to the length
     amplitudes = (Amplitude("p", "-", 0.0, Normal(0.0, 1.0)),)
     sentence = "A parameter changes with the length of the sample more than the plain model assumes."
     shows = "differs between lengths only"

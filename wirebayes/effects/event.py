@@ -15,6 +15,7 @@ class GripSlip(EventEffect):
     pattern = "step at a hold"
     place = "zero_length"
     formula = "slip"
+    # a third of a step: a grip that gives way by more is seen in the readings
     amplitudes = (Amplitude("w", "mm", 0.0, Normal(0.0, 0.3)),)
     sentence = "The wire slipped in its grip once."
     shows = "one step in level; names the hold"
@@ -31,6 +32,7 @@ class UnrecordedHold(EventEffect):
     pattern = "step at a hold"
     place = "wait"
     formula = "wait"
+    # some holds long: from a pause between two holds to a break at noon in a test of minutes
     amplitudes = (Amplitude("T", "s", 0.0, HalfNormal(2.5)),)
     sentence = "Time passed at a displacement before its first reading."
     shows = "step in level; names the hold"

@@ -19,6 +19,7 @@ class ReadingDelay(Effect):
     place = "clock"
     formula = "delay"
     scope = "instrument"
+    # some seconds in holds of minutes
     amplitudes = (Amplitude("t_d", "s", 0.0, HalfNormal(0.04)),)
     sentence = "The first reading of each hold was taken later than recorded."
     shows = "first reading low, most where creep is fastest"
@@ -54,6 +55,7 @@ class SensorDrift(Effect):
     place = "reading"
     formula = "drift"
     scope = "instrument"
+    # a tenth of the typical tension a hold: a sensor that drifts faster is seen before the test
     amplitudes = (Amplitude("a", "N/s", 0.0, Normal(0.0, 0.1)),)
     sentence = "The force sensor drifts with time."
     shows = "grows with elapsed time, also within holds"
@@ -70,6 +72,7 @@ class SensorNonlinearity(Effect):
     place = "reading"
     formula = "square"
     scope = "instrument"
+    # at the typical tension the reading is wrong by a few per cent: a sensor half wrong is no sensor
     amplitudes = (Amplitude("a", "1/N", 0.0, Normal(0.0, 0.08)),)
     sentence = "The force sensor is nonlinear at higher tension."
     shows = "like stiffening; distinguishable with several wires"
@@ -87,6 +90,7 @@ class ClampTransient(Effect):
     formula = "transient"
     scope = "instrument"
     amplitudes = (
+        # a few per cent of the tension, gone in a tenth of a hold within a factor of three
         Amplitude("a", "-", 0.0, Normal(0.0, 0.05)),
         Amplitude("T", "s", 0.08, LogNormal(1.0, 0.08), is_shape=True),
     )
@@ -196,6 +200,7 @@ class LostMotion(_NeedsReversal):
     place = "position"
     formula = "lost_motion"
     scope = "instrument"
+    # play of a tenth of a step
     amplitudes = (Amplitude("w", "mm", 0.0, HalfNormal(0.1)),)
     sentence = "The screw has play: after a reversal the true position lags behind."
     shows = "unloading branch"
@@ -212,6 +217,7 @@ class GuideFriction(_NeedsReversal):
     place = "guide"
     formula = "friction"
     scope = "instrument"
+    # a guide or a pulley takes a few per cent of the tension
     amplitudes = (Amplitude("mu", "-", 0.0, Normal(0.0, 0.05)),)
     sentence = "Friction in the guide raises the reading while loading and lowers it while unloading."
     shows = "unloading branch"
