@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,14 +140,25 @@ def test_findings_do_not_depend_on_how_many_processes_there_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     experiments = made(tmp_path, [Bench()], {"toe.w": 1.5}, [effect_named("toe")])
-    kinds = {name: CATALOGUE[name] for name in ("toe", "superposition", "steady_creep")}
+    settings = Settings(
+        kinds={name: CATALOGUE[name] for name in ("toe", "superposition", "steady_creep")}, simulations=FEW
+    )
+    heard: list[Any] = []
+
+    def hear(what: str, done: int, total: int) -> None:
+        heard.append(what)
+
     reports = []
     for cores in (1, 2):
         monkeypatch.setattr(workers, "cores", lambda cores=cores: cores)
+        heard.clear()
         with workers.workers() as parallel_map:
-            reports.append(
-                investigate(experiments, Settings(kinds=kinds, simulations=FEW), 0, parallel_map=parallel_map).report
-            )
+            found = investigate(experiments, settings, 0, hear, parallel_map, heard.append)
+        reports.append(found.report)
+        # the models are told before it is looked at how they predict
+        (models,) = (told for told in heard if not isinstance(told, str))
+        assert models.final is found.final and models.undecided is found.undecided
+        assert heard.index(models) < heard.index("held-out holds")
     assert json.dumps(reports[0]) == json.dumps(reports[1])
 
 

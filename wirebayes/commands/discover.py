@@ -16,7 +16,7 @@ from wirebayes.commands.options import (
     other_effort,
     path_of,
 )
-from wirebayes.discovery.investigation import Investigation, JointModel, alternative_models, final_models
+from wirebayes.discovery.investigation import Concluded, Investigation, JointModel, alternative_models, final_models
 from wirebayes.discovery.search import catalogue_without, investigate
 from wirebayes.discovery.settings import SIMULATIONS, Settings
 from wirebayes.effects import catalogue, source_of
@@ -32,7 +32,7 @@ from wirebayes.notice import from_json, notices_by_part, to_json
 from wirebayes.processes.copies import loaded_meanwhile, prepared_copy
 from wirebayes.processes.workers import computing, give_way, workers
 from wirebayes.progress import Progress, silent
-from wirebayes.results.jobs import Job, run
+from wirebayes.results.jobs import Job, begin, run
 from wirebayes.results.mixture import write_mixture
 from wirebayes.results.read_back import load_posterior
 from wirebayes.strict.files import PathLike
@@ -149,14 +149,20 @@ def _searched_and_sampled(
     policy: Policy,
     report: Progress,
 ) -> Investigation:
-    """What was found, and the posteriors of it; the plain ones are begun beside the search."""
+    """What was found, and the posteriors of it: the plain ones are begun beside the search, the others at its end."""
     spec = settings.spec
     sampled = partial(run, directory=output, seed=seed, policy=policy)
     plain = partial(sampled, plain_jobs(experiments, spec, own))
+    waits: list[Callable[[Progress], None]] = []
     with computing(), prepared_copy(partial(_in_gaps, plain)) as in_copy:
         with workers(prepare=partial(catalogue, own)) as parallel_map, loaded_meanwhile(_PICTURES):
-            found = investigate(experiments, settings, seed, report, parallel_map)
-            sampled(jobs_of(found, spec, own), report=report, parallel_map=parallel_map)
+
+            def concluded(models: Concluded) -> None:
+                waits.append(begin(jobs_of(models, spec, own), output, seed, policy, parallel_map))
+
+            found = investigate(experiments, settings, seed, report, parallel_map, concluded)
+            for wait in waits:
+                wait(report)
         in_copy(plain)
         sampled(plain_jobs(_void(found, experiments, output), spec, own), report=report)
     return found
@@ -214,15 +220,15 @@ def plain_jobs(experiments: Sequence[Experiment], spec: ModelSpec, own_effects: 
     return [_job("plain", JointModel((e,)), spec, own_effects) for e in experiments]
 
 
-def jobs_of(found: Investigation, spec: ModelSpec, own_effects: Path | None) -> list[Job]:
+def jobs_of(found: Concluded, spec: ModelSpec, own_effects: Path | None) -> list[Job]:
     """The final fits that have more effects than the plain ones.
 
     Where the findings are ambiguous, there is one for each effect that could be the missing one.
 
     Parameters
     ----------
-    found : Findings
-        Of the search.
+    found : Concluded
+        By the search.
     spec, own_effects
         As for `plain_jobs`.
     """
@@ -238,7 +244,7 @@ def _job(kind: str, model: JointModel, spec: ModelSpec, own_effects: Path | None
     return Job(folders[0], model.experiments, keys, own_effects, spec, provenance, model.near, folders)
 
 
-def _others(found: Investigation) -> list[tuple[int, JointModel]]:
+def _others(found: Concluded) -> list[tuple[int, JointModel]]:
     """The undecided models beside the final ones, each with its number among those of its experiments."""
     out, count = [], dict[str, int]()
     for models in alternative_models(found):

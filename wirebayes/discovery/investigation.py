@@ -11,22 +11,35 @@ from wirebayes.wire.effect import Effect
 
 
 @dataclass(frozen=True)
-class Investigation:
+class Concluded:
+    """The models that were found for a file, for each material.
+
+    Attributes
+    ----------
+    final : tuple of LaplaceFit
+        The samples of each material, gross errors struck out, with the effects that were accepted.
+    remains : tuple of bool
+        Whether something unknown remains beside these.
+    undecided : tuple of list of Alternative
+        The models that the readings leave undecided, the final one first; empty where nothing is.
+    """
+
+    final: tuple[LaplaceFit, ...]
+    remains: tuple[bool, ...]
+    undecided: tuple[list[Alternative], ...]
+
+
+@dataclass(frozen=True)
+class Investigation(Concluded):
     """What was found in a file.
 
     Attributes
     ----------
     report : dict
         The content of ``discovery.json``.
-    final : tuple of LaplaceFit
-        The samples of each material, gross errors struck out, with the effects that were accepted.
-    undecided : tuple of list of Alternative
-        For each material the models that the readings leave undecided, the final one first; empty where nothing is.
     """
 
     report: DiscoveryJson
-    final: tuple[LaplaceFit, ...]
-    undecided: tuple[list[Alternative], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -38,21 +51,19 @@ class JointModel:
     near: dict[str, float] | None = None
 
 
-def final_models(findings: Investigation) -> list[JointModel]:
+def final_models(findings: Concluded) -> list[JointModel]:
     """The final model of every experiment.
 
     Samples of one material share what they are, and the amplitude of what was added. Where nothing was, each stands for
     itself; where something unknown remains, with the flexible discrepancy beside what was added.
     """
     out = []
-    for block in findings.final:
-        reports = [findings.report["experiments"][name] for name in block.names]
-        remains = reports[0]["verdict"] in ("partial", "unknown")
+    for block, remains in zip(findings.final, findings.remains, strict=True):
         out += _sampled(block, remains)
     return out
 
 
-def alternative_models(findings: Investigation) -> list[list[JointModel]]:
+def alternative_models(findings: Concluded) -> list[list[JointModel]]:
     """The other models that stay undecided beside the final ones, each as what is sampled for it."""
     return [_sampled(other.block, other.remains) for others in findings.undecided for other in others[1:]]
 

@@ -5,7 +5,7 @@ beside a flexible reference; further effects by leave-one-hold-out; the gap on h
 detected.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import repeat
@@ -18,7 +18,7 @@ from wirebayes.discovery.alternatives import Alternative, alternatives
 from wirebayes.discovery.families import block_ratio, called, family_sentence
 from wirebayes.discovery.global_test import Gate, examine
 from wirebayes.discovery.held_out import LeftOut
-from wirebayes.discovery.investigation import Investigation
+from wirebayes.discovery.investigation import Concluded, Investigation
 from wirebayes.discovery.judgement import Evidence, FamilyEvidence
 from wirebayes.discovery.material_answer import MaterialAnswer, answer_material
 from wirebayes.discovery.model_space import largest_first
@@ -71,6 +71,7 @@ def investigate(
     seed: int = 0,
     report: Progress = silent,
     parallel_map: ParallelMap = map,
+    concluded: Callable[[Concluded], None] = lambda found: None,
 ) -> Investigation:
     """Judge the experiments of one file together.
 
@@ -83,6 +84,8 @@ def investigate(
         Called as the work proceeds.
     parallel_map : function, optional
         The built-in `map`, or one over processes (`wirebayes.processes.workers`); the findings are the same.
+    concluded : function of a Concluded, optional
+        Called as soon as the models are known, before it is reported how they predict.
 
     Returns
     -------
@@ -106,8 +109,9 @@ def investigate(
         past = name_effects(gate, expansions, settings, left_out, rng, parallel_map)
         report("naming", 1, 1)
     answers = [answer_material(gate, past, i, where[i], left_out, rng, parallel_map) for i in range(len(gate.blocks))]
-    final = [a.stages[-1] if a.stages else block for a, block in zip(answers, gate.blocks, strict=True)]
-    alike = power.similarity(expansions, gate.trials, [block_ratio(f) for f in final])
+    models = _models(past, answers, gate.blocks)
+    concluded(models)
+    alike = power.similarity(expansions, gate.trials, [block_ratio(f) for f in models.final])
     out: dict[str, ExperimentFindings] = {}
     for i, answer in enumerate(answers):
         report("held-out holds", i, len(answers))
@@ -118,9 +122,10 @@ def investigate(
             out[e.name] = {**common, **ahead, **own[e.name]}
     report("held-out holds", len(answers), len(answers))
     return Investigation(
+        models.final,
+        models.remains,
+        models.undecided,
         {"version": 3, "experiments": out, "warnings": notices_by_part(out)},
-        tuple(final),
-        _undecided(past, answers, final),
     )
 
 
@@ -139,6 +144,12 @@ def _disagreements(gate: Gate) -> list[list[Disagreement]]:
     number = len(gate.trials)
     each = zip(gate.patterns, gate.data, gate.nulls, gate.blocks, strict=True)
     return [residual_patterns.findings(p, number, d, null, ", ".join(b.names)) for p, d, null, b in each]
+
+
+def _models(past: Named | None, answers: Sequence[MaterialAnswer], plain: Sequence[LaplaceFit]) -> Concluded:
+    """What is said of each material as models: the final one, and those that stay undecided beside it."""
+    final = tuple(a.stages[-1] if a.stages else block for a, block in zip(answers, plain, strict=True))
+    return Concluded(final, tuple(a.remains for a in answers), _undecided(past, answers, final))
 
 
 def _undecided(

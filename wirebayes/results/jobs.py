@@ -82,17 +82,41 @@ def run(
     parallel_map : callable, optional
         Takes the place of processes that share the work.
     """
-    todo = [job for job in jobs if not all((directory / f / "summary.json").exists() for f in job.folders)]
+    todo = _left(jobs, directory)
     if len(todo) <= 1 or cores() == 1:
         for job in todo:
             one(job, directory, seed, policy, lambda share, name=job.folder: report(name, share, 1.0))  # type: ignore[misc]
         return
-    work = partial(one, directory=directory, seed=seed, policy=policy)
-    # those that take longest begin first, so that no core waits for one that began last
-    longest = sorted(todo, key=lambda job: -len(job.experiments) * (1 + len(job.effects)))
     with workers(len(todo)) if parallel_map is None else nullcontext(parallel_map) as parallel_map:
-        for done, _ in enumerate(parallel_map(work, longest), 1):
-            report("fits", done, len(todo))
+        begin(todo, directory, seed, policy, parallel_map)(report)
+
+
+def begin(
+    jobs: Sequence[Job], directory: Path, seed: int, policy: Policy, parallel_map: ParallelMap
+) -> Callable[[Progress], None]:
+    """Hand over all fits that are not in the directory yet; what is returned waits for them, and reports the number.
+
+    Parameters
+    ----------
+    jobs, directory, seed, policy
+        As for `run`.
+    parallel_map : callable
+        A map over processes, which begins at once, or the built-in one, which does the work when it is waited for.
+    """
+    # those that take longest begin first, so that no core waits for one that began last
+    longest = sorted(_left(jobs, directory), key=lambda job: -len(job.experiments) * (1 + len(job.effects)))
+    begun = parallel_map(partial(one, directory=directory, seed=seed, policy=policy), longest)
+
+    def wait(report: Progress) -> None:
+        for done, _ in enumerate(begun, 1):
+            report("fits", done, len(longest))
+
+    return wait
+
+
+def _left(jobs: Sequence[Job], directory: Path) -> list[Job]:
+    """Those that are not done yet."""
+    return [job for job in jobs if not all((directory / f / "summary.json").exists() for f in job.folders)]
 
 
 def one(
