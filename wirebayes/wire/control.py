@@ -7,7 +7,7 @@ it, the sensor or the gauge on what it shows.
 
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import HoldContext, Placed
-from wirebayes.wire.elastic import Elastic
+from wirebayes.wire.elastic_with_effects import Elastic
 from wirebayes.wire.inverse import inverse
 from wirebayes.wire.protocol import Control
 

@@ -15,7 +15,7 @@ from wirebayes.wire import compiled, laws
 from wirebayes.wire.control import SETTINGS
 from wirebayes.wire.creep import Creep
 from wirebayes.wire.effect import Clock, HoldContext, Placed
-from wirebayes.wire.elastic import Elastic
+from wirebayes.wire.elastic_with_effects import Elastic
 from wirebayes.wire.model import PLAIN, Model
 from wirebayes.wire.protocol import Protocol
 
