@@ -11,7 +11,9 @@ _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of Linux's <sys/prctl.h>
 
 ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
 
-gc.set_threshold(100_000, 50, 100)  # as for a command (`wirebayes.cli`)
+from wirebayes.processes.workers import SELDOM  # noqa: E402
+
+gc.set_threshold(*SELDOM)
 
 import wirebayes.discovery.model_check  # noqa: E402
 import wirebayes.results.store  # noqa: E402, F401

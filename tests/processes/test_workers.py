@@ -1,5 +1,6 @@
 """Work spread over processes: in order, for any amount of it, with effects that only a user's file has."""
 
+import gc
 import subprocess
 import sys
 from functools import partial
@@ -154,6 +155,16 @@ def test_while_computing_linear_algebra_has_one_thread_and_then_what_it_had() ->
             assert set(threads()) == {1}
         assert threads() == before
         assert max(before) == 2  # else this machine has nothing to limit
+
+
+def test_while_computing_cycles_of_objects_are_looked_for_seldom() -> None:
+    """Whoever called may look as often as before."""
+    before = gc.get_threshold()
+    assert before[0] < 100_000
+    with pytest.raises(InterruptedError), computing():
+        assert gc.get_threshold()[0] == 100_000
+        raise InterruptedError
+    assert gc.get_threshold() == before
 
 
 def test_a_script_that_loaded_numpy_first_computes_with_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:

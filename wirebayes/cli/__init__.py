@@ -140,8 +140,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         arguments = sys.argv[1:]
         watch(arguments)
-        # Imports make objects that stay: to look for cycles among them again and again takes a tenth of a fit.
-        gc.set_threshold(100_000, 50, 100)
+        from wirebayes.processes.workers import SELDOM
+
+        gc.set_threshold(*SELDOM)
         # The end of the process frees all at once; Python would free each object before it, for half a second.
         atexit.register(gc.freeze)
     arguments = list(arguments)

@@ -1,5 +1,6 @@
 """Independent work on all cores; the results do not depend on how many there are."""
 
+import gc
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -23,6 +24,9 @@ _FORKS = sys.platform == "linux"  # elsewhere system libraries do not survive a 
 _THREADS_OF_THIS = Path("/proc/self/task")  # one folder a thread; on Linux alone
 _LOOKS, _MOMENT_S = 10, 0.001  # ten times as long as a thread takes to be gone
 _TRACKER = "ignore:resource_tracker"
+# objects made from one look for cycles of them to the next, as `gc.set_threshold` takes them: what is imported, and
+# most of what is computed, stays, and to look at it again and again takes a twentieth of a search, a tenth of a fit
+SELDOM = 100_000, 50, 100
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -111,7 +115,8 @@ def computing() -> Iterator[None]:
     """Compute within the block, whoever called: with one thread for linear algebra, and apart from the user's script.
 
     Matrices here are small, and several threads only wait for each other: beside other work on the machine everything
-    took five times as long. Environment variables say nothing to a numpy that a user's script has loaded before.
+    took five times as long. Environment variables say nothing to a numpy that a user's script has loaded before. And
+    Python looks for cycles of objects as seldom as in a command.
 
     Processes that start within the block do not import that script, so it need not guard its top level. A new process
     imports the main module of its parent in case that work was defined there. Ours never is, and a script whose top
@@ -123,10 +128,13 @@ def computing() -> Iterator[None]:
     known = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
     for name in known:
         setattr(main, name, None)
+    before = gc.get_threshold()
+    gc.set_threshold(*SELDOM)
     try:
         with threadpool_limits(1):
             yield
     finally:
+        gc.set_threshold(*before)
         for name, value in known.items():
             setattr(main, name, value)
 
