@@ -53,3 +53,9 @@ def test_a_test_that_breaks_in_a_recording_of_times_is_written_without_its_last_
     made = wb.import_bench(path, length_mm=1000, drop_breaks=True, output=tmp_path / "out")
     assert [hold.setting for hold in made.experiments[0].holds] == [1.0, 2.0]
     assert (tmp_path / "out" / "raw.svg").is_file()
+
+
+def test_a_file_without_a_whole_row_is_refused(tmp_path):
+    cells = {(row, 1 + row % 2): "-" for row in range(len(ROWS))}
+    with pytest.raises(wb.InputError, match="found no row with a time, a displacement and a tension, all of them numb"):
+        read(tmp_path, cells, drop_breaks=True)

@@ -25,7 +25,7 @@ from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
 from wirebayes.io.bench.two_units import finest_of_same
 from wirebayes.io.bench.undecided import Undecided
-from wirebayes.io.bench.words import last_named, speaks_of
+from wirebayes.io.bench.words import ERRORS, last_named, speaks_of, words_in
 from wirebayes.sentences import listed
 from wirebayes.strict.hint import hint
 
@@ -109,6 +109,8 @@ def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
     if len(different) > 1 and role == "tension":
         varying = [i for i in different if len(set(table.column(i))) > 1]  # beside a breaking load, or a preload
         different = varying if len(varying) == 1 else different
+    if len(different) > 1:
+        different = _without_errors(table, different, role)
     if len(different) > 1 and role in ("tension", "displacement"):
         different = finest_of_same(table, different, role)
     if len(different) == 1:
@@ -125,6 +127,13 @@ def _without_copies(table: RawTable, likely: Sequence[int]) -> list[int]:
         if not any(is_copy(table, index, other) for other in out):
             out.append(index)
     return out
+
+
+def _without_errors(table: RawTable, likely: Sequence[int], role: Role) -> list[int]:
+    """The columns without those that say the error of another one: ``Force error (N)`` beside ``Force (N)``."""
+    words = {i: words_in(name_and_unit(table.header[i], role)[0]) for i in likely}
+    of_error = [i for i in likely if any(words[k] < words[i] and words[i] - words[k] <= ERRORS for k in likely)]
+    return [i for i in likely if i not in of_error]
 
 
 def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
@@ -272,6 +281,7 @@ def _several(table: RawTable, likely: Sequence[int], role: Role, how: str = "") 
 def _option(table: RawTable, unread: Sequence[int], role: Role) -> str:
     """What to write for a missing quantity: the column in a unit of it, if there is one; it is the user who decides."""
     likely = [i for i in unread if quantity_unit(table.units[i], role) or name_and_unit(table.header[i], role)[1]]
+    likely = likely or [i for i in unread if quantity_unit(table.header[i], role)]  # named by nothing but its unit
     if len(likely) == 1:
         return f'--map "{table.header[likely[0]]}={role}"'
     return f'--map "HEADER={role} [{UNITS[role]}]"'

@@ -24,6 +24,7 @@ from wirebayes.io.bench.glitches import without_glitches
 from wirebayes.io.bench.holds import cut, stretches
 from wirebayes.io.bench.joined import HOLD, lacking, one_table
 from wirebayes.io.bench.no_weight import without_weight
+from wirebayes.io.bench.parts_of_seconds import with_whole_seconds
 from wirebayes.io.bench.quantities import UNITS
 from wirebayes.io.bench.recorded import Cut
 from wirebayes.io.bench.resolution import evident_step
@@ -148,7 +149,8 @@ def lacks_a_setting(path: Path, choices: Choices) -> bool:
 def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted]:
     """The experiments of the specimens of a table."""
     table = with_titles_as_columns(with_units_beside(table), choices.mapping)
-    table = with_dates(with_joined_parts(table, choices.mapping), choices.time_since)
+    table = with_joined_parts(with_whole_seconds(table, choices.mapping), choices.mapping)
+    table = with_dates(table, choices.time_since)
     tables = specimen_tables(table, choices.mapping, choices.specimens)
     if len(tables) > 1:
         names = _names_of([each.specimen for each, _ in tables], about)

@@ -25,6 +25,7 @@ _OPEN_CELL = re.compile(
     r'^(?:[^"]|"[^"]*")*(?:^|[,;\t|])\s*"[^"]*$'
 )  # a quote that begins a cell, and none that ends it
 _CLOSED_CELL = re.compile(r'[^"]*"\s*([,;\t|]|$)')
+_MARKUP = re.compile(r"\s*<(!doctype|html|\?xml|table|head|body)\b", re.IGNORECASE)  # some benches call it .xls
 _ENDS = ("\n", "\r", "\x1a")  # of a file whose last line was finished
 MOST_BREAKS = 20  # of the cells of one line: a name and a unit in each of twenty columns
 _SEPARATOR = re.compile(
@@ -47,6 +48,8 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     InputError
         No sign splits the lines into columns of numbers.
     """
+    if _MARKUP.match(text):
+        raise InputError(f"{path}, line 1: found HTML or XML, expected text (CSV) or xlsx; save it as xlsx")
     lines = _whole_lines(text.splitlines() or [""])
     if labview.is_measurement(lines):
         return labview.sheet_of_measurement(path, lines, encoding)
@@ -135,7 +138,15 @@ def _score(lines: list[str], sign: str) -> tuple[float, int, int]:
 def _cells(line: str, sign: str) -> list[str]:
     if sign == " ":
         return _BETWEEN_WORDS.split(joined_measures(line.strip())) if line.strip() else []
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])]
+    return [_bare_cell(cell.strip()) for cell in next(csv.reader([line], delimiter=sign, skipinitialspace=True), [])]
+
+
+def _bare_cell(cell: str) -> str:
+    """A cell without what keeps spreadsheets from changing it, ``="1.50"``, and without a comment behind its number."""
+    if cell.startswith('="') and cell.endswith('"'):
+        return cell[2:-1]
+    number, sign, _ = cell.partition(" #")
+    return number.rstrip() if sign and is_value(number.rstrip()) else cell
 
 
 def _rows(lines: list[str], sign: str) -> tuple[tuple[SheetRow, ...], bool]:

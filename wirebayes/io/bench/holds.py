@@ -24,7 +24,6 @@ from wirebayes.io.bench.recorded import (
     Rows,
     changes,
     groups_between,
-    is_continuous,
     level_of,
     restarts,
     wanders,
@@ -64,7 +63,7 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
         groups = groups_between(changes(readings.hold))
         if not wanders(x, groups):
             return _cut_into_groups(readings, groups, time_since, resets)
-        if not is_continuous(groups):
+        if _usual(groups) < CONTINUOUS:  # moves may have numbers of their own
             raise _wandering(readings, groups)
         resets = [*resets, f"hold numbers are not used: the {readings.role} changes within them"]
         return by_plateaus(readings, resets)
@@ -103,9 +102,15 @@ def stretches(readings: Readings, fewest: int = FEWEST) -> list[Rows]:
 def _are_holds(groups: Sequence[Rows]) -> bool:
     """Whether groups of one setting each are holds as people write them down, without moves between them."""
     sizes = np.array([len(rows) for rows in groups])
-    usual = float(np.median(np.repeat(sizes, sizes)))
+    usual = _usual(groups)
     no_moves = sizes.min() > MOVE_SHARE * usual
     return bool(2 * len(groups) <= sizes.sum() and (usual < CONTINUOUS or no_moves))
+
+
+def _usual(groups: Sequence[Rows]) -> float:
+    """How many readings the hold of the usual reading has."""
+    sizes = [len(rows) for rows in groups]
+    return float(np.median(np.repeat(sizes, sizes)))
 
 
 def _check_order(readings: Readings) -> None:

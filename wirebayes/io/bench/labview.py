@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from wirebayes.errors import InputError
+from wirebayes.io.bench.numerals import plain_number
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
 
 _SIGNATURE = "LabVIEW Measurement"
@@ -43,11 +44,32 @@ def sheet_of_measurement(path: Path, lines: list[str], encoding: str = "utf-8") 
         if split[head] != split[header]:
             found = f"the channels {', '.join(filter(None, split[head]))}"
             raise InputError(f"{path}, line {head + 1}: found {found}, expected those of line {header + 1}")
+    clocks = _clocks(split)
     for number, cells in enumerate(split[header + 1 :], start=header + 2):
         first = next((cell for cell in cells if cell), "")
         if is_value(first):  # the preamble of another segment begins with words
-            rows.append(SheetRow(number, _filled(cells)))
+            time = clocks.get(number - 1, "") if cells[0] == "" else cells[0]
+            rows.append(SheetRow(number, _filled([time, *cells[1:]])))
     return Sheet(path, tuple(row for row in rows if row.cells), described="LabVIEW measurement", encoding=encoding)
+
+
+def _clocks(split: list[list[str]]) -> dict[int, str]:
+    """The time of each line of readings, where their preamble says when they begin and how far apart they are."""
+    comma = any(cells[0] == "Decimal_Separator" and "," in "".join(cells[1:]) for cells in split)
+    times, begin, step, head = dict[int, str](), set[str](), set[str](), 0
+    for i, cells in enumerate(split):
+        if cells[0] == "X0":
+            begin = set(filter(None, cells[1:]))
+        elif cells[0] == "Delta_X":
+            step = set(filter(None, cells[1:]))
+        elif cells[0] == _END or cells[0].startswith(_TIMES):
+            head = i
+        elif len(begin) == len(step) == 1:
+            first, apart = (plain_number(text, "comma" if comma else "point") for (text,) in (begin, step))
+            if first and apart:
+                time = f"{float(first) + (i - head - 1) * float(apart):.6f}"
+                times[i] = time.replace(".", ",") if comma else time
+    return times
 
 
 def _is_head(split: list[list[str]], i: int) -> bool:

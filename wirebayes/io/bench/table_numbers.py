@@ -150,6 +150,9 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     decimal = decimal_sign(table, [column.index for column in numbers.values()], choices.decimal)
     check_signs(table, [column.index for column in numbers.values()], decimal)
     table, left_out = without_marks(table, numbers, decimal, choices.drop_breaks)
+    if not table.rows:
+        found = "no row with a time, a displacement and a tension, all of them numbers"
+        raise InputError(f"{table.sheet.path}: found {found}, expected readings")
     notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes, *left_out]
     texts: dict[Role, list[str]] = {
         role: _numbers(table, column, decimal) for role, column in numbers.items() if role != "hold"
@@ -169,7 +172,7 @@ def _from_zero_on(recorded: Recorded, notes: list[str]) -> tuple[Recorded, list[
     """Without the readings that a trigger keeps of the time before each hold, counted below zero."""
     time = recorded.values["time"]
     before = time < 0.0
-    if not before.any() or not (np.diff(time) < 0.0).any():
+    if not before.any() or before.all() or not (np.diff(time) < 0.0).any():
         return recorded, notes
     return recorded.of_rows(np.flatnonzero(~before)), [
         *notes,

@@ -80,6 +80,11 @@ STATISTICS = {
     "mean", "average", "avg", "median", "max", "maximum", "min", "minimum", "sum", "total", "std", "stdev", "sd",
     "mittel", "mittelwert", "durchschnitt", "summe", "moyenne", "somme", "media", "promedio", "suma", "somma", "totale",
 }  # fmt: skip
+# What the error of a quantity is called, beside its name.
+ERRORS = {
+    "error", "err", "uncertainty", "unc", "sd", "std", "stdev", "sem", "sigma", "fehler", "messfehler", "unsicherheit",
+    "standardabweichung", "erreur", "incertitude", "incertidumbre", "incertezza", "errore", "incerteza", "fout",
+}  # fmt: skip
 # What numbers the loads or steps of a test, first or last in its header; amid others it may be a Portuguese "in the".
 NUMBERING = {"no", "nr", "num", "number", "nummer", "numero", "№", "#"}
 _COMPOUND = 3  # letters of a word that may end another one, as in Traversenweg or Prüfzeit

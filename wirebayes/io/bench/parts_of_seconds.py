@@ -1,0 +1,73 @@
+"""Whole seconds and what is left of them side by side, as computers stamp readings: ``sec, nsec``."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from wirebayes.io.bench.header import name_and_unit
+from wirebayes.io.bench.table import RawTable
+
+_UNITS = {  # parts of a second in one, by what programs call them
+    1: ("s", "sec", "secs", "second", "seconds"),
+    10**3: ("ms", "msec", "msecs", "millis", "millisec", "milliseconds"),
+    10**6: ("us", "µs", "usec", "usecs", "micros", "microsec", "microseconds"),
+    10**9: ("ns", "nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanoseconds"),
+}
+_WHOLE = re.compile(r"\d{1,12}")
+_DIGITS = 9  # of the fraction that is written
+_WITH_COMMA = re.compile(r"-?\d+,\d+")
+
+
+def with_whole_seconds(table: RawTable, mapping: Sequence[str]) -> RawTable:
+    """The table with one column of seconds for the two; itself where there are none.
+
+    Parameters
+    ----------
+    table : RawTable
+    mapping : sequence of str
+        What the user says of columns: those that it names stay as they are.
+    """
+    said = {text.rpartition("=")[0].strip() for text in mapping}
+    for first in range(len(table.header) - 1):
+        second = first + 1
+        if not said.isdisjoint(table.header[first : second + 1]):
+            continue
+        parts = _parts(table, second)
+        if _parts(table, first) == 1 and parts > 1 and _count(table, first, second, parts):
+            return _joined(table, first, parts)
+    return table
+
+
+def _parts(table: RawTable, column: int) -> int:
+    """How many of what a column counts make a second; 0 where it counts something else."""
+    header, under = table.header[column].strip(), table.units[column]
+    unit = name_and_unit(header, "time")[1]
+    last = re.split(r"[\s._/()\[\]]+", header.rstrip(")] "))[-1]
+    called = (under, unit.text if unit else "", last)
+    return next((parts for text in called for parts, names in _UNITS.items() if text.lower() in names), 0)
+
+
+def _count(table: RawTable, first: int, second: int, parts: int) -> bool:
+    """Whether both columns count in whole numbers, and the second one to less than a second, again and again."""
+    seconds, rest = table.column(first), table.column(second)
+    if not all(map(_WHOLE.fullmatch, [*seconds, *rest])):
+        return False
+    counts = list(map(int, rest))
+    begins_again = any(b < a for a, b in zip(counts, counts[1:], strict=False))
+    return max(counts) < parts and begins_again and len(set(seconds)) > 1
+
+
+def _joined(table: RawTable, first: int, parts: int) -> RawTable:
+    """The table with seconds and their fraction in the first of the two columns."""
+    sign = "," if any(_WITH_COMMA.fullmatch(cell) for row in table.rows for cell in row.cells) else "."
+    rows = []
+    for row in table.rows:
+        fraction = int(row.cell(first + 1)) * (10**_DIGITS // parts)
+        cells = [*row.cells]
+        cells[first : first + 2] = [f"{row.cell(first)}{sign}{fraction:0{_DIGITS}d}", ""]
+        rows.append(replace(row, cells=tuple(cells)))
+    header, units = [*table.header], [*table.units]
+    described = f"{table.sheet.described}, time from {header[first]} and {header[first + 1]}"
+    header[first : first + 2], units[first : first + 2] = ["time (s)", ""], ["", ""]
+    sheet = replace(table.sheet, described=described)
+    return replace(table, sheet=sheet, header=tuple(header), units=tuple(units), rows=tuple(rows))
