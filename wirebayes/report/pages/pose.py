@@ -177,7 +177,8 @@ def _slices(pose: PoseJson) -> list[Block]:
 def _drift(pose: PoseJson) -> list[Block]:
     lines = []
     entries = pose.get("drift", [])
-    turns = any(any(entry["tilt_deg"]["q95"]) or any(entry["from_vertical_deg"]["q95"]) for entry in entries)
+    angles = [entry[name] for entry in entries for name in ("tilt_deg", "from_vertical_deg")]
+    turns = any(any(band["q95"] or ()) for band in angles)  # there are no bands where no draw could be solved
     for entry in entries:
         bands = [entry["distance_mm"], *([entry["tilt_deg"], entry["from_vertical_deg"]] if turns else [])]
         for i, time in enumerate(entry["times_s"]):
