@@ -42,6 +42,7 @@ from wirebayes.robot.self_calibration import (
     whole_answer,
 )
 from wirebayes.robot.self_calibration.identified import identified
+from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.seeds import best
 from wirebayes.robot.self_calibration.summary import Moment, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT
@@ -294,7 +295,7 @@ def _power(one: Case, errors: StatedErrors, log: session.Session) -> float:
         0.0,
         1e-3 * one.told.robot.rule.lowest_N,
     )
-    e = equations.linearised(free, holds, noise, state, creep, state)
+    e = linearised(free, holds, noise, state, creep, state)
     covariance = np.linalg.inv(descent.eliminated(e, white, 0.0).matrix)
     at = free.slices["exit"]
     information = np.linalg.inv(covariance[at, at]) - np.eye(len(shift))

@@ -10,10 +10,11 @@ from tests.robot import drawn
 from tests.robot.test_usable import _session
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.motion.drift import CreepingHold
+from wirebayes.robot.motion.creeping_hold import CreepingHold
 from wirebayes.robot.self_calibration.descent import Descent
-from wirebayes.robot.self_calibration.equations import Holds, Noise, State, linearised
+from wirebayes.robot.self_calibration.equations import Holds, Noise, State
 from wirebayes.robot.self_calibration.holds_creep import creep_of
+from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.posterior import gaussian_posterior
 from wirebayes.robot.self_calibration.predicted import predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior

@@ -12,7 +12,7 @@ from wirebayes.effects import effect_named
 from wirebayes.effects.rivals import Logarithmic, PowerLaw, TwoModes
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.mechanics.wires import Wires, tension
-from wirebayes.robot.motion import drift, forward, inverse
+from wirebayes.robot.motion import creeping_hold, drift, forward, inverse
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 from wirebayes.wire.model import Model
@@ -167,14 +167,14 @@ def test_smaller_errors_allowed_a_step_change_little():
 @pytest.fixture
 def tries(monkeypatch):
     """Steps that a walk tries; it is ended after a thousand."""
-    tried, once = [], drift.CreepingHold._try
+    tried, once = [], creeping_hold.CreepingHold._try
 
     def counted(walk, time, least):
         assert len(tried) < 1000
         tried.append((time, least))
         return once(walk, time, least)
 
-    monkeypatch.setattr(drift.CreepingHold, "_try", counted)
+    monkeypatch.setattr(creeping_hold.CreepingHold, "_try", counted)
     return tried
 
 
@@ -202,7 +202,8 @@ def test_nothing_is_followed_where_no_draw_hangs_in_balance(tries):
 @pytest.mark.parametrize("off", [-1e-9, 1e-9])
 def test_a_step_is_taken_whatever_its_error_where_creep_grows_by_a_ten_thousandth(off, monkeypatch):
     robot = schema.read_robot_file("linear-7")
-    walk = drift.CreepingHold(robot, draws.for_robot(robot, _line()), np.full(7, np.nan), (robot.home_m, np.eye(3)))
+    start = robot.home_m, np.eye(3)
+    walk = creeping_hold.CreepingHold(robot, draws.for_robot(robot, _line()), np.full(7, np.nan), start)
     walk.live[:] = True
     seen = []
 
@@ -215,7 +216,7 @@ def test_a_step_is_taken_whatever_its_error_where_creep_grows_by_a_ten_thousandt
 
     monkeypatch.setattr(walk, "_try", noted)
     walk.creep.time_s = 10.0
-    walk.step = drift._LEAST_STEP * (10.0**walk.power + walk.first) * (1.0 + off)
+    walk.step = creeping_hold._LEAST_STEP * (10.0**walk.power + walk.first) * (1.0 + off)
     with pytest.raises(Seen):
         walk.to(1000.0)
     assert seen == [off < 0]

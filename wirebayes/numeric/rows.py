@@ -13,14 +13,15 @@ if TYPE_CHECKING:
 Record = TypeVar("Record", bound="DataclassInstance")
 
 
-def chosen_rows(first: Bools, one: Array, other: Array) -> Array:
+def chosen_rows(first: Bools, one: Array, other: Array | float) -> Array:
     """The rows of one array or of another.
 
     Parameters
     ----------
     first : (n,) bool array
         True where the row is of `one`.
-    one, other : (n, ...) arrays
+    one : (n, ...) array
+    other : (n, ...) array or float
     """
     return np.where(first.reshape(-1, *[1] * (one.ndim - 1)), one, other)
 

@@ -10,7 +10,7 @@ from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.creep import CreepState, fresh
-from wirebayes.robot.motion.drift import CreepingHold
+from wirebayes.robot.motion.creeping_hold import CreepingHold
 
 # Share of the mean tension by which a command must change a wire's tension to restart the clocks. On the paper's
 # bench every step changed the tension by a tenth or more; of smaller changes the tests say nothing.

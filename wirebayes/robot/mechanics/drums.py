@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics.description import Drums
 
 
@@ -21,20 +21,52 @@ class _Winding:
     per_rad_m: Floats
     full_rad: float
 
+    def wound(self, angle: Floats) -> tuple[Floats, Floats]:
+        """Wire on the drum at drum angles, m, and its slope, m/rad."""
+        layer = _layer_of(self.angle_rad, angle)
+        per_rad = self.per_rad_m[layer]
+        return self.wire_m[layer] + (angle - self.angle_rad[layer]) * per_rad, per_rad
+
+    def angle(self, wound: Floats) -> Floats:
+        """Drum angles, rad, at which so much wire is on the drum, m."""
+        layer = _layer_of(self.wire_m, wound)
+        return np.asarray(self.angle_rad[layer] + (wound - self.wire_m[layer]) / self.per_rad_m[layer])
+
 
 def _winding(drums: Drums, leg: int) -> _Winding:
-    radius, pitch, turns = drums.radius_m[leg], drums.pitch_m[leg], drums.layer_turns[leg]
-    layers = 1
-    if np.isfinite(turns):
-        layers = max(int(np.ceil(drums.wire_m[leg] / (2 * np.pi * radius * turns))), 1)
-    per_turn = np.hypot(2 * np.pi * (radius + drums.layer_m[leg] * np.arange(layers)), pitch)
-    wire, angle = np.zeros(layers), np.zeros(layers)
-    if layers > 1:
-        wire[1:], angle[1:] = np.cumsum(turns * per_turn)[:-1], 2 * np.pi * turns * np.arange(1, layers)
+    per_turn = _wire_per_turn(drums, leg)
     per_rad = per_turn / (2 * np.pi)
-    last = int(np.searchsorted(wire, drums.wire_m[leg], side="right")) - 1
-    full = angle[last] + (drums.wire_m[leg] - wire[last]) / per_rad[last]
+    turns, wound_m = drums.layer_turns[leg], drums.wire_m[leg]
+    wire, angle = np.zeros(len(per_turn)), np.zeros(len(per_turn))
+    if len(per_turn) > 1:
+        filled = np.cumsum(turns * per_turn)
+        wire[1:] = filled[:-1]
+        angle[1:] = 2 * np.pi * turns * np.arange(1, len(per_turn))
+    last = _layer_of(wire, wound_m)
+    full = angle[last] + (wound_m - wire[last]) / per_rad[last]
     return _Winding(angle, wire, per_rad, float(full))
+
+
+def _wire_per_turn(drums: Drums, leg: int) -> Floats:
+    """Length of a turn on every layer, m."""
+    layer = np.arange(_layers(drums, leg))
+    radius = drums.radius_m[leg] + drums.layer_m[leg] * layer
+    return np.hypot(2 * np.pi * radius, drums.pitch_m[leg])
+
+
+def _layers(drums: Drums, leg: int) -> int:
+    """How many layers the whole wire of a leg fills."""
+    turns = drums.layer_turns[leg]
+    if not np.isfinite(turns):
+        return 1
+    innermost = 2 * np.pi * drums.radius_m[leg] * turns
+    return max(int(np.ceil(drums.wire_m[leg] / innermost)), 1)
+
+
+def _layer_of(begins: Floats, values: Floats) -> Indices:
+    """In which layer values lie, of where each layer begins."""
+    layer = np.searchsorted(begins, values, side="right") - 1
+    return np.clip(layer, 0, None)
 
 
 def paid_out(drums: Drums, motor_rad: Floats) -> tuple[Floats, Floats]:
@@ -50,13 +82,14 @@ def paid_out(drums: Drums, motor_rad: Floats) -> tuple[Floats, Floats]:
     length_m, slope_m : (..., w) arrays
         Length paid out and its slope by the motor's angle, m/rad; NaN for legs without a drum of known radius.
     """
-    length, slope = np.full((2, *motor_rad.shape), np.nan)
+    length = np.full(motor_rad.shape, np.nan)
+    slope = np.full(motor_rad.shape, np.nan)
     for leg in np.flatnonzero(drums.radius_m):
-        on, gear = _winding(drums, int(leg)), drums.gear[leg]
-        angle = on.full_rad - motor_rad[..., leg] / gear
-        layer = np.clip(np.searchsorted(on.angle_rad, angle, side="right") - 1, 0, None)
-        wound = on.wire_m[layer] + (angle - on.angle_rad[layer]) * on.per_rad_m[layer]
-        length[..., leg], slope[..., leg] = drums.wire_m[leg] - wound, on.per_rad_m[layer] / gear
+        drum = _winding(drums, int(leg))
+        gear = drums.gear[leg]
+        wound, per_rad = drum.wound(drum.full_rad - motor_rad[..., leg] / gear)
+        length[..., leg] = drums.wire_m[leg] - wound
+        slope[..., leg] = per_rad / gear
     return length, slope
 
 
@@ -64,15 +97,14 @@ def motor_angle(drums: Drums, length_m: Floats) -> Floats:
     """Motor angles ``(..., w)``, rad, that pay out zero-tension lengths ``(..., w)``; NaN for legs without a drum."""
     out = np.full(length_m.shape, np.nan)
     for leg in np.flatnonzero(drums.radius_m):
-        on = _winding(drums, int(leg))
-        wound = drums.wire_m[leg] - length_m[..., leg]
-        layer = np.clip(np.searchsorted(on.wire_m, wound, side="right") - 1, 0, None)
-        angle = on.angle_rad[layer] + (wound - on.wire_m[layer]) / on.per_rad_m[layer]
-        out[..., leg] = drums.gear[leg] * (on.full_rad - angle)
+        drum = _winding(drums, int(leg))
+        angle = drum.angle(drums.wire_m[leg] - length_m[..., leg])
+        out[..., leg] = drums.gear[leg] * (drum.full_rad - angle)
     return out
 
 
 def emptied(drums: Drums, length_m: Floats) -> list[int]:
     """Legs, from 0, whose layered drums would need more wire, ``(..., w)`` m, than there is."""
     most = length_m.reshape(-1, len(drums.radius_m)).max(0)
-    return [int(i) for i in np.flatnonzero(np.isfinite(drums.layer_turns) & (most > drums.wire_m))]
+    short = np.isfinite(drums.layer_turns) & (most > drums.wire_m)
+    return np.flatnonzero(short).tolist()

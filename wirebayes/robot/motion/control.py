@@ -9,8 +9,7 @@ from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, inverse
-from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
-from wirebayes.robot.motion.drift import without_creep
+from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh, without_creep
 
 Schedule = Callable[[float], Floats]
 

@@ -6,7 +6,7 @@ zero-tension length is its length before creep times one plus that elongation ov
 
 from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -80,16 +80,19 @@ class HoldCreep:
         self.reached, self.counted = np.zeros((1, 1)), np.zeros((1, 1))  # share of the creep, and its own clock
         self.before: tuple[Floats, Floats] | None = None  # tension and progress of the step before
 
-    def toward(self, time_s: float, slope: Floats, last: Floats | None = None) -> "HoldCreep":
+    def onward(self, time_s: float, slope: Floats | None) -> "HoldCreep":
+        """The hold at a later time while the amount goes on with a slope by creep's own clock; None: it stays."""
+        change = np.zeros(1) if slope is None else slope
+        return self.toward(time_s, self.amount + change * self.progress(time_s))
+
+    def toward(self, time_s: float, amount: Floats) -> "HoldCreep":
         """The hold at a later time while the amount changes in a straight line, by creep's own clock (`progress`).
 
         Parameters
         ----------
         time_s : float
-        slope : (w, n) array
-            Change of the amount by that clock; not used where `last` is given.
-        last : (w, n) array, optional
-            The amount at that time.
+        amount : (w, n) array
+            At that time.
         """
         done = self.progress(time_s)
         out = copy(self)
@@ -98,15 +101,17 @@ class HoldCreep:
         if self.follow == "start":
             out.grown = self.amount * out.reached
             return out
-        last = self.amount + slope * done if last is None else last
-        if self._open_ended:
-            out.grown = self.grown + 0.5 * (self.amount + last) * done
-        else:
-            share = -np.expm1(-done)
-            lag = np.where(done > 1e-5, 1.0 - share / np.maximum(done, 1e-300), 0.5 * done)
-            out.grown = self.grown + (self.amount - self.grown) * share + (last - self.amount) * lag
-        out.amount = last
+        out.grown = self._grown(amount, done)
+        out.amount = amount
         return out
+
+    def _grown(self, amount: Floats, done: Floats) -> Floats:
+        """What has grown when the amount has come to a value in a straight line and the clock has gone so far."""
+        if self._open_ended:
+            return self.grown + 0.5 * (self.amount + amount) * done
+        share = -np.expm1(-done)
+        lag = np.where(done > 1e-5, 1.0 - share / np.maximum(done, 1e-300), 0.5 * done)
+        return self.grown + (self.amount - self.grown) * share + (amount - self.amount) * lag
 
     @property
     def _open_ended(self) -> bool:
@@ -118,8 +123,12 @@ class HoldCreep:
         self._look(time_s)
         if self._open_ended:
             return np.asarray(self.law.fraction(self.k2, self.hold) - self.reached)
-        clock = self.law.clock(self.hold)
-        return np.asarray(self.k2 * (np.power(clock, self.law.N) - np.power(self.counted, self.law.N)))
+        return self._passed(self.law.clock(self.hold))
+
+    def _passed(self, clock: Floats) -> Floats:
+        """By what ``k2 t^N`` has grown since the last step."""
+        N = self.law.N
+        return np.asarray(self.k2 * (np.power(clock, N) - np.power(self.counted, N)))
 
     def amount_at(self, tension_N: Floats) -> Floats:
         """Creep that the hold still has to come, if the tension stayed, (w, n) mm of the tested length."""
@@ -135,16 +144,16 @@ class HoldCreep:
         self.time_s = time_s
         self._look(time_s)
         reached, clock = law.fraction(self.k2, hold), law.clock(hold)
-        progress = reached - self.reached
         if self.follow == "start":
             self.grown = self.amount * reached
         else:
+            progress = reached - self.reached
             self.amount = law.amount(self._onward(progress, tension_N), hold)
             if self._open_ended:
                 self.grown = self.grown + self.amount * progress
             else:
                 # The share of what is left: composes to eq (5) exactly when the tension stays.
-                share = -np.expm1(-self.k2 * (np.power(clock, law.N) - np.power(self.counted, law.N)))
+                share = -np.expm1(-self._passed(clock))
                 self.grown = self.grown + (self.amount - self.grown) * share
         self.reached, self.counted = reached, clock
         return self.state()
@@ -154,17 +163,14 @@ class HoldCreep:
         hold, law, carried = self.hold, self.law, self.carried
         self._look(self.time_s)
         own = (carried.clock_s, carried.creep_mm + self.amount, self.k2)
-        hold.past = [*carried.past, own]
-        creep = hold.grown = law.creep(carried.creep_mm + self.grown, hold)
+        past = (*carried.past, own)
+        hold.past = list(past)
+        creep = law.creep(carried.creep_mm + self.grown, hold)
+        hold.grown = creep
         beside = law.beside(carried.beside_mm, hold)
-        return CreepState(
-            creep,
-            beside,
-            carried.holds + 1,
-            carried.clock_s + self.time_s,
-            (*carried.past, own),
-            law.elongation(creep, beside, hold),
-        )
+        elongation = law.elongation(creep, beside, hold)
+        clock_s = carried.clock_s + self.time_s
+        return CreepState(creep, beside, carried.holds + 1, clock_s, past, elongation)
 
     def _onward(self, progress: Floats, tension_N: Floats) -> Floats:
         """Tension half-way through the step: it goes on as over the step before, per share of creep done.
@@ -175,6 +181,14 @@ class HoldCreep:
         if self.before is not None:
             last, done = self.before
             lead = 0.5 * progress / np.maximum(done, 1e-300)
-            ahead = np.maximum(tension_N + np.minimum(lead, 2.0) * (tension_N - last), 0.0)
+            change = np.minimum(lead, 2.0) * (tension_N - last)
+            ahead = np.maximum(tension_N + change, 0.0)
         self.before = tension_N, progress
         return ahead
+
+
+def without_creep(wires: Wires) -> Wires:
+    """The same wires under Hooke's law alone."""
+    theta = dict(wires.theta) | {"B": np.zeros_like(wires.theta["B"])}
+    kept = tuple(e for e in wires.effects if e.place == "strain")
+    return replace(wires, theta=theta, effects=kept)

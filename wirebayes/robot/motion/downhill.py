@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from wirebayes.numeric import cholesky
+from wirebayes.numeric.batches import batch_first
 from wirebayes.numeric.rows import last_axis_of
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
@@ -93,8 +94,10 @@ def lead_downhill(
     solved = _in_chunks(robot, wires, zero, offset, x, R, quick)
     slow = np.flatnonzero(solved.status == NOT_CONVERGED)
     if slow.size and max_iterations > quick:
-        part = wires.part(slow), zero[:, slow], offset[:, slow], solved.x[:, slow], solved.R[..., slow]
-        solved.go_on(slow, _in_chunks(robot, *part, max_iterations - quick))
+        part = wires.part(slow), zero[:, slow], offset[:, slow]
+        reached = solved.x[:, slow], solved.R[..., slow]
+        later = _in_chunks(robot, *part, *reached, max_iterations - quick)
+        solved.go_on(slow, later)
     return solved
 
 
@@ -106,7 +109,11 @@ def _in_chunks(
         cut = slice(first, first + _CHUNK)
         part = wires.part(cut), zero[:, cut], offset[:, cut], x[:, cut], R[..., cut]
         parts.append(_in_one_chunk(robot, *part, max_iterations))
-    return Solved(*(np.concatenate([getattr(part, f.name) for part in parts], -1) for f in fields(Solved)))
+    joined = {}
+    for field in fields(Solved):
+        arrays = [getattr(part, field.name) for part in parts]
+        joined[field.name] = np.concatenate(arrays, -1)
+    return Solved(**joined)
 
 
 @dataclass(frozen=True)
@@ -152,16 +159,19 @@ class _Cases:
         x, R = np.where(accept, x, self.x), np.where(accept, R, self.R)
         return replace(self, x=x, R=R, at=self.at.where(accept, new))
 
+    def newton(self, step: "_Step") -> Bools:
+        """(n,) Which steps are Newton's own."""
+        return np.asarray(step.positive & (self.damping == 0))
+
 
 def _in_one_chunk(
     robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
 ) -> Solved:
     """One chunk; solved cases leave the batch as they finish."""
     solved = Solved.not_yet(x, R, robot.legs)
-    scale = robot.edge_scale[:, None]  # rotations are stepped in metres at the platform's edge
-    cases = _begin(robot, wires, zero, offset, x, R, scale)
+    cases = _begin(robot, wires, zero, offset, x, R)
     for iteration in range(1, max_iterations + 1):
-        cases, ended = _iterate(robot, cases, scale)
+        cases, ended = _iterate(robot, cases)
         solved.count[cases.number] = iteration
         finished = ended != _GOING_ON
         if finished.any():
@@ -175,45 +185,75 @@ def _in_one_chunk(
     return solved
 
 
-def _begin(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, scale: Floats) -> _Cases:
+def _begin(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats) -> _Cases:
     """All cases at their starts, undamped."""
     n = zero.shape[1]
     k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, n))
-    # S/ℓ - 1 is known to one rounding error. Moments are divided by the platform's size; points far from the reference
-    # point make more of the same error.
-    arm = max(1.0, np.abs(robot.platform_m).max() / robot.size_m) if robot.degrees == 6 else 1.0
-    floor = 32 * np.finfo(float).eps * arm * (np.max(k1, axis=0) * robot.lines.max() + robot.mass_kg * GRAVITY)
     level = np.sum(k1 * robot.lines[:, None] ** 2 / zero, axis=0)
-    at = _evaluate(robot, wires, zero, offset, x, R, scale)
-    return _Cases(np.arange(n), wires, zero, offset, x, R, at, np.zeros(n), level, floor, robot.span_m + zero.max(0))
+    at = _evaluate(robot, wires, zero, offset, x, R)
+    span = robot.span_m + zero.max(0)
+    return _Cases(np.arange(n), wires, zero, offset, x, R, at, np.zeros(n), level, _floor(robot, k1), span)
 
 
-def _iterate(robot: Robot, cases: _Cases, scale: Floats) -> tuple[_Cases, Ints]:
+def _floor(robot: Robot, k1: Floats) -> Floats:
+    """(n,) force below which no computed one can be trusted, N.
+
+    The strain is known to one rounding error. Moments are divided by the platform's size; points far from the reference
+    point make more of the same error.
+    """
+    arm = 1.0
+    if robot.degrees == 6:
+        arm = max(1.0, np.abs(robot.platform_m).max() / robot.size_m)
+    forces = np.max(k1, axis=0) * robot.lines.max() + robot.mass_kg * GRAVITY
+    return np.asarray(32 * np.finfo(float).eps * arm * forces)
+
+
+def _iterate(robot: Robot, cases: _Cases) -> tuple[_Cases, Ints]:
     """A damped Newton step of every case, taken where it leads down, and how it ended (`_GOING_ON` if it did not)."""
     step = _newton_step(robot, cases)
-    move = step.move * scale
-    x = cases.x + move[:3]
-    R = turning.compose(move[3:], cases.R) if robot.degrees == 6 else cases.R
-    new = _evaluate(robot, cases.wires, cases.zero, cases.offset, x, R, scale)
-    before, undamped = cases.at, cases.damping == 0
-    noise = 1e-14 * (np.abs(before.energy) + robot.mass_kg * GRAVITY * cases.span)
-    is_newton = step.positive & undamped
-    accept = new.energy <= before.energy + 1e-4 * step.downhill + noise
-    accept |= is_newton & (new.size < 0.5 * before.size) & (step.length < 1e-3 * robot.size_m)
+    x, R = _stepped(robot, cases, step)
+    new = _evaluate(robot, cases.wires, cases.zero, cases.offset, x, R)
+    noise = 1e-14 * (np.abs(cases.at.energy) + robot.mass_kg * GRAVITY * cases.span)
+    accept = _leads_down(robot, cases, step, new, noise)
     moved = cases.moved(accept, x, R, new)
-    balanced = moved.at.size <= cases.floor
     more = np.maximum(1e-3, cases.damping * 10)
     damping = np.where(accept, _calmer(cases, step, new, noise), more)
+    balanced = moved.at.size <= cases.floor
     damping = np.where(balanced, 0.0, damping)  # so that the next step uses the bare stiffness
-    hardly_moves = accept & (step.length < 1e-9 * robot.size_m)
+    moved = replace(moved, damping=damping)
+    still = step.length < 1e-9 * robot.size_m
+    return moved, _ended(cases, moved, step, accept & still)
+
+
+def _stepped(robot: Robot, cases: _Cases, step: "_Step") -> tuple[Floats, Floats]:
+    """Poses after steps."""
+    move = step.move * robot.edge_scale[:, None]
+    x = cases.x + move[:3]
+    if robot.degrees == 3:
+        return x, cases.R
+    return x, turning.compose(move[3:], cases.R)
+
+
+def _leads_down(robot: Robot, cases: _Cases, step: "_Step", new: "_Point", noise: Floats) -> Bools:
+    """(n,) Which steps lower the energy as they should, or the imbalance where the energy no longer tells."""
+    before = cases.at
+    lower = new.energy <= before.energy + 1e-4 * step.downhill + noise
+    short = step.length < 1e-3 * robot.size_m
+    nearer = (new.size < 0.5 * before.size) & short
+    return np.asarray(lower | (cases.newton(step) & nearer))
+
+
+def _ended(cases: _Cases, moved: _Cases, step: "_Step", hardly_moves: Bools) -> Ints:
+    """(n,) How cases ended that moved on by a step; `_GOING_ON` where they did not."""
+    balanced = moved.at.size <= cases.floor
+    undamped = cases.damping == 0
     ends = {
         NO_EQUILIBRIUM: np.abs(moved.x).max(axis=0) > _FAR * cases.span,
-        FOUND: is_newton & (balanced | hardly_moves),
+        FOUND: cases.newton(step) & (balanced | hardly_moves),
         NOT_HELD: balanced & ~step.positive & undamped,
-        NOT_CONVERGED: damping > 1e12,
+        NOT_CONVERGED: moved.damping > 1e12,
     }
-    ended = np.select(list(ends.values()), list(ends), _GOING_ON)
-    return replace(moved, damping=damping), ended
+    return np.select(list(ends.values()), list(ends), _GOING_ON)
 
 
 @dataclass(frozen=True)
@@ -239,21 +279,22 @@ class _Step:
 
 def _newton_step(robot: Robot, cases: _Cases) -> _Step:
     """Steps of all cases; one across the room is no Newton step: it is cut, the direction kept."""
-    at = cases.at
-    damped = at.H.copy()
+    gradient = cases.at.gradient
+    damped = cases.at.H.copy()
     for i in range(robot.degrees):
         damped[i, i] += cases.damping * cases.level
-    step, positive = cholesky.solve_symmetric(damped, -at.gradient)
-    indefinite = np.flatnonzero(~positive)
-    if indefinite.size:
-        part = damped[..., indefinite], at.gradient[:, indefinite], cases.level[indefinite], cases.floor[indefinite]
-        step[:, indefinite] = _off_saddle(*part)
+    step, positive = cholesky.solve_symmetric(damped, -gradient)
+    saddle = np.flatnonzero(~positive)
+    if saddle.size:
+        step[:, saddle] = _off_saddle(
+            damped[..., saddle], gradient[:, saddle], cases.level[saddle], cases.floor[saddle]
+        )
     np.clip(step, -1e100, 1e100, out=step)  # the square of a step along no stiffness at all would overflow
     length = np.sqrt((step * step).sum(0))
     longest = np.where(positive, 0.25 * _FAR * cases.span, _LOOSE * cases.span)
     cut = np.minimum(1.0, longest / np.maximum(length, 1e-300))
     step *= cut
-    return _Step(step, length * cut, positive, (at.gradient * step).sum(0))
+    return _Step(step, length * cut, positive, (gradient * step).sum(0))
 
 
 def _calmer(cases: _Cases, step: _Step, new: "_Point", noise: Floats) -> Floats:
@@ -285,10 +326,12 @@ def _off_saddle(H: Floats, gradient: Floats, level: Floats, floor: Floats) -> Fl
         NaN where the stiffness has overflowed: no step from there is better.
     """
     finite = np.isfinite(H).all((0, 1))
-    curvature, along = np.linalg.eigh(np.moveaxis(np.where(finite, H, 0.0), -1, 0), UPLO="U")
+    known = np.where(finite, H, 0.0)
+    curvature, along = np.linalg.eigh(batch_first(known), UPLO="U")
     slope = np.einsum("nij,in->nj", along, gradient)
     slope = np.where(np.abs(slope) > floor[:, None], slope, 0.0)
-    stiffness = np.maximum(np.abs(curvature), np.finfo(float).eps * level[:, None])
+    least = np.finfo(float).eps * level[:, None]
+    stiffness = np.maximum(np.abs(curvature), least)
     step = -np.einsum("nij,nj->in", along, slope / stiffness)
     return np.where(finite, step, np.nan)
 
@@ -306,20 +349,24 @@ class _Point:
     def where(self, accept: Bools, other: "_Point") -> "_Point":
         if accept.all():
             return other
-        return _Point(*(np.where(accept, getattr(other, f.name), getattr(self, f.name)) for f in fields(_Point)))
+        chosen = {}
+        for field in fields(_Point):
+            chosen[field.name] = np.where(accept, getattr(other, field.name), getattr(self, field.name))
+        return _Point(**chosen)
 
     def part(self, keep: Indices) -> "_Point":
         return last_axis_of(self, keep)
 
 
-def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, scale: Floats) -> _Point:
+def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats) -> _Point:
     shape = statics.geometry(robot, x, R)
-    S = statics.stretched(robot, shape, offset)
-    tau, slope = tension(wires, S, zero)
-    gradient, H = in_metres(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
+    stretched = statics.stretched(robot, shape, offset)
+    tau, slope = tension(wires, stretched, zero)
+    derivatives = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
+    gradient, H = in_metres(*derivatives, robot.edge_scale[:, None])
     height = x[2]
     if robot.degrees == 6:
         c = robot.centre_of_mass_m
         height = height + (R[2, 0] * c[0] + R[2, 1] * c[1] + R[2, 2] * c[2])
-    total = energy(wires, S, zero).sum(0) + robot.mass_kg * GRAVITY * height
+    total = energy(wires, stretched, zero).sum(0) + robot.mass_kg * GRAVITY * height
     return _Point(total, gradient, H, tau, np.abs(gradient).max(0))

@@ -74,22 +74,35 @@ def hang(robot: Robot, position_m: Floats, reference: Floats, asked_rad: Floats 
     p = len(position_m)
     near = np.broadcast_to(reference, (p, 3, 3))
     asked = np.full(3, np.nan) if asked_rad is None else asked_rad
-    turns = _TURNED_RAD * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    begin = (turning.matrix(turns)[None] @ near[:, None]).reshape(-1, 3, 3)
-    x, target = (np.repeat(v, len(turns), 0) for v in (position_m, near))
-    found = nearest_balances(robot, x, begin, target, asked)
-    good = found.balanced & (off(robot, found.position_m, found.rotation) < _ALIKE * robot.span_m)
-    good &= _stable(robot, found)
+    found, good = _balances(robot, position_m, near, asked)
     out = np.full((p, 3, 3), np.nan)
-    tension, choice, others = np.full((p, robot.legs), np.nan), np.zeros(p, np.int64), []
+    tension = np.full((p, robot.legs), np.nan)
+    choice = np.zeros(p, np.int64)
+    others = []
     for k in range(p):
-        rows = k * len(turns) + np.flatnonzero(good.reshape(p, -1)[k])
-        rows = _distinct(found.rotation, rows[np.argsort(found.distance_rad[rows], kind="stable")])
+        rows = _nearest_first(found, np.flatnonzero(good[k]) + k * good.shape[1])
         others.append(turning.vector(found.rotation[rows[1:]]).reshape(-1, 3))
         if rows.size:
             out[k], tension[k] = found.rotation[rows[0]], found.tension_N[rows[0]]
             choice[k] = len(chosen(robot, position_m[k], out[k], tension[k]))
     return Hanging(out, tension, tuple(others), choice)
+
+
+def _balances(robot: Robot, position_m: Floats, near: Floats, asked: Floats) -> tuple[Balances, Bools]:
+    """Balances from several beginnings at each of p positions, and which of them, ``(p, k)``, are good and stable."""
+    turns = _TURNED_RAD * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    begin = turning.matrix(turns)[None] @ near[:, None]
+    x, target = np.repeat(position_m, len(turns), 0), np.repeat(near, len(turns), 0)
+    found = nearest_balances(robot, x, begin.reshape(-1, 3, 3), target, asked)
+    there = off(robot, found.position_m, found.rotation) < _ALIKE * robot.span_m
+    good = found.balanced & there & _stable(robot, found)
+    return found, good.reshape(len(position_m), -1)
+
+
+def _nearest_first(found: Balances, rows: Indices) -> Indices:
+    """Rows of different balances, by their distance from the target."""
+    order = np.argsort(found.distance_rad[rows], kind="stable")
+    return _distinct(found.rotation, rows[order])
 
 
 def orientations(robot: Robot, position_m: Floats, reference: Floats) -> Floats:
@@ -170,7 +183,8 @@ def commandable(robot: Robot, position_m: Floats, rotation: Floats, tension_N: F
     scale = robot.edge_scale
     K = stiffness_at_tension(robot, shape, rotation[..., None], tau)[0] * scale * scale[:, None]
     J = statics.jacobian(robot, shape)[..., 0] * (robot.lines * scale[:, None])
-    free = null_space(np.concatenate([K / max(float(tension_N.max()), 1e-300), J], 1))[: robot.degrees].T
+    largest = max(float(tension_N.max()), 1e-300)
+    free = null_space(np.concatenate([K / largest, J], 1))[: robot.degrees].T
     return _basis(free[:, :3]), len(_basis(free))
 
 
@@ -188,25 +202,31 @@ def nearest_position(robot: Robot, position_m: Floats, reference: Floats) -> Flo
     -------
     (3,) array, or None where nothing was found
     """
-    found = nearest_balances(
-        robot, position_m[None], reference[None], reference[None], np.full(3, np.nan), movable=True
-    )
-    return found.position_m[0] if found.balanced[0] and _stable(robot, found)[0] else None
+    near = reference[None]
+    free = np.full(3, np.nan)
+    found = nearest_balances(robot, position_m[None], near, near, free, movable=True)
+    if not found.balanced[0] or not _stable(robot, found)[0]:
+        return None
+    return found.position_m[0]
 
 
 def _stable(robot: Robot, found: Balances) -> Bools:
     """(n,) Whether every motion that stretches no wire raises the energy."""
     out = np.zeros(len(found.rotation), bool)
-    scale = robot.edge_scale
     for k in np.flatnonzero(found.balanced):
-        turn = found.rotation[k][..., None]
-        shape = statics.geometry(robot, found.position_m[k][:, None], turn)
-        K = stiffness_at_tension(robot, shape, turn, found.tension_N[k][:, None])[0] * scale * scale[:, None]
-        pulled = found.tension_N[k] > 0
-        J = statics.jacobian(robot, shape)[..., 0] * scale[:, None]
-        loose = null_space(J[:, pulled].T)
-        out[k] = loose.shape[1] == 0 or np.linalg.eigvalsh(loose.T @ K @ loose)[0] > 0
+        out[k] = _is_stable(robot, found.position_m[k], found.rotation[k], found.tension_N[k])
     return out
+
+
+def _is_stable(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> bool:
+    shape = statics.geometry_at(robot, position_m, rotation)
+    scale = robot.edge_scale[:, None]
+    K = stiffness_at_tension(robot, shape, rotation[..., None], tension_N[:, None])[0] * robot.edge_scale * scale
+    J = statics.jacobian(robot, shape)[..., 0] * scale
+    loose = null_space(J[:, tension_N > 0].T)
+    if not loose.shape[1]:
+        return True
+    return bool(np.linalg.eigvalsh(loose.T @ K @ loose)[0] > 0)
 
 
 def _basis(rows: Floats) -> Floats:

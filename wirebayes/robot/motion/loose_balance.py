@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
@@ -20,7 +21,8 @@ def stiffness_at_tension(robot: Robot, shape: statics.Geometry, turn: Floats, ta
     turn, tau : (3, 3, n) and (w, n) arrays
         Rotations, and tensions, N.
     """
-    return np.moveaxis(statics.unbalance_and_stiffness(robot, shape, turn, tau, np.zeros_like(tau))[1], -1, 0)
+    _, hessian = statics.unbalance_and_stiffness(robot, shape, turn, tau, np.zeros_like(tau))
+    return batch_first(hessian)
 
 
 def equations(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, Floats, Floats]:
@@ -32,14 +34,14 @@ def equations(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, 
     x, R, tau : (n, 3), (n, 3, 3) and (n, w) arrays
         Positions, m, rotations and tensions, N.
     """
-    turn = np.moveaxis(R, 0, -1)
+    turn = batch_last(R)
     shape = statics.geometry(robot, x.T, turn)
-    force, H = statics.unbalance_and_stiffness(robot, shape, turn, tau.T, np.zeros_like(tau.T))
-    scale = robot.edge_scale
+    force, hessian = statics.unbalance_and_stiffness(robot, shape, turn, tau.T, np.zeros_like(tau.T))
+    scale = robot.edge_scale[:, None]
     by_turn = np.zeros((len(x), robot.degrees, 3))  # of a platform that cannot turn
-    by_turn[..., : robot.degrees - 3] = np.moveaxis(H, -1, 0)[:, :, 3:] * scale[:, None]
-    by_tension = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0) * scale[:, None]
-    return (force * scale[:, None]).T, by_turn, by_tension
+    by_turn[..., : robot.degrees - 3] = batch_first(hessian)[:, :, 3:] * scale
+    by_tension = batch_first(statics.wire_jacobian(robot, shape)) * scale
+    return (force * scale).T, by_turn, by_tension
 
 
 def slope_by_place(robot: Robot, x: Floats, R: Floats, tau: Floats) -> Floats:
@@ -51,9 +53,10 @@ def slope_by_place(robot: Robot, x: Floats, R: Floats, tau: Floats) -> Floats:
     x, R, tau : (n, 3), (n, 3, 3) and (n, w) arrays
         Positions, m, rotations and tensions, N.
     """
-    turn = np.moveaxis(R, 0, -1)
+    turn = batch_last(R)
     shape = statics.geometry(robot, x.T, turn)
-    return np.asarray(stiffness_at_tension(robot, shape, turn, tau.T)[:, :, :3] * robot.edge_scale[:, None])
+    stiffness = stiffness_at_tension(robot, shape, turn, tau.T)
+    return np.asarray(stiffness[:, :, :3] * robot.edge_scale[:, None])
 
 
 def largest_imbalance(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[Floats, Floats]:
@@ -66,13 +69,17 @@ def largest_imbalance(robot: Robot, x: Floats, R: Floats, tau: Floats) -> tuple[
         Positions, m, rotations and tensions, N.
     """
     force, _, _ = equations(robot, x, R, tau)
-    return np.abs(force).max(1), np.maximum(np.abs(tau).max(1) * robot.lines.max(), robot.mass_kg * GRAVITY)
+    largest = np.abs(tau).max(1) * robot.lines.max()
+    return np.abs(force).max(1), np.maximum(largest, robot.mass_kg * GRAVITY)
 
 
 def null_space(matrix: Floats) -> Floats:
     """Orthonormal columns that a matrix maps to zero."""
     _, sizes, right = np.linalg.svd(matrix)
-    rank = int((sizes > DEPENDENT * max(float(sizes[0]), 1e-300)).sum()) if sizes.size else 0
+    if not sizes.size:
+        return np.asarray(right.T)
+    least = DEPENDENT * max(float(sizes[0]), 1e-300)
+    rank = int((sizes > least).sum())
     return np.asarray(right[rank:].T)
 
 

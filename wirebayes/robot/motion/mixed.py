@@ -49,19 +49,35 @@ def newton_step_with_tensions(
     tension_N : (n, w) array
         After the step.
     """
-    zero, offset = lengths[0].T, np.broadcast_to(lengths[1], lengths[0].shape).T
-    tau, R = tension_N.T, pose[1].transpose(1, 2, 0)
+    energy = _energy(robot, wires, pose, tension_N.T, lengths)
+    return _lowest(energy, tension_N.T > 0)
+
+
+def _energy(robot: Robot, wires: Wires, pose: Poses, tau: Floats, lengths: Lengths) -> "_Quadratic":
+    """The energy about poses, its wires' tangents at tensions ``(w, n)``."""
+    position, rotation = pose
+    turn = rotation.transpose(1, 2, 0)
     scale = robot.edge_scale[:, None]
-    shape = statics.geometry(robot, pose[0].T, R)
-    _, K = statics.unbalance_and_stiffness(robot, shape, R, tau, np.zeros_like(tau))
+    shape = statics.geometry(robot, position.T, turn)
+    _, K = statics.unbalance_and_stiffness(robot, shape, turn, tau, np.zeros_like(tau))
     K *= scale[:, None] * scale.T[..., None]
     J = statics.wire_jacobian(robot, shape) * scale[:, None]
-    load = -statics.weight(robot, R) * scale
+    load = -statics.weight(robot, turn) * scale
+    pull, slope = _tangent(robot, wires, shape, tau, lengths)
+    return _Quadratic(K, J, load, pull, slope)
+
+
+def _tangent(
+    robot: Robot, wires: Wires, shape: statics.Geometry, tau: Floats, lengths: Lengths
+) -> tuple[Floats, Floats]:
+    """What wires would pull at poses by their tangents, and by how much that grows along a step: ``(w, n)``."""
+    zero = lengths[0].T
+    offset = np.broadcast_to(lengths[1], lengths[0].shape).T
     carried = stretched_length(wires, zero, tau)
-    slope = tension(wires, np.maximum(carried, zero * (1.0 + _BARELY)), zero)[1]
-    # What a wire would pull at the pose by its tangent, and by how much that grows along a step.
-    pull = tau + slope * (statics.stretched(robot, shape, offset) - carried)
-    return _lowest(_Quadratic(K, J, load, pull, slope), tau > 0)
+    barely_taut = np.maximum(carried, zero * (1.0 + _BARELY))
+    _, slope = tension(wires, barely_taut, zero)
+    beyond = statics.stretched(robot, shape, offset) - carried
+    return tau + slope * beyond, slope
 
 
 @dataclass(frozen=True)
@@ -100,9 +116,11 @@ class _Quadratic:
 
     def least_with(self, taut: Bools) -> tuple[Floats, Bools]:
         """Where the energy would be least if just these wires were taut, and whether it would."""
-        stiff, at_rest = np.where(taut, self.slope, 0.0), np.where(taut, self.pull, 0.0)
-        H = self.K + np.einsum("iwn,jwn->ijn", self.J * stiff, self.J)
-        return cholesky.solve_symmetric(H, -(self.load + (self.J * at_rest).sum(1)))
+        stiff = np.where(taut, self.slope, 0.0)
+        at_rest = np.where(taut, self.pull, 0.0)
+        hessian = self.K + np.einsum("iwn,jwn->ijn", self.J * stiff, self.J)
+        gradient = self.load + (self.J * at_rest).sum(1)
+        return cholesky.solve_symmetric(hessian, -gradient)
 
 
 def _lowest(energy: _Quadratic, taut: Bools) -> tuple[Floats, Floats]:
@@ -119,15 +137,17 @@ def _lowest(energy: _Quadratic, taut: Bools) -> tuple[Floats, Floats]:
     rows, here = np.arange(n), np.zeros((d, n))
     for _ in range(_SETS):
         there, positive = energy.least_with(taut)
-        settled = positive & ((energy.tensions(there) > 0) == taut).all(0)
-        done = np.flatnonzero(settled)
-        step[:, rows[done]] = there[:, done]
-        tau[:, rows[done]] = np.maximum(energy.tensions(there), 0.0)[:, done]
+        pull = energy.tensions(there)
+        settled = positive & ((pull > 0) == taut).all(0)
+        at = rows[settled]
+        step[:, at] = there[:, settled]
+        tau[:, at] = np.maximum(pull, 0.0)[:, settled]
         left = np.flatnonzero(positive & ~settled)
         if not left.size:
             break
-        rows, energy, here, there = rows[left], energy.part(left), here[:, left], there[:, left]
-        here = here + _share(energy, here, there - here) * (there - here)
+        rows, energy, here = rows[left], energy.part(left), here[:, left]
+        way = there[:, left] - here
+        here = here + _share(energy, here, way) * way
         taut = energy.tensions(here) > 0
     return step.T, tau.T
 
@@ -135,12 +155,17 @@ def _lowest(energy: _Quadratic, taut: Bools) -> tuple[Floats, Floats]:
 def _share(energy: _Quadratic, here: Floats, way: Floats) -> Floats:
     """How much of a way ``(d, n)`` leads to its lowest point: ``(n,)``, 0 to 1."""
     low, high = np.zeros(here.shape[1]), np.ones(here.shape[1])
-    whole = (energy.unbalance(here + way) * way).sum(0) <= 0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        down = (energy.unbalance(here + middle * way) * way).sum(0) <= 0
+        down = _falls(energy, here + middle * way, way)
         low, high = np.where(down, middle, low), np.where(down, high, middle)
+    whole = _falls(energy, here + way, way)
     return np.where(whole, 1.0, low)
+
+
+def _falls(energy: _Quadratic, there: Floats, way: Floats) -> Bools:
+    """(n,) Whether the energy still falls along a way, at displacements on it."""
+    return np.asarray((energy.unbalance(there) * way).sum(0) <= 0)
 
 
 def approach(
@@ -162,6 +187,7 @@ def approach(
     """
     ahead, tau = newton_step_with_tensions(robot, wires, pose, tension_N, lengths)
     x, R = after_step(robot, pose, ahead)
+    zero, offset = lengths[0], np.broadcast_to(lengths[1], lengths[0].shape)
     step, rows = ahead, np.arange(len(x))
     for _ in range(_STEPS):
         length = np.linalg.norm(step, axis=1)
@@ -169,9 +195,10 @@ def approach(
         rows, tau = rows[further], tau[further]
         if not rows.size:
             break
-        part = lengths[0][rows], np.broadcast_to(lengths[1], lengths[0].shape)[rows]
-        step, tau = newton_step_with_tensions(robot, wires.part(rows), (x[rows], R[rows]), tau, part)
-        x[rows], R[rows] = after_step(robot, (x[rows], R[rows]), step)
+        here = x[rows], R[rows]
+        own = zero[rows], offset[rows]
+        step, tau = newton_step_with_tensions(robot, wires.part(rows), here, tau, own)
+        x[rows], R[rows] = after_step(robot, here, step)
     return (x, R), ahead
 
 
@@ -191,9 +218,10 @@ def after_step(robot: Robot, pose: Poses, step: Floats) -> Poses:
     position : (n, 3) array
     rotation : (n, 3, 3) array
     """
+    position, rotation = pose
     step = np.where(np.isfinite(step), step, 0.0)
-    x = pose[0] + step[:, :3]
+    moved = position + step[:, :3]
     if robot.degrees == 3:
-        return x, np.array(pose[1])
-    turn = turning.compose(step[:, 3:].T / robot.size_m, pose[1].transpose(1, 2, 0))
-    return x, turn.transpose(2, 0, 1)
+        return moved, np.array(rotation)
+    turn = turning.compose(step[:, 3:].T / robot.size_m, rotation.transpose(1, 2, 0))
+    return moved, turn.transpose(2, 0, 1)

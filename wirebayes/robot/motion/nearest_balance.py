@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_first, batch_last
+from wirebayes.numeric.rows import chosen_rows, rows_of
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
@@ -56,31 +58,37 @@ def nearest_balances(
     movable : bool
         Whether the position may change too, as little as possible.
     """
-    unit = _unit(robot)
-    search = _Search.beginning(robot, position_m, begin)
+    aim = _Aim(robot, asked, movable)
+    search = _Search.beginning(aim, position_m, begin)
     for _ in range(_STEPS):
         rows = np.flatnonzero(~search.done & ~search.dead)
         if not rows.size:
             break
         goal = position_m[rows], target[rows]
-        step, imbalance, hindrance = _step(robot, search.at(rows), goal, asked, search.bound[rows], unit, movable)
-        turned = np.linalg.norm(step[:, 3:6], axis=1)
-        step *= np.minimum(1.0, _LONGEST_RAD / np.maximum(turned, 1e-300))[:, None]
-        lost = ~np.isfinite(step).all(1)
+        step = aim.step(search.at(rows), goal, search.bound[rows])
+        lost = ~np.isfinite(step.change).all(1)
         search.dead[rows[lost]] = True
-        rows, step, imbalance, hindrance = rows[~lost], step[~lost], imbalance[~lost], hindrance[~lost]
-        search.move(rows, step, unit)
-        change = np.abs(step[:, :6]).max(1)
-        newly = search.hold_at_bounds(rows, change < _NEARLY, robot, unit)
-        rest = (imbalance < _BALANCED) & (change < _SETTLED) & ~newly
-        search.done[rows] = rest & ~search.let_go(rows, rest, hindrance)
-        search.let_go_oldest(rows[(imbalance > _UNSOLVED * np.abs(step).max(1)) & ~rest & ~newly])
-    return search.balances(robot, target, asked)
+        search.take(rows[~lost], rows_of(step, ~lost))
+    return search.balances(target)
 
 
-def _unit(robot: Robot) -> float:
-    """In which forces are counted, N."""
-    return float(max(robot.mass_kg * GRAVITY, robot.rule.lowest_N))
+@dataclass(frozen=True)
+class _Step:
+    """A step of ``n`` searches.
+
+    Attributes
+    ----------
+    change : (n, 6 + w) array
+        Displacement, turn, and change of the tensions in units of force; NaN where none leads on.
+    imbalance : (n,) array
+        What the equations leave before the step, in units of force.
+    hindrance : (n, w) array
+        How much nearer to the goal a search would come by leaving each wire's bound inwards; below 0: not at all.
+    """
+
+    change: Floats
+    imbalance: Floats
+    hindrance: Floats
 
 
 @dataclass(frozen=True)
@@ -89,6 +97,7 @@ class _Search:
 
     Attributes
     ----------
+    aim : _Aim
     x, R, tau : (n, 3), (n, 3, 3) and (n, w) arrays
     bound : (n, w) int array
         -1 and 1: held at the lowest and the highest tension.
@@ -100,6 +109,7 @@ class _Search:
         Whether each has come to rest, and whether it can go no further.
     """
 
+    aim: "_Aim"
     x: Floats
     R: Floats
     tau: Floats
@@ -110,30 +120,44 @@ class _Search:
     dead: Bools
 
     @classmethod
-    def beginning(cls, robot: Robot, position_m: Floats, rotation: Floats) -> "_Search":
-        n = len(rotation)
+    def beginning(cls, aim: "_Aim", position_m: Floats, rotation: Floats) -> "_Search":
         x, R = np.array(position_m), np.array(rotation)
-        bound = np.zeros((n, robot.legs), np.int64)
-        none = np.zeros(n, bool)
-        return cls(x, R, _first_tensions(robot, x, R), bound, bound.copy(), bound != 0, none, none.copy())
+        tau = _first_tensions(aim.robot, x, R)
+        bound = np.zeros(tau.shape, np.int64)
+        none = np.zeros(len(tau), bool)
+        return cls(aim, x, R, tau, bound, bound.copy(), bound != 0, none, none.copy())
 
     def at(self, rows: Indices) -> tuple[Floats, Floats, Floats]:
         """Poses and tensions of some searches."""
         return self.x[rows], self.R[rows], self.tau[rows]
 
-    def move(self, rows: Indices, step: Floats, unit: float) -> None:
-        """Take the steps (k, 6 + w) of some searches."""
-        self.x[rows] += step[:, :3]
-        self.R[rows] = turning.compose(step[:, 3:6].T, self.R[rows].transpose(1, 2, 0)).transpose(2, 0, 1)
-        self.tau[rows] += unit * step[:, 6:]
+    def take(self, rows: Indices, step: _Step) -> None:
+        """Take the steps of some searches, then hold wires at their bounds or let them go."""
+        self.move(rows, step.change)
+        change = np.abs(step.change[:, :6]).max(1)
+        newly = self.hold_at_bounds(rows, change < _NEARLY)
+        balanced = step.imbalance < _BALANCED
+        rest = balanced & (change < _SETTLED) & ~newly
+        self.done[rows] = rest & ~self.let_go(rows, rest, step.hindrance)
+        unsolved = step.imbalance > _UNSOLVED * np.abs(step.change).max(1)
+        self.let_go_oldest(rows[unsolved & ~rest & ~newly])
 
-    def hold_at_bounds(self, rows: Indices, nearly: Bools, robot: Robot, unit: float) -> Bools:
+    def move(self, rows: Indices, change: Floats) -> None:
+        """Take the steps (k, 6 + w) of some searches."""
+        self.x[rows] += change[:, :3]
+        turned = turning.compose(change[:, 3:6].T, self.R[rows].transpose(1, 2, 0))
+        self.R[rows] = turned.transpose(2, 0, 1)
+        self.tau[rows] += self.aim.unit * change[:, 6:]
+
+    def hold_at_bounds(self, rows: Indices, nearly: Bools) -> Bools:
         """Hold what has left its bounds where a search is `nearly` there, and say which searches hold more now."""
-        low, high = robot.rule.lowest_N, robot.rule.highest_N
         tau = self.tau[rows]
-        newly = _newly_bound(tau, self.bound[rows], (low, high), unit) & nearly[:, None]
-        self.bound[rows] += np.where(newly, np.where(tau < low, -1, 1), 0)
-        self.since[rows] = np.where(newly, self.since[rows].max(1, keepdims=True) + 1, self.since[rows])
+        newly = self.aim.newly_bound(tau, self.bound[rows]) & nearly[:, None]
+        side = np.where(tau < self.aim.robot.rule.lowest_N, -1, 1)
+        self.bound[rows] += np.where(newly, side, 0)
+        since = self.since[rows]
+        last = since.max(1, keepdims=True)
+        self.since[rows] = np.where(newly, last + 1, since)
         return np.asarray(newly.any(1))
 
     def let_go(self, rows: Indices, rest: Bools, hindrance: Floats) -> Bools:
@@ -146,11 +170,12 @@ class _Search:
         rest : (k,) bool array
             Which of them have come to rest.
         hindrance : (k, w) array
-            As `_step` returns it.
+            As in `_Step`.
         """
         most = np.where(self.freed[rows], 0.0, hindrance).argmax(1)
         there = rows, most
-        wrongly = rest & ~self.freed[there] & (hindrance[np.arange(len(rows)), most] > _HINDERED)
+        hinders = hindrance[np.arange(len(rows)), most] > _HINDERED
+        wrongly = rest & ~self.freed[there] & hinders
         self.bound[there] = np.where(wrongly, 0, self.bound[there])
         self.freed[there] |= wrongly
         return np.asarray(wrongly)
@@ -158,120 +183,151 @@ class _Search:
     def let_go_oldest(self, rows: Indices) -> None:
         """Let go, in searches that no step brings to a balance, the wire that is held longest."""
         held = (self.bound[rows] != 0) & ~self.freed[rows]
-        there = rows, np.where(held, self.since[rows], np.iinfo(np.int64).max).argmin(1)
+        oldest = np.where(held, self.since[rows], np.iinfo(np.int64).max).argmin(1)
+        there = rows, oldest
         some = held.any(1)
         self.bound[there] = np.where(some, 0, self.bound[there])
         self.freed[there] |= some
 
-    def balances(self, robot: Robot, target: Floats, asked: Floats) -> Balances:
+    def balances(self, target: Floats) -> Balances:
         """What has come to rest in balance, within the bounds of tensions, with what is asked for."""
-        low, high = robot.rule.lowest_N, robot.rule.highest_N
-        left, size = largest_imbalance(robot, self.x, self.R, self.tau)
-        slack = 1e-9 * np.maximum(np.abs(self.tau).max(1), _unit(robot))
-        inside = (self.tau.min(1) >= low - slack) & (self.tau.max(1) <= high + slack)
-        reached = np.isnan(asked) | (np.abs(turning.vector(self.R) - asked) < 1e-8)
-        good = self.done & (left < 100 * _BALANCED * size) & inside & reached.all(1)
-        far = np.linalg.norm(turning.vector(self.R @ target.swapaxes(1, 2)), axis=1)
-        return Balances(self.x, self.R, np.clip(self.tau, low, high), far, good)
+        rule = self.aim.robot.rule
+        left, size = largest_imbalance(self.aim.robot, self.x, self.R, self.tau)
+        balanced = left < 100 * _BALANCED * size
+        good = self.done & balanced & self._inside() & self.aim.reached(self.R)
+        turn = turning.vector(self.R @ target.mT)
+        far = np.linalg.norm(turn, axis=1)
+        return Balances(self.x, self.R, np.clip(self.tau, rule.lowest_N, rule.highest_N), far, good)
+
+    def _inside(self) -> Bools:
+        """(n,) Whether all tensions are within their bounds, but for rounding."""
+        rule = self.aim.robot.rule
+        slack = 1e-9 * np.maximum(np.abs(self.tau).max(1), self.aim.unit)
+        lowest, highest = self.tau.min(1), self.tau.max(1)
+        return np.asarray((lowest >= rule.lowest_N - slack) & (highest <= rule.highest_N + slack))
 
 
-def _step(
-    robot: Robot,
-    at: tuple[Floats, Floats, Floats],
-    goal: tuple[Floats, Floats],
-    asked: Floats,
-    bound: Ints,
-    unit: float,
-    movable: bool,
-) -> tuple[Floats, Floats, Floats]:
-    """The smallest step from poses and tensions that solves the linearised equations and comes nearest to the goal.
+@dataclass(frozen=True)
+class _Aim:
+    """What searches of a robot aim at beside balance.
 
-    Returns
-    -------
-    step : (n, 6 + w) array
-        Displacement, turn, and change of the tensions in `unit`.
-    imbalance : (n,) array
-        What the equations leave before the step, in `unit`.
-    hindrance : (n, w) array
-        How much nearer to the goal a search would come by leaving each wire's bound inwards; below 0: not at all.
+    Attributes
+    ----------
+    robot : Robot
+    asked : (3,) array
+        Components of the rotation vector, NaN where free.
+    movable : bool
+        Whether the position may change too.
     """
-    A, value = _linearised(robot, at, asked, bound, unit, movable)
-    wish, weight = _wish(robot, at, goal, unit, movable)
-    wish[np.abs(value).max(1) > _FAR_FROM_BALANCE] = 0.0
-    sound = np.asarray(np.isfinite(A).all((1, 2)) & np.isfinite(value).all(1))  # a wire without length has no direction
-    B = np.where(sound[:, None, None], A / weight, 0.0)
-    step = np.where(sound[:, None], wish * weight, np.nan)
-    missed = value + (B @ step[..., None])[..., 0]
-    inverse = np.linalg.pinv(B, rcond=DEPENDENT)
-    back = inverse @ missed[..., None]
-    multiplier = (inverse.swapaxes(1, 2) @ back)[..., 0]  # Lagrange's; the bounds' equations are the last
-    return (step - back[..., 0]) / weight, np.abs(value).max(1), -bound * multiplier[:, -bound.shape[1] :]
+
+    robot: Robot
+    asked: Floats
+    movable: bool
+
+    @property
+    def unit(self) -> float:
+        """In which forces are counted, N."""
+        return float(max(self.robot.mass_kg * GRAVITY, self.robot.rule.lowest_N))
+
+    def step(self, at: tuple[Floats, Floats, Floats], goal: tuple[Floats, Floats], bound: Ints) -> _Step:
+        """The smallest step from poses and tensions that solves the linearised equations and comes nearest to a goal.
+
+        Parameters
+        ----------
+        at : position, rotation and tensions
+        goal : position and rotation
+        bound : (n, w) int array
+        """
+        A, value = self._linearised(at, bound)
+        imbalance = np.abs(value).max(1)
+        wish, weight = self._wish(at, goal)
+        wish[imbalance > _FAR_FROM_BALANCE] = 0.0
+        sound = _all_finite(A, value)  # a wire without length has no direction
+        B = chosen_rows(sound, A / weight, 0.0)
+        wished = chosen_rows(sound, wish * weight, np.nan)
+        missed = value + (B @ wished[..., None])[..., 0]
+        inverse = np.linalg.pinv(B, rcond=DEPENDENT)
+        back = inverse @ missed[..., None]
+        multiplier = (inverse.mT @ back)[..., 0]  # Lagrange's; the bounds' equations are the last
+        hindrance = -bound * multiplier[:, -bound.shape[1] :]
+        return _Step(_cut((wished - back[..., 0]) / weight), imbalance, hindrance)
+
+    def _linearised(self, at: tuple[Floats, Floats, Floats], bound: Ints) -> tuple[Floats, Floats]:
+        """Slopes (n, e, 6 + w) and values (n, e) of all equations."""
+        force, by_turn, by_tension = equations(self.robot, *at)
+        by_place = np.zeros((*force.shape, 3))
+        if self.movable:
+            by_place = slope_by_place(self.robot, *at)
+        A = np.concatenate([by_place / self.unit, by_turn / self.unit, by_tension], 2)
+        extra, more = self._side_conditions(at[1], at[2], bound)
+        return np.concatenate([A, extra], 1), np.concatenate([force / self.unit, more], 1)
+
+    def _wish(self, at: tuple[Floats, Floats, Floats], goal: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+        """What the step (n, 6 + w) should be if nothing had to balance, and how much each part (6 + w,) weighs."""
+        x, R, tau = at
+        place = goal[0] - x if self.movable else np.zeros_like(x)
+        turn = turning.vector(goal[1] @ R.mT)
+        pull = (_reference(self.robot) - tau) / self.unit
+        weights = _PLACE / self.robot.span_m, *self._angle_and_pull()
+        return np.concatenate([place, turn, pull], 1), np.repeat(weights, (3, 3, tau.shape[1]))
+
+    def _angle_and_pull(self) -> tuple[float, float]:
+        """Weights of angles and tensions."""
+        if self.movable:
+            return _LESSER, _LESSER
+        return (_LESSER, 1.0) if self.robot.is_underactuated else (1.0, _LESSER)
+
+    def _side_conditions(self, R: Floats, tau: Floats, bound: Ints) -> tuple[Floats, Floats]:
+        """Rows of the equations that say what is asked for, and which tensions are held at a bound."""
+        n, legs = tau.shape
+        rows, values = np.zeros((n, 3 + legs, 6 + legs)), np.zeros((n, 3 + legs))
+        vector = turning.vector(R)
+        wanted = np.isfinite(self.asked)
+        rows[:, :3, 3:6] = np.where(wanted[:, None], vector_by_turn(vector), 0.0)
+        values[:, :3] = np.where(wanted, vector - np.where(wanted, self.asked, 0.0), 0.0)
+        held = bound != 0
+        rule = self.robot.rule
+        off = tau - np.where(bound < 0, rule.lowest_N, rule.highest_N)
+        rows[:, 3:, 6:] = np.eye(legs) * held[:, None]
+        values[:, 3:] = np.where(held, off / self.unit, 0.0)
+        return rows, values
+
+    def newly_bound(self, tau: Floats, bound: Ints) -> Bools:
+        """(n, w) Of each row the wire that is farthest beyond its bounds, where there is one."""
+        rule = self.robot.rule
+        beyond = np.maximum(rule.lowest_N - tau, tau - rule.highest_N)
+        beyond = np.where(bound == 0, beyond, -np.inf)
+        out = np.zeros(tau.shape, bool)
+        out[np.arange(len(tau)), beyond.argmax(1)] = beyond.max(1) > 1e-9 * self.unit
+        return out
+
+    def reached(self, R: Floats) -> Bools:
+        """(n,) Whether rotations have the components that are asked for."""
+        near = np.abs(turning.vector(R) - self.asked) < 1e-8
+        return np.asarray((np.isnan(self.asked) | near).all(1))
 
 
-def _linearised(
-    robot: Robot,
-    at: tuple[Floats, Floats, Floats],
-    asked: Floats,
-    bound: Ints,
-    unit: float,
-    movable: bool,
-) -> tuple[Floats, Floats]:
-    """Slopes (n, e, 6 + w) and values (n, e) of all equations."""
-    x, R, tau = at
-    force, by_turn, by_tension = equations(robot, x, R, tau)
-    by_place = slope_by_place(robot, x, R, tau) if movable else np.zeros((len(tau), len(force[0]), 3))
-    A = np.concatenate([by_place / unit, by_turn / unit, by_tension], 2)
-    extra, more = _side_conditions(robot, R, tau, asked, bound, unit)
-    return np.concatenate([A, extra], 1), np.concatenate([force / unit, more], 1)
+def _all_finite(A: Floats, value: Floats) -> Bools:
+    """(n,) Which equations are finite."""
+    return np.asarray(np.isfinite(A).all((1, 2)) & np.isfinite(value).all(1))
 
 
-def _wish(
-    robot: Robot, at: tuple[Floats, Floats, Floats], goal: tuple[Floats, Floats], unit: float, movable: bool
-) -> tuple[Floats, Floats]:
-    """What the step (n, 6 + w) should be if nothing had to balance, and how much each part (6 + w,) of it weighs."""
-    x, R, tau = at
-    place = goal[0] - x if movable else np.zeros_like(x)
-    turn = turning.vector(goal[1] @ R.swapaxes(1, 2))
-    wish = np.concatenate([place, turn, (_reference(robot) - tau) / unit], 1)
-    aim = (_LESSER, 1.0) if robot.is_underactuated else (1.0, _LESSER)
-    angle, pull = (_LESSER, _LESSER) if movable else aim
-    weights = _PLACE / robot.span_m, angle, pull
-    return wish, np.repeat(weights, (3, 3, tau.shape[1]))
-
-
-def _side_conditions(
-    robot: Robot, R: Floats, tau: Floats, asked: Floats, bound: Ints, unit: float
-) -> tuple[Floats, Floats]:
-    """Rows of the equations that say what is asked for, and which tensions are held at a bound."""
-    n, legs = tau.shape
-    rows, values = np.zeros((n, 3 + legs, 6 + legs)), np.zeros((n, 3 + legs))
-    vector = turning.vector(R)
-    wanted = np.isfinite(asked)
-    rows[:, :3, 3:6] = np.where(wanted[:, None], vector_by_turn(vector), 0.0)
-    values[:, :3] = np.where(wanted, vector - np.where(wanted, asked, 0.0), 0.0)
-    at = np.where(bound < 0, robot.rule.lowest_N, robot.rule.highest_N)
-    rows[:, 3:, 6:] = np.eye(legs) * (bound != 0)[:, None]
-    values[:, 3:] = np.where(bound != 0, (tau - at) / unit, 0.0)
-    return rows, values
-
-
-def _newly_bound(tau: Floats, bound: Ints, limits: tuple[float, float], unit: float) -> Bools:
-    """(n, w) Of each row the wire that is farthest beyond its bounds, where there is one."""
-    beyond = np.where(bound == 0, np.maximum(limits[0] - tau, tau - limits[1]), -np.inf)
-    worst = beyond.argmax(1)
-    out = np.zeros(tau.shape, bool)
-    out[np.arange(len(tau)), worst] = beyond.max(1) > 1e-9 * unit
-    return out
+def _cut(change: Floats) -> Floats:
+    """Steps (n, 6 + w), long ones shorter in the same direction."""
+    turned = np.linalg.norm(change[:, 3:6], axis=1)
+    share = np.minimum(1.0, _LONGEST_RAD / np.maximum(turned, 1e-300))
+    return change * share[:, None]
 
 
 def _first_tensions(robot: Robot, x: Floats, R: Floats) -> Floats:
     """Tensions that come nearest to balance, none below the lowest."""
-    turn = np.moveaxis(R, 0, -1)
+    turn = batch_last(R)
     shape = statics.geometry(robot, x.T, turn)
-    J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0)[:, :3]
+    J = batch_first(statics.wire_jacobian(robot, shape))[:, :3]
     load = statics.weight(robot, turn).T[:, :3]
     tau = (np.linalg.pinv(J, rcond=1e-3) @ load[..., None])[..., 0]
-    return np.asarray(np.clip(tau, max(robot.rule.lowest_N, 1e-3 * robot.mass_kg * GRAVITY), robot.rule.highest_N))
+    lowest = max(robot.rule.lowest_N, 1e-3 * robot.mass_kg * GRAVITY)
+    return np.asarray(np.clip(tau, lowest, robot.rule.highest_N))
 
 
 def _reference(robot: Robot) -> float:

@@ -6,10 +6,12 @@ is stable where every displacement raises it. The form is continuously different
 minimum on the unit sphere is an eigenvector of the form that adds all wires of one set: trying every set finds it.
 """
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
@@ -56,32 +58,70 @@ def held(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> Bools:
 
 def _bounds(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> tuple[Bools, Floats, Floats]:
     """Where any wire is just not slack, and least and largest stiffness, ``(n,)`` each; NaN where there is no pose."""
-    turn, zero = np.moveaxis(pose[1], 0, -1), lengths[0].T
-    shape = statics.geometry(robot, pose[0].T, turn)
-    stretched = statics.stretched(robot, shape, np.broadcast_to(lengths[1], lengths[0].shape).T)
-    touching = np.abs(stretched / zero - 1.0) < TOUCHING
-    any_touching = np.asarray(touching.any(axis=0))
-    # the form of the taut wires, which resist both ways, and its values
-    tau, slope = (np.where(touching, 0.0, value) for value in tension(wires, stretched, zero))
-    _, stiffness = statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)
-    both = _at_edge(robot, stiffness)
+    balance = _Balance.at(robot, wires, pose, lengths)
+    both, one_way = balance.two_way(), balance.one_way()
     values = np.asarray(np.linalg.eigvalsh(both), np.float64)
     least, largest = values[:, 0].copy(), values[:, -1]
-    # what each wire would add as soon as it is taut
-    _, slope = tension(wires, np.maximum(stretched, zero * (1.0 + TOUCHING)), zero)
-    resisting = statics.wire_jacobian(robot, shape) * robot.edge_scale[:, None, None] * np.sqrt(slope)
+    touched = np.asarray(balance.touching.any(axis=0))
     known = np.isfinite(pose[0]).all(axis=1)
-    decided = known & np.isfinite(resisting).all(axis=(0, 1))
-    for k in np.flatnonzero(decided & any_touching & (least <= _APART * largest)):
-        least[k] = _least_of(both[k], resisting[:, touching[:, k], k])
-    return any_touching, np.where(known, least, np.nan), largest
+    decided = known & np.isfinite(one_way).all(axis=(0, 1))
+    for k in np.flatnonzero(decided & touched & (least <= _APART * largest)):
+        touching = balance.touching[:, k]
+        least[k] = _least_of(both[k], one_way[:, touching, k])
+    return touched, np.where(known, least, np.nan), largest
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """Wires at equilibria, batch-last.
+
+    Attributes
+    ----------
+    touching : (w, n) bool array
+        Which wires are just not slack.
+    """
+
+    robot: Robot
+    wires: Wires
+    shape: statics.Geometry
+    turn: Floats
+    zero: Floats
+    stretched: Floats
+    touching: Bools
+
+    @classmethod
+    def at(cls, robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> "_Balance":
+        position, rotation = pose
+        zero, offset = lengths
+        turn = batch_last(rotation)
+        shape = statics.geometry(robot, position.T, turn)
+        beyond = np.broadcast_to(offset, zero.shape).T
+        stretched = statics.stretched(robot, shape, beyond)
+        strain = stretched / zero.T - 1.0
+        return cls(robot, wires, shape, turn, zero.T, stretched, np.abs(strain) < TOUCHING)
+
+    def two_way(self) -> Floats:
+        """(n, d, d) form of the taut wires, which resist both ways."""
+        tau, slope = tension(self.wires, self.stretched, self.zero)
+        taut_N = np.where(self.touching, 0.0, tau)
+        taut_slope = np.where(self.touching, 0.0, slope)
+        _, stiffness = statics.unbalance_and_stiffness(self.robot, self.shape, self.turn, taut_N, taut_slope)
+        return _at_edge(self.robot, stiffness)
+
+    def one_way(self) -> Floats:
+        """(d, w, n) what each wire would add as soon as it is taut, as numbers whose squares are added."""
+        just_taut = np.maximum(self.stretched, self.zero * (1.0 + TOUCHING))
+        _, slope = tension(self.wires, just_taut, self.zero)
+        J = statics.wire_jacobian(self.robot, self.shape)
+        return J * self.robot.edge_scale[:, None, None] * np.sqrt(slope)
 
 
 def _at_edge(robot: Robot, stiffness: Floats) -> Floats:
     """(n, d, d) stiffnesses (d, d, n) with rotations in metres at the platform's edge; zero where there is none."""
     scale = robot.edge_scale[:, None]
-    first = np.moveaxis(stiffness, -1, 0)
-    return np.where(np.isfinite(first), first, 0.0) * (scale * scale.T)
+    first = batch_first(stiffness)
+    finite = np.where(np.isfinite(first), first, 0.0)
+    return finite * (scale * scale.T)
 
 
 def _least_of(both: Floats, one_way: Floats) -> Floats:
@@ -94,14 +134,20 @@ def _least_of(both: Floats, one_way: Floats) -> Floats:
     one_way : (d, m) array
         Of the numbers.
     """
-    d, m = one_way.shape
-    noise = np.random.default_rng(0).standard_normal((d, d))
+    d = len(both)
     size = np.abs(both).max() + (one_way**2).sum()
+    noise = np.random.default_rng(0).standard_normal((d, d))
     apart = both + _APART * size * (noise + noise.T)
-    sets = np.array(list(product((0.0, 1.0), repeat=m)))
-    of_sets = np.einsum("im,sm,jm->sij", one_way, sets, one_way)
-    _, vectors = np.linalg.eigh(apart + of_sets)
-    tried = np.concatenate([vectors, -vectors], axis=-1).swapaxes(1, 2).reshape(-1, d)
+    _, vectors = np.linalg.eigh(apart + _of_every_set(one_way))
+    both_ways = np.concatenate([vectors, -vectors], axis=-1)
+    tried = both_ways.mT.reshape(-1, d)
     stretch = np.maximum(tried @ one_way, 0.0)
-    value = np.einsum("vi,ij,vj->v", tried, both, tried) + (stretch**2).sum(axis=1)
+    form = np.einsum("vi,ij,vj->v", tried, both, tried)
+    value = form + (stretch**2).sum(axis=1)
     return np.asarray(value.min())
+
+
+def _of_every_set(one_way: Floats) -> Floats:
+    """(2^m, d, d) forms that the numbers of every set of the m add."""
+    sets = np.array(list(product((0.0, 1.0), repeat=one_way.shape[1])))
+    return np.asarray(np.einsum("im,sm,jm->sij", one_way, sets, one_way))

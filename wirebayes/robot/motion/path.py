@@ -5,12 +5,13 @@ accepted when it ends where the stiffness at its start predicts; otherwise it is
 jump is left that no division removes: there the platform falls.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from wirebayes.numeric import cholesky
+from wirebayes.numeric.batches import batch_first
+from wirebayes.numeric.rows import chosen_rows, rows_of
 from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
@@ -51,11 +52,11 @@ class Followed:
             getattr(self.here, name)[rows] = getattr(there, name)[held]
         self.share[rows] = share[held]
 
-    def _fall(
-        self, robot: Robot, wires: Wires, rows: Indices, lengths: Sequence[Floats], pose: Sequence[Floats]
-    ) -> None:
-        """Note where some platforms come to rest downhill from the poses in which they hung."""
-        caught = forward.solve_equilibrium(robot, wires, lengths[0], lengths[1], pose[0], pose[1])
+    def _fall(self, robot: Robot, wires: Wires, live: Indices, fell: Bools, lengths: Lengths, start: Poses) -> None:
+        """Note where those of the `live` platforms that fell come to rest downhill from their poses."""
+        own, pose = (lengths[0][fell], lengths[1][fell]), (start[0][fell], start[1][fell])
+        rows = live[fell]
+        caught = forward.solve_equilibrium(robot, wires.part(np.flatnonzero(fell)), *own, *pose)
         distance = np.linalg.norm(caught.position_m - pose[0], axis=1)
         lost = caught.status == outcome.NOT_CONVERGED
         self.here.status[rows] = np.where(lost, outcome.NOT_CONVERGED, outcome.FELL)
@@ -88,39 +89,40 @@ def follow(
     -------
     Followed
     """
-    n = len(start[0])
     followed, good = _undivided(robot, wires, start, old, new)
     whole = followed.here
-    divided = _Divided(np.full(n, 0.5), np.zeros(n, bool))
+    divided = _Divided(np.full(len(good), 0.5), np.zeros(len(good), bool))
     live = np.flatnonzero(~good & np.isfinite(whole.position_m).all(1))
     while live.size:
         to = np.minimum(followed.share[live] + divided.step[live], 1.0)
         between = _between(old, new, live, to)
-        part, at = wires.part(live), (whole.position_m[live], whole.rotation[live])
-        there, held = _step(robot, part, at, whole.tension_N[live], between)
+        part = wires.part(live)
+        pose = whole.position_m[live], whole.rotation[live]
+        there, held = _step(robot, part, pose, whole.tension_N[live], between)
         followed._go_on(live[held], there, held, to)
         divided.adapt(live, held)
         fell = ~held & (divided.step[live] < smallest)
         if fell.any():
-            lengths, pose = ([array[fell] for array in arrays] for arrays in (between, at))
-            followed._fall(robot, part.part(np.flatnonzero(fell)), live[fell], lengths, pose)
+            followed._fall(robot, part, live, fell, between, pose)
         live = live[~fell & (followed.share[live] < 1.0)]
     return followed
 
 
 def _between(old: Lengths, new: Lengths, rows: Indices, share: Floats) -> Lengths:
     """Some lengths and offsets on the straight line from old to new ones, each at its own share of the way."""
-    zero, offset = (a[rows] + share[:, None] * (b[rows] - a[rows]) for a, b in zip(old, new, strict=True))
+    zero = old[0][rows] + share[:, None] * (new[0][rows] - old[0][rows])
+    offset = old[1][rows] + share[:, None] * (new[1][rows] - old[1][rows])
     return zero, offset
 
 
 def _undivided(robot: Robot, wires: Wires, start: Poses, old: Lengths, new: Lengths) -> tuple[Followed, Bools]:
     """All at once, as most need no division; the others are where they were, and (n,) says which are not."""
-    x, R = (np.array(v) for v in start)
+    x, R = np.array(start[0]), np.array(start[1])
     tau = tensions_at(robot, wires, x, R, *old)
     whole, good = _step(robot, wires, (x, R), tau, new)
-    for name, before in (("position_m", x), ("rotation", R), ("tension_N", tau)):
-        getattr(whole, name)[~good] = before[~good]
+    whole.position_m[~good] = x[~good]
+    whole.rotation[~good] = R[~good]
+    whole.tension_N[~good] = tau[~good]
     return Followed(whole, np.where(good, 1.0, 0.0), np.zeros(len(x))), good
 
 
@@ -161,24 +163,32 @@ def _step(
     predicted = mixed.after_step(robot, start, ahead)
     # Where the stiffness predicts nothing, as of wires that part just now, what does not jump has not fallen.
     ahead = np.where(np.isfinite(ahead), ahead, 0.0)
-    close = np.linalg.norm(ahead[:, :3], axis=1) <= _FARTHEST * robot.span_m
-    close &= np.linalg.norm(ahead[:, 3:], axis=1) <= _FARTHEST_RAD * robot.size_m
+    believed = _believed(robot, ahead)
     zero, offset = lengths
-    there = forward.solve_equilibrium(robot, wires, np.where(close[:, None], zero, np.nan), offset, *near)
+    there = forward.solve_equilibrium(robot, wires, chosen_rows(believed, zero, np.nan), offset, *near)
     loose = np.flatnonzero(there.status == outcome.NOT_HELD)
     if loose.size:
         _let_go(robot, wires, there, loose, lengths)
     trusted = _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
-    close &= _apart_m(robot, there, predicted) <= trusted
-    return there, np.asarray(there.found & close)
+    near_prediction = _apart_m(robot, there, predicted) <= trusted
+    return there, np.asarray(there.found & believed & near_prediction)
+
+
+def _believed(robot: Robot, ahead: Floats) -> Bools:
+    """(n,) Which predicted steps are no longer than is believed."""
+    displaced = np.linalg.norm(ahead[:, :3], axis=1)
+    turned = np.linalg.norm(ahead[:, 3:], axis=1)
+    short = displaced <= _FARTHEST * robot.span_m
+    return np.asarray(short & (turned <= _FARTHEST_RAD * robot.size_m))
 
 
 def _apart_m(robot: Robot, there: forward.Equilibria, predicted: Poses) -> Floats:
     """(n,) how far solutions lie from predicted poses: in place, or by the turn at the platform's edge."""
     position, rotation = predicted
-    moved_m = np.linalg.norm(there.position_m - position, axis=1)
-    turn = there.rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)
-    return np.maximum(moved_m, robot.size_m * np.linalg.norm(turn, axis=(1, 2)))
+    displaced = np.linalg.norm(there.position_m - position, axis=1)
+    turn = there.rotation @ rotation.mT - np.eye(3)
+    turned = np.linalg.norm(turn, axis=(1, 2))
+    return np.maximum(displaced, robot.size_m * turned)
 
 
 def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, loose: Indices, lengths: Lengths) -> None:
@@ -186,16 +196,21 @@ def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, loose: Indice
 
     Where wires that were just not slack part from a symmetric platform, it tilts until some are taut again.
     """
-    offset = np.broadcast_to(lengths[1], lengths[0].shape)
-    part, own = wires.part(loose), (lengths[0][loose], offset[loose])
+    zero, offset = lengths[0], np.broadcast_to(lengths[1], lengths[0].shape)
+    part, own = wires.part(loose), (zero[loose], offset[loose])
     balance = there.position_m[loose], there.rotation[loose]
-    stiffness = np.moveaxis(balance_at(robot, part, *balance, *own)[1], -1, 0)
-    softest = np.linalg.eigh(stiffness)[1][..., 0]
+    _, hessian = balance_at(robot, part, *balance, *own)
+    _, directions = np.linalg.eigh(batch_first(hessian))
+    softest = directions[..., 0]
     aside = mixed.after_step(robot, balance, _ASIDE * robot.size_m * softest)
     found = forward.solve_equilibrium(robot, part, *own, *aside)
-    held = np.flatnonzero(found.found)
+    _put_in(there, loose[found.found], rows_of(found, found.found))
+
+
+def _put_in(out: forward.Equilibria, rows: Indices, found: forward.Equilibria) -> None:
+    """Put equilibria in place of others, in these rows."""
     for field in fields(forward.Equilibria):
-        getattr(there, field.name)[loose[held]] = getattr(found, field.name)[held]
+        getattr(out, field.name)[rows] = getattr(found, field.name)
 
 
 def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: float = _SMALL) -> forward.Equilibria:
@@ -218,17 +233,16 @@ def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: flo
     """
     step = newton_step(robot, wires, near, lengths)
     x, R = mixed.after_step(robot, near, step)
-    n = len(x)
     tau = tensions_at(robot, wires, x, R, *lengths)
+    n = len(x)
     out = forward.Equilibria(x, R, tau, np.full(n, outcome.FOUND), np.ones(n, np.int64), np.zeros(n))
     # the error left is of the order of the step's square over a wire's length
-    far = np.flatnonzero(~(np.linalg.norm(step, axis=1) < small * robot.size_m))
+    exact = np.linalg.norm(step, axis=1) < small * robot.size_m
+    far = np.flatnonzero(~exact)
     if far.size:
-        rest = forward.solve_equilibrium(
-            robot, wires.part(far), lengths[0][far], lengths[1][far], near[0][far], near[1][far]
-        )
-        for field in fields(forward.Equilibria):
-            getattr(out, field.name)[far] = getattr(rest, field.name)
+        own, start = (lengths[0][far], lengths[1][far]), (near[0][far], near[1][far])
+        rest = forward.solve_equilibrium(robot, wires.part(far), *own, *start)
+        _put_in(out, far, rest)
     return out
 
 

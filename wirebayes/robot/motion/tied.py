@@ -10,7 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wirebayes.numeric.typing import Bools, Floats, Ints
+from wirebayes.numeric.batches import batch_first, batch_last
+from wirebayes.numeric.rows import chosen_rows, rows_of
+from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
@@ -45,6 +47,15 @@ class Tied:
     held: Bools
 
 
+@dataclass(frozen=True)
+class _Goal:
+    """Positions ``(n, 3)``, rotations ``(n, 3, 3)`` and tensions ``(n, w)`` that are aimed at."""
+
+    x: Floats
+    R: Floats
+    tau: Floats
+
+
 @dataclass
 class _Cases:
     """Requests on their way: position ``(n, 3)``, rotation ``(n, 3, 3)``, joint values ``(n, j)``."""
@@ -53,6 +64,11 @@ class _Cases:
     R: Floats
     joint: Floats
     bound: Ints  # -1 and 1: lines held at the lowest and the highest tension
+
+    @classmethod
+    def beginning(cls, goal: _Goal, joint: Floats) -> "_Cases":
+        """At the poses aimed at, with joint values of winches."""
+        return cls(goal.x, goal.R, joint, np.zeros(goal.tau.shape, int))
 
 
 @dataclass(frozen=True)
@@ -93,109 +109,129 @@ def tied(
     creep, error_m : (w, n) array
         As for `inverse.commands`.
     """
-    n, legs = tension_N.shape
-    creep, error = (np.broadcast_to(v, (legs, n)).T for v in (creep, error_m))
-    none = np.full((n, legs), np.nan)
-    out = Tied(np.array(rotation), none, none.copy(), np.zeros(n, bool))
+    creep, error = (np.broadcast_to(v, tension_N.T.shape).T for v in (creep, error_m))
+    none = np.full(tension_N.shape, np.nan)
+    out = Tied(np.array(rotation), none, none.copy(), np.zeros(len(none), bool))
     live = np.flatnonzero(np.isfinite(joint_m).all(1) & np.isfinite(tension_N).all(1))
-    cases = _Cases(
-        position_m[live], rotation[live], mean_of_each_winch(robot, joint_m)[live], np.zeros((len(live), legs), int)
-    )
-    scale = robot.edge_scale
+    goal = _Goal(position_m, rotation, tension_N)
+    cases = _Cases.beginning(rows_of(goal, live), mean_of_each_winch(robot, joint_m)[live])
     for _ in range(_STEPS):
         if not live.size:
             break
-        here = _here(robot, wires.part(live), cases, creep[live], error[live], scale)
-        step = _step(robot, here, cases, (position_m[live], rotation[live], tension_N[live]))
+        here = _here(robot, wires.part(live), cases, creep[live], error[live])
+        step = _step(robot, here, cases, rows_of(goal, live))
         done = _settled(robot, here, cases, step)
-        at = live[done]
-        reached = np.abs(cases.x - position_m[live]).max(1)[done] < _REACHED * robot.span_m
-        out.rotation[at], out.tension_N[at] = cases.R[done], here.tension_N[done]
-        out.joint_m[at] = cases.joint[done] @ turned_by(robot).T
-        out.held[at] = reached
+        _keep(out, robot, live, done, cases, here)
+        off = np.abs(cases.x - position_m[live]).max(1)
+        out.held[live[done]] = off[done] < _REACHED * robot.span_m
         go = ~done & np.isfinite(step).all(1)
-        live, step = live[go], step[go]
-        _move(robot, cases, go, step, scale)
+        live = live[go]
+        _move(robot, cases, go, step[go])
     return out
+
+
+def _keep(out: Tied, robot: Robot, live: Indices, done: Bools, cases: _Cases, here: _Here) -> None:
+    """Write down where cases came to rest."""
+    at = live[done]
+    out.rotation[at] = cases.R[done]
+    out.tension_N[at] = here.tension_N[done]
+    out.joint_m[at] = cases.joint[done] @ turned_by(robot).T
 
 
 def _settled(robot: Robot, here: _Here, cases: _Cases, step: Floats) -> Bools:
     """(n,) Which cases are in balance and at rest; a line outside its bounds then is bound, and its case goes on."""
-    size, unit = np.abs(step).max(1), robot.mass_kg * GRAVITY + np.abs(here.tension_N).max(1)
-    still = (size < _SETTLED * robot.span_m) & (np.abs(here.force).max(1) < _BALANCED * unit)
+    size, low_N = np.abs(step).max(1), robot.rule.lowest_N
+    unit = robot.mass_kg * GRAVITY + np.abs(here.tension_N).max(1)
+    balanced = np.abs(here.force).max(1) < _BALANCED * unit
+    still = (size < _SETTLED * robot.span_m) & balanced
     newly = _newly_bound(robot, here.tension_N, cases.bound) & still[:, None]
-    cases.bound += np.where(here.tension_N < robot.rule.lowest_N, -1, 1) * newly
+    cases.bound += np.where(here.tension_N < low_N, -1, 1) * newly
     return np.asarray(still & ~newly.any(1))
 
 
-def _here(robot: Robot, wires: Wires, cases: _Cases, creep: Floats, error: Floats, scale: Floats) -> _Here:
+def _here(robot: Robot, wires: Wires, cases: _Cases, creep: Floats, error: Floats) -> _Here:
     """Balance and tensions at the cases' poses and joint values, with their slopes."""
-    joint, grown, linear = cases.joint @ turned_by(robot).T, 1.0 + creep, robot.is_linear
-    bare, offset = lengths(robot, joint)
+    grown, scale = 1.0 + creep, robot.edge_scale
+    bare, offset = lengths(robot, cases.joint @ turned_by(robot).T)
     zero = (bare + error) * grown
-    R = np.moveaxis(cases.R, 0, -1)
-    shape = statics.geometry(robot, cases.x.T, R)
-    S = statics.stretched(robot, shape, offset.T)
-    tau, slope = tension(wires, S, zero.T)
-    gradient, H = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
-    J = statics.wire_jacobian(robot, shape) * scale[:, None, None]
+    turn = batch_last(cases.R)
+    shape = statics.geometry(robot, cases.x.T, turn)
+    stretched = statics.stretched(robot, shape, offset.T)
+    tau, slope = tension(wires, stretched, zero.T)
+    gradient, hessian = statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)
+    force_by_pose = batch_first(hessian) * scale * scale[:, None]
     # a tension depends on the strain alone: by the zero-tension length it falls as it grows by the stretched one
-    by_joint = slope.T * np.where(linear, robot.ratio, -(S.T / zero) * grown)
-    tension_by_pose = np.moveaxis(slope * J, -1, 0).swapaxes(1, 2)
-    tension_by_joint = by_joint[:, :, None] * turned_by(robot)
-    force_by_joint = np.moveaxis(J, -1, 0) @ tension_by_joint
-    force_by_pose = np.moveaxis(H, -1, 0) * scale * scale[:, None]
-    return _Here(
-        gradient.T * scale,
-        np.concatenate([force_by_pose, force_by_joint], 2),
-        tau.T,
-        np.concatenate([tension_by_pose, tension_by_joint], 2),
-    )
+    by_joint = slope.T * np.where(robot.is_linear, robot.ratio, -(stretched.T / zero) * grown)
+    J = statics.wire_jacobian(robot, shape) * scale[:, None, None]
+    by_force, by_tension = _slopes(J, force_by_pose, slope, by_joint[:, :, None] * turned_by(robot))
+    return _Here(gradient.T * scale, by_force, tau.T, by_tension)
 
 
-def _step(robot: Robot, here: _Here, cases: _Cases, goal: tuple[Floats, Floats, Floats]) -> Floats:
+def _slopes(J: Floats, force_by_pose: Floats, slope: Floats, tension_by_joint: Floats) -> tuple[Floats, Floats]:
+    """Slopes of balance and tensions by pose and joint values."""
+    force_by_joint = batch_first(J) @ tension_by_joint
+    tension_by_pose = batch_first(slope * J).mT
+    by_force = np.concatenate([force_by_pose, force_by_joint], 2)
+    return by_force, np.concatenate([tension_by_pose, tension_by_joint], 2)
+
+
+def _step(robot: Robot, here: _Here, cases: _Cases, goal: _Goal) -> Floats:
     """(n, d + j) The step that meets every aim as far as those before it leave it free."""
-    x, R, tau = goal
-    n, d, columns = len(x), robot.degrees, here.by_force.shape[2]
-    place = np.broadcast_to(np.eye(columns)[:3], (n, 3, columns))
-    aims = [(here.by_force, -here.force, 0.0), (place, x - cases.x, _FREE)]
-    if d == 6 and robot.joints >= robot.freedoms:
-        turn = np.broadcast_to(np.eye(columns)[3:6], (n, 3, columns))
-        aims.append((turn, robot.size_m * turning.vector(R @ cases.R.swapaxes(1, 2)), _FREE))
-    at = np.where(cases.bound < 0, robot.rule.lowest_N, robot.rule.highest_N)
-    held = cases.bound != 0
-    aims.append((here.by_tension * held[..., None], np.where(held, at - here.tension_N, 0.0), _FREE))
-    aims.append((here.by_tension, tau - here.tension_N, _FREE))
-    step, free = np.zeros((n, columns)), np.broadcast_to(np.eye(columns), (n, columns, columns))
-    for by_step, wanted, least in aims:
+    columns = here.by_force.shape[2]
+    step = np.zeros((len(here.force), columns))
+    free = np.broadcast_to(np.eye(columns), (len(step), columns, columns))
+    for by_step, wanted, least in _aims(robot, here, cases, goal):
         inside = by_step @ free
-        back = _inverse(inside, least * np.linalg.norm(by_step, axis=(1, 2)))
-        step = step + (back @ (wanted[..., None] - by_step @ step[..., None]))[..., 0]
+        size = np.linalg.norm(by_step, axis=(1, 2))
+        back = _inverse(inside, least * size)
+        missing = wanted[..., None] - by_step @ step[..., None]
+        step = step + (back @ missing)[..., 0]
         free = free - back @ inside
     return step
+
+
+def _aims(robot: Robot, here: _Here, cases: _Cases, goal: _Goal) -> list[tuple[Floats, Floats, float]]:
+    """Slopes by the step, what is wanted, and what moves an aim too little to count: of one aim after another."""
+    n, columns = len(goal.x), here.by_force.shape[2]
+    unit = np.broadcast_to(np.eye(columns), (n, columns, columns))
+    aims = [(here.by_force, -here.force, 0.0), (unit[:, :3], goal.x - cases.x, _FREE)]
+    if robot.degrees == 6 and robot.joints >= robot.freedoms:
+        turned = turning.vector(goal.R @ cases.R.mT)
+        aims.append((unit[:, 3:6], robot.size_m * turned, _FREE))
+    held = cases.bound != 0
+    aims.append((here.by_tension * held[..., None], _beyond(robot, here, cases.bound), _FREE))
+    aims.append((here.by_tension, goal.tau - here.tension_N, _FREE))
+    return aims
+
+
+def _beyond(robot: Robot, here: _Here, bound: Ints) -> Floats:
+    """(n, w) by how much tensions are to change that are held at a bound."""
+    at = np.where(bound < 0, robot.rule.lowest_N, robot.rule.highest_N)
+    return np.where(bound != 0, at - here.tension_N, 0.0)
 
 
 def _inverse(A: Floats, least: Floats) -> Floats:
     """Pseudo-inverses ``(n, c, r)`` of ``(n, r, c)`` matrices, without singular values up to `least`, (n,)."""
     finite = np.asarray(np.isfinite(A).all((1, 2)))
-    U, size, V = np.linalg.svd(np.where(finite[:, None, None], A, 0.0), full_matrices=False)
+    U, size, V = np.linalg.svd(chosen_rows(finite, A, 0.0), full_matrices=False)
     least = np.maximum(least[:, None], 1e-13 * size[:, :1])
     part = np.where(size > least, 1.0 / np.maximum(size, 1e-300), 0.0)
     out = np.einsum("nkc,nk,nrk->ncr", V, part, U)
-    return np.where(finite[:, None, None], out, np.nan)
+    return chosen_rows(finite, out, np.nan)
 
 
-def _move(robot: Robot, cases: _Cases, go: Bools, step: Floats, scale: Floats) -> None:
+def _move(robot: Robot, cases: _Cases, go: Bools, step: Floats) -> None:
     """Cases that go on, moved; long steps are cut, the direction kept."""
     moved = np.linalg.norm(step[:, :3], axis=1) / (_LONGEST * robot.span_m)
-    turned = step[:, 3 : robot.degrees] * scale[3:]
+    turned = step[:, 3 : robot.degrees] * robot.edge_scale[3:]
     longest = np.maximum(moved, np.linalg.norm(turned, axis=1) / _LONGEST_RAD)
     share = 1.0 / np.maximum(longest, 1.0)[:, None]
     cases.x = cases.x[go] + share * step[:, :3]
     cases.R = cases.R[go]
     if robot.degrees == 6:
-        cases.R = np.moveaxis(turning.compose((share * turned).T, np.moveaxis(cases.R, 0, -1)), -1, 0)
-    cases.joint, cases.bound = cases.joint[go] + share * step[:, robot.degrees :], cases.bound[go]
+        cases.R = batch_first(turning.compose((share * turned).T, batch_last(cases.R)))
+    cases.joint = cases.joint[go] + share * step[:, robot.degrees :]
+    cases.bound = cases.bound[go]
 
 
 def _outside(robot: Robot, tension_N: Floats) -> Bools:
@@ -212,7 +248,9 @@ def _newly_bound(robot: Robot, tension_N: Floats, bound: Ints) -> Bools:
     rule = robot.rule
     beyond = np.maximum(rule.lowest_N - tension_N, tension_N - rule.highest_N)
     beyond = np.where(_outside(robot, tension_N) & (bound == 0), beyond, -np.inf)
-    spare = robot.joints - min(robot.joints, 3 if robot.joints < robot.freedoms else robot.freedoms)
     worst = np.zeros(tension_N.shape, bool)
     worst[np.arange(len(worst)), beyond.argmax(1)] = True
-    return worst & np.isfinite(beyond) & ((bound != 0).sum(1) < spare)[:, None]
+    commanded = 3 if robot.joints < robot.freedoms else robot.freedoms
+    spare = robot.joints - min(robot.joints, commanded)
+    free = (bound != 0).sum(1) < spare
+    return worst & np.isfinite(beyond) & free[:, None]

@@ -83,11 +83,16 @@ class Balance:
                 slope += by_place
                 continue
             moment = _sum(moment, _cross(r, pull))
-            lever = _skew(r)
-            by_arm = -(lever * by_turn)
-            by_both = lever * by_place * by_arm - _skew(pull) * by_arm
-            slope += _block(by_place, by_place * by_arm, by_both, self.size, lever * by_place)
-        return (force if d == 3 else force + [v / self.size for v in moment]), slope
+            slope += self._by_pose(_skew(r), by_turn, pull, by_place)
+        if d == 3:
+            return force, slope
+        return force + [v / self.size for v in moment], slope
+
+    def _by_pose(self, lever: Any, by_turn: Any, pull: list[Any], by_place: Any) -> Any:
+        """Slope (6, 6) of a wire's force and moment by the pose, from that by its platform point."""
+        by_arm = -(lever * by_turn)
+        by_both = lever * by_place * by_arm - _skew(pull) * by_arm
+        return _block(by_place, by_place * by_arm, by_both, self.size, lever * by_place)
 
     def _pulled(self, i: int, span: Span, known: tuple[Any, Any] | None) -> tuple[list[Any], Any]:
         """Force of a wire on the platform and its slope by the platform point.
@@ -96,11 +101,15 @@ class Balance:
         """
         from flint import arb_mat
 
-        m, u, bends = self.arb(float(self.robot.lines[i])), span.direction, span.curvature
-        S = m * span.length + self.offset[i]
-        tau, stiff = known or self.pull(i, self.strain(i, S), S)
-        by_place = [[-m * (stiff * m * u[j] * u[k] + tau * bends[j][k]) for k in range(3)] for j in range(3)]
-        return [-m * tau * a for a in u], arb_mat(by_place)
+        m = self.arb(float(self.robot.lines[i]))
+        u, bends = span.direction, span.curvature
+        stretched = m * span.length + self.offset[i]
+        tau, stiff = known or self.pull(i, self.strain(i, stretched), stretched)
+        by_place = arb_mat(3, 3)
+        for j in range(3):
+            for k in range(3):
+                by_place[j, k] = -m * (stiff * m * u[j] * u[k] + tau * bends[j][k])
+        return [-m * tau * a for a in u], by_place
 
     def at_centre(self) -> tuple[Any, list[tuple[Any, Any]]]:
         """Balance at the centre in parts: the weight's, and each wire's wrench of 1 N with its tension."""
@@ -117,8 +126,8 @@ class Balance:
 
     def strand(self, i: int, y: list[Any]) -> "Strand":
         """One wire's geometry over a box of poses."""
-        robot, m = self.robot, self.arb(float(self.robot.lines[i]))
-        turn, by_turn = self._turn(y[3:]) if robot.degrees == 6 else (self.R, None)
+        m = self.arb(float(self.robot.lines[i]))
+        turn, by_turn = self._turn(y[3:]) if self.robot.degrees == 6 else (self.R, None)
         r, line = self._line(i, y, turn)
         span = self._span(i, line)
         stretched = m * span.length + self.offset[i]
@@ -134,7 +143,9 @@ class Balance:
     def _line(self, i: int, y: list[Any], turn: Any) -> tuple[list[Any], list[Any]]:
         """Platform point from the reference point, and from the exit point."""
         r = _times(turn, self.robot.platform_m[i])
-        return r, [self.x[k] + y[k] + r[k] - self.arb(float(self.robot.exit_m[i, k])) for k in range(3)]
+        exit_m = [self.arb(float(v)) for v in self.robot.exit_m[i]]
+        line = [self.x[k] + y[k] + r[k] - exit_m[k] for k in range(3)]
+        return r, line
 
     def _span(self, i: int, line: list[Any]) -> Span:
         """A line from an exit point, over its pulley if it has one (`mechanics.pulleys` has the equations)."""
@@ -155,14 +166,16 @@ class Balance:
         h = away - rho
         straight = (h * h + z * z - rho * rho).sqrt()
         size = h * h + z * z
-        cosine, sine = (z * straight - h * rho) / size, (z * rho + h * straight) / size
+        cosine = (z * straight - h * rho) / size
+        sine = (z * rho + h * straight) / size
         wrap = arb.pi() / 2 - arb.atan2(cosine, sine)  # cut where no pulley in use is wrapped that far
         u = [sine * a + cosine * b for a, b in zip(e, s, strict=True)]
         normal = [cosine * a - sine * b for a, b in zip(e, s, strict=True)]
         across = _cross(s, e)
-        bends = [
-            [normal[j] * normal[k] / straight + across[j] * across[k] * sine / away for k in range(3)] for j in range(3)
-        ]
+        bends: list[list[Any]] = []
+        for j in range(3):
+            swivelling = [across[j] * across[k] * sine / away for k in range(3)]
+            bends.append([normal[j] * normal[k] / straight + swivelling[k] for k in range(3)])
         return Span(rho * wrap + straight, u, bends)
 
     def strain(self, i: int, S: Any) -> Any:
@@ -307,5 +320,8 @@ def identity(size: int) -> Any:
 
 def upper_bounds(image: Any) -> Floats:
     """Numbers above the absolute values in a column of balls; infinite where a ball is."""
-    largest = [value.abs_upper() for value in image.entries()]
-    return np.array([np.nextafter(float(ball), np.inf) if ball.is_finite() else np.inf for ball in largest])
+    out = []
+    for value in image.entries():
+        largest = value.abs_upper()
+        out.append(np.nextafter(float(largest), np.inf) if largest.is_finite() else np.inf)
+    return np.array(out)

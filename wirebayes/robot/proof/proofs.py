@@ -13,6 +13,7 @@ from wirebayes.robot.proof.reach import Reach, each_on_its_own, reach
 from wirebayes.wire.laws import ElasticLaw
 
 _Pose = tuple[Floats, Floats, Floats]  # position, rotation, and how exactly they are known
+_Band = tuple[Floats, Floats]  # low and high
 _STEP = 0.1  # how far, of the whole creep, wires may be out of step
 SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of the bands, the largest that can be proved
 
@@ -42,9 +43,9 @@ def only_equilibrium(robot: Robot, wires: Wires, position_m: Floats, rotation: F
     mean = control.known(wires)
     k1 = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)
     here = inverse.commands_at(robot, mean, position_m, rotation)
-    lengths = here.zero_m[0], here.zero_m[0]
+    zero, offset = here.zero_m[0], here.offset_m[0]
     try:
-        proof = certify(robot, wires.law, (k1, k1), lengths, here.offset_m[0], position_m, here.rotation[0])
+        proof = certify(robot, wires.law, (k1, k1), (zero, zero), offset, position_m, here.rotation[0])
     except ImportError:
         return {"proved": None, "sentence": "python-flint is not installed (extra: certificate)."}
     return {"proved": proof.proved, "enclosure_m": proof.radius_m, "alone_within_m": proof.unique_m}
@@ -79,28 +80,48 @@ def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rot
         return {}
     end_s = course.times_s[-1]
     nothing: EnclosedBand = {"band": {"time_s": end_s, "share": 0.0, "low_mm": None, "high_mm": None}}
-    if not course.found.any() or (course.falls is not None and course.falls.fell.any()):
+    fell = course.falls is not None and course.falls.fell.any()
+    if fell or not course.found.any():
         return nothing
     mean = control.known(wires)
     commands = inverse.commands_at(robot, mean, position_m, rotation)
-    bare, offset = inverse.lengths(robot, commands.joint_m[0])
-    strain = np.broadcast_to(course.end.strain(wires), (robot.legs, len(course.found)))[:, course.found]
-    k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, len(course.found)))[:, course.found]
-    known = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)
-    bands = [(np.quantile(v, 0.05, axis=1), np.quantile(v, 0.95, axis=1)) for v in (k1, strain)]
+    bands = _band(robot, wires.theta["k1"], course), _band(robot, course.end.strain(wires), course)
     for share in SHARES:
-        stiff, grown = (_middle(low, high, share) for low, high in bands)
-        # the commanded pose itself must be among what is proved
-        stiff = np.minimum(stiff[0], known), np.maximum(stiff[1], known)
         try:
-            way = _Way(robot, wires.law, stiff, grown, bare, offset)
-            proof = way.proved(position_m, commands.rotation[0], known)
+            proof = _proved_share(robot, mean, commands, bands, share, position_m)
         except ImportError:
             return {}
         if proof is not None:
-            span = 1e3 * (proof.centre_m - position_m + np.array([-1.0, 1.0])[:, None] * proof.radius_m[:3])
-            return {"band": {"time_s": end_s, "share": share, "low_mm": span[0], "high_mm": span[1]}}
+            middle = proof.centre_m - position_m
+            half = proof.radius_m[:3]
+            low, high = 1e3 * (middle - half), 1e3 * (middle + half)
+            return {"band": {"time_s": end_s, "share": share, "low_mm": low, "high_mm": high}}
     return nothing
+
+
+def _band(robot: Robot, values: Floats, course: Course) -> _Band:
+    """5 and 95 % quantiles (w,) of the wires' values in the draws that hold the platform to the end."""
+    each = np.broadcast_to(values, (robot.legs, len(course.found)))
+    held = each[:, course.found]
+    return np.quantile(held, 0.05, axis=1), np.quantile(held, 0.95, axis=1)
+
+
+def _proved_share(
+    robot: Robot,
+    mean: Wires,
+    commands: inverse.Commands,
+    bands: tuple[_Band, _Band],
+    share: float,
+    position_m: Floats,
+) -> Reach | None:
+    """The proof of a share of the bands of stiffness and strain about their middle, from the commanded pose on."""
+    known = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)
+    bare, offset = inverse.lengths(robot, commands.joint_m[0])
+    low, high = _middle(*bands[0], share)
+    # the commanded pose itself must be among what is proved
+    stiff = np.minimum(low, known), np.maximum(high, known)
+    way = _Way(robot, mean.law, stiff, _middle(*bands[1], share), bare, offset)
+    return way.proved(position_m, commands.rotation[0], known)
 
 
 def _middle(low: Floats, high: Floats, share: float) -> tuple[Floats, Floats]:
@@ -155,7 +176,8 @@ class _Way:
             if piece is None:
                 if b - a < _STEP:  # what varies now is not the creep: smaller pieces are as wide
                     return None
-                pieces += [(0.5 * (a + b), b), (a, 0.5 * (a + b))]
+                middle = 0.5 * (a + b)
+                pieces += [(middle, b), (a, middle)]
                 continue
             at, strain = 0.5 * (self.k1[0] + self.k1[1]), 0.5 * b * (low + high)
             here = self._certain((here[0], here[1]), at, strain)
@@ -173,22 +195,28 @@ class _Way:
         return (*pose, proof.radius_m) if proof.proved else None
 
     def _solved(self, near: Poses, k1_N: Floats, strain: Floats) -> tuple[Floats, Floats] | None:
-        wires = Wires(self.law, "saturating", {"k1": k1_N[:, None]}, np.full((self.robot.legs, 1), 1000.0))
-        found = forward.solve_equilibrium(self.robot, wires, (self.bare * (1 + strain))[None], self.offset, *near)
+        modulus = Wires(self.law, "saturating", {"k1": k1_N[:, None]}, np.full((self.robot.legs, 1), 1000.0))
+        zero = self.bare * (1 + strain)
+        found = forward.solve_equilibrium(self.robot, modulus, zero[None], self.offset, *near)
+        if not found.found[0]:
+            return None
         left, _, right = np.linalg.svd(found.rotation[0])
-        return (found.position_m[0], left @ right) if found.found[0] else None
+        return found.position_m[0], left @ right
 
     def _reach(self, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> Reach | None:
         """A piece's proof about its middle, if the pose here is the equilibrium that it proves."""
-        stiff, grown = (0.5 * (low + high) for low, high in (self.k1, band))
+        stiff = 0.5 * (self.k1[0] + self.k1[1])
+        grown = 0.5 * (band[0] + band[1])
         middle = self._solved((here[0], here[1]), stiff, grown)
         if middle is None:
             return None
-        half = 0.5 * (self.k1[1] - self.k1[0]), 0.5 * self.bare * (band[1] - band[0])
-        proof = reach(
-            self.robot, self.law, stiff, self.bare * (1 + grown), each_on_its_own(*half), self.offset, *middle
-        )
-        return proof if proof.proved and self._joined(proof, here, k1_N, strain, band) else None
+        half_k1 = 0.5 * (self.k1[1] - self.k1[0])
+        half_zero = 0.5 * self.bare * (band[1] - band[0])
+        generators = each_on_its_own(half_k1, half_zero)
+        proof = reach(self.robot, self.law, stiff, self.bare * (1 + grown), generators, self.offset, *middle)
+        if proof.proved and self._joined(proof, here, k1_N, strain, band):
+            return proof
+        return None
 
     def _joined(self, proof: Reach, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> bool:
         p = []

@@ -66,11 +66,15 @@ class Reach:
         slack_m : float or array
             How well the pose is known.
         """
+        if not self.proved:
+            return False
         turn = vector(rotation @ self.rotation.T)
         angle = float(np.linalg.norm(turn))
-        cayley = turn * (2 * np.tan(0.5 * angle) / angle) if angle > 0 else turn
-        here = np.concatenate([position_m - self.centre_m, size_m * cayley])[: len(self.beside_m)]
-        return self.proved and bool(np.all(np.abs(here - self.line_m @ p) + slack_m <= self.beside_m))
+        if angle > 0:
+            turn = turn * (2 * np.tan(0.5 * angle) / angle)  # Cayley's
+        here = np.concatenate([position_m - self.centre_m, size_m * turn])
+        off = np.abs(here[: len(self.beside_m)] - self.line_m @ p)
+        return bool(np.all(off + slack_m <= self.beside_m))
 
 
 def each_on_its_own(half_k1_N: Floats, half_zero_m: Floats) -> tuple[Floats, Floats]:
@@ -114,17 +118,17 @@ def reach(
     if min(k1_bounds[0].min(), zero_bounds[0].min()) <= 0:
         return nothing
     middle = Balance(robot, law, (k1_N, k1_N), (zero_m, zero_m), offset_m, position_m, rotation)
-    wide = Balance(robot, law, k1_bounds, zero_bounds, offset_m, position_m, rotation)
     C = preconditioner(middle)
     if C is None:
         return nothing
-    Y = _linear_answer(middle, C, generators)
-    along = np.abs(Y).sum(1) * _UP
-    image = partial(_image, middle, wide, C, Y, generators, along)
+    wide = Balance(robot, law, k1_bounds, zero_bounds, offset_m, position_m, rotation)
+    line = _linear_answer(middle, C, generators)
+    along = np.abs(line).sum(1) * _UP
+    image = partial(_image, middle, wide, C, line, generators, along)
     beside = box_around_image(image, d, robot.span_m)
     if beside is None:
         return nothing
-    return Reach(True, position_m, rotation, (along + beside) * _UP, beside, Y)
+    return Reach(True, position_m, rotation, (along + beside) * _UP, beside, line)
 
 
 def _bounds(middle: Floats, generators: Floats) -> tuple[Floats, Floats]:
@@ -134,14 +138,16 @@ def _bounds(middle: Floats, generators: Floats) -> tuple[Floats, Floats]:
 
 def _linear_answer(middle: Balance, C: Floats, generators: tuple[Floats, Floats]) -> Floats:
     """Approximate change of the pose by each parameter, (d, q)."""
-    legs, d = len(generators[0]), len(C)
+    d = len(C)
     still = [middle.arb(0)] * d
     out = np.zeros((d, generators[0].shape[1]))
-    for i in range(legs):
+    for i, (by_k1, by_zero) in enumerate(zip(*generators, strict=True)):
         strand = middle.strand(i, still)
-        by_k1, by_zero = (float(v.mid()) for v in middle.by_wire(i, strand.length, middle.strain(i, strand.length)))
-        push = np.array([float(v.mid()) for v in strand.wrench])
-        out -= np.outer(C @ push, by_k1 * generators[0][i] + by_zero * generators[1][i])
+        strain = middle.strain(i, strand.length)
+        slope_k1, slope_zero = middle.by_wire(i, strand.length, strain)
+        push = np.array([float(force.mid()) for force in strand.wrench])
+        pull = float(slope_k1.mid()) * by_k1 + float(slope_zero.mid()) * by_zero
+        out -= np.outer(C @ push, pull)
     return out
 
 
@@ -173,7 +179,9 @@ def _image(
     """Largest distance of Krawczyk's image from the linear answer, (d,)."""
     d, q = Y.shape
     box = _Box(balls((along + beside) * _UP), balls(beside), ball_matrix(Y))
-    wires = [_wire_in_box(middle, wide, i, box, *own) for i, own in enumerate(zip(*generators, strict=True))]
+    wires = []
+    for i, (G, H) in enumerate(zip(*generators, strict=True)):
+        wires.append(_wire_in_box(middle, wide, i, box, G, H))
     _, slope = wide.evaluate(box.whole, [wire.pull for wire in wires])
     precondition = ball_matrix(C)
     turned = precondition * slope
@@ -190,7 +198,9 @@ def _wire_in_box(middle: Balance, wide: Balance, i: int, box: _Box, G: Floats, H
     strand = wide.strand(i, box.whole)
     strain = _strain(middle, wide, i, strand, box, H)
     by_k1, by_zero = wide.by_wire(i, strand.length, strain)
-    by_parameter = [by_k1 * wide.arb(float(g)) + by_zero * wide.arb(float(h)) for g, h in zip(G, H, strict=True)]
+    by_parameter = []
+    for g, h in zip(G, H, strict=True):
+        by_parameter.append(by_k1 * wide.arb(float(g)) + by_zero * wide.arb(float(h)))
     return _WireInBox(wide.pull(i, strain, strand.length), column(strand.wrench), by_parameter)
 
 
@@ -199,8 +209,16 @@ def _strain(middle: Balance, wide: Balance, i: int, strand: Strand, box: _Box, H
     arb = wide.arb
     by_strain = wide.law.by_stretched(strand.length, wide.zero[i])
     by_own = wide.law.by_zero(strand.length, wide.zero[i])
-    strain = middle.strain(i, middle.strand(i, [arb(0)] * len(box.whole)).length)
+    at_centre = middle.strand(i, [arb(0)] * len(box.whole))
+    strain = middle.strain(i, at_centre.length)
     for j, h in enumerate(H):
-        stretch = sum((slope * box.line[k, j] for k, slope in enumerate(strand.slope)), arb(0))
+        stretch = _sum_of_products(strand.slope, [box.line[k, j] for k in range(len(strand.slope))], arb)
         strain += (by_strain * stretch + by_own * arb(float(h))) * arb(0, 1)
-    return strain + by_strain * sum((a * b for a, b in zip(strand.slope, box.beside, strict=True)), arb(0))
+    return strain + by_strain * _sum_of_products(strand.slope, box.beside, arb)
+
+
+def _sum_of_products(a: list[Any], b: list[Any], arb: Any) -> Any:
+    total = arb(0)
+    for x, y in zip(a, b, strict=True):
+        total = total + x * y
+    return total

@@ -33,24 +33,36 @@ def onward(passed: Sequence[State], reached: State, sd: Floats, tension_sd_N: fl
         Of a tension that is read, or of tensions where none is.
     """
     last = passed[-1]
-    white, pull = 0.5 * (last.white + reached.white), 0.5 * (last.pull_N + reached.pull_N)
+    white = 0.5 * (last.white + reached.white)
+    pull = 0.5 * (last.pull_N + reached.pull_N)
     nearer = [*passed, replace(reached, white=white, pull_N=pull)]
-    farther = _jump(nearer[-3:], sd, tension_sd_N) if len(nearer) > 2 else None
+    if len(nearer) < 3:
+        return nearer
+    farther = _jump(nearer[-3:], sd, tension_sd_N)
     return nearer if farther is None else [farther]
 
 
 def _jump(passed: Sequence[State], sd: Floats, tension_sd_N: float) -> State | None:
     """Where steps that shorten as two did would end; None where the second turns, or is much shorter than the first."""
-    places = [np.concatenate([s.white / sd, s.pull_N.ravel() / tension_sd_N]) for s in passed]
-    first, second = np.diff(places, axis=0)
-    along = float(first @ second)
-    if not along > _STRAIGHT * np.linalg.norm(first) * np.linalg.norm(second):
+    places = []
+    for state in passed:
+        pull = state.pull_N.ravel() / tension_sd_N
+        places.append(np.concatenate([state.white / sd, pull]))
+    steps = _steps_on(*np.diff(places, axis=0))
+    if not steps:
         return None
-    ratio = along / float(first @ first)
-    if ratio < _SLOW:
-        return None
-    steps = min(ratio / max(1.0 - ratio, 1e-9), _FARTHEST)
     _, before, last = passed
     white = last.white + steps * (last.white - before.white)
     pull = last.pull_N + steps * (last.pull_N - before.pull_N)
     return replace(last, white=white, pull_N=pull)
+
+
+def _steps_on(first: Floats, second: Floats) -> float:
+    """How many steps as long as the second one the way is still, where the next shorten as it did; 0 for no jump."""
+    along = float(first @ second)
+    if not along > _STRAIGHT * np.linalg.norm(first) * np.linalg.norm(second):
+        return 0.0
+    ratio = along / float(first @ first)
+    if ratio < _SLOW:
+        return 0.0
+    return min(ratio / max(1.0 - ratio, 1e-9), _FARTHEST)

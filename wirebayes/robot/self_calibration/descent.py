@@ -1,16 +1,18 @@
 """Levenberg-Marquardt over robot and holds together, the holds eliminated one by one."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.linear_algebra import inv, solve
-from wirebayes.numeric.rows import chosen_rows
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.rows import Record, chosen_rows
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.self_calibration.equations import Equations, Holds, Noise, State, linearised
+from wirebayes.robot.self_calibration.equations import Equations, Holds, Noise, State
+from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.strain import Grown
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 
@@ -42,21 +44,24 @@ def eliminated(e: Equations, white: Floats, damping: float) -> NormalEquations:
     damping : float
         Levenberg-Marquardt's; 0 at the mode.
     """
-    z, g, r = e.by_hold, e.by_robot, e.residual[..., None]
-    zt = z.swapaxes(1, 2)
-    A = zt @ z
-    diagonal = np.einsum("pii->pi", A)
-    A = A + (damping + 1e-13) * diagonal[:, None] * np.eye(A.shape[1])
-    inverse_ = inv(A)
-    B = zt @ g
-    by_robot = -inverse_ @ B
-    alone = -inverse_ @ (zt @ r)
-    gt = g.swapaxes(1, 2)
-    left = (gt @ g + B.swapaxes(1, 2) @ by_robot).sum(0)
-    right = (gt @ r + B.swapaxes(1, 2) @ alone).sum(0)[:, 0]
-    m = len(white)
-    matrix = left + (1.0 + damping) * np.eye(m) + damping * np.diag(np.einsum("pki,pki->i", g, g))
-    return NormalEquations(by_robot, alone[..., 0], inverse_, matrix, right + white)
+    by_hold, by_robot = e.by_hold, e.by_robot
+    residual = e.residual[..., None]
+    inverse = inv(_normal(by_hold, damping + 1e-13))
+    mixed = by_hold.mT @ by_robot
+    follows = -inverse @ mixed
+    alone = -inverse @ (by_hold.mT @ residual)
+    matrix = (by_robot.mT @ by_robot + mixed.mT @ follows).sum(0)
+    slope = (by_robot.mT @ residual + mixed.mT @ alone).sum(0)[:, 0]
+    squares = np.einsum("pki,pki->i", by_robot, by_robot)
+    matrix = matrix + (1.0 + damping) * np.eye(len(white)) + damping * np.diag(squares)
+    return NormalEquations(follows, alone[..., 0], inverse, matrix, slope + white)
+
+
+def _normal(by_hold: Floats, damping: float) -> Floats:
+    """Normal matrices of the holds' own unknowns, their diagonals larger by a share."""
+    normal = by_hold.mT @ by_hold
+    diagonal = np.einsum("pii->pi", normal)
+    return np.asarray(normal + damping * diagonal[:, None] * np.eye(normal.shape[1]))
 
 
 @dataclass(frozen=True)
@@ -87,30 +92,92 @@ def descend(
     steps : int
         At most.
     """
+    target = _Target(unknowns, holds, noise, creep, since)
+    here = target.at(state)
     damping = 1e-6
-    equations = linearised(unknowns, holds, noise, state, creep, since)
-    cost = cost_of(equations, state.white)
     for _ in range(steps):
-        change, hold = _step(unknowns.robot, equations, state.white, damping)
-        new = np.inf  # where the equations are singular with so little damping
-        if np.isfinite(change).all() and np.isfinite(hold).all():
-            there, ahead, new = _ahead(unknowns, holds, noise, state, equations, change, hold, creep, since)
-        if new < cost:
-            gain = cost - new
-            state, equations, cost = there, ahead, new
+        there = target.ahead(here, damping)
+        if there.cost < here.cost:
+            gain = here.cost - there.cost
+            here = there
             damping = max(damping / 10, 1e-12)
             if gain < _GAIN:
-                return Descent(state, equations, cost, True)
+                return here.ended(True)
         else:
             damping = max(damping * 10, 1e-9)
             if damping > 1e6:
-                return Descent(state, equations, cost, True)
-    return Descent(state, equations, cost, False)
+                return here.ended(True)
+    return here.ended(False)
 
 
-def _step(robot: Robot, e: Equations, white: Floats, damping: float) -> tuple[Floats, Floats]:
+@dataclass(frozen=True)
+class _Place:
+    """A state on the way down, the equations and the sum of squares there."""
+
+    state: State
+    equations: Equations
+    cost: float
+
+    def ended(self, converged: bool) -> Descent:
+        return Descent(self.state, self.equations, self.cost, converged)
+
+
+@dataclass(frozen=True)
+class _Target:
+    """What a descent minimises."""
+
+    unknowns: Unknowns
+    holds: Holds
+    noise: Noise
+    creep: Grown
+    since: State
+
+    def equations(self, state: State) -> Equations:
+        return linearised(self.unknowns, self.holds, self.noise, state, self.creep, self.since)
+
+    def at(self, state: State) -> _Place:
+        equations = self.equations(state)
+        return _Place(state, equations, cost_of(equations, state.white))
+
+    def ahead(self, here: _Place, damping: float) -> _Place:
+        """Where a step leads; led back where it gains less than foreseen. Infinitely high where there is no step."""
+        change, hold = _step(self.unknowns.robot, here, damping)
+        if not (np.isfinite(change).all() and np.isfinite(hold).all()):  # singular with so little damping
+            return replace(here, cost=np.inf)
+        there = self.at(_stepped(self.unknowns.robot, here.state, change, hold))
+        white = there.state.white
+        foreseen = _foreseen(here.equations, change, hold) + float(white @ white)
+        for _ in range(_CORRECTIONS):
+            if here.cost - there.cost > _AS_FORESEEN * (here.cost - foreseen):
+                break
+            there = self.corrected(there)
+        return there
+
+    def corrected(self, here: _Place) -> _Place:
+        """Poses and tensions a Newton step nearer to where each hold has them for the same robot, where that is better.
+
+        Loops and balance leave a narrow, curved valley; a step along its slope leaves it, and this leads back.
+        """
+        e, state = here.equations, here.state
+        slope = e.by_hold.mT @ e.residual[..., None]
+        hold = -solve(_normal(e.by_hold, 1e-12), slope)[..., 0]
+        there = _stepped(self.unknowns.robot, state, np.zeros_like(state.white), np.nan_to_num(hold))
+        ahead = self.equations(there)
+        better = (ahead.residual**2).sum(1) < (e.residual**2).sum(1)
+        nearer = _chosen(better, there, state, ("position_m", "rotation", "pull_N"))
+        equations = _chosen(better, ahead, e, ("residual", "by_robot", "by_hold"))
+        return _Place(nearer, equations, cost_of(equations, state.white))
+
+
+def _chosen(first: Bools, one: Record, other: Record, names: Iterable[str]) -> Record:
+    """The other record, with rows of some of its arrays from the first one."""
+    rows = {name: chosen_rows(first, getattr(one, name), getattr(other, name)) for name in names}
+    return replace(other, **rows)
+
+
+def _step(robot: Robot, here: _Place, damping: float) -> tuple[Floats, Floats]:
     """A damped step of the robot's unknowns (m,) and of each hold (p, d and its tensions), as far as slopes reach."""
-    normal = eliminated(e, white, damping)
+    normal = eliminated(here.equations, here.state.white, damping)
     change = -solve(normal.matrix, normal.slope[:, None])[:, 0]
     hold = normal.alone + normal.by_robot @ change
     d = robot.degrees
@@ -118,31 +185,6 @@ def _step(robot: Robot, e: Equations, white: Floats, damping: float) -> tuple[Fl
     farthest = float((np.abs(hold[:, :d]) / reach).max())
     share = min(1.0, 1.0 / max(farthest, 1e-300))
     return share * change, share * hold
-
-
-def _ahead(
-    unknowns: Unknowns,
-    holds: Holds,
-    noise: Noise,
-    state: State,
-    e: Equations,
-    change: Floats,
-    hold: Floats,
-    creep: Grown,
-    since: State,
-) -> tuple[State, Equations, float]:
-    """Where a step leads, the equations and the sum of squares there; led back where it gains less than foreseen."""
-    cost = cost_of(e, state.white)
-    there = _stepped(unknowns.robot, state, change, hold)
-    ahead = linearised(unknowns, holds, noise, there, creep, since)
-    new = cost_of(ahead, there.white)
-    foreseen = _foreseen(e, change, hold) + float(there.white @ there.white)
-    for _ in range(_CORRECTIONS):
-        if cost - new > _AS_FORESEEN * (cost - foreseen):
-            break
-        there, ahead = _corrected(unknowns, holds, noise, there, ahead, creep, since)
-        new = cost_of(ahead, there.white)
-    return there, ahead, new
 
 
 def cost_of(e: Equations, white: Floats) -> float:
@@ -155,7 +197,7 @@ def _stepped(robot: Robot, state: State, change: Floats, hold: Floats) -> State:
     motion = hold[:, :d] * robot.edge_scale
     turn = state.rotation
     if d == 6:
-        turn = np.moveaxis(turns.compose(motion[:, 3:].T, np.moveaxis(turn, 0, -1)), -1, 0)
+        turn = batch_first(turns.compose(motion[:, 3:].T, batch_last(turn)))
     return State(state.white + change, state.position_m + motion[:, :3], turn, state.pull_N + hold[:, d:])
 
 
@@ -163,33 +205,3 @@ def _foreseen(e: Equations, change: Floats, hold: Floats) -> float:
     """Sum of squares of the residuals after a step, were they straight."""
     moved_by = e.by_robot @ change + (e.by_hold @ hold[..., None])[..., 0]
     return float(((e.residual + moved_by) ** 2).sum())
-
-
-def _corrected(
-    unknowns: Unknowns, holds: Holds, noise: Noise, state: State, e: Equations, creep: Grown, since: State
-) -> tuple[State, Equations]:
-    """Poses and tensions a Newton step nearer to where each hold has them for the same robot, where that is better.
-
-    Loops and balance leave a narrow, curved valley; a step along its slope leaves it, and this leads back.
-    """
-    z = e.by_hold
-    zt = z.swapaxes(1, 2)
-    A = zt @ z
-    A = A + 1e-12 * np.einsum("pii->pi", A)[:, None] * np.eye(A.shape[1])
-    hold = -solve(A, zt @ e.residual[..., None])[..., 0]
-    there = _stepped(unknowns.robot, state, np.zeros_like(state.white), np.nan_to_num(hold))
-    ahead = linearised(unknowns, holds, noise, there, creep, since)
-    chosen = partial(chosen_rows, (ahead.residual**2).sum(1) < (e.residual**2).sum(1))
-    state = State(
-        state.white,
-        chosen(there.position_m, state.position_m),
-        chosen(there.rotation, state.rotation),
-        chosen(there.pull_N, state.pull_N),
-    )
-    e = replace(
-        e,
-        residual=chosen(ahead.residual, e.residual),
-        by_robot=chosen(ahead.by_robot, e.by_robot),
-        by_hold=chosen(ahead.by_hold, e.by_hold),
-    )
-    return state, e

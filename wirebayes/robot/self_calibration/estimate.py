@@ -25,6 +25,7 @@ from wirebayes.robot.self_calibration.trust import joint_test
 # missed by a hundred standard errors. A search is given up after so many steps then; of sessions that fit, however
 # rough, the third step foresees less than a thousandth of it.
 GROSS, PATIENT = 1e4, 5
+_DIFFERENCE = 1e-3  # of a prior's standard deviation: differences of smooth functions
 
 
 @dataclass(frozen=True)
@@ -108,19 +109,24 @@ def length_posterior(
     target = _Target(robot, prior, session, readings, mean, root, progress)
     # Unknowns in units of their prior; references first brought near by the geometry of measured tensions.
     white = np.zeros((len(readings), len(mean)))
-    white[:, : robot.legs] = starting_references(robot, prior, session, readings) / prior.reference_sd_m
+    references = starting_references(robot, prior, session, readings)
+    white[:, : robot.legs] = references / prior.reference_sd_m
     mode = _mode(target, white, iterations, patience)
     progress(1.0)
-    here = mode.here
-    J, G, P = target.derivatives(mode.white, here)
-    spread = inv(np.swapaxes(J, 1, 2) @ J + np.eye(len(mean)))
-    variance = np.einsum("mwd,mde,mwe->mw", G, spread, G)
-    ended = np.sqrt(np.einsum("mxd,mde,mxe->mx", P, spread, P)).reshape(len(readings), -1, 6)
+    return _about(target, mode)
+
+
+def _about(target: "_Target", mode: "_Mode") -> LengthPosterior:
+    """The Gaussian posterior about its mode."""
+    root, here, readings = target.root, mode.here, target.readings
+    J, by_length, by_pose = target.derivatives(mode.white, here)
+    spread = inv(J.mT @ J + np.eye(len(root)))
+    ended_sd = _standard_errors(by_pose, spread).reshape(len(readings), -1, 6)
     return LengthPosterior(
-        unknowns=mean + mode.white @ root.T,
+        unknowns=target.mean + mode.white @ root.T,
         covariance=root @ spread @ root.T,
         length_m=here.length_m,
-        length_sd_m=np.sqrt(variance),
+        length_sd_m=_standard_errors(by_length, spread),
         creep=here.creep,
         position_m=here.position_m[:, -1],
         rotation=here.rotation[:, -1],
@@ -128,11 +134,16 @@ def length_posterior(
         begun_rotation=here.begun_rotation,
         ended_m=here.ended_m,
         ended_rotation=here.ended_rotation,
-        ended_sd=ended,
+        ended_sd=ended_sd,
         misfit=((readings - here.readings) ** 2).mean(1),
-        p_joint=joint_test(mode.cost, readings.shape[1], mode.white, spread, robot.legs),
+        p_joint=joint_test(mode.cost, readings.shape[1], mode.white, spread, target.robot.legs),
         converged=mode.converged & here.solved,
     )
+
+
+def _standard_errors(slopes: Floats, spread: Floats) -> Floats:
+    """``(m, k)`` of values with slopes ``(m, k, d)`` by unknowns of covariances ``(m, d, d)``."""
+    return np.sqrt(np.einsum("mkd,mde,mke->mk", slopes, spread, slopes))
 
 
 @dataclass(frozen=True)
@@ -188,29 +199,41 @@ def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mo
         open_ = np.flatnonzero(~ended & moved)  # where a step failed, the derivatives stay: they are the work
         if len(open_):
             J[open_] = target.derivatives(white[open_], rows_of(here, open_))[0]
-        normal = np.swapaxes(J, 1, 2) @ J + np.eye(d)
+        normal = J.mT @ J + np.eye(d)
         slope = np.einsum("mrd,mr->md", J, target.readings - here.readings) - white
-        # What a whole step could still gain in twice the log posterior: below a thousandth, the mode is reached.
-        decrement = np.einsum("md,md->m", slope, solve(normal, slope[..., None])[..., 0])
+        decrement = _decrement(normal, slope)
         # A mode on the edge of slackness has no zero slope; there, no step however short improves.
         converged |= (decrement < 1e-3) | (damping > 1e8)
-        ended = converged | ((taken >= patience) & target.contradicted(cost - decrement))
+        absurd = (taken >= patience) & target.contradicted(cost - decrement)
+        ended = converged | absurd
         if ended.all():
             break
-        step = _damped_step(normal, slope, damping)
-        step[ended] = 0.0
-        there = target.predicted(white + step, near=(here.begun_m, here.begun_rotation))
-        new = target.cost(there, white + step)
-        better = new < cost - 1e-9 * np.where(np.isfinite(cost), cost, 0.0)
-        white, moved = np.where(better[:, None], white + step, white), better
-        damping = np.where(better, damping / 10, damping * 10)
-        here, cost = _pick(better, there, here), np.where(better, new, cost)
+        tried = white + chosen_rows(~ended, _damped_step(normal, slope, damping), 0.0)
+        there = target.predicted(tried, near=(here.begun_m, here.begun_rotation))
+        new = target.cost(there, tried)
+        moved = _better(new, cost)
+        white = chosen_rows(moved, tried, white)
+        damping = np.where(moved, damping / 10, damping * 10)
+        here, cost = _pick(moved, there, here), np.where(moved, new, cost)
     return _Mode(white, here, cost, converged)
+
+
+def _decrement(normal: Floats, slope: Floats) -> Floats:
+    """(m,) What a whole step could still gain in twice the log posterior: below a thousandth, the mode is reached."""
+    step = solve(normal, slope[..., None])[..., 0]
+    return np.asarray(np.einsum("md,md->m", slope, step))
+
+
+def _better(new: Floats, cost: Floats) -> Bools:
+    """(m,) Which costs are lower than before, by more than rounding."""
+    finite = np.where(np.isfinite(cost), cost, 0.0)
+    return np.asarray(new < cost - 1e-9 * finite)
 
 
 def _damped_step(normal: Floats, slope: Floats, damping: Floats) -> Floats:
     """Steps ``(m, d)`` by normal equations whose diagonals are larger by a share `damping` ``(m,)``."""
-    ridge = damping[:, None, None] * np.einsum("mdd->md", normal)[:, None] * np.eye(slope.shape[1])
+    diagonal = np.einsum("mdd->md", normal)[:, None]
+    ridge = damping[:, None, None] * diagonal * np.eye(slope.shape[1])
     return solve(normal + ridge, slope[..., None])[..., 0]
 
 
@@ -235,8 +258,9 @@ def corrected_joints(
         m.
     """
     wires, error = prior.wires(robot, known.unknowns)
-    tau = inverse.tensions(robot, position_m[None], rotation[None])
-    commands = inverse.commands(robot, wires, position_m[None], rotation[None], tau, known.creep.T, error.T)
+    x, R = position_m[None], rotation[None]
+    tau = inverse.tensions(robot, x, R)
+    commands = inverse.commands(robot, wires, x, R, tau, known.creep.T, error.T)
     return commands.joint_m
 
 
@@ -272,23 +296,34 @@ def derivatives(
         Of the pose at every hold's end: m, and rad about the world's axes.
     """
     m, d = white.shape
-    step = 1e-3
-    moves = step * np.concatenate([np.eye(d), -np.eye(d)])
+    moves = _DIFFERENCE * np.concatenate([np.eye(d), -np.eye(d)])
+    unknowns = mean + (white[:, None] + moves).reshape(-1, d) @ root.T
     near = np.repeat(at.begun_m, 2 * d, 0), np.repeat(at.begun_rotation, 2 * d, 0)
-    p = predict_session(robot, prior, session, mean + (white[:, None] + moves).reshape(-1, d) @ root.T, near=near)
+    moved = predict_session(robot, prior, session, unknowns, near=near)
+    poses = _small_motions(moved, at)
+    return _difference(moved.readings, m), _difference(moved.length_m, m), _difference(poses, m)
 
-    def difference(values: Floats) -> Floats:
-        both = values.reshape(m, 2, d, -1)
-        return np.asarray(np.swapaxes((both[:, 0] - both[:, 1]) / (2 * step), 1, 2))
 
-    turn = p.ended_rotation.reshape(m, 2 * d, *at.ended_rotation.shape[1:])
-    change = turn @ np.swapaxes(at.ended_rotation, -1, -2)[:, None]
+def _difference(values: Floats, m: int) -> Floats:
+    """Slopes ``(m, k, d)`` of values ``(2 d m, k)``, of all unknowns first a little up, then down."""
+    both = values.reshape(m, 2, -1, *values.shape[1:])
+    up, down = both[:, 0], both[:, 1]
+    slope = (up - down) / (2 * _DIFFERENCE)
+    return np.asarray(slope.mT)
+
+
+def _small_motions(moved: PredictedSession, at: PredictedSession) -> Floats:
+    """Positions, and turns about the world's axes, at the holds' ends: ``(2 d m, 6 p)``."""
+    m = len(at.ended_rotation)
+    turn = moved.ended_rotation.reshape(m, -1, *at.ended_rotation.shape[1:])
+    change = turn @ at.ended_rotation.mT[:, None]
     held = np.isfinite(change).all((-1, -2), keepdims=True)
-    turned = rotation.vector(np.where(held, change, np.eye(3))).reshape(*p.ended_m.shape)
-    poses = np.concatenate([p.ended_m, turned], -1).reshape(2 * d * m, -1)
-    return difference(p.readings), difference(p.length_m), difference(poses)
+    turned = rotation.vector(np.where(held, change, np.eye(3))).reshape(moved.ended_m.shape)
+    return np.concatenate([moved.ended_m, turned], -1).reshape(len(turned), -1)
 
 
 def _pick(first: Bools, a: PredictedSession, b: PredictedSession) -> PredictedSession:
-    both = {f.name: chosen_rows(first, getattr(a, f.name), getattr(b, f.name)) for f in fields(PredictedSession)}
-    return PredictedSession(**both)
+    chosen = {}
+    for field in fields(PredictedSession):
+        chosen[field.name] = chosen_rows(first, getattr(a, field.name), getattr(b, field.name))
+    return PredictedSession(**chosen)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
@@ -70,12 +71,14 @@ def holds(
     """
     n, legs = error_m.shape
     state, pace = fresh(legs, n), _Pace(_FIRST, longest_step)
-    for k, (joint, duration) in enumerate(zip(session.joint_m, session.duration_s, strict=True)):
+    begin: list[Poses] = list(zip(session.position_m, session.rotation, strict=True))
+    if near is not None:
+        begin = list(zip(near[0].swapaxes(0, 1), near[1].swapaxes(0, 1), strict=True))
+    for k, joint in enumerate(session.joint_m):
         bare, offset = inverse.lengths(robot, np.broadcast_to(joint, (n, legs)))
-        begin = (session.position_m[k], session.rotation[k]) if near is None else (near[0][:, k], near[1][:, k])
-        walk = _Walk(robot, wires, (bare + error_m, offset), begin, state, resolved_N)
+        walk = _Walk(robot, wires, (bare + error_m, offset), begin[k], state, resolved_N)
         begun = walk.here
-        walk.through(float(duration), pace, longest_step)
+        walk.through(float(session.duration_s[k]), pace, longest_step)
         state = walk.creep.state()
         yield SessionHold(begun, walk.here, walk.bare, state)
 
@@ -126,26 +129,32 @@ class _Walk:
         longest : float
             Step, in the logarithm of time.
         """
-        power = float(np.clip(np.median(self.wires.theta["N"]), *_POWERS))
         step, opening, taken = pace.next, None, 0
         while self.creep.time_s < duration_s:
-            now = self.creep.time_s
-            first = now == 0.0
-            time = duration_s * pace.first if first else _next(now, duration_s, step)
-            free = taken >= _MOST or (first and pace.first <= _EARLIEST)
-            error = self._try(time, np.inf if free else _ERROR)
+            free = taken >= _MOST
             taken += 1
-            factor = _SAFE * (_ERROR / max(error, 1e-300)) ** (1 / 2 if first else 1 / 3)
-            if first:
-                share = pace.first * np.clip(factor, _SHORTER, _LONGER) ** (1 / power)
-                pace.first = float(np.clip(share, _EARLIEST, _FIRST))
+            now = self.creep.time_s
+            if now == 0.0:
+                self._begin(duration_s, pace, free)
                 continue
+            error = self._try(_next(now, duration_s, step), np.inf if free else _ERROR)
+            factor = _factor(error, 3)
             if self.creep.time_s > now and opening is None:
                 opening = step * min(max(factor, 1.0), _LONGER)
-            step = longest if free else min(longest, step * min(max(factor, _SHORTER), _LONGER))
+            allowed = step * min(max(factor, _SHORTER), _LONGER)
+            step = longest if free else min(longest, allowed)
         pace.next = min(longest, opening or step)
         zero = self._zero(self.creep.state())
-        self.here = path.settle(self.robot, self.wires, (self.here.position_m, self.here.rotation), (zero, self.offset))
+        pose = self.here.position_m, self.here.rotation
+        self.here = path.settle(self.robot, self.wires, pose, (zero, self.offset))
+
+    def _begin(self, duration_s: float, pace: _Pace, free: bool) -> None:
+        """Try a hold's first step, and say how long the next first one may be."""
+        free = free or pace.first <= _EARLIEST
+        error = self._try(duration_s * pace.first, np.inf if free else _ERROR)
+        power = float(np.clip(np.median(self.wires.theta["N"]), *_POWERS))
+        longer = np.clip(_factor(error, 2), _SHORTER, _LONGER) ** (1 / power)
+        pace.first = float(np.clip(pace.first * longer, _EARLIEST, _FIRST))
 
     def _zero(self, state: CreepState) -> Floats:
         return np.asarray(self.bare * (1 + state.strain(self.wires).T))
@@ -157,48 +166,73 @@ class _Walk:
             self.robot, self.wires, here.position_m, here.rotation, zero, offset
         )
         motion, change = motion * zero[:, None], change * zero[:, None]
-        held = here.found & np.isfinite(change).all((1, 2)) & np.isfinite(motion).all((1, 2))
+        finite = np.isfinite(change).all((1, 2)) & np.isfinite(motion).all((1, 2))
         motion[:, 3:] *= self.robot.size_m
-        self.motion, self.answer = (np.where(held[:, None, None], v, 0.0) for v in (motion, change))
+        held = here.found & finite
+        self.motion = chosen_rows(held, motion, 0.0)
+        self.answer = chosen_rows(held, change, 0.0)
 
     def _solved(self, zero: Floats, grown_mm: Floats) -> forward.Equilibria:
         """The poses at other lengths, where the wires have grown by as much."""
         ahead = self._by_growth(self.motion, grown_mm)
-        ahead = np.where(np.linalg.norm(ahead, axis=1, keepdims=True) < _FAR * self.size, ahead, 0.0)
+        short = np.linalg.norm(ahead, axis=1) < _FAR * self.size
+        ahead = chosen_rows(short, ahead, 0.0)
         near = mixed.after_step(self.robot, (self.here.position_m, self.here.rotation), ahead)
+        offset = np.broadcast_to(self.offset, zero.shape)
         small = _SMALL * self.size / self.robot.size_m
-        return path.settle(self.robot, self.wires, near, (zero, np.broadcast_to(self.offset, zero.shape)), small)
+        return path.settle(self.robot, self.wires, near, (zero, offset), small)
 
     def _try(self, time_s: float, allowed: float) -> float:
         """One step by prediction and correction, taken unless its error, over what is resolved, is too large."""
         creep = self.creep
-        guess = creep.toward(time_s, np.zeros(1) if self.slope is None else self.slope)
+        guess = creep.onward(time_s, self.slope)
         zero = self._zero(guess.state())
         here = self._solved(zero, guess.grown - creep.grown)
         if ((here.tension_N > 0) != (self.here.tension_N > 0)).any():
             self._look(here, zero)
         done = np.maximum(creep.progress(time_s), 1e-300)
-        last = creep.toward(time_s, np.zeros(1), creep.amount_at(here.tension_N.T))
+        last = creep.toward(time_s, creep.amount_at(here.tension_N.T))
         off = last.grown - guess.grown
-        # errors of prediction and correction are in a known ratio, once there is a slope to predict by
-        share = 1.0 / (3.0 * (1.0 + self.before / done)) if self.slope is not None else np.full(1, 1 / 3)
-        error = np.abs(self._by_growth(self.answer, share * off)) / self.resolved_N
-        worst = float(error[here.found].max(initial=0.0))
+        share = self._share_of_error(done)
+        worst = self._worst(here, share * off)
         if worst > allowed:
             return worst
         if self.slope is not None:
             off = (1.0 - share) * off
             last.grown = guess.grown + off
-        tension = np.maximum(here.tension_N + self._by_growth(self.answer, off), 0.0)
-        last.amount = creep.amount_at(np.where(here.found[:, None], tension, here.tension_N).T)
+        last.amount = self._amount(here, off)
         self.slope, self.before = (last.amount - creep.amount) / done, done
         self.creep, self.here = last, here
         return worst
+
+    def _share_of_error(self, done: Floats) -> Floats:
+        """Of what a correction changes, the part that is the corrected one's own error.
+
+        Errors of prediction and correction are in a known ratio, once there is a slope to predict by.
+        """
+        if self.slope is None:
+            return np.full(1, 1 / 3)
+        return np.asarray(1.0 / (3.0 * (1.0 + self.before / done)))
+
+    def _worst(self, here: forward.Equilibria, off_mm: Floats) -> float:
+        """The largest error of a tension, over what is resolved, of creep that is off."""
+        error = np.abs(self._by_growth(self.answer, off_mm)) / self.resolved_N
+        return float(error[here.found].max(initial=0.0))
+
+    def _amount(self, here: forward.Equilibria, off_mm: Floats) -> Floats:
+        """The amount at the end of a step that led to poses, and wires that are longer than there."""
+        tension = np.maximum(here.tension_N + self._by_growth(self.answer, off_mm), 0.0)
+        return self.creep.amount_at(chosen_rows(here.found, tension, here.tension_N).T)
 
     def _by_growth(self, slope: Floats, grown_mm: Floats) -> Floats:
         """What slopes ``(n, ., w)`` make of creep ``(w, n)`` of the tested length."""
         strain = np.broadcast_to(grown_mm / self.wires.length_mm, self.bare.T.shape)
         return np.asarray(np.einsum("nij,jn->ni", slope, strain))
+
+
+def _factor(error: float, order: int) -> float:
+    """By how much a step may be longer whose error grows with this power of it."""
+    return float(_SAFE * (_ERROR / max(error, 1e-300)) ** (1 / order))
 
 
 def _next(now_s: float, end_s: float, step: float) -> float:

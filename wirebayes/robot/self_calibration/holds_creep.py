@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_last
+from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.motion import forward, inverse
@@ -33,21 +35,23 @@ def creep_of(unknowns: Unknowns, holds: Holds, state: State, known: Grown | None
     here = _Here(unknowns, holds, state)
     resolved = roughly * _resolution(unknowns, holds, here)
     finest = _FINE if roughly < ROUGHLY else _ROUGH
+    course = None if known is None else known.course
 
     def loaded(end_N: Floats) -> Loaded:
         return Loaded(end_N, here.response, holds.session.duration_s, resolved, finest, here.beyond)
 
-    return grown(unknowns, state.white, state.pull_N, loaded, None if known is None else known.course)
+    return grown(unknowns, state.white, state.pull_N, loaded, course)
 
 
 def _resolution(unknowns: Unknowns, holds: Holds, here: "_Here") -> float:
     """What the session resolves of a tension, N: a reading's error, or what a joint value's makes of it."""
-    read = bool(np.isfinite(holds.tension_N).any())
+    sd_N = holds.session.tension_sd_N
+    read = np.isfinite(holds.tension_N).any()
     if read and unknowns.errors.joint_m is None:
-        return holds.session.tension_sd_N
-    joint_m = joint_error(unknowns, holds)
-    by_joint = float(np.median(here.wires.theta["k1"]) * joint_m / np.median(here.zero))
-    return max(by_joint, holds.session.tension_sd_N) if read else by_joint
+        return sd_N
+    strain = joint_error(unknowns, holds) / np.median(here.zero)
+    by_joint = float(np.median(here.wires.theta["k1"]) * strain)
+    return max(by_joint, sd_N) if read else by_joint
 
 
 class _Here:
@@ -66,29 +70,44 @@ class _Here:
 
     def __init__(self, unknowns: Unknowns, holds: Holds, state: State) -> None:
         parts = unknowns.parts(state.white)
-        self.state, self.robot = state, moved(unknowns.robot, parts)
+        self.state = state
+        self.robot = moved(unknowns.robot, parts)
         self.wires = unknowns.prior.wires(unknowns.robot, parts.wires[None])[0]
         self.offset = inverse.lengths(self.robot, holds.session.joint_m)[1]
-        shape = statics.geometry(self.robot, state.position_m.T, np.moveaxis(state.rotation, 0, -1))
+        turn = batch_last(state.rotation)
+        shape = statics.geometry(self.robot, state.position_m.T, turn)
         way = statics.stretched(self.robot, shape, self.offset.T).T
         self.zero = way / stretch(unknowns, state.white, state.pull_N).ratio
-        pose = state.position_m, state.rotation
-        change = observability.length_sensitivity(self.robot, self.wires, *pose, self.zero, self.offset)[1]
-        answer = change * self.zero[:, None]
-        usual = np.abs(answer).max((1, 2)) <= 2 * np.max(self.wires.theta["k1"])
-        self.response = np.where(usual[:, None, None] & np.isfinite(answer).all((1, 2), keepdims=True), answer, 0.0)
+        self.response = self._response()
+
+    def _response(self) -> Floats:
+        position, rotation = self.state.position_m, self.state.rotation
+        _, change = observability.length_sensitivity(self.robot, self.wires, position, rotation, self.zero, self.offset)
+        by_strain = change * self.zero[:, None]
+        stiffest = 2 * np.max(self.wires.theta["k1"])
+        usual = np.abs(by_strain).max((1, 2)) <= stiffest
+        finite = np.isfinite(by_strain).all((1, 2))
+        return chosen_rows(usual & finite, by_strain, 0.0)
 
     def beyond(self, ahead: Floats) -> Floats:
         """Tensions ``(p, t, w)`` of wires longer by strains, the last of which is none, beyond the response."""
+        p, t, _ = ahead.shape
+        tension = self._tensions(ahead)
+        at_end = tension[:, -1]
+        bend = tension - at_end[:, None] - ahead @ self.response.mT
+        pull = np.maximum(self.state.pull_N, 0.0)
+        imbalance = np.abs(at_end - pull).max(1)
+        balanced = imbalance < _BALANCED * pull.max(1)
+        counts = balanced[:, None, None] & np.isfinite(bend)
+        return np.where(counts, bend, 0.0)
+
+    def _tensions(self, ahead: Floats) -> Floats:
+        """Tensions at the equilibria of wires longer by strains ``(p, t, w)``; NaN where there is none."""
         p, t, w = ahead.shape
-        state, each = self.state, np.repeat(np.arange(p), t)
-        zero = (self.zero[:, None] * (1 + ahead)).reshape(-1, w)
-        pose = state.position_m[each], state.rotation[each]
-        found = forward.solve_equilibrium(
-            self.robot, self.wires.part(np.zeros(p * t, int)), zero, self.offset[each], *pose
-        )
-        tension = np.where(found.found[:, None], found.tension_N, np.nan).reshape(p, t, w)
-        bend = tension - tension[:, -1:] - ahead @ self.response.swapaxes(1, 2)
-        pull = np.maximum(state.pull_N, 0.0)
-        balanced = np.abs(tension[:, -1] - pull).max(1) < _BALANCED * pull.max(1)
-        return np.where(balanced[:, None, None] & np.isfinite(bend), bend, 0.0)
+        hold = np.repeat(np.arange(p), t)
+        zero = self.zero[:, None] * (1 + ahead)
+        wires = self.wires.part(np.zeros(p * t, int))
+        position, rotation = self.state.position_m[hold], self.state.rotation[hold]
+        found = forward.solve_equilibrium(self.robot, wires, zero.reshape(-1, w), self.offset[hold], position, rotation)
+        tension = np.where(found.found[:, None], found.tension_N, np.nan)
+        return tension.reshape(p, t, w)

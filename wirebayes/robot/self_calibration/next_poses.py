@@ -13,7 +13,8 @@ from wirebayes.numeric.linear_algebra import inv, solve
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration.equations import Equations, Holds, State, linearised, moved
+from wirebayes.robot.self_calibration.equations import Equations, Holds, State, moved
+from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.session import Session
 from wirebayes.robot.self_calibration.strain import Grown

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.linear_algebra import solve
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
@@ -34,17 +35,18 @@ def response(
     by_zero : (n, w) array
         Change of a wire's tension with its zero-tension length at the same stretched length, N/m.
     """
-    R = np.moveaxis(rotation, 0, -1)
-    shape = statics.geometry(robot, position_m.T, R)
-    S, zero = statics.stretched(robot, shape, offset_m.T), zero_m.T
-    tau, slope = tension(wires, S, zero)
-    _, H = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
-    K = np.moveaxis(H, -1, 0)
-    J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0)
-    motion = np.asarray(-solve(K, J), np.float64)
-    change = slope.T[:, :, None] * (np.swapaxes(J, 1, 2) @ motion) + np.eye(robot.legs)
-    # The tension depends on S/ℓ alone under either law, so its slope by ℓ follows from that by S.
-    return motion, np.asarray(change), (-slope * S / zero).T
+    turn, zero = batch_last(rotation), zero_m.T
+    shape = statics.geometry(robot, position_m.T, turn)
+    stretched = statics.stretched(robot, shape, offset_m.T)
+    tau, slope = tension(wires, stretched, zero)
+    _, hessian = statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)
+    J = batch_first(statics.wire_jacobian(robot, shape))
+    motion = np.asarray(-solve(batch_first(hessian), J), np.float64)
+    lengthening = J.mT @ motion
+    change = slope.T[:, :, None] * lengthening + np.eye(robot.legs)
+    # The tension depends on stretched / zero alone under either law, so its slope by zero follows from the other.
+    by_zero = -slope * stretched / zero
+    return motion, np.asarray(change), by_zero.T
 
 
 def length_sensitivity(
@@ -114,26 +116,52 @@ def observe(
     sign : (p, w) array, optional
         How the bias enters each reading; default: as a constant.
     """
-    w = change_N.shape[-1]
-    information = (np.swapaxes(change_N, 1, 2) @ change_N).sum(0) / tension_sd_N**2
-    if bias_sd_N > 0:
-        sign = np.ones(change_N.shape[:2]) if sign is None else sign
-        mixed = (sign[:, :, None] * change_N).sum(0) / tension_sd_N**2
-        own = (sign**2).sum(0) / tension_sd_N**2 + 1.0 / bias_sd_N**2
-        information = information - mixed.T @ (mixed / own[:, None])
+    legs = change_N.shape[-1]
+    if sign is None:
+        sign = np.ones(change_N.shape[:2])
+    information = _information(change_N, tension_sd_N, bias_sd_N, sign)
     if not np.isfinite(information).all():
         sentence = "What the readings show cannot be computed at these poses: nothing holds the platform there."
-        return Observability(0, np.full(w, prior_sd_m), np.full(w, np.nan), np.inf, sentence)
+        return Observability(0, np.full(legs, prior_sd_m), np.full(legs, np.nan), np.inf, sentence)
+    return _observed(information, prior_sd_m)
+
+
+def _observed(information: Floats, prior_sd_m: float) -> Observability:
+    """Observability by what the readings say of the lengths, ``(w, w)``, 1/m²."""
     values, vectors = np.linalg.eigh(information)
     alone = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     rank = int((alone < 0.1 * prior_sd_m).sum())
     # by eigenvectors: where some combinations are known absurdly well, information and prior have no inverse in floats
-    sd = np.sqrt((vectors**2 / (np.maximum(values, 0.0) + prior_sd_m**-2)).sum(axis=1))
-    weakest = vectors[:, 0] * np.sign(vectors[np.argmax(np.abs(vectors[:, 0])), 0])
-    parts = [f"{weakest[i]:+.2f} of wire {i + 1}" for i in np.argsort(-np.abs(weakest)) if abs(weakest[i]) > 0.2]
-    seen = f"The readings show {rank} of {w} combinations of lengths to a tenth of their prior uncertainty"
-    sentence = f"{seen}; least of all {', '.join(parts)}, known to {1e3 * min(alone[0], prior_sd_m):.2g} mm."
+    total = np.maximum(values, 0.0) + prior_sd_m**-2
+    sd = np.sqrt((vectors**2 / total).sum(axis=1))
+    weakest = _largest_positive(vectors[:, 0])
+    sentence = _sentence(rank, weakest, min(alone[0], prior_sd_m))
     return Observability(rank, sd, weakest, float(alone[0]), sentence)
+
+
+def _largest_positive(direction: Floats) -> Floats:
+    """The direction or its opposite, whose largest component is positive."""
+    largest = direction[np.argmax(np.abs(direction))]
+    return np.asarray(direction * np.sign(largest))
+
+
+def _information(change_N: Floats, tension_sd_N: float, bias_sd_N: float, sign: Floats) -> Floats:
+    """What readings of all poses say of the lengths, their constant or signed biases eliminated: ``(w, w)``, 1/m²."""
+    information = (change_N.mT @ change_N).sum(0) / tension_sd_N**2
+    if bias_sd_N > 0:
+        mixed = (sign[:, :, None] * change_N).sum(0) / tension_sd_N**2
+        own = (sign**2).sum(0) / tension_sd_N**2 + 1.0 / bias_sd_N**2
+        information = information - mixed.T @ (mixed / own[:, None])
+    return np.asarray(information)
+
+
+def _sentence(rank: int, weakest: Floats, known_m: float) -> str:
+    parts = []
+    for i in np.argsort(-np.abs(weakest)):
+        if abs(weakest[i]) > 0.2:
+            parts.append(f"{weakest[i]:+.2f} of wire {i + 1}")
+    seen = f"The readings show {rank} of {len(weakest)} combinations of lengths to a tenth of their prior uncertainty"
+    return f"{seen}; least of all {', '.join(parts)}, known to {1e3 * known_m:.2g} mm."
 
 
 def choose_poses(change_N: Floats, count: int, tension_sd_N: float, prior_sd_m: float) -> list[int]:
@@ -150,13 +178,14 @@ def choose_poses(change_N: Floats, count: int, tension_sd_N: float, prior_sd_m: 
     list of int
         Indices of candidates; a pose may be worth repeating.
     """
-    pieces = np.swapaxes(change_N, 1, 2) @ change_N / tension_sd_N**2
+    information = change_N.mT @ change_N / tension_sd_N**2
     total = np.eye(change_N.shape[-1]) / prior_sd_m**2
     chosen: list[int] = []
-    if not len(pieces):
+    if not len(information):
         return chosen
     for _ in range(count):
-        gain = np.linalg.slogdet(total + pieces)[1]
-        chosen.append(int(np.argmax(gain)))
-        total = total + pieces[chosen[-1]]
+        gain = np.linalg.slogdet(total + information)[1]
+        best = int(np.argmax(gain))
+        chosen.append(best)
+        total = total + information[best]
     return chosen

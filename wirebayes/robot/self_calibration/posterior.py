@@ -75,16 +75,27 @@ def gaussian_posterior(unknowns: Unknowns, down: Descent, noise: Noise, creep: G
     last_m : (w,) array
         Lengths that the last joint values stand for, without reference errors.
     """
-    state, e, cost = down.state, down.equations, down.cost
-    normal = eliminated(e, state.white, 0.0)
-    covariance = inv(normal.matrix)
-    by_robot = normal.by_robot
-    hold = normal.inverse + by_robot @ covariance @ by_robot.swapaxes(1, 2)
+    normal = eliminated(down.equations, down.state.white, 0.0)
+    covariance, by_robot = inv(normal.matrix), normal.by_robot
+    hold = normal.inverse + by_robot @ covariance @ by_robot.mT
     finite = bool(np.isfinite(covariance).all() and np.isfinite(hold).all() and (np.diag(covariance) > 0).all())
     if not finite:  # a search that ended nowhere leaves what was known before
         covariance, by_robot, hold = np.eye(len(covariance)), np.zeros_like(by_robot), np.zeros_like(hold)
-    good = down.converged and finite and bool(np.isfinite(cost))
-    return Whole(unknowns, state, covariance, by_robot, hold, e, noise, np.inf, creep, good, cost, last_m)
+    good = down.converged and finite and bool(np.isfinite(down.cost))
+    return Whole(
+        unknowns=unknowns,
+        state=down.state,
+        covariance=covariance,
+        by_robot=by_robot,
+        hold_covariance=hold,
+        equations=down.equations,
+        noise=noise,
+        degrees=np.inf,
+        creep=creep,
+        converged=good,
+        cost=down.cost,
+        last_m=last_m,
+    )
 
 
 def at_joint_error(found: Whole, factor: float) -> Whole:
@@ -95,12 +106,12 @@ def at_joint_error(found: Whole, factor: float) -> Whole:
     found : Whole
     factor : float
     """
-    e = found.equations
+    e, white = found.equations, found.state.white
     unit = np.ones(e.residual.shape[1])
     unit[e.rows["loop"]] /= factor
-    there = replace(
-        e, residual=e.residual * unit, by_robot=e.by_robot * unit[:, None], by_hold=e.by_hold * unit[:, None]
-    )
-    down = Descent(found.state, there, cost_of(there, found.state.white), found.converged)
+    by_robot, by_hold = e.by_robot * unit[:, None], e.by_hold * unit[:, None]
+    there = replace(e, residual=e.residual * unit, by_robot=by_robot, by_hold=by_hold)
+    down = Descent(found.state, there, cost_of(there, white), found.converged)
     noise = replace(found.noise, joint_m=found.noise.joint_m * factor)
-    return replace(gaussian_posterior(found.unknowns, down, noise, found.creep, found.last_m), degrees=found.degrees)
+    wider = gaussian_posterior(found.unknowns, down, noise, found.creep, found.last_m)
+    return replace(wider, degrees=found.degrees)

@@ -32,25 +32,52 @@ def trust(found: Whole) -> float:
     robot's file allows, or an error of the loops far above what is usual, show that lengths and geometry contradict
     each other.
     """
-    e, unknowns = found.equations, found.unknowns
-    rows = e.rows["tension"]
-    unread = ~e.known[:, rows]
-    open_ = float(leverage(found, rows)[unread].sum())
-    beyond = float((e.residual[:, rows][unread] ** 2).sum())
-    count = float(e.known.sum()) - e.by_hold.shape[0] * e.by_hold.shape[2] + open_
-    first = np.r_[0 : unknowns.slices["wires"].start, unknowns.references]
-    white, spread = found.state.white[first], found.covariance[np.ix_(first, first)]
-    p = float(joint_test(np.array([found.cost - beyond]), max(count, 1.0), white[None], spread[None], len(first))[0])
+    p = _joint_probability(found)
+    rows = found.equations.rows["tension"]
+    unread = ~found.equations.known[:, rows]
     if not unread.any():
         return p
-    tensions = float(chdtrc(max(unread.sum() - open_, 1.0), beyond))
+    free = unread.sum() - _taken_up(found)
+    tensions = float(chdtrc(max(free, 1.0), _beyond_usual(found)))
     return min(1.0, 2.0 * p, 4.0 * tensions, 4.0 * _usual_noise(found))  # p has the better of two tests times two
+
+
+def _joint_probability(found: Whole) -> float:
+    """`trust.joint_test` of what was read and stated."""
+    e, unknowns = found.equations, found.unknowns
+    holds, _, own = e.by_hold.shape
+    count = float(e.known.sum()) - holds * own + _taken_up(found)
+    cost = np.array([found.cost - _beyond_usual(found)])
+    first = np.r_[0 : unknowns.slices["wires"].start, unknowns.references]
+    white = found.state.white[first]
+    spread = found.covariance[np.ix_(first, first)]
+    p = joint_test(cost, max(count, 1.0), white[None], spread[None], len(first))
+    return float(p[0])
+
+
+def _taken_up(found: Whole) -> float:
+    """Degrees of freedom that the unknowns take up of the tensions that nobody read."""
+    rows = found.equations.rows["tension"]
+    unread = ~found.equations.known[:, rows]
+    return float(leverage(found, rows)[unread].sum())
+
+
+def _beyond_usual(found: Whole) -> float:
+    """Squared residuals, summed, of tensions that nobody read about what is usual."""
+    e = found.equations
+    rows = e.rows["tension"]
+    usual = e.residual[:, rows][~e.known[:, rows]]
+    return float((usual**2).sum())
 
 
 def misfit(found: Whole) -> float:
     """Mean squared residual of what was read or stated, the balance aside."""
     e = found.equations
-    read = [e.residual[:, part][e.known[:, part]] for name, part in e.rows.items() if name != "balance"]
+    read = []
+    for name, part in e.rows.items():
+        if name != "balance":
+            known = e.known[:, part]
+            read.append(e.residual[:, part][known])
     return float(np.mean(np.concatenate(read) ** 2))
 
 
@@ -107,37 +134,44 @@ def noise_shown(found: Whole, usual_m: float, worth: float) -> tuple[Floats, flo
     usual_m, worth : float
         What `usual_joint` returned.
     """
-    e, robot, stated = found.equations, found.unknowns.robot, found.unknowns.errors.joint_m
-
-    def shown(rows: str, sd: float, usual: float, worth: float) -> tuple[float, float]:
-        residual = e.residual[:, e.rows[rows]]
-        left = 1.0 - leverage(found, e.rows[rows])
-        squares = float((residual**2).sum()) * sd**2
-        free = float(np.maximum(left, 0.0).sum()) + worth
-        return float(np.sqrt((squares + worth * usual**2) / free)), free
-
-    balance, _ = shown("balance", found.noise.balance, FRICTIONLESS, _LEAST_DEGREES)
+    robot, stated = found.unknowns.robot, found.unknowns.errors.joint_m
+    balance, _ = _shown(found, "balance", found.noise.balance, FRICTIONLESS, _LEAST_DEGREES)
     balance = float(np.clip(balance, 1e-2 * FRICTIONLESS, 1e2))
     if stated is not None:  # every error is: what is left unbalanced then speaks against them
         return np.log([found.noise.joint_m, FRICTIONLESS]), np.inf
-    joint, degrees = shown("loop", found.noise.joint_m, usual_m, worth)
-    return np.log([np.clip(joint, _FINEST * usual_m, robot.span_m), balance]), degrees
+    joint, degrees = _shown(found, "loop", found.noise.joint_m, usual_m, worth)
+    joint = np.clip(joint, _FINEST * usual_m, robot.span_m)
+    return np.log([joint, balance]), degrees
+
+
+def _shown(found: Whole, rows: str, sd: float, usual: float, worth: float) -> tuple[float, float]:
+    """The noise of some equations by restricted maximum likelihood, and its degrees of freedom."""
+    at = found.equations.rows[rows]
+    residual = found.equations.residual[:, at]
+    left = 1.0 - leverage(found, at)
+    squares = float((residual**2).sum()) * sd**2
+    free = float(np.maximum(left, 0.0).sum()) + worth
+    return float(np.sqrt((squares + worth * usual**2) / free)), free
 
 
 def leverage(found: Whole, rows: slice) -> Floats:
     """(p, r) share of each residual's variance that the unknowns take up."""
-    z, g = found.equations.by_hold[:, rows], found.equations.by_robot[:, rows]
-    total = g + z @ found.by_robot
-    alone = found.hold_covariance - found.by_robot @ found.covariance @ found.by_robot.swapaxes(1, 2)
-    own = np.einsum("pri,pij,prj->pr", z, alone, z)
+    by_hold = found.equations.by_hold[:, rows]
+    by_robot = found.equations.by_robot[:, rows]
+    total = by_robot + by_hold @ found.by_robot
+    from_robot = found.by_robot @ found.covariance @ found.by_robot.mT
+    alone = found.hold_covariance - from_robot
+    own = np.einsum("pri,pij,prj->pr", by_hold, alone, by_hold)
     return own + np.einsum("pri,ij,prj->pr", total, found.covariance, total)
 
 
 def _usual_noise(found: Whole) -> float:
     """Probability of an error of the loops as large as found, where what is usual is all that was known of it."""
-    if not np.isfinite(found.degrees) or found.equations.known[:, found.equations.rows["tension"]].any():
+    e = found.equations
+    read = e.known[:, e.rows["tension"]].any()
+    if read or not np.isfinite(found.degrees):
         return 1.0
-    usual, worth = USUAL * found.unknowns.robot.span_m, _BLIND_DEGREES
-    free = max(found.degrees - worth, 1e-9)
-    shown = (found.degrees * found.noise.joint_m**2 - worth * usual**2) / free
-    return float(fdtrc(free, worth, max(shown, 0.0) / usual**2))
+    usual = USUAL * found.unknowns.robot.span_m
+    free = max(found.degrees - _BLIND_DEGREES, 1e-9)
+    shown = (found.degrees * found.noise.joint_m**2 - _BLIND_DEGREES * usual**2) / free
+    return float(fdtrc(free, _BLIND_DEGREES, max(shown, 0.0) / usual**2))

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.random import Generator
 from scipy.optimize import nnls
 
+from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.linear_algebra import solve
-from wirebayes.numeric.typing import Floats, Indices
+from wirebayes.numeric.rows import chosen_rows
+from wirebayes.numeric.typing import Array, Bools, Floats, Indices
 from wirebayes.progress import Progress, silent
 from wirebayes.robot.mechanics import rotation as turns
 from wirebayes.robot.mechanics import statics
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.equations import Holds, State, moved
 from wirebayes.robot.self_calibration.posterior import Whole
@@ -39,20 +41,19 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: Generator) -> Sta
         Draws the places that the search begins from.
     """
     robot, session = unknowns.robot, holds.session
-    p = len(session.duration_s)
-    read = np.where(np.isfinite(holds.tension_N), holds.tension_N, robot.rule.lowest_N)
-    pull = np.maximum(read, 1e-3 * robot.rule.lowest_N)
-    position = np.where(holds.placed[:, None], session.position_m, robot.home_m)
-    home = turns.matrix(robot.home_rotation_rad)
-    turn = np.where(holds.oriented[:, None, None], session.rotation, home)
-    lost = np.flatnonzero(~holds.placed | (~holds.oriented & (robot.degrees == 6)))
-    if len(lost):
-        ratio = stretch(unknowns, white, pull).ratio
-        position[lost], turn[lost] = _located(unknowns, holds, white, ratio, lost, position, turn, rng)
-    pull = np.array(pull, float).reshape(p, robot.legs)
     unread = ~np.isfinite(holds.tension_N)
+    read = np.where(unread, robot.rule.lowest_N, holds.tension_N)
+    pull = np.maximum(read, 1e-3 * robot.rule.lowest_N)
+    home = turns.matrix(robot.home_rotation_rad)
+    position = chosen_rows(holds.placed, session.position_m, robot.home_m)
+    turn = chosen_rows(holds.oriented, session.rotation, home)
+    lost = ~holds.placed | (~holds.oriented & (robot.degrees == 6))
+    if lost.any():
+        ratio = stretch(unknowns, white, pull).ratio
+        _locate(unknowns, holds, white, ratio, np.flatnonzero(lost), (position, turn), rng)
+    here = moved(robot, unknowns.parts(white))
     for k in np.flatnonzero(unread.any(1)):
-        carried = _carrying(moved(robot, unknowns.parts(white)), position[k], turn[k])
+        carried = _carrying(here, position[k], turn[k])
         pull[k, unread[k]] = carried[unread[k]]
     return State(np.array(white), position, turn, pull)
 
@@ -60,45 +61,38 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: Generator) -> Sta
 def _carrying(robot: Robot, position_m: Floats, turn: Floats) -> Floats:
     """(w,) tensions above the lowest that carry the platform at a pose as nearly as they can, small ones rather."""
     shape = statics.geometry_at(robot, position_m, turn)
-    unit = robot.edge_scale
+    unit, lowest = robot.edge_scale, robot.rule.lowest_N
     structure = -statics.jacobian(robot, shape)[..., 0] * robot.lines * unit[:, None]
     load = -statics.weight(robot, turn[..., None])[:, 0] * unit
-    lowest = robot.rule.lowest_N
-    left = np.concatenate([load - structure.sum(1) * lowest, np.zeros(robot.legs)])
-    return np.asarray(lowest + nnls(np.vstack([structure, _SMALL * np.eye(robot.legs)]), left)[0])
+    left = load - structure.sum(1) * lowest
+    small = _SMALL * np.eye(robot.legs)
+    above, _ = nnls(np.vstack([structure, small]), np.concatenate([left, np.zeros(robot.legs)]))
+    return np.asarray(lowest + above)
 
 
-def _located(
-    unknowns: Unknowns,
-    holds: Holds,
-    white: Floats,
-    ratio: Floats,
-    lost: Indices,
-    position: Floats,
-    turn: Floats,
-    rng: Generator,
-) -> tuple[Floats, Floats]:
-    """Poses ``(l, 3)``, ``(l, 3, 3)`` of holds that close the loops best, of many trials each."""
+def _locate(
+    unknowns: Unknowns, holds: Holds, white: Floats, ratio: Floats, lost: Indices, poses: Poses, rng: Generator
+) -> None:
+    """Put in place of the poses of lost holds those that close the loops best, of many trials each."""
+    position, turn = poses
     parts = unknowns.parts(white)
     robot = moved(unknowns.robot, parts)
-    joint = holds.session.joint_m[lost]
-    bare, offset = inverse.lengths(robot, joint)
-    goal = np.repeat((bare + parts.reference_m) * ratio[lost], _TRIALS, 0)
-    offset = np.repeat(offset, _TRIALS, 0)
-    search = _PoseSearch(robot, goal, offset)
-    trial = rng.uniform(-1, 1, (len(goal), 3))
-    stated = np.repeat(holds.placed[lost], _TRIALS)
-    x = search.middle + 1.2 * search.half * trial
-    x = np.where(stated[:, None], np.repeat(position[lost], _TRIALS, 0), x).T
-    R = np.moveaxis(np.repeat(turn[lost], _TRIALS, 0), 0, -1)
-    for _ in range(_STEPS):
-        step = search.step(x, R)
-        x = x + np.where(stated[:, None], 0.0, step[:, :3]).T
-        if robot.degrees == 6:
-            R = turns.compose(step[:, 3:].T, R)
-    bad = search.misfit(x, R).reshape(len(lost), _TRIALS)
-    chosen = np.arange(len(lost)) * _TRIALS + bad.argmin(1)
-    return x.T[chosen], np.moveaxis(R, -1, 0)[chosen]
+    bare, offset = inverse.lengths(robot, holds.session.joint_m[lost])
+    goal = (bare + parts.reference_m) * ratio[lost]
+    search = _PoseSearch(robot, _trials(goal), _trials(offset))
+    stated = _trials(holds.placed[lost])
+    drawn = search.drawn(len(stated), rng)
+    x = chosen_rows(stated, _trials(position[lost]), drawn).T
+    x, R = search.descended(x, batch_last(_trials(turn[lost])), stated)
+    misfit = search.misfit(x, R).reshape(len(lost), _TRIALS)
+    chosen = np.arange(len(lost)) * _TRIALS + misfit.argmin(1)
+    position[lost] = x.T[chosen]
+    turn[lost] = batch_first(R)[chosen]
+
+
+def _trials(values: Array) -> Array:
+    """A row of each trial ``(l t, ...)``, of values ``(l, ...)`` of each hold."""
+    return np.repeat(values, _TRIALS, 0)
 
 
 @dataclass(frozen=True)
@@ -124,15 +118,27 @@ class _PoseSearch:
         """(n, w) by how much wires are too long."""
         return statics.stretched(self.robot, shape, self.offset.T).T - self.goal
 
+    def drawn(self, count: int, rng: Generator) -> Floats:
+        """(count, 3) places in the workspace, and a little outside."""
+        return np.asarray(self.middle + 1.2 * self.half * rng.uniform(-1, 1, (count, 3)))
+
+    def descended(self, x: Floats, R: Floats, stated: Bools) -> tuple[Floats, Floats]:
+        """Poses after all steps; positions that are `stated`, (n,), stay."""
+        for _ in range(_STEPS):
+            step = self.step(x, R)
+            x = x + chosen_rows(~stated, step[:, :3], 0.0).T
+            if self.robot.degrees == 6:
+                R = turns.compose(step[:, 3:].T, R)
+        return x, R
+
     def step(self, x: Floats, R: Floats) -> Floats:
         """(n, d) Gauss-Newton steps, none longer than a fifth of the robot."""
         robot = self.robot
         shape = statics.geometry(robot, x, R)
-        gap = self.gap(shape)
-        J = np.moveaxis(statics.wire_jacobian(robot, shape), -1, 0).swapaxes(1, 2) * robot.edge_scale
+        J = batch_first(statics.wire_jacobian(robot, shape)).mT * robot.edge_scale
         toward, pull = self._toward_home(x, R)
-        normal = J.swapaxes(1, 2) @ J + _WEAK**2 * np.diag(pull**2)
-        slope = (J.swapaxes(1, 2) @ gap[..., None])[..., 0] + _WEAK**2 * pull * toward
+        normal = J.mT @ J + _WEAK**2 * np.diag(pull**2)
+        slope = (J.mT @ self.gap(shape)[..., None])[..., 0] + _WEAK**2 * pull * toward
         step = -solve(normal, slope[..., None])[..., 0]
         size = np.linalg.norm(step, axis=1, keepdims=True)
         share = np.minimum(1.0, 0.2 * robot.span_m / np.maximum(size, 1e-300))
@@ -146,13 +152,15 @@ class _PoseSearch:
         toward[:, :3] = (x.T - self.middle) * pull[:3]
         if robot.degrees == 6:
             home = turns.matrix(robot.home_rotation_rad)
-            toward[:, 3:] = turns.vector(np.moveaxis(R, -1, 0) @ home.T) * robot.size_m
+            turned = turns.vector(batch_first(R) @ home.T)
+            toward[:, 3:] = turned * robot.size_m
         return toward, pull
 
     def misfit(self, x: Floats, R: Floats) -> Floats:
         """(n,) how badly poses close the loops, and how far outside the workspace they are."""
         gap = self.gap(statics.geometry(self.robot, x, R))
-        out = np.maximum(np.abs(x.T - self.middle) - 1.2 * self.half, 0.0)
+        outside = np.abs(x.T - self.middle) - 1.2 * self.half
+        out = np.maximum(outside, 0.0)
         return np.nan_to_num((gap**2).sum(1) + (out**2).sum(1), nan=np.inf)
 
 
@@ -186,11 +194,19 @@ def best(
             break
         white = np.array(found.state.white)  # holds that went astray are looked for again
         if k > 0:
-            white = np.zeros(unknowns.count)
-            white[: unknowns.slices["drum"].start] = 0.5 * rng.standard_normal(unknowns.slices["drum"].start)
+            white = _near_file(unknowns, rng)
         other = from_start(white, k + 2)
-        if not (other.converged or lost(other)) and other.evidence > found.evidence:  # likelier, only short of rounds
+        likelier = other.evidence > found.evidence
+        if likelier and not (other.converged or lost(other)):  # only short of rounds
             other = estimate(unknowns, holds, other.state)
         if other.converged > found.converged or other.evidence > found.evidence:
             found = other
     return found
+
+
+def _near_file(unknowns: Unknowns, rng: Generator) -> Floats:
+    """(m,) unknowns about the robot's file, geometry and references half as far off as their prior says."""
+    white = np.zeros(unknowns.count)
+    first = unknowns.slices["drum"].start
+    white[:first] = 0.5 * rng.standard_normal(first)
+    return white

@@ -21,7 +21,7 @@ from wirebayes.robot.mechanics.draws import (
     spread_of,
 )
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion.drift import without_creep
+from wirebayes.robot.motion.creep import without_creep
 
 _LEAST = 1e-6  # relative: wires that are said to be alike still get a spread, far below anything that matters
 
@@ -75,10 +75,14 @@ class Session:
         return replace(self, position_m=position, rotation=turn)
 
     @property
+    def signs(self) -> Floats:
+        """(p, w) How the bias enters a tension that is read."""
+        return np.ones_like(self.joint_m) if self.motion is None else self.motion
+
+    @property
     def bias_sign(self) -> Floats:
         """(q, w) How the bias enters the tensions that were read."""
-        signs = np.ones_like(self.joint_m) if self.motion is None else self.motion
-        return np.asarray(signs[self.read])
+        return np.asarray(self.signs[self.read])
 
 
 @dataclass(frozen=True)
@@ -106,11 +110,11 @@ class LengthPrior:
     @property
     def names(self) -> list[str]:
         """The parameters of all lines among the unknowns, those of further lines with the line's name before them."""
-        return [
-            name if line is self.line else f"{wire} {name}"
-            for wire, line in self.line.each.items()
-            for name in _own(line)
-        ]
+        names = []
+        for wire, line in self.line.each.items():
+            before = "" if line is self.line else f"{wire} "
+            names += [before + name for name in _own(line)]
+        return names
 
     @property
     def own(self) -> tuple[str, ...]:
@@ -125,13 +129,12 @@ class LengthPrior:
     @property
     def fitted(self) -> Floats:
         """(p, n) draws of all lines' parameters, logarithms of those that are positive."""
-        return np.array(
-            [
-                np.log(line.parameters[name]) if name in CORE else line.parameters[name]
-                for line in self.line.each.values()
-                for name in _own(line)
-            ]
-        )
+        values = []
+        for line in self.line.each.values():
+            for name in _own(line):
+                drawn = line.parameters[name]
+                values.append(np.log(drawn) if name in CORE else drawn)
+        return np.array(values)
 
     def moments(self, legs: int) -> tuple[Floats, Floats]:
         """Mean ``(d,)`` and covariance ``(d, d)`` of the unknowns: references, (log) parameters, specimens, biases."""
@@ -150,24 +153,37 @@ class LengthPrior:
 
     def wires(self, robot: Robot, unknowns: Floats) -> tuple[Wires, Floats]:
         """Wires, and reference errors ``(n, w)``, of unknowns ``(n, d)``."""
-        n, legs, p = len(unknowns), robot.legs, len(self.names)
-        columns = iter(unknowns[:, legs : legs + p].T)
+        first_own = robot.legs + len(self.names)
+        wires = self._without_specimens(robot, unknowns[:, robot.legs : first_own])
+        theta = dict(wires.theta)
+        for k, name in enumerate(self.own):
+            start = first_own + k * robot.legs
+            deviation = unknowns[:, start : start + robot.legs].T
+            theta[name] = theta[name] * np.exp(self._specimen_scale(robot, name) * deviation)
+        whole = replace(wires, theta=theta)
+        if not self.creeps:
+            whole = without_creep(whole)
+        return whole, unknowns[:, : robot.legs]
+
+    def _without_specimens(self, robot: Robot, fitted: Floats) -> Wires:
+        """Wires of the lines' parameters ``(n, p)``, specimens of one line alike."""
+        columns = iter(fitted.T)
         lines = {}
         for wire, line in self.line.each.items():
             values = {name: next(columns) for name in _own(line)}
-            values |= {name: np.exp(values[name]) for name in CORE}
+            for name in CORE:
+                values[name] = np.exp(values[name])
             lines[wire] = replace(line, parameters=values)
         first = lines.pop(self.line.name)
-        wires = for_robot(robot, replace(first, others=lines))
-        first_own = legs + p
-        own = unknowns[:, first_own : first_own + len(self.own) * legs].T.reshape(len(self.own), legs, n)
-        theta = dict(wires.theta)
-        for name, deviation in zip(self.own, own, strict=True):
-            rms = [np.sqrt(np.mean(np.square(spread_of(one, name, self.own_sd)))) for one in lines_of(robot, self.line)]
-            scale = np.array(rms)[:, None] / self.own_sd
-            theta[name] = theta[name] * np.exp(scale * deviation)
-        whole = replace(wires, theta=theta)
-        return (whole if self.creeps else without_creep(whole)), unknowns[:, :legs]
+        return for_robot(robot, replace(first, others=lines))
+
+    def _specimen_scale(self, robot: Robot, name: str) -> Floats:
+        """(w, 1) how much more than `own_sd` the specimens of each leg's line differ."""
+        rms = []
+        for line in lines_of(robot, self.line):
+            spread = spread_of(line, name, self.own_sd)
+            rms.append(np.sqrt(np.mean(np.square(spread))))
+        return np.array(rms)[:, None] / self.own_sd
 
     def bias_N(self, legs: int, unknowns: Floats) -> Floats:
         """Biases ``(n, w)`` of the tension sensors among unknowns ``(n, d)``; zero where sensors have none."""
@@ -176,5 +192,9 @@ class LengthPrior:
 
 def _own(line: WireDraws) -> list[str]:
     """The parameters of one line."""
-    exponent = [name for name in (LENGTH_EXPONENT,) if name in line.parameters]
-    return [*CORE, *(column for effect in line.material() for column in effect.columns()), *exponent]
+    names = list(CORE)
+    for effect in line.material():
+        names += effect.columns()
+    if LENGTH_EXPONENT in line.parameters:
+        names.append(LENGTH_EXPONENT)
+    return names

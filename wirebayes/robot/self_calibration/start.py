@@ -8,11 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.linear_algebra import solve
+from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation, statics
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.wires import stretched_length
+from wirebayes.robot.mechanics.wires import Wires, stretched_length
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.predicted import PredictedSession, predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
@@ -73,54 +75,90 @@ def starting_references(
     """
     mean, _ = prior.moments(robot.legs)
     expected = predict_session(robot, prior, session, mean[None])
-    m, q = len(readings), expected.position_m.shape[1]
     loops = _loops(robot, prior, session, readings, expected)
+    m = len(readings)
     x = np.tile(expected.position_m[0], (m, 1)).T
-    R = np.moveaxis(np.tile(expected.rotation[0], (m, 1, 1)), 0, -1)
+    R = batch_last(np.tile(expected.rotation[0], (m, 1, 1)))
     error = np.zeros((m, robot.legs))
     for _ in range(iterations):
-        equations = _linearised(robot, loops, x, R, np.repeat(error, q, 0))
+        equations = _linearised(robot, loops, x, R, error)
         change, move = _step(equations, error, prior.reference_sd_m)
         error = error + change
-        move *= np.minimum(1.0, 0.1 * robot.size_m / np.maximum(np.abs(move).max(0), 1e-300))
-        move *= robot.edge_scale[:, None]
-        x = x + move[:3]
-        R = rotation.compose(move[3:], R) if robot.degrees == 6 else R
+        x, R = _moved(robot, x, R, move)
         if not np.abs(change).max() >= 1e-7:
             break
     # Absurd readings lead nowhere: such a robot starts from its references.
-    return np.where(np.isfinite(error).all(1, keepdims=True), error, 0.0)
+    known = np.asarray(np.isfinite(error).all(1))
+    return chosen_rows(known, error, 0.0)
+
+
+def _moved(robot: Robot, x: Floats, R: Floats, move: Floats) -> tuple[Floats, Floats]:
+    """Poses ``(3, r)``, ``(3, 3, r)`` after steps ``(d, r)``, of which long ones are cut."""
+    largest = np.maximum(np.abs(move).max(0), 1e-300)
+    share = np.minimum(1.0, 0.1 * robot.size_m / largest)
+    step = move * share * robot.edge_scale[:, None]
+    if robot.degrees == 6:
+        R = rotation.compose(step[3:], R)
+    return x + step[:3], R
 
 
 def _loops(robot: Robot, prior: LengthPrior, session: Session, readings: Floats, expected: PredictedSession) -> _Loops:
-    wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
-    m, q = len(readings), expected.position_m.shape[1]
-    tau = readings[:, : q * robot.legs].reshape(m * q, robot.legs) * session.tension_sd_N
     joint = session.joint_m[session.read]
-    bare, offset = (np.tile(a, (m, 1)) for a in inverse.lengths(robot, joint))
-    grown = np.tile(expected.read_length_m[0] / inverse.lengths(robot, joint)[0], (m, 1))
-    stretch = stretched_length(wires, np.ones_like(tau.T), np.maximum(tau.T, 0.0)).T * grown
+    bare, offset = inverse.lengths(robot, joint)
+    crept = expected.read_length_m[0] / bare
+    tension = readings[:, : joint.size] * session.tension_sd_N
+    tau = tension.reshape(-1, robot.legs)
+    alike = len(readings), 1
+    bare, offset = np.tile(bare, alike), np.tile(offset, alike)
+    wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
+    stretch = _elastic(wires, tau) * np.tile(crept, alike)
     sd_N = float(np.hypot(session.tension_sd_N, prior.bias_sd_N))
-    weight = (tau > 3 * sd_N) / np.hypot(1e-4, bare * sd_N / wires.theta["k1"].mean())
+    weight = _weight(tau, sd_N, bare * sd_N / wires.theta["k1"].mean())
     return _Loops(bare, offset, tau, stretch, weight, sd_N)
 
 
+def _elastic(wires: Wires, tension_N: Floats) -> Floats:
+    """(r, w) stretched over zero-tension length."""
+    pull = np.maximum(tension_N.T, 0.0)
+    return stretched_length(wires, np.ones_like(pull), pull).T
+
+
+def _weight(tension_N: Floats, sd_N: float, sd_m: Floats) -> Floats:
+    """One over the standard errors of loops that tensions leave open by `sd_m`; 0 where a wire may be slack."""
+    return (tension_N > 3 * sd_N) / np.hypot(1e-4, sd_m)
+
+
 def _linearised(robot: Robot, loops: _Loops, x: Floats, R: Floats, error: Floats) -> _Equations:
-    """Equations about poses ``(3, r)``, ``(3, 3, r)`` and reference errors ``(r, w)``."""
-    d, legs, scale = robot.degrees, robot.legs, robot.edge_scale[:, None]
-    tau = loops.tension_N.T
-    shape = statics.geometry(robot, x, R)
-    J = statics.jacobian(robot, shape) * robot.lines[:, None]
-    gap = statics.stretched(robot, shape, loops.offset_m.T).T - (loops.bare_m + error) * loops.stretch
-    balance, H = statics.unbalance_and_stiffness(robot, shape, R, tau, np.zeros_like(tau))
-    K = np.moveaxis(H, -1, 0) * (scale * scale.T)
-    loop_by_pose = np.moveaxis(J * scale[:, None], -1, 0).swapaxes(1, 2) * loops.weight[..., None]
-    loop_by_length = -(loops.stretch * loops.weight)[:, None] * np.eye(legs)
+    """Equations about poses ``(3, r)``, ``(3, 3, r)`` and reference errors ``(m, w)``."""
+    r = len(loops.bare_m)
+    of_readings = np.repeat(error, r // len(error), 0)
+    loop, loop_by_pose = _closing(robot, loops, x, R, of_readings)
+    balance, balance_by_pose = _balancing(robot, loops, x, R)
+    loop_by_length = -(loops.stretch * loops.weight)[:, None] * np.eye(robot.legs)
+    balance_by_length = np.zeros((r, robot.degrees, robot.legs))
     return _Equations(
-        np.concatenate([gap * loops.weight, (balance * scale).T / loops.sd_N], 1),
-        np.concatenate([loop_by_pose, K / loops.sd_N], 1),
-        np.concatenate([loop_by_length, np.zeros((len(gap), d, legs))], 1),
+        np.concatenate([loop, balance], 1),
+        np.concatenate([loop_by_pose, balance_by_pose], 1),
+        np.concatenate([loop_by_length, balance_by_length], 1),
     )
+
+
+def _closing(robot: Robot, loops: _Loops, x: Floats, R: Floats, error: Floats) -> tuple[Floats, Floats]:
+    """How far loops are open, ``(r, w)`` standard errors, and the slopes ``(r, w, d)`` by the pose."""
+    shape = statics.geometry(robot, x, R)
+    way = statics.stretched(robot, shape, loops.offset_m.T).T
+    gap = way - (loops.bare_m + error) * loops.stretch
+    J = statics.wire_jacobian(robot, shape) * robot.edge_scale[:, None, None]
+    return gap * loops.weight, batch_first(J).mT * loops.weight[..., None]
+
+
+def _balancing(robot: Robot, loops: _Loops, x: Floats, R: Floats) -> tuple[Floats, Floats]:
+    """Imbalance of the measured tensions, ``(r, d)`` standard errors, and its slopes ``(r, d, d)`` by the pose."""
+    scale, tau = robot.edge_scale[:, None], loops.tension_N.T
+    shape = statics.geometry(robot, x, R)
+    imbalance, hessian = statics.unbalance_and_stiffness(robot, shape, R, tau, np.zeros_like(tau))
+    stiffness = batch_first(hessian) * (scale * scale.T)
+    return (imbalance * scale).T / loops.sd_N, stiffness / loops.sd_N
 
 
 def _step(equations: _Equations, error: Floats, reference_sd_m: float) -> tuple[Floats, Floats]:
@@ -129,16 +167,30 @@ def _step(equations: _Equations, error: Floats, reference_sd_m: float) -> tuple[
     Poses are eliminated one by one; what is left speaks of the lengths.
     """
     m, legs = error.shape
-    by_pose, by_length = equations.by_pose, equations.by_length
-    residual, d = equations.residual[..., None], by_pose.shape[2]
-    A = by_pose.swapaxes(1, 2) @ by_pose + 1e-9 * np.eye(d)
-    B = by_pose.swapaxes(1, 2) @ by_length
-    solved = solve(A, np.concatenate([B, by_pose.swapaxes(1, 2) @ residual], 2))
-    by_change, alone = solved[..., :legs], solved[..., legs:]
-    left = by_length.swapaxes(1, 2) @ by_length - B.swapaxes(1, 2) @ by_change
-    right = by_length.swapaxes(1, 2) @ residual - B.swapaxes(1, 2) @ alone
-    total = left.reshape(m, -1, legs, legs).sum(1) + np.eye(legs) / reference_sd_m**2
-    pull = right.reshape(m, -1, legs).sum(1) + error / reference_sd_m**2
+    information, slope, answer = _without_poses(equations, legs)
+    total = information.reshape(m, -1, legs, legs).sum(1) + np.eye(legs) / reference_sd_m**2
+    pull = slope.reshape(m, -1, legs).sum(1) + error / reference_sd_m**2
     change = -solve(total, pull[..., None])[..., 0]
-    move = -(alone + by_change @ np.repeat(change, len(left) // m, 0)[..., None])[..., 0].T
-    return change, move
+    of_readings = np.repeat(change, len(answer) // m, 0)
+    move = -(answer[..., legs:] + answer[..., :legs] @ of_readings[..., None])
+    return change, move[..., 0].T
+
+
+def _without_poses(equations: _Equations, legs: int) -> tuple[Floats, Floats, Floats]:
+    """What each reading says of the lengths once its pose is free, and how that pose answers.
+
+    Returns
+    -------
+    information : (r, w, w) array
+    slope : (r, w, 1) array
+    answer : (r, d, w + 1) array
+        To a change of each length, and last to the residuals.
+    """
+    by_pose, by_length = equations.by_pose, equations.by_length
+    residual = equations.residual[..., None]
+    mixed = by_pose.mT @ by_length
+    normal = by_pose.mT @ by_pose + 1e-9 * np.eye(by_pose.shape[2])
+    answer = solve(normal, np.concatenate([mixed, by_pose.mT @ residual], 2))
+    information = by_length.mT @ by_length - mixed.mT @ answer[..., :legs]
+    slope = by_length.mT @ residual - mixed.mT @ answer[..., legs:]
+    return information, slope, answer

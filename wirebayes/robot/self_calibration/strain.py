@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_first
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.wires import Wires, stretched_length
 from wirebayes.robot.self_calibration.unknowns import Unknowns
@@ -47,8 +48,11 @@ def differing_wires(unknowns: Unknowns, white: Floats) -> Wires:
     """
     mean, root = unknowns.moments
     at = white[unknowns.slices["wires"]]
-    moves = _STEP * np.concatenate([np.zeros((1, len(mean))), _directions(unknowns), -_directions(unknowns)])
-    return unknowns.prior.wires(unknowns.robot, mean + (at + moves) @ root.T)[0]
+    directions = _directions(unknowns)
+    moves = np.concatenate([np.zeros((1, len(mean))), directions, -directions])
+    values = mean + (at + _STEP * moves) @ root.T
+    wires, _ = unknowns.prior.wires(unknowns.robot, values)
+    return wires
 
 
 def _directions(unknowns: Unknowns) -> Floats:
@@ -67,12 +71,14 @@ def by_unknown(unknowns: Unknowns, values: Floats) -> Floats:
     """Slopes ``(p, w, d)`` of values ``(p, w, 1 + 2 c)`` at the columns of `differing_wires`."""
     legs, p = unknowns.robot.legs, len(unknowns.prior.names)
     c = (values.shape[2] - 1) // 2
-    slope = (values[..., 1 : 1 + c] - values[..., 1 + c :]) / (2 * _STEP)
+    up, down = values[..., 1 : 1 + c], values[..., 1 + c :]
+    slope = (up - down) / (2 * _STEP)
     out = np.zeros((*values.shape[:2], len(unknowns.moments[0])))
     out[..., legs : legs + p] = slope[..., :p]
     leg = np.arange(legs)
     for k in range(c - p):
-        out[:, leg, legs + p + k * legs + leg] = slope[..., p + k]
+        own = legs + p + k * legs + leg
+        out[:, leg, own] = slope[..., p + k]
     return out
 
 
@@ -103,12 +109,18 @@ def grown(
         return Grown(strain[..., 0], by_unknown(unknowns, strain), strain[..., 0])
     # two more columns: all tensions a little larger, and smaller
     more = wires.part(np.concatenate([np.arange(columns), [0, 0]]))
-    factor = np.ones(columns + 2)
-    factor[-2:] = 1 + _LOAD, 1 - _LOAD
-    strain, course = crept(more, loaded(np.maximum(pull_N[..., None] * factor, 0.0)), known)
-    slope = (strain[..., -2] - strain[..., -1]) / (2 * _LOAD * np.maximum(pull_N, 1e-300))
-    taut = pull_N > 0
-    return Grown(strain[..., 0], by_unknown(unknowns, strain[..., :-2]), np.where(taut, slope, 0.0), course)
+    factor = np.concatenate([np.ones(columns), [1 + _LOAD, 1 - _LOAD]])
+    tensions = np.maximum(pull_N[..., None] * factor, 0.0)
+    strain, course = crept(more, loaded(tensions), known)
+    by_wires = by_unknown(unknowns, strain[..., :-2])
+    return Grown(strain[..., 0], by_wires, _by_pull(strain, pull_N), course)
+
+
+def _by_pull(strain: Floats, pull_N: Floats) -> Floats:
+    """Slopes ``(p, w)`` by the tension, of strains whose last two columns have larger and smaller tensions."""
+    change = strain[..., -2] - strain[..., -1]
+    slope = change / (2 * _LOAD * np.maximum(pull_N, 1e-300))
+    return np.where(pull_N > 0, slope, 0.0)
 
 
 def _count(wires: Wires) -> int:
@@ -135,20 +147,21 @@ def stretch(unknowns: Unknowns, white: Floats, pull_N: Floats) -> Stretch:
         Latent tensions.
     """
     wires = differing_wires(unknowns, white)
-    p, legs = pull_N.shape
-    columns = _count(wires)
     step = 1e-4 * np.abs(pull_N).max() + 1e-9
-    values = []
-    for tensions in (pull_N, pull_N + step):
-        taut = np.maximum(tensions, 0.0).T
-        load = np.repeat(taut[:, None], columns, 1).reshape(legs, columns * p)  # column by column, hold by hold
-        each = wires.part(np.repeat(np.arange(columns), p))
-        long = stretched_length(each, np.ones_like(load), load)
-        gap = np.minimum(tensions, 0.0).T[:, None] / _k1(wires, columns, legs)[..., None]
-        values.append(np.moveaxis(long.reshape(legs, columns, p) + gap, -1, 0))
-    here, up = values
-    return Stretch(here[..., 0], (up[..., 0] - here[..., 0]) / step, by_unknown(unknowns, here))
+    here = _ratio(wires, pull_N)
+    up = _ratio(wires, pull_N + step)
+    by_pull = (up[..., 0] - here[..., 0]) / step
+    return Stretch(here[..., 0], by_pull, by_unknown(unknowns, here))
 
 
-def _k1(wires: Wires, columns: int, legs: int) -> Floats:
-    return np.broadcast_to(wires.theta["k1"], (legs, columns))
+def _ratio(wires: Wires, tension_N: Floats) -> Floats:
+    """Stretched over zero-tension length of every column of wires under tensions ``(p, w)``: ``(p, w, c)``."""
+    p, legs = tension_N.shape
+    columns = _count(wires)
+    taut = np.maximum(tension_N, 0.0).T
+    load = np.repeat(taut[:, None], columns, 1).reshape(legs, columns * p)  # column by column, hold by hold
+    each = wires.part(np.repeat(np.arange(columns), p))
+    long = stretched_length(each, np.ones_like(load), load)
+    k1 = np.broadcast_to(wires.theta["k1"], (legs, columns))
+    gap = np.minimum(tension_N, 0.0).T[:, None] / k1[..., None]
+    return batch_first(long.reshape(legs, columns, p) + gap)

@@ -14,8 +14,9 @@ from wirebayes.progress import Progress, ShareDone
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.approach import onward
 from wirebayes.robot.self_calibration.descent import descend
-from wirebayes.robot.self_calibration.equations import FRICTIONLESS, Holds, Noise, State, linearised
+from wirebayes.robot.self_calibration.equations import FRICTIONLESS, Equations, Holds, Noise, State
 from wirebayes.robot.self_calibration.holds_creep import ROUGHLY, creep_of
+from wirebayes.robot.self_calibration.linearisation import linearised
 from wirebayes.robot.self_calibration.posterior import Whole, gaussian_posterior
 from wirebayes.robot.self_calibration.residuals import (
     joint_error,
@@ -65,7 +66,8 @@ def with_levels(unknowns: Unknowns, holds: Holds) -> Unknowns:
     if np.isfinite(holds.tension_N).all():
         return unknowns
     rule = unknowns.robot.rule
-    return replace(unknowns, errors=replace(unknowns.errors, level_N=_LEVEL * (rule.highest_N - rule.lowest_N)))
+    level_N = _LEVEL * (rule.highest_N - rule.lowest_N)
+    return replace(unknowns, errors=replace(unknowns.errors, level_N=level_N))
 
 
 def progress_of(progress: Progress, name: str) -> ShareDone:
@@ -88,45 +90,87 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State, progress: ShareDone
     creep = creep_of(unknowns, holds, state, roughly=ROUGHLY)
     state = _from_rough(unknowns, holds, noise, state, creep)
     if unknowns.errors.joint_m is None:
-        noise = replace(noise, balance=_shown(unknowns, holds, noise, state, creep, "balance"))
+        balance = _shown(unknowns, holds, noise, state, creep, "balance")
+        noise = replace(noise, balance=balance)
         if np.isfinite(holds.tension_N).any():
-            noise = replace(noise, joint_m=_shown(unknowns, holds, noise, state, creep, "loop"))
-    found = _at_rest(unknowns, holds, noise, state, creep, progress)
+            joint_m = _shown(unknowns, holds, noise, state, creep, "loop")
+            noise = replace(noise, joint_m=joint_m)
+    search = _Search(unknowns, holds, noise, state, creep)
+    found = search.at_rest(progress)
     progress(1.0)
     return replace(found, converged=found.converged and not lost(found))
 
 
-def _at_rest(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, progress: ShareDone) -> Whole:
-    """State, noise and creep in turns, each from the others, until none of them moves on."""
-    rounds: list[tuple[Floats, Floats]] = []
-    opened_m: list[float] = []
-    passed, roughly, cost = [state], ROUGHLY, np.inf
-    last = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])[0]
-    usual = usual_joint(unknowns.robot, holds)
-    unit_N = holds.session.tension_sd_N if np.isfinite(holds.tension_N).any() else noise.pull_N
-    for taken in range(_ROUNDS):
-        progress(taken / _ROUNDS)
-        since = passed[-1]
-        creep = creep_of(unknowns, holds, since, creep, roughly)
-        down = descend(unknowns, holds, noise, state, creep, since)
-        state = down.state
-        found = gaussian_posterior(unknowns, down, noise, creep, last)
-        shown, degrees = noise_shown(found, *usual)
-        found = replace(found, degrees=degrees)
-        rounds.append((np.log([noise.joint_m, noise.balance]), shown))
-        sd = np.sqrt(np.diag(found.covariance))
-        moved_on = float((np.abs(state.white - since.white) / sd).max(initial=0.0))
-        level = np.abs(shown - rounds[-1][0]).max() < _SETTLED and abs(cost - found.cost) < _LEVEL_FIT
-        if level and moved_on < _STILL:
-            return found
-        opened_m.append(length_rms_m(found))
-        if _given_up(opened_m, most_open_m(found, _HOPELESS), lost_m(found)):
-            break
-        cost = found.cost
-        roughly = max(_FINEST, min(_STEADY * moved_on, ROUGHLY * _FINER ** len(rounds)))
-        passed = onward(passed, state, sd, unit_N) if len(rounds) > _WHOLE_ROUNDS else [state]
-        noise = _next_noise(noise, rounds)
-    return replace(found, converged=False)
+class _Search:
+    """State, noise and creep in turns, each from the others, until none of them moves on.
+
+    Attributes
+    ----------
+    passed : list of State
+        About which creep was taken.
+    rounds : list of (2,) arrays
+        Logarithms of the noises that were thought, and of those that the residuals then showed.
+    opened_m : list of float
+        How far loops were open after each round.
+    """
+
+    def __init__(self, unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> None:
+        self.unknowns, self.holds = unknowns, holds
+        self.noise, self.state, self.creep = noise, state, creep
+        self.passed = [state]
+        self.roughly, self.cost = ROUGHLY, np.inf
+        self.rounds: list[tuple[Floats, Floats]] = []
+        self.opened_m: list[float] = []
+        self.last_m, _ = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])
+        self.usual = usual_joint(unknowns.robot, holds)
+        read = np.isfinite(holds.tension_N).any()
+        self.unit_N = holds.session.tension_sd_N if read else noise.pull_N
+
+    def at_rest(self, progress: ShareDone) -> Whole:
+        """The posterior where nothing moves on; not converged where the search is given up."""
+        for taken in range(_ROUNDS):
+            progress(taken / _ROUNDS)
+            found = self._round()
+            sd = np.sqrt(np.diag(found.covariance))
+            moved = np.abs(self.state.white - self.passed[-1].white) / sd
+            moved_on = float(moved.max(initial=0.0))
+            if self._settled(found) and moved_on < _STILL:
+                return found
+            self.opened_m.append(length_rms_m(found))
+            if _given_up(self.opened_m, most_open_m(found, _HOPELESS), lost_m(found)):
+                break
+            self._go_on(found, sd, moved_on)
+        return replace(found, converged=False)
+
+    def _round(self) -> Whole:
+        """The posterior with creep about the last state, and the noise that its residuals show."""
+        since = self.passed[-1]
+        self.creep = creep_of(self.unknowns, self.holds, since, self.creep, self.roughly)
+        down = descend(self.unknowns, self.holds, self.noise, self.state, self.creep, since)
+        self.state = down.state
+        found = gaussian_posterior(self.unknowns, down, self.noise, self.creep, self.last_m)
+        shown, degrees = noise_shown(found, *self.usual)
+        thought = np.log([self.noise.joint_m, self.noise.balance])
+        self.rounds.append((thought, shown))
+        return replace(found, degrees=degrees)
+
+    def _settled(self, found: Whole) -> bool:
+        """Whether noise and sum of squares are what they were."""
+        thought, shown = self.rounds[-1]
+        level = np.abs(shown - thought).max() < _SETTLED
+        return bool(level and abs(self.cost - found.cost) < _LEVEL_FIT)
+
+    def _go_on(self, found: Whole, sd: Floats, moved_on: float) -> None:
+        """What the next round begins with."""
+        taken = len(self.rounds)
+        self.cost = found.cost
+        usual = ROUGHLY * _FINER**taken
+        self.roughly = max(_FINEST, min(_STEADY * moved_on, usual))
+        if taken > _WHOLE_ROUNDS:
+            self.passed = onward(self.passed, self.state, sd, self.unit_N)
+        else:
+            self.passed = [self.state]
+        self.noise = _next_noise(self.noise, self.rounds)
 
 
 def _given_up(opened_m: list[float], hopeless_m: float, lost_m: float) -> bool:
@@ -149,10 +193,12 @@ def _given_up(opened_m: list[float], hopeless_m: float, lost_m: float) -> bool:
 
 def _before_reading(unknowns: Unknowns, holds: Holds) -> Noise:
     """What is stated of every noise, or usual."""
-    robot = unknowns.robot
-    low, high = robot.rule.lowest_N, robot.rule.highest_N
-    usual = 0.5 * (low + high) if robot.rule.choice == "middle" else low
-    finest = min(holds.session.tension_sd_N, low) if np.isfinite(holds.tension_N).any() else low
+    rule = unknowns.robot.rule
+    low, high = rule.lowest_N, rule.highest_N
+    usual = 0.5 * (low + high) if rule.choice == "middle" else low
+    finest = low
+    if np.isfinite(holds.tension_N).any():
+        finest = min(holds.session.tension_sd_N, low)
     return Noise(joint_error(unknowns, holds), FRICTIONLESS, _UNREAD * (high - low), usual, _SOFT * finest)
 
 
@@ -169,9 +215,11 @@ def _ahead(rounds: list[tuple[Floats, Floats]]) -> Floats:
     noise, shown = rounds[-1]
     if len(rounds) == 1:
         return shown
-    gone = noise - rounds[-2][0]
-    slope = np.divide(shown - rounds[-2][1], gone, out=np.zeros_like(gone), where=np.abs(gone) > 1e-9)
-    return np.asarray(noise + (shown - noise) / (1.0 - np.clip(slope, -1.0, _CREEPING)))
+    noise_before, shown_before = rounds[-2]
+    gone = noise - noise_before
+    slope = np.divide(shown - shown_before, gone, out=np.zeros_like(gone), where=np.abs(gone) > 1e-9)
+    closing = 1.0 - np.clip(slope, -1.0, _CREEPING)
+    return np.asarray(noise + (shown - noise) / closing)
 
 
 def _from_rough(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> State:
@@ -181,25 +229,34 @@ def _from_rough(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, cr
     mode, and no reading would bring them back.
     """
     since = state
-    fine = {"joint_m": noise.joint_m, "balance": noise.balance}
-    read = bool(np.isfinite(holds.tension_N).all())
-    eased = replace(
-        noise,
-        joint_m=_shown(unknowns, holds, noise, state, creep, "loop"),
-        balance=_UNEVEN if read else noise.balance,
-        soft_N=float(np.median(np.abs(state.pull_N))) if read else noise.soft_N,
-    )
+    eased = _eased(unknowns, holds, noise, state, creep)
     for _ in range(_EASINGS):
         down = descend(unknowns, holds, eased, state, creep, since, 6)
-        state, equations = down.state, down.equations
-        smaller = {}
-        for name, rows in (("joint_m", "loop"), ("balance", "balance")):
-            fits = np.mean(equations.residual[:, equations.rows[rows]] ** 2) < 2
-            smaller[name] = max(getattr(eased, name) / 4, fine[name]) if fits else getattr(eased, name)
-        if smaller == {name: getattr(eased, name) for name in smaller} and eased.soft_N == noise.soft_N:
+        state = down.state
+        next_ = replace(
+            eased,
+            joint_m=_smaller(down.equations, "loop", eased.joint_m, noise.joint_m),
+            balance=_smaller(down.equations, "balance", eased.balance, noise.balance),
+        )
+        if next_ == eased and eased.soft_N == noise.soft_N:
             break
-        eased = replace(eased, **smaller, soft_N=max(eased.soft_N / 4, noise.soft_N))
+        eased = replace(next_, soft_N=max(eased.soft_N / 4, noise.soft_N))
     return state
+
+
+def _eased(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> Noise:
+    """Errors of loops and balance as large as they are at a rough state."""
+    joint_m = _shown(unknowns, holds, noise, state, creep, "loop")
+    if not np.isfinite(holds.tension_N).all():
+        return replace(noise, joint_m=joint_m)
+    soft_N = float(np.median(np.abs(state.pull_N)))
+    return replace(noise, joint_m=joint_m, balance=_UNEVEN, soft_N=soft_N)
+
+
+def _smaller(equations: Equations, rows: str, error: float, finest: float) -> float:
+    """A quarter of an error, where the equations it weighs fit."""
+    residual = equations.residual[:, equations.rows[rows]]
+    return max(error / 4, finest) if np.mean(residual**2) < 2 else error
 
 
 def _shown(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, rows: str) -> float:

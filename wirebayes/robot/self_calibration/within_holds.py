@@ -156,8 +156,9 @@ def _through(wires: Wires, loaded: Loaded, course: TensionCourse) -> _Through:
     state = fresh(*loaded.end_N.shape[1:])
     held = []
     for k in range(len(loaded.duration_s)):
-        held.append(_held(wires, state, loaded, course, k))
-        state = held[-1].state
+        hold = _held(wires, state, loaded, course, k)
+        held.append(hold)
+        state = hold.state
     return _Through(
         strain=np.stack([one.strain for one in held]),
         off=np.stack([one.off for one in held]),
@@ -181,28 +182,39 @@ class _Held:
 
 def _held(wires: Wires, carried: CreepState, loaded: Loaded, course: TensionCourse, hold: int) -> _Held:
     """Creep and tensions of a hold, one after the other until they agree."""
-    path, bend, end = course.path_N[hold], course.bend_N[hold][..., None], loaded.end_N[hold]
+    path = course.path_N[hold]
     times = _times(wires, float(loaded.duration_s[hold]), len(path) - 1)
     before: Floats | None = None
     for _ in range(_PASSES):
         states = _creeping(wires, carried, times, path)
-        strains = np.array([s.strain(wires) for s in states])
+        strains = np.array([state.strain(wires) for state in states])
         ahead = (strains - strains[-1]) / (1.0 + strains[-1])
-        change = np.maximum(end + loaded.response_N[hold] @ ahead + bend, 0.0) - path
+        change = _tensions(loaded, course, hold, ahead) - path
         same = bool(np.abs(change).max() < _SAME * loaded.sd_N)
         further = 0.0 if same or before is None else _extrapolated(before, change)
         path = np.maximum(path + (1.0 + further) * change, 0.0)
         if same:
             break
         before = change if before is None else None
-    coarse = _creeping(wires, carried, times[::2], path[::2])[-1].strain(wires)
-    return _Held(strains[-1], strains[-1] - coarse, ahead[..., 0], path, same, states[-1])
+    coarse = _creeping(wires, carried, times[::2], path[::2])[-1]
+    off = strains[-1] - coarse.strain(wires)
+    return _Held(strains[-1], off, ahead[..., 0], path, same, states[-1])
+
+
+def _tensions(loaded: Loaded, course: TensionCourse, hold: int, ahead: Floats) -> Floats:
+    """Tensions ``(t, w, n)`` in a hold of wires that are longer by strains than at its end."""
+    bend = course.bend_N[hold][..., None]
+    tension = loaded.end_N[hold] + loaded.response_N[hold] @ ahead + bend
+    return np.maximum(tension, 0.0)
 
 
 def _extrapolated(before: Floats, change: Floats) -> float:
     """How many times a change is to be taken more, where changes go on in the ratio of the last two (Aitken)."""
-    ratio = float((change * before).sum() / max(float((before * before).sum()), 1e-300))
-    return min(ratio / (1.0 - ratio), _AHEAD) if ratio < 1.0 else 0.0
+    squares = float((before * before).sum())
+    ratio = float((change * before).sum() / max(squares, 1e-300))
+    if not ratio < 1.0:
+        return 0.0
+    return min(ratio / (1.0 - ratio), _AHEAD)
 
 
 def _creeping(wires: Wires, state: CreepState, times_s: Floats, tension_N: Floats) -> list[CreepState]:
@@ -210,7 +222,7 @@ def _creeping(wires: Wires, state: CreepState, times_s: Floats, tension_N: Float
     creep = HoldCreep(wires, state, tension_N[0])
     states = [state]
     for time, tension in zip(times_s[1:], tension_N[1:], strict=True):
-        creep = creep.toward(float(time), np.zeros(1), creep.amount_at(tension))
+        creep = creep.toward(float(time), creep.amount_at(tension))
         states.append(creep.state())
     return states
 

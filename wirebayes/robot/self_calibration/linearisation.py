@@ -1,0 +1,330 @@
+"""The equations of a session's holds about a state: residuals in standard deviations, and their slopes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wirebayes.numeric.batches import batch_first, batch_last
+from wirebayes.numeric.rows import chosen_rows
+from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.robot.mechanics import rotation as turns
+from wirebayes.robot.mechanics import statics
+from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.winches import turned_by
+from wirebayes.robot.motion import inverse
+from wirebayes.robot.self_calibration.equations import EXACT, Equations, Holds, Noise, State, moved, pulled
+from wirebayes.robot.self_calibration.strain import Grown, Stretch, stretch
+from wirebayes.robot.self_calibration.unknowns import Parts, Unknowns, one_after_another
+
+
+@dataclass(frozen=True)
+class _About:
+    """The state about which equations are linearised, and what several of them are made of.
+
+    Attributes
+    ----------
+    here : Robot
+        With its points where the state has them.
+    turn : (3, 3, p) array
+    J : (p, w, d) array
+        Growth of the wires' lengths by a small motion, rotations in metres at the platform's edge.
+    """
+
+    unknowns: Unknowns
+    holds: Holds
+    noise: Noise
+    state: State
+    parts: Parts
+    here: Robot
+    turn: Floats
+    shape: statics.Geometry
+    J: Floats
+
+
+def linearised(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, since: State) -> Equations:
+    """The equations about a state.
+
+    Parameters
+    ----------
+    unknowns : Unknowns
+    holds : Holds
+    noise : Noise
+    state : State
+    creep : Grown
+        About `since`; straight from there.
+    since : State
+    """
+    parts = unknowns.parts(state.white)
+    here = moved(unknowns.robot, parts)
+    turn = batch_last(state.rotation)
+    shape = statics.geometry(here, state.position_m.T, turn)
+    J = batch_first(statics.wire_jacobian(here, shape)).mT * here.edge_scale
+    about = _About(unknowns, holds, noise, state, parts, here, turn, shape, J)
+    out = _empty(unknowns, holds)
+    _loops(out, about, creep, since)
+    _balance(out, about)
+    _tensions(out, about)
+    _poses(out, about)
+    if holds.tilt is not None:
+        _tilts(out, about)
+    return out
+
+
+def _empty(unknowns: Unknowns, holds: Holds) -> Equations:
+    """Equations of which nothing is written yet."""
+    robot = unknowns.robot
+    counts = {"loop": robot.legs, "balance": robot.degrees, "tension": robot.legs, "pose": robot.degrees}
+    if holds.tilt is not None:
+        counts["tilt"] = 2
+    shape = len(holds.session.duration_s), sum(counts.values())
+    by_robot = np.zeros((*shape, unknowns.count))
+    by_hold = np.zeros((*shape, robot.degrees + robot.legs))
+    return Equations(np.zeros(shape), by_robot, by_hold, one_after_another(counts), np.ones(shape, bool))
+
+
+@dataclass(frozen=True)
+class _Lengths:
+    """Of what wires are as long as they are, ``(p, w)``: bare lengths that creep and tension make longer, and offsets.
+
+    Attributes
+    ----------
+    drawn : (p, w) array
+        What the joint values draw, by which errors of drums grow.
+    strain : (p, w) array
+        By creep.
+    elastic : Stretch
+    """
+
+    bare: Floats
+    offset: Floats
+    drawn: Floats
+    strain: Floats
+    elastic: Stretch
+
+    @classmethod
+    def at(cls, about: _About, creep: Grown, since: State) -> "_Lengths":
+        robot, parts, state = about.unknowns.robot, about.parts, about.state
+        joint_m, linear = about.holds.session.joint_m, robot.is_linear
+        bare, offset = inverse.lengths(robot, joint_m)
+        drawn = robot.ratio * joint_m * linear + joint_m * ~linear
+        bare = bare + parts.reference_m + parts.drum * drawn * ~linear
+        offset = offset + parts.drum * drawn * linear
+        strain = creep.strain + _more_creep(about, creep, since)
+        elastic = stretch(about.unknowns, state.white, state.pull_N)
+        return cls(bare, offset, drawn, strain, elastic)
+
+    @property
+    def longer(self) -> Floats:
+        """(p, w) how often as long as before creep and stretch."""
+        return np.asarray((1 + self.strain) * self.elastic.ratio)
+
+    def by_pull(self, creep: Grown) -> Floats:
+        """(p, w) slopes of `longer` by the tensions."""
+        elastic = self.elastic
+        return np.asarray(creep.by_pull * elastic.ratio + (1 + self.strain) * elastic.by_pull)
+
+    def by_wires(self, creep: Grown) -> Floats:
+        """(p, w, d) slopes of `longer` by the wires' unknowns."""
+        elastic = self.elastic
+        crept = creep.by_wires * elastic.ratio[..., None]
+        return np.asarray(crept + (1 + self.strain)[..., None] * elastic.by_wires)
+
+
+def _more_creep(about: _About, creep: Grown, since: State) -> Floats:
+    """(p, w) creep strain, to first order, that a state has beyond the one since which creep was not simulated."""
+    state, wires = about.state, about.unknowns.slices["wires"]
+    change = state.white[wires] - since.white[wires]
+    return np.asarray(creep.by_wires @ change + creep.by_pull * (state.pull_N - since.pull_N))
+
+
+def _loops(out: Equations, about: _About, creep: Grown, since: State) -> None:
+    """Every wire is as long as its way: stretched from what the joint value, its reference and creep make of it."""
+    unknowns, robot = about.unknowns, about.unknowns.robot
+    loop, leg, d = out.rows["loop"], np.arange(robot.legs), robot.degrees
+    lengths = _Lengths.at(about, creep, since)
+    way = statics.stretched(robot, about.shape, lengths.offset.T).T
+    out.residual[:, loop] = way - lengths.bare * lengths.longer
+    out.by_hold[:, loop, :d] = about.J
+    out.by_hold[:, leg, d + leg] = -lengths.bare * lengths.by_pull(creep)
+    wires = out.by_robot[:, loop, unknowns.slices["wires"]]
+    wires -= lengths.bare[..., None] * lengths.by_wires(creep)
+    wires[:, leg, leg] -= lengths.longer * unknowns.prior.reference_sd_m
+    if unknowns.errors.drum > 0:
+        _loops_by_drum(out, unknowns, lengths)
+    _loops_by_points(out, about)
+    _weigh_loops(out, robot, about.noise)
+
+
+def _loops_by_points(out: Equations, about: _About) -> None:
+    along = batch_first(about.shape.direction).mT * about.here.lines[:, None]  # (p, w, 3)
+    by_platform = np.einsum("pwi,pij->pwj", along, about.state.rotation)
+    _points(out.by_robot[:, out.rows["loop"]], about.unknowns, -along, by_platform)
+
+
+def _loops_by_drum(out: Equations, unknowns: Unknowns, lengths: _Lengths) -> None:
+    """Slopes by the errors of drums: of what is drawn of the line, or of the line that is longer than bare."""
+    robot = unknowns.robot
+    leg = np.arange(robot.legs)
+    drum = leg if robot.winch is None else robot.winch
+    by_drum = np.where(robot.is_linear, lengths.drawn, -lengths.drawn * lengths.longer)
+    out.by_robot[:, leg, unknowns.slices["drum"].start + drum] = by_drum * unknowns.errors.drum
+
+
+def _weigh_loops(out: Equations, robot: Robot, noise: Noise) -> None:
+    """Equations of the wires in standard deviations of their errors, which are made independent."""
+    loop, alone = out.rows["loop"], _errors_apart(robot)
+    for values in (out.residual, out.by_robot, out.by_hold):
+        values[:, loop] /= noise.joint_m
+        if alone is not None:
+            values[:, loop] = np.einsum("ij,pj...->pi...", alone, values[:, loop])
+
+
+def _errors_apart(robot: Robot) -> Floats | None:
+    """(w, w) What makes the errors of all lines' lengths independent of each other; None where they are.
+
+    Half of the variance is the winch's, whose encoder and drum its lines share; half is each line's, as it lies there.
+    """
+    if robot.winch is None:
+        return None
+    share = turned_by(robot)
+    covariance = 0.5 * (np.eye(robot.legs) + share @ share.T)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+
+
+def _balance(out: Equations, about: _About) -> None:
+    """The wires carry the platform."""
+    robot, scale = about.unknowns.robot, about.unknowns.robot.edge_scale
+    balance, d = out.rows["balance"], robot.degrees
+    pull, taut = pulled(about.state.pull_N, about.noise.soft_N)
+    gradient, hessian = statics.unbalance_and_stiffness(
+        about.here, about.shape, about.turn, pull.T, np.zeros_like(pull.T)
+    )
+    stiffness = batch_first(hessian) * scale * scale[:, None]
+    force = about.noise.balance * robot.mass_kg * GRAVITY
+    out.residual[:, balance] = gradient.T * scale / force
+    out.by_hold[:, balance, :d] = stiffness / force
+    out.by_hold[:, balance, d:] = about.J.mT * taut[:, None] / force
+    _balance_by_points(out, about, pull, force)
+
+
+def _balance_by_points(out: Equations, about: _About, pull: Floats, force: float) -> None:
+    """Slopes of the balance, in units of a force, by the points at which wires pull."""
+    unit = about.here.edge_scale[:, None, None]
+    by_exit, by_platform = _swing(about.here, about.shape, about.state.rotation, pull)
+    _points(out.by_robot[:, out.rows["balance"]], about.unknowns, by_exit * unit / force, by_platform * unit / force)
+
+
+def _points(out: Floats, unknowns: Unknowns, by_exit: Floats, by_platform: Floats) -> None:
+    """Slopes by exit and platform points, where these are unknown.
+
+    `by_exit` and `by_platform` are ``(p, w, 3)`` of equations that speak of one leg each, or ``(p, d, w, 3)``.
+    """
+    errors = unknowns.errors
+    for name, slope, sd in (("exit", by_exit, errors.exit_m), ("platform", by_platform, errors.platform_m)):
+        at = unknowns.slices[name]
+        if at.stop == at.start:
+            continue
+        if slope.ndim == 3:
+            leg = np.arange(slope.shape[1])
+            for axis in range(3):
+                out[:, leg, at.start + 3 * leg + axis] = slope[..., axis] * sd
+        else:
+            out[:, :, at] = slope.reshape(*slope.shape[:2], -1) * sd
+
+
+def _swing(robot: Robot, shape: statics.Geometry, rotation: Floats, pull: Floats) -> tuple[Floats, Floats]:
+    """How the wires' pull on the platform changes when a point moves: ``(p, d, w, 3)`` by exit and platform points."""
+    tau = (pull * robot.lines).T  # (w, p)
+    turn = _turn_of_pull(shape, tau)
+    by_line = np.moveaxis(turn, 1, 2)  # (p, 3, w, 3)
+    by_arm = np.zeros_like(by_line)
+    if robot.degrees == 6:
+        arm = turns.cross_matrix(batch_first(shape.arm_m).mT)  # (p, w, 3, 3)
+        pulls = turns.cross_matrix(batch_first(shape.direction).mT * tau.T[..., None])
+        by_line = np.concatenate([by_line, np.moveaxis(arm @ turn, 1, 2)], 1)
+        by_arm = np.concatenate([by_arm, np.moveaxis(-pulls, 1, 2)], 1)
+    by_platform = np.einsum("pdwi,pij->pdwj", by_line + by_arm, rotation)
+    return -by_line, by_platform
+
+
+def _turn_of_pull(shape: statics.Geometry, tau: Floats) -> Floats:
+    """(p, w, 3, 3) change of forces ``(w, p)`` along the wires when their platform points move."""
+    by_length = tau / shape.straight_m
+    u = batch_first(shape.direction)  # (p, 3, w)
+    turn = by_length.T[..., None, None] * np.eye(3)
+    turn = turn - np.einsum("wp,piw,pjw->pwij", by_length, u, u)
+    if shape.over is not None:
+        side = batch_first(shape.over.across)
+        turn = turn + np.einsum("wp,piw,pjw->pwij", tau * shape.over.swing_1_m, side, side)
+    return turn
+
+
+def _tensions(out: Equations, about: _About) -> None:
+    """Tensions that were read, and what is usual where none was."""
+    robot, noise = about.unknowns.robot, about.noise
+    session, parts = about.holds.session, about.parts
+    read = np.isfinite(about.holds.tension_N)
+    pull, taut = pulled(about.state.pull_N, noise.soft_N)
+    off = pull + session.signs * parts.bias_N - about.holds.tension_N
+    usual = about.state.pull_N - parts.level_N - noise.usual_N
+    rows, leg = out.rows["tension"], np.arange(robot.legs)
+    out.known[:, rows] = read
+    out.residual[:, rows] = np.where(read, off / session.tension_sd_N, usual / noise.pull_N)
+    by_pull = np.where(read, taut / session.tension_sd_N, 1.0 / noise.pull_N)
+    out.by_hold[:, rows.start + leg, robot.degrees + leg] = by_pull
+    _tensions_by_robot(out, about, read)
+
+
+def _tensions_by_robot(out: Equations, about: _About, read: Bools) -> None:
+    """Slopes by levels and by the sensors' biases, where these are unknown."""
+    unknowns, session = about.unknowns, about.holds.session
+    leg = np.arange(unknowns.robot.legs)
+    row = out.rows["tension"].start + leg
+    level_N, bias_N = unknowns.errors.level_N, unknowns.prior.bias_sd_N
+    if level_N > 0:
+        by_level = np.where(read, 0.0, -level_N / about.noise.pull_N)
+        out.by_robot[:, row, unknowns.slices["level"].start + leg] = by_level
+    if bias_N > 0:
+        by_bias = session.signs * bias_N / session.tension_sd_N
+        first = unknowns.slices["wires"].stop - len(leg)
+        out.by_robot[:, row, first + leg] = np.where(read, by_bias, 0.0)
+
+
+def _poses(out: Equations, about: _About) -> None:
+    """Poses that were stated."""
+    robot, rows = about.unknowns.robot, out.rows["pose"]
+    sd = max(about.unknowns.errors.pose_m, EXACT * robot.span_m)
+    known, residual = out.known[:, rows], out.residual[:, rows]
+    known[:, :3] = about.holds.placed[:, None]
+    residual[:, :3] = _displaced(about) / sd
+    if robot.degrees == 6:
+        known[:, 3:] = about.holds.oriented[:, None]
+        residual[:, 3:] = _turned(about) * robot.size_m / sd
+    out.by_hold[:, rows, : robot.degrees] = known[..., None] * np.eye(robot.degrees) / sd
+
+
+def _displaced(about: _About) -> Floats:
+    """(p, 3) m from the positions that were stated; zero where none was."""
+    displaced = about.state.position_m - about.holds.session.position_m
+    return chosen_rows(about.holds.placed, displaced, 0.0)
+
+
+def _turned(about: _About) -> Floats:
+    """(p, 3) rad from the orientations that were stated; zero where none was."""
+    rotation = about.state.rotation
+    stated = chosen_rows(about.holds.oriented, about.holds.session.rotation, rotation)
+    return turns.vector(rotation @ stated.mT)
+
+
+def _tilts(out: Equations, about: _About) -> None:
+    """Components of the platform's normal that an inclinometer read."""
+    tilt, sd = about.holds.tilt, about.holds.session.tilt_sd_rad
+    if tilt is None or sd is None:
+        return
+    rows, read = out.rows["tilt"], np.isfinite(tilt)
+    normal = about.state.rotation[:, :, 2]
+    out.known[:, rows] = read
+    out.residual[:, rows] = np.where(read, normal[:, :2] - tilt, 0.0) / sd
+    if about.here.degrees == 6:
+        slope = -turns.cross_matrix(normal)[:, :2] / about.here.size_m
+        out.by_hold[:, rows, 3:6] = read[..., None] * slope / sd
