@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from wirebayes.io.experiment_file import read_experiments as read_experiments
     from wirebayes.prediction.table import Prediction as Prediction
     from wirebayes.robot.history.live import LiveEstimator as LiveEstimator
-    from wirebayes.robot.history.live import LivePose as LivePose
+    from wirebayes.robot.history.live_pose import LivePose as LivePose
     from wirebayes.robot.mechanics.description import Robot as Robot
     from wirebayes.views.batch import Batch as Batch
     from wirebayes.views.calibration import Calibration as Calibration
@@ -90,7 +90,7 @@ _PLACES = {
     "SimulatedTests": "wirebayes.views.simulated_tests",
     "Robot": "wirebayes.robot.mechanics.description",
     "LiveEstimator": "wirebayes.robot.history.live",
-    "LivePose": "wirebayes.robot.history.live",
+    "LivePose": "wirebayes.robot.history.live_pose",
     "Pose": "wirebayes.views.pose",
     "Calibration": "wirebayes.views.calibration",
     "Export": "wirebayes.views.export",

@@ -15,7 +15,8 @@ import numpy as np
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.history.estimate import estimate_poses
 from wirebayes.robot.history.history import History
-from wirebayes.robot.history.live import LiveEstimator, LivePose
+from wirebayes.robot.history.live import LiveEstimator
+from wirebayes.robot.history.live_pose import LivePose
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot

@@ -14,6 +14,7 @@ from wirebayes.robot.history.history import History, divided
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import inverse
 
 _STRAIGHT = 0.02  # of the robot's span: over so short a way, even joint values make an even motion
@@ -58,30 +59,48 @@ def drift_along(
     """
     fine, kept = refined_poses(robot, history)
     fine = balanced(robot, fine)
+    assert fine.position_m is not None and fine.rotation is not None
     known = unknowns(robot, line, replace(errors, reference_m=0.0), rng)
     wires, error = known.columns(known.draws)
     if errors.calibrated is None:
         error = np.zeros_like(error)  # of lengths that nobody measured nothing but creep is followed
     carried = known.carried(known.draws)
-    strain = carried.strain(wires)
-    tau = wanted_tensions(robot, fine)
-    assert fine.position_m is not None and fine.rotation is not None
+    tau = _held_tensions(robot, fine)
+    joint = _commanded_joints(robot, fine, wires, tau, carried.strain(wires), error)
+    starts = clock_starts(fine, tau, restart)
+    start = fine.position_m[0], fine.rotation[0]
+
+    def watched(row: int) -> None:
+        progress("poses", row + 1, len(tau))
+
+    track = follow_log(robot, wires, fine, joint, start, starts, error, watched, carried)
+    strain = np.zeros((1, *tau.shape))
+    plain = Track(fine.position_m[None], fine.rotation[None], tau[None], strain, track.hold)
+    found = Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error, starts)
+    return found, np.swapaxes(joint[kept], 0, 1)
+
+
+def _held_tensions(robot: Robot, history: History) -> Floats:
+    """`wanted_tensions` where they hold the platform at every row."""
+    tau = wanted_tensions(robot, history)
     bad = np.flatnonzero(~np.isfinite(tau).all(1))
     if bad.size:
-        raise Unheld(float(fine.times_s[bad[0]]))
-    joint = np.stack(
-        [
-            inverse.commands(fine.robot_at(robot, k), wires, x[None], R[None], t[None], strain, error.T).joint_m
-            for k, (x, R, t) in enumerate(zip(fine.position_m, fine.rotation, tau, strict=True))
-        ]
-    )
-    rows, starts = len(fine.times_s), clock_starts(fine, tau, restart)
-    start = fine.position_m[0], fine.rotation[0]
-    track = follow_log(
-        robot, wires, fine, joint, start, starts, error, lambda k: progress("poses", k + 1, rows), carried
-    )
-    plain = Track(fine.position_m[None], fine.rotation[None], tau[None], np.zeros((1, *tau.shape)), track.hold)
-    return Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error, starts), np.swapaxes(joint[kept], 0, 1)
+        raise Unheld(float(history.times_s[bad[0]]))
+    return tau
+
+
+def _commanded_joints(
+    robot: Robot, history: History, wires: Wires, tau: Floats, strain: Floats, error: Floats
+) -> Floats:
+    """Joint values ``(t, n, w)`` of each draw's actuators."""
+    assert history.position_m is not None and history.rotation is not None
+    joints = []
+    for k, tension in enumerate(tau):
+        loaded = history.robot_at(robot, k)
+        x, R = history.position_m[k], history.rotation[k]
+        commands = inverse.commands(loaded, wires, x[None], R[None], tension[None], strain, error.T)
+        joints.append(commands.joint_m)
+    return np.stack(joints)
 
 
 class Unheld(Exception):
@@ -99,18 +118,17 @@ def wanted_tensions(robot: Robot, history: History) -> Floats:
     loads = np.column_stack([history.payload_kg, history.payload_m])
     for load in np.unique(loads, axis=0):
         rows = np.flatnonzero((loads == load).all(1))
-        out[rows] = inverse.tensions(
-            history.robot_at(robot, int(rows[0])), history.position_m[rows], history.rotation[rows]
-        )
+        loaded = history.robot_at(robot, int(rows[0]))
+        out[rows] = inverse.tensions(loaded, history.position_m[rows], history.rotation[rows])
     return out
 
 
 def refined_poses(robot: Robot, history: History) -> tuple[History, Indices]:
     """The history with rows between distant poses, and where its own rows are among them."""
-    x, R = history.position_m, history.rotation
-    assert x is not None and R is not None
-    turned = Rotation.from_matrix(R)
+    assert history.position_m is not None and history.rotation is not None
+    turned = Rotation.from_matrix(history.rotation)
     angle = (turned[:-1].inv() * turned[1:]).magnitude()
-    far = np.maximum(np.linalg.norm(np.diff(x, axis=0), axis=1), robot.size_m * angle)
-    pieces = np.maximum(np.ceil(far / (_STRAIGHT * robot.span_m)).astype(int), 1)
-    return divided(history, pieces)
+    displaced = np.linalg.norm(np.diff(history.position_m, axis=0), axis=1)
+    far = np.maximum(displaced, robot.size_m * angle)
+    pieces = np.ceil(far / (_STRAIGHT * robot.span_m)).astype(int)
+    return divided(history, np.maximum(pieces, 1))

@@ -51,14 +51,19 @@ class LogReadings:
 
     def residual(self, track: Track, white: Floats) -> Floats:
         """What unknowns with the sensors' offsets, ``(n, d + m)``, leave of the readings, ``(n, t, m)``."""
-        offset = white[:, None, white.shape[1] - len(self.of.offset) :] * self.of.offset
+        first = white.shape[1] - len(self.of.offset)
+        offset = white[:, None, first:] * self.of.offset
         return np.asarray(self.values - predicted_readings(track) - offset)
 
     def cost(self, residual: Floats, white: Floats) -> Floats:
         """Twice the negative log of the posterior density, ``(n,)``; infinite where a platform fell that was read."""
         scaled = self.counts[:, None] * (residual / self.of.noise) ** 2
-        lost = (np.isnan(residual) & np.isfinite(self.values)).any((1, 2))
-        return np.asarray(np.where(lost, np.inf, np.nansum(scaled, (1, 2)) + (white**2).sum(1)))
+        squares = np.nansum(scaled, (1, 2)) + (white**2).sum(1)
+        return np.asarray(np.where(self.missed(residual), np.inf, squares))
+
+    def missed(self, residual: Floats) -> Bools:
+        """(n,) Which platforms had fallen when they were read."""
+        return np.asarray((np.isnan(residual) & np.isfinite(self.values)).any((1, 2)))
 
     def gathered(self, slope: Floats, residual: Floats) -> Information:
         """All rows' information about unknowns and offsets."""
@@ -132,14 +137,15 @@ def find_mode(known: LogUnknowns, read: LogReadings, way: Way, without: Bools) -
     z, last, cost, best = np.zeros(d + m), np.zeros(d + m), np.inf, None
     for number in range(_MOST):
         track = way(known.differences(z[:d]), f"mode, pass {number + 1}", without)
-        h = predicted_readings(track)
-        residual = (read.values - h[0] - read.of.offset * z[d:])[None]
+        predicted = predicted_readings(track)
+        residual = (read.values - predicted[0] - read.of.offset * z[d:])[None]
         new = float(read.cost(residual, z[None])[0]) if track.held[0].all() else np.inf
         if not new <= cost:  # no better, or not in balance: go half as far
             z = 0.5 * (z + last)
             continue
-        slope = slopes(h)
-        found, cost, last = read.gathered(slope, residual), new, z
+        cost, last = new, z
+        slope = slopes(predicted)
+        found = read.gathered(slope, residual)
         move = found.moves(-z[None], None)
         near = bool(_length(move, found)[0] < _NEAR)
         best = Mode(z, slope, found, near)
@@ -164,12 +170,12 @@ def draw_posterior(known: Callable[[], LogUnknowns], read: LogReadings, mode: Mo
     white, tracks, logs = [], [], []
     for _ in range(_BATCHES):
         prior = known().draws
-        n = len(prior)
-        one, track, weight = _moved(prior, read, mode, way, rng)
-        white.append(one)
-        tracks.append(track)
-        logs.append(weight)
+        batch = _moved(prior, read, mode, way, rng)
+        white.append(batch.white)
+        tracks.append(batch.track)
+        logs.append(batch.log_weight)
         share, effective = _shares(np.concatenate(logs))
+        n = len(prior)
         if effective >= _ENOUGH * n:
             break
     if not effective:
@@ -187,38 +193,61 @@ def _shares(logs: Floats) -> tuple[Floats, float]:
     return np.asarray(share), float(1.0 / (share**2).sum())
 
 
-def _moved(prior: Floats, read: LogReadings, mode: Mode, way: Way, rng: Generator) -> tuple[Floats, Track, Floats]:
+@dataclass(frozen=True)
+class _Batch:
     """Draws ``(n, d + m)`` that fit readings of their own, their way, and the logarithms of their weights."""
-    (n, d), m, every = prior.shape, len(read.of.offset), np.zeros(1, bool)
-    noise = rng.standard_normal((n, d + m))
-    prior = np.concatenate([prior, rng.standard_normal((n, m))], 1)
-    draws = mode.white + replace(mode.found, vector=np.tile(mode.found.vector, (n, 1))).moves(prior - mode.white, noise)
+
+    white: Floats
+    track: Track
+    log_weight: Floats
+
+
+def _moved(prior: Floats, read: LogReadings, mode: Mode, way: Way, rng: Generator) -> _Batch:
+    """Draws of the prior, moved until each fits its own readings."""
+    n, d = prior.shape
+    every = np.zeros(1, bool)
+    noise = rng.standard_normal((n, len(mode.white)))
+    prior = np.concatenate([prior, rng.standard_normal((n, len(read.of.offset)))], 1)
+    draws = _linear_draws(prior, mode, noise)
     track = way(draws[:, :d], "poses", every)
-    residual = read.residual(track, draws)
     todo, before = np.ones(n, bool), np.full(n, np.inf)
     for number in range(_PASSES):
+        residual = read.residual(track, draws)
         found = read.gathered(mode.slope, residual)
         move = found.moves(prior - draws, noise)
-        size = _length(move, found)
-        size[np.isnan(residual[:, np.isfinite(read.values)]).any(1)] = np.inf
+        size = np.where(read.missed(residual), np.inf, _length(move, found))
         todo &= (size > _NEAR) & (size < before)  # one that goes astray is left where it is
         before = size
         if number == _PASSES - 1 or not todo.any():
             break
         draws[todo] += move[todo]
         track = track.with_columns(todo, way(draws[todo, :d], "poses", every))
-        residual = read.residual(track, draws)
+    weight = np.where(size <= _NEAR, _log_weight(read, draws, residual, found), -np.inf)
+    return _Batch(draws, track, weight)
+
+
+def _linear_draws(prior: Floats, mode: Mode, noise: Floats) -> Floats:
+    """Draws of the posterior, were readings straight about the mode."""
+    of_each = np.tile(mode.found.vector, (len(prior), 1))
+    about = replace(mode.found, vector=of_each)
+    return np.asarray(mode.white + about.moves(prior - mode.white, noise))
+
+
+def _log_weight(read: LogReadings, draws: Floats, residual: Floats, found: Information) -> Floats:
+    """(n,) of what linear moves cannot explain."""
     explained = _length(found.moves(-draws, None), found) ** 2
-    logs = -0.5 * (read.cost(residual, draws) - explained)
-    return draws, track, np.where(size <= _NEAR, logs, -np.inf)
+    return np.asarray(-0.5 * (read.cost(residual, draws) - explained))
 
 
 def _length(move: Floats, found: Information) -> Floats:
     """Length of moves ``(n, d + m)`` in posterior standard deviations, whatever their direction."""
-    return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", move, found.matrix + np.eye(move.shape[1]), move)))
+    precision = found.matrix + np.eye(move.shape[1])
+    return np.asarray(np.sqrt(np.einsum("ni,ij,nj->n", move, precision, move)))
 
 
 def _joined(tracks: list[Track]) -> Track:
     """The columns of all."""
-    names = ("position_m", "rotation", "tension_N", "strain")
-    return replace(tracks[0], **{name: np.concatenate([getattr(t, name) for t in tracks]) for name in names})
+    joined = {}
+    for name in ("position_m", "rotation", "tension_N", "strain"):
+        joined[name] = np.concatenate([getattr(track, name) for track in tracks])
+    return replace(tracks[0], **joined)

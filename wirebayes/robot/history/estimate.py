@@ -7,7 +7,7 @@ import numpy as np
 from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.progress import Progress, silent
-from wirebayes.robot.history.conditioning import LogReadings, draw_posterior, find_mode, slack_wires
+from wirebayes.robot.history.conditioning import Draws, LogReadings, draw_posterior, find_mode, slack_wires
 from wirebayes.robot.history.follow import Track, clock_starts, follow_log, refined_joints
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.readings import reading_weight, sensors
@@ -97,15 +97,23 @@ def estimate_poses(
     if mode is None:  # not even the mean wires hang in balance
         return replace(way.followed(known.draws), converged=False, effective=0.0, used=False)
     out = draw_posterior(lambda: unknowns(robot, line, errors, rng), read, mode, way.white, rng)
-    left = mean_of_finite(read.residual(out.track, np.zeros_like(out.white)))
     used = out.effective >= min(_TOO_FEW, 0.5 * line.count)
     if used:
-        found = Estimate(out.track, way.plain, *known.columns(out.white[:, : known.count]), way.starts_s)
+        columns = known.columns(out.white[:, : known.count])
+        found = Estimate(out.track, way.plain, *columns, way.starts_s)
     else:
         found = way.followed(known.draws)
-    squares = (left / read.of.sd) ** 2
-    misfit = float(np.nanmean(squares)) if np.isfinite(squares).any() else np.nan
+    misfit = _misfit(read, out)
     return replace(found, misfit=misfit, converged=mode.converged, effective=out.effective, used=used)
+
+
+def _misfit(read: LogReadings, out: Draws) -> float:
+    """Mean squared residual of what the draws leave on average; NaN where nothing is left to compare."""
+    left = mean_of_finite(read.residual(out.track, np.zeros_like(out.white)))
+    squares = (left / read.of.sd) ** 2
+    if not np.isfinite(squares).any():
+        return np.nan
+    return float(np.nanmean(squares))
 
 
 def log_readings(history: History, legs: int) -> Floats:
@@ -223,6 +231,5 @@ class _Way:
     def followed(self, white: Floats) -> Estimate:
         """White draws followed."""
         wires, error = self.known.columns(white)
-        return Estimate(
-            self.track(wires, error, self.known.carried(white), "poses"), self.plain, wires, error, self.starts_s
-        )
+        track = self.track(wires, error, self.known.carried(white), "poses")
+        return Estimate(track, self.plain, wires, error, self.starts_s)

@@ -62,12 +62,10 @@ class Track:
     def with_columns(self, at: Bools, other: "Track") -> "Track":
         """The columns of another in the places of some of its own."""
         out = self.part(np.arange(len(at)))
-        for own, new in zip(
-            (out.position_m, out.rotation, out.tension_N, out.strain),
-            (other.position_m, other.rotation, other.tension_N, other.strain),
-            strict=True,
-        ):
-            own[at] = new
+        out.position_m[at] = other.position_m
+        out.rotation[at] = other.rotation
+        out.tension_N[at] = other.tension_N
+        out.strain[at] = other.strain
         return out
 
 
@@ -106,12 +104,12 @@ def follow_log(
     -------
     Track
     """
-    n = wires.count
-    times, legs = history.times_s, robot.legs
+    times = history.times_s
+    since = float(times[0])
     hold = np.searchsorted(starts_s, times, "right") - 1
-    track = _empty(n, legs, np.maximum(hold, 0))
-    schedule, since = _schedule(times, joint_m), float(times[0])
-    brought = fresh(legs, n) if carried is None else _without_clocks(carried, wires)
+    track = _empty(wires.count, robot.legs, np.maximum(hold, 0))
+    brought = fresh(robot.legs, wires.count) if carried is None else _without_clocks(carried, wires)
+    schedule = _schedule(times, joint_m)
     walk = _begin(history.robot_at(robot, 0), wires, schedule, since, start, brought, error_m)
     ahead = [float(time) for time in starts_s if time > since]
     for k, time in enumerate(times):
@@ -125,18 +123,27 @@ def follow_log(
         if ahead and ahead[0] == time:
             since = ahead.pop(0)
             walk = _again(walk, schedule, since)
-        live = walk.live
-        track.position_m[live, k], track.rotation[live, k] = walk.here.position_m[live], walk.here.rotation[live]
-        track.tension_N[live, k] = walk.here.tension_N[live]
-        track.strain[:, k] = np.broadcast_to(walk.creep.state().strain(wires).T, (n, legs))
+        _note(track, k, walk)
         progress(k)
     return track
 
 
+def _note(track: Track, row: int, walk: CreepingHold) -> None:
+    """Write down a row: where the platform hangs, and the creep of every wire."""
+    here, live = walk.here, walk.live
+    track.position_m[live, row] = here.position_m[live]
+    track.rotation[live, row] = here.rotation[live]
+    track.tension_N[live, row] = here.tension_N[live]
+    track.strain[:, row] = walk.creep.state().strain(walk.wires).T
+
+
 def _empty(columns: int, legs: int, hold: Ints) -> Track:
     """A track of which no row is known yet."""
-    shapes = ((3,), (3, 3), (legs,), (legs,))
-    position, rotation, tension, strain = (np.full((columns, len(hold), *shape), np.nan) for shape in shapes)
+    rows = columns, len(hold)
+    position = np.full((*rows, 3), np.nan)
+    rotation = np.full((*rows, 3, 3), np.nan)
+    tension = np.full((*rows, legs), np.nan)
+    strain = np.full((*rows, legs), np.nan)
     return Track(position, rotation, tension, strain, hold)
 
 
@@ -162,22 +169,35 @@ def clock_starts(history: History, tension_N: Floats, share: float = RESTART) ->
     """
     times = history.times_s
     if history.hold is not None and np.isfinite(share):
-        return np.asarray(times[np.concatenate([[True], np.diff(history.hold) != 0])])
-    out, reference = [float(times[0])], tension_N[0]
+        new = np.diff(history.hold) != 0
+        return np.asarray(times[np.concatenate([[True], new])])
+    starts, reference = [float(times[0])], tension_N[0]
     for k in range(1, len(times)):
-        jump = _loaded(history, k)
-        before, after = tension_N[k if jump else k - 1], tension_N[k]
-        while np.abs(after - reference).max() > (limit := share * float(reference.mean())) > 0:
-            if jump:
-                out.append(float(times[k]))
+        after = tension_N[k]
+        if _loaded(history, k):
+            if _changed(reference, after, share):
+                starts.append(float(times[k]))
                 reference = after
-                continue
-            beyond = np.abs(after - reference) > limit
-            edge = reference + limit * np.sign(after - reference)
-            reached = float(((edge - before)[beyond] / (after - before)[beyond]).min())
-            out.append(float(times[k - 1] + reached * (times[k] - times[k - 1])))
-            reference = before + reached * (after - before)
-    return np.array(out)
+            continue
+        while _changed(reference, after, share):
+            reached, reference = _first_changed(reference, tension_N[k - 1], after, share)
+            starts.append(float(times[k - 1] + reached * (times[k] - times[k - 1])))
+    return np.array(starts)
+
+
+def _changed(reference: Floats, tension_N: Floats, share: float) -> bool:
+    """Whether a wire's tension has changed by a share of the mean tension."""
+    limit = share * float(reference.mean())
+    return bool(np.abs(tension_N - reference).max() > limit > 0)
+
+
+def _first_changed(reference: Floats, before: Floats, after: Floats, share: float) -> tuple[float, Floats]:
+    """Which part of an even change a wire's tension is the first to have changed by a share, and all tensions then."""
+    limit = share * float(reference.mean())
+    beyond = np.abs(after - reference) > limit
+    edge = reference + limit * np.sign(after - reference)
+    reached = float(((edge - before)[beyond] / (after - before)[beyond]).min())
+    return reached, before + reached * (after - before)
 
 
 def refined_joints(robot: Robot, history: History) -> tuple[History, Indices]:
@@ -185,7 +205,8 @@ def refined_joints(robot: Robot, history: History) -> tuple[History, Indices]:
     assert history.joint_m is not None
     wire = np.where(robot.is_linear, robot.ratio, 1.0) / robot.lines  # paid out in each line, by the joint value
     far = (np.abs(np.diff(history.joint_m, axis=0)) * wire).max(1)
-    return divided(history, np.maximum(np.ceil(far / (_EVEN * robot.span_m)).astype(int), 1))
+    pieces = np.ceil(far / (_EVEN * robot.span_m)).astype(int)
+    return divided(history, np.maximum(pieces, 1))
 
 
 def _begin(
@@ -237,14 +258,17 @@ def _pose(walk: CreepingHold) -> tuple[Floats, Floats]:
 
 def uncreeping(wires: Wires) -> Wires:
     """One column: the mean wire, which never creeps."""
-    keep = {column for effect in wires.at("strain") for column in effect.columns()}
+    elastic = {column for effect in wires.at("strain") for column in effect.columns()}
+    neutral = {}
+    for effect in wires.effects:
+        for amplitude, column in zip(effect.amplitudes, effect.columns(), strict=True):
+            neutral[column] = amplitude.neutral
     theta = {}
-    neutral = {c: a.neutral for e in wires.effects for a, c in zip(e.amplitudes, e.columns(), strict=True)}
     for name, value in wires.theta.items():
         mean = value.mean(-1, keepdims=True)
         if name == "B":
             mean = np.zeros_like(mean)
-        elif name in neutral and name not in keep:
+        elif name in neutral and name not in elastic:
             mean = np.full_like(mean, neutral[name])
         theta[name] = mean
     return replace(wires, theta=theta)

@@ -6,18 +6,20 @@ the forward solution. Where tensions or angles are read, columns beside the draw
 unknown, and the draws are moved by what the readings so far say (`readings`): the batch estimate in one pass.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wirebayes.errors import InputError
-from wirebayes.numeric.typing import Floats, Indices
+from wirebayes.numeric.rows import chosen_rows
+from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.history.beside import beside, beside_fresh
 from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
 from wirebayes.robot.history.live_input import checked_number, checked_reading, checked_vector, refuse_bad
-from wirebayes.robot.history.readings import Information, reading_weight, sensors
+from wirebayes.robot.history.live_pose import LivePose
+from wirebayes.robot.history.readings import Information, Sensors, reading_weight, sensors
 from wirebayes.robot.history.unknowns import Uncertain, slopes, unknowns
 from wirebayes.robot.mechanics import firmware
 from wirebayes.robot.mechanics.description import Poses, Robot
@@ -33,54 +35,6 @@ _SHARE, _SHORT_S = 0.2, 1.0  # a step may last so much of its hold's age, and so
 _FAR = 8.0  # prior sd: a draw that readings move so far contradicts them (a wire is slack, say) and is left out
 _LEAP = 1.5  # times the length at the step before: straight lengths are at most half of a wire of several lines
 _REFRESH_S = 0.1  # what all readings say together changes slowly
-
-
-@dataclass(frozen=True)
-class LivePose:
-    """Where the platform is, and what would bring it back.
-
-    Attributes
-    ----------
-    time_s : float
-    position_m, position_sd_m : (3,) arrays
-        Mean and standard deviation.
-    low_m, high_m : (3,) arrays
-        5 and 95 % of the position.
-    rotation : (3, 3) array
-        Mean orientation.
-    rotation_sd_rad : (3,) array
-        About the world's axes.
-    joint_m, joint_sd_m : (j,) arrays
-        Joint values that bring the platform to where the nominal joint values would hold it if no wire crept.
-    correction_m : (j,) array
-        What that is beyond the nominal joint values: wire of all lines.
-    straight_correction_m : (j,) array
-        The same in one line, as firmware counts: `correction_m` over the number of lines.
-    tension_N : (w,) array
-        Mean.
-    held : float
-        Share of the draws that hold the platform.
-
-    Examples
-    --------
-    >>> now = wb.live("linear-7", posterior, draws=16).step(0.0, held.summary()["inverse"]["joint_value_m"]["q50"])
-    >>> now.held
-    1.0
-    """
-
-    time_s: float
-    position_m: Floats
-    position_sd_m: Floats
-    low_m: Floats
-    high_m: Floats
-    rotation: Floats
-    rotation_sd_rad: Floats
-    joint_m: Floats
-    joint_sd_m: Floats
-    correction_m: Floats
-    straight_correction_m: Floats
-    tension_N: Floats
-    held: float
 
 
 class LiveEstimator:
@@ -128,21 +82,29 @@ class LiveEstimator:
         known = unknowns(robot, line, errors, self._rng)
         self._bare, self.robot, self._reads = robot, robot, reads
         self.warnings = (*doubts(robot, line), *plausible.robot_notices(robot))
-        n, d, m = line.count, known.count, robot.legs + 2
         white = known.draws
         if reads:
-            white = np.concatenate([white, known.differences(np.zeros(d))])
+            differences = known.differences(np.zeros(known.count))
+            white = np.concatenate([white, differences])
         wires, error = known.columns(white)
-        self._wires, self._error = beside(wires, known.plain), np.concatenate([error, np.zeros((1, robot.legs))])
-        self._n, self._columns = n, len(self._error)
-        self._of = sensors(robot, errors)
-        self._offset = self._rng.standard_normal((n, m))
-        self._information = Information.none(d, m, n)
-        self._moves, self._sane = np.zeros((n, d)), np.ones(n, bool)
-        self._refreshed = self._last = -np.inf
+        self._wires = beside(wires, known.plain)
+        self._error = np.concatenate([error, np.zeros((1, robot.legs))])
         self._start, self._state = start, beside_fresh(known.carried(white), robot.legs)
+        self._n, self._columns = line.count, len(self._error)
         self._live = np.ones(self._columns, bool)
         self._joint = np.empty((self._columns, robot.legs))
+        self._last = -np.inf
+        self._prepare_readings(known.count, sensors(robot, errors))
+
+    def _prepare_readings(self, count: int, of: Sensors) -> None:
+        """What the sensors will say, of so many unknowns: nothing yet."""
+        m = self.robot.legs + 2
+        self._of = of
+        self._offset = self._rng.standard_normal((self._n, m))
+        self._information = Information.none(count, m, self._n)
+        self._moves = np.zeros((self._n, count))
+        self._sane = np.ones(self._n, bool)
+        self._refreshed = -np.inf
 
     def wire_m(self, straight_m: ArrayLike) -> Floats:
         """Joint values, ``(j,)`` m, of the straight lengths that firmware counts: ``lines x straight + beyond_exit``.
@@ -226,19 +188,18 @@ class LiveEstimator:
             raise InputError("readings: found some, expected none; make the estimator with reads=True")
         joint = self._joints("joint_m", joint_m)
         nominal = joint if nominal_m is None else self._joints("nominal_m", nominal_m)
-        legs = self.robot.legs
-        readings = np.concatenate(
-            [checked_reading("tension_N", tension_N, legs), checked_reading("tilt_rad", tilt_rad, 2)]
-        )
+        tension = checked_reading("tension_N", tension_N, self.robot.legs)
+        tilt = checked_reading("tilt_rad", tilt_rad, 2)
         with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
-            return self._step(time, joint, nominal, readings)
+            return self._step(time, joint, nominal, np.concatenate([tension, tilt]))
 
     def _joints(self, name: str, values: ArrayLike) -> Floats:
         """Joint values as they can be: a drum has paid out some length, a linear actuator may stand on either side."""
         given = checked_vector(name, values, self.robot.joints)
         linear = of_each_winch(self.robot, self.robot.is_linear)
-        refuse_bad(name, given, np.isfinite(given) | ~linear, "a finite number")
-        refuse_bad(name, given, (np.isfinite(given) & (given > 0)) | linear, "a finite length above 0")
+        finite = np.isfinite(given)
+        refuse_bad(name, given, finite | ~linear, "a finite number")
+        refuse_bad(name, given, (finite & (given > 0)) | linear, "a finite length above 0")
         each = of_each_leg(self.robot, given)
         unlikely = plausible.wrong(self.robot, each[None]) if self._leaps(each) else None
         if unlikely is not None:
@@ -252,7 +213,8 @@ class LiveEstimator:
         if self._last == -np.inf:
             return True
         last, drum = self._joint[-1], ~self.robot.is_linear
-        return bool((np.maximum(given, last) > _LEAP * np.minimum(given, last))[drum].any())
+        longer, shorter = np.maximum(given, last), np.minimum(given, last)
+        return bool((longer > _LEAP * shorter)[drum].any())
 
     def _step(self, time_s: float, joint: Floats, nominal: Floats, readings: Floats) -> LivePose:
         """A step with arguments that are right; of all sensors, ``(w + 2,)``, NaN where one was not read."""
@@ -276,7 +238,8 @@ class LiveEstimator:
         """Where a long step is divided: while a hold is young, its creep is fast."""
         out, time = [], self._last
         while time < time_s:
-            time = min(time_s, time + max(_SHARE * (time - self._since), _SHORT_S))
+            longest = max(_SHARE * (time - self._since), _SHORT_S)
+            time = min(time_s, time + longest)
             out.append(time)
         return out
 
@@ -284,21 +247,27 @@ class LiveEstimator:
         """Creep under the tensions so far, then the pose."""
         bare, offset = inverse.lengths(self.robot, joint_m)
         self._state = self._creep.advance(time_s - self._since, self._tension.T)
-        self._go((bare + self._error) * (1.0 + self._state.strain(self._wires).T), offset)
-        if np.abs(self._tension[-1] - self._reference).max() > RESTART * self._reference.mean():
+        self._go(self._grown(bare), offset)
+        change = np.abs(self._tension[-1] - self._reference).max()
+        if change > RESTART * self._reference.mean():
             self._begin(time_s)
+
+    def _grown(self, bare: Floats) -> Floats:
+        """Zero-tension lengths with the errors of references and the creep so far."""
+        strain = self._state.strain(self._wires).T
+        return (bare + self._error) * (1.0 + strain)
 
     def _settle(self, joint_m: Floats) -> None:
         """The first pose, found from afar."""
         bare, offset = inverse.lengths(self.robot, joint_m)
-        bare = (bare + self._error) * (1.0 + self._state.strain(self._wires).T)
-        here = forward.solve_equilibrium(self.robot, self._wires, bare, offset, *self._start)
+        zero = self._grown(bare)
+        here = forward.solve_equilibrium(self.robot, self._wires, zero, offset, *self._start)
         self._live = here.found
         x, R = self._start
-        self._x = np.where(here.found[:, None], here.position_m, x)
-        self._R = np.where(here.found[:, None, None], here.rotation, R)
-        self._tension = np.where(here.found[:, None], here.tension_N, 0.0)
-        self._lengths = bare, np.broadcast_to(offset, bare.shape)
+        self._x = chosen_rows(here.found, here.position_m, x)
+        self._R = chosen_rows(here.found, here.rotation, R)
+        self._tension = chosen_rows(here.found, here.tension_N, 0.0)
+        self._lengths = zero, np.broadcast_to(offset, zero.shape)
 
     def _begin(self, time_s: float) -> None:
         """The wires' clocks restart."""
@@ -312,48 +281,57 @@ class LiveEstimator:
         for _ in range(3):
             step = path.newton_step(robot, wires, (self._x, self._R), (zero, offset))
             length = np.sqrt((step * step).sum(1))
-            hard = self._live & ~(length < _LONG * robot.size_m)
-            if hard.any():
-                step[hard] = np.nan
+            short = length < _LONG * robot.size_m
+            hard = self._live & ~short
+            step[hard] = np.nan
             self._x, self._R = mixed.after_step(robot, (self._x, self._R), step)
             if hard.any():
                 self._carefully(np.flatnonzero(hard), zero, offset)
-            if not (length[self._live & ~hard] > _AGAIN * robot.size_m).any():
+            moved = length[self._live & ~hard]
+            if not (moved > _AGAIN * robot.size_m).any():
                 break
         self._tension = balance.tensions_at(robot, wires, self._x, self._R, zero, offset)
         self._lengths = zero, offset
 
     def _carefully(self, rows: Indices, zero: Floats, offset: Floats) -> None:
         """Columns whose way is long or unstable: followed in parts; lost where the platform falls."""
-        new, old = ((a[rows], b[rows]) for a, b in ((zero, offset), self._lengths))
-        there = path.follow(self.robot, self._wires.part(rows), (self._x[rows], self._R[rows]), old, new).here
+        old_zero, old_offset = self._lengths
+        old, new = (old_zero[rows], old_offset[rows]), (zero[rows], offset[rows])
+        start = self._x[rows], self._R[rows]
+        there = path.follow(self.robot, self._wires.part(rows), start, old, new).here
         good = rows[there.found]
-        self._x[good], self._R[good] = there.position_m[there.found], there.rotation[there.found]
+        self._x[good] = there.position_m[there.found]
+        self._R[good] = there.rotation[there.found]
         self._live[rows[~there.found]] = False
 
     def _read(self, time_s: float, y: Floats) -> None:
         """What the sensors say, added to what they said before."""
         n, of = self._n, self._of
-        h = np.concatenate([self._tension, roll_and_pitch(self._R)], 1)[:-1]
+        predicted = np.concatenate([self._tension, roll_and_pitch(self._R)], 1)[:-1]
         counts = reading_weight(None if self._last == -np.inf else time_s - self._last)
         noise = of.noise * self._rng.standard_normal((n, len(y))) / np.sqrt(counts)
-        left = np.where(self._live[:n, None], y - h[:n] - of.offset * self._offset + noise, np.nan)
-        self._information.add(of, slopes(h[n:]), left, counts)
-        if time_s - self._refreshed >= _REFRESH_S or self._refreshed == -np.inf:
-            none = np.zeros(1)
-            self._moves = self._information.moves(none, None)[:, : self._moves.shape[1]]
-            self._sane = np.abs(self._moves).max(1) < _FAR
-            self._refreshed = time_s
+        left = y - predicted[:n] - of.offset * self._offset + noise
+        left = chosen_rows(self._live[:n], left, np.nan)
+        self._information.add(of, slopes(predicted[n:]), left, counts)
+        if time_s - self._refreshed >= _REFRESH_S:
+            self._refresh(time_s)
+
+    def _refresh(self, time_s: float) -> None:
+        """How all readings so far move the draws."""
+        moves = self._information.moves(np.zeros(1), None)
+        self._moves = moves[:, : self._moves.shape[1]]
+        self._sane = np.abs(self._moves).max(1) < _FAR
+        self._refreshed = time_s
 
     def _pose(self, time_s: float, nominal: Floats) -> LivePose:
         """The draws, moved by the readings, in numbers."""
+        robot, w = self.robot, self.robot.legs
         centre = self._R[self._n if self._reads else -1]
         own = self._own_draws(centre)
         mean, sd = own.mean(0), own.std(0)
         low, high = _quantiles(own[:, :3], np.array([0.05, 0.95]))
-        w = self.robot.legs
         wanted, wanted_sd = mean[6 : 6 + w], sd[6 : 6 + w]
-        change = of_each_winch(self.robot, wanted - nominal)
+        change = of_each_winch(robot, wanted - nominal)
         return LivePose(
             time_s,
             mean[:3],
@@ -362,28 +340,37 @@ class LiveEstimator:
             high,
             matrix(mean[3:6]) @ centre,
             sd[3:6],
-            of_each_winch(self.robot, wanted),
-            of_each_winch(self.robot, wanted_sd),
+            of_each_winch(robot, wanted),
+            of_each_winch(robot, wanted_sd),
             change,
-            change / mean_of_each_winch(self.robot, self.robot.lines),
+            change / mean_of_each_winch(robot, robot.lines),
             mean[6 + w :],
             float(self._live[: self._n].mean()),
         )
 
     def _own_draws(self, centre: Floats) -> Floats:
         """Position, rotation from `centre`, joint values and tensions of the draws that count; NaN if none does."""
-        turned = antisymmetric(self._R @ centre.T)
-        target = self._x[-1:], self._R[-1:], self._tension[-1:]
-        strain = self._state.strain(self._wires)
-        wanted = inverse.commands(self.robot, self._wires, *target, strain, self._error.T).joint_m
-        values = np.concatenate([self._x, turned, wanted, self._tension], 1)
+        values = self._values(centre)
         own = values[: self._n]
         if self._reads:
             own = own + self._moves @ slopes(values[self._n : -1])
-        live = self._live[: self._n]
-        shown = live & self._sane if (live & self._sane).any() else live
+        shown = self._shown()
         own = own if shown.all() else own[shown]
         return own if len(own) else np.full((1, values.shape[1]), np.nan)
+
+    def _values(self, centre: Floats) -> Floats:
+        """What `_own_draws` speaks of, of every column."""
+        turned = antisymmetric(self._R @ centre.T)
+        target = self._x[-1:], self._R[-1:], self._tension[-1:]
+        strain = self._state.strain(self._wires)
+        commands = inverse.commands(self.robot, self._wires, *target, strain, self._error.T)
+        return np.concatenate([self._x, turned, commands.joint_m, self._tension], 1)
+
+    def _shown(self) -> Bools:
+        """(n,) Draws that count: those that hang and are moved sanely, or all that hang where none is."""
+        live = self._live[: self._n]
+        sane = live & self._sane
+        return sane if sane.any() else live
 
 
 def _quantiles(values: Floats, probability: Floats) -> Floats:
@@ -391,4 +378,6 @@ def _quantiles(values: Floats, probability: Floats) -> Floats:
     ordered, last = np.sort(values, 0), len(values) - 1
     at = probability * last
     below = at.astype(int)
-    return ordered[below] + (at - below)[:, None] * (ordered[np.minimum(below + 1, last)] - ordered[below])
+    above = np.minimum(below + 1, last)
+    rise = ordered[above] - ordered[below]
+    return ordered[below] + (at - below)[:, None] * rise

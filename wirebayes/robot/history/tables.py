@@ -12,7 +12,7 @@ from wirebayes.robot.history.estimate import Estimate
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import winches
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.drums import motor_angle
 
 
@@ -39,7 +39,8 @@ def pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> t
         turn = rotation_vectors(track.rotation)
         for i, axis in enumerate("xyz"):
             columns |= _with_bands(f"r{axis}", "rad", turn[..., i])
-    columns |= _with_bands("distance", "mm", 1e3 * np.linalg.norm(track.position_m - to.position_m, axis=-1))
+    distance = np.linalg.norm(track.position_m - to.position_m, axis=-1)
+    columns |= _with_bands("distance", "mm", 1e3 * distance)
     for i in range(robot.legs):
         columns[f"tension_{i + 1}_N"] = mean_of_finite(track.tension_N[..., i])
     columns["held"] = track.held.mean(0)
@@ -83,14 +84,18 @@ def correction_table(
     for i in range(robot.joints):
         columns[f"joint_{i + 1}_m"] = joint[:, i]
     if robot.drums is not None:
-        angle = winches.of_each_winch(robot, motor_angle(robot.drums, joint_m + described["mean"]))
-        known = winches.of_each_winch(robot, robot.drums.radius_m)
-        for i in np.flatnonzero(known).tolist():
-            columns[f"motor_{i + 1}_rad"] = angle[:, i]
+        columns |= _motor_columns(robot, robot.drums, joint_m + described["mean"])
     for i in range(robot.joints):
         columns[f"change_{i + 1}_mm"] = 1e3 * mean[:, i]
         columns[f"change_{i + 1}_sd_mm"] = 1e3 * sd[:, i]
     return _as_table(columns)
+
+
+def _motor_columns(robot: Robot, drums: Drums, joint_m: Floats) -> dict[str, Floats]:
+    """Motor angles of drums of known radius."""
+    angle = winches.of_each_winch(robot, motor_angle(drums, joint_m))
+    known = winches.of_each_winch(robot, drums.radius_m)
+    return {f"motor_{i + 1}_rad": angle[:, i] for i in np.flatnonzero(known).tolist()}
 
 
 def _described(values: Floats) -> dict[str, Floats]:
@@ -107,4 +112,5 @@ def _described(values: Floats) -> dict[str, Floats]:
 def rotation_vectors(rotation: Floats) -> Floats:
     """Rotation vectors; NaN where the platform has fallen."""
     held = np.asarray(np.isfinite(rotation).all((-2, -1), keepdims=True))
-    return np.where(held[..., 0], turning.vector(np.where(held, rotation, np.eye(3))), np.nan)
+    known = np.where(held, rotation, np.eye(3))
+    return np.where(held[..., 0], turning.vector(known), np.nan)

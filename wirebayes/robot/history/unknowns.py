@@ -114,14 +114,19 @@ def unknowns(robot: Robot, line: WireDraws, errors: Uncertain, rng: Generator) -
         draws = even_normals(line.count, len(known.mean), rng)
         return LogUnknowns(robot, known.prior, known.mean, _root(known.covariance), draws, known)
     prior = LengthPrior(line, max(errors.reference_m, _EXACT_M), errors.spread)
-    mean, cov = prior.moments(robot.legs)
-    root = np.asarray(np.linalg.cholesky(cov), np.float64)
-    legs = robot.legs
-    drawn = even_normals(line.count, len(prior.own) * legs + legs, rng)
-    own, reference = drawn[:, legs:] * prior.own_sd, drawn[:, :legs] * prior.reference_sd_m
-    values = np.concatenate([reference, prior.fitted.T, own], 1)
-    white = solve_triangular(root, (values - mean).T, lower=True).T
+    mean, covariance = prior.moments(robot.legs)
+    root = np.asarray(np.linalg.cholesky(covariance), np.float64)
+    off = _drawn(prior, robot.legs, rng) - mean
+    white = solve_triangular(root, off.T, lower=True).T
     return LogUnknowns(robot, prior, mean, root, np.asarray(white))
+
+
+def _drawn(prior: LengthPrior, legs: int, rng: Generator) -> Floats:
+    """Unknowns ``(n, d)`` drawn from a prior, the line's as the posterior of its fit has them."""
+    normal = even_normals(prior.line.count, len(prior.own) * legs + legs, rng)
+    reference = normal[:, :legs] * prior.reference_sd_m
+    own = normal[:, legs:] * prior.own_sd
+    return np.concatenate([reference, prior.fitted.T, own], 1)
 
 
 def even_normals(n: int, m: int, rng: Generator) -> Floats:
@@ -148,12 +153,15 @@ def even_normals(n: int, m: int, rng: Generator) -> Floats:
     in the analysis of output from a computer code, Technometrics 21(2), 1979 (Latin hypercube sampling).
     """
     half = n // 2
-    below = ndtri((np.arange(half)[:, None] + 1.0 - rng.uniform(size=(half, m))) / n)
+    drawn = np.arange(half)[:, None] + 1.0 - rng.uniform(size=(half, m))
+    below = ndtri(drawn / n)
     middle = ndtri((half + rng.uniform(size=(n % 2, m))) / n)
-    return np.asarray(rng.permuted(np.concatenate([below, middle, -below]), axis=0))
+    in_order = np.concatenate([below, middle, -below])
+    return np.asarray(rng.permuted(in_order, axis=0))
 
 
 def _root(covariance: Floats) -> Floats:
     """Cholesky factor of a covariance whose unknowns have very different units."""
     sd = np.sqrt(np.diag(covariance))
-    return np.asarray(sd[:, None] * np.linalg.cholesky(covariance / (sd[:, None] * sd)), np.float64)
+    correlation = covariance / (sd[:, None] * sd)
+    return np.asarray(sd[:, None] * np.linalg.cholesky(correlation), np.float64)

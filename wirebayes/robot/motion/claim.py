@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.json_files.pose import ClaimNumbers
+from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
@@ -70,10 +71,12 @@ def _median(values: Floats) -> Floats:
 
 def grid(robot: Robot, points: tuple[int, int, int]) -> Floats:
     """Regular grid over the robot's workspace box, (p, 3) m; one layer where the box is flat."""
-    axes = [
-        np.linspace(low, high, count) if count > 1 and high > low else np.array([0.5 * (low + high)])
-        for low, high, count in zip(robot.lower_m, robot.upper_m, points, strict=True)
-    ]
+    axes = []
+    for low, high, count in zip(robot.lower_m, robot.upper_m, points, strict=True):
+        if count > 1 and high > low:
+            axes.append(np.linspace(low, high, count))
+        else:
+            axes.append(np.array([0.5 * (low + high)]))
     return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
 
 
@@ -107,33 +110,32 @@ def over_workspace(
     turn = hanging.orientations(robot, position_m, level)
     tau = inverse.tensions(robot, position_m, turn)
     good = np.isfinite(tau).all(1)
-    if not good.any():
-        empty = np.empty((0, 1))
-        return WorkspaceDrift(np.empty((0, 3)), empty, empty, np.empty((0, robot.legs)), 0.0, 0.0)
     x, tau = position_m[good], tau[good]
     n, p = wires.count, len(x)
+    if not p:
+        empty = np.empty((0, 1))
+        return WorkspaceDrift(x, empty, empty, tau, 0.0, 0.0)
     many = _at_each(wires, n, p)
     where, pull = np.repeat(x, n, 0), np.repeat(tau, n, 0)
-    R = np.repeat(turn[good], n, 0)
     state = fresh(robot.legs, n * p)
     if loaded_s > 0:
         state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
-    commands = inverse.commands(robot, many, where, R, pull, state.strain(many))
+    commands = inverse.commands(robot, many, where, np.repeat(turn[good], n, 0), pull, state.strain(many))
     R = commands.rotation
     held = drift.stably(robot, many, commands, where, R)
-    course = drift.hold(
-        robot, many, np.where(held[:, None], commands.joint_m, np.nan), np.array([time_s]), where, R, state
-    )
-    shift = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
-    tilt = turning.tilt(course.rotation[:, 0], R)
-    return WorkspaceDrift(
-        x, shift.reshape(p, n), tilt.reshape(p, n), tau, float(good.mean()), float(course.found.mean())
-    )
+    joint = chosen_rows(held, commands.joint_m, np.nan)
+    course = drift.hold(robot, many, joint, np.array([time_s]), where, R, state)
+    distance = np.linalg.norm(course.position_m[:, 0] - where, axis=1).reshape(p, n)
+    tilt = turning.tilt(course.rotation[:, 0], R).reshape(p, n)
+    return WorkspaceDrift(x, distance, tilt, tau, float(good.mean()), float(course.found.mean()))
 
 
 def _at_each(wires: Wires, draws: int, positions: int) -> Wires:
     """A row for every position and draw, of which draws vary fastest."""
-    theta = {k: np.tile(np.broadcast_to(v, (len(v), draws)), positions) for k, v in wires.theta.items()}
+    theta = {}
+    for name, value in wires.theta.items():
+        each = np.broadcast_to(value, (len(value), draws))
+        theta[name] = np.tile(each, positions)
     return replace(wires, theta=theta)
 
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_last
+from wirebayes.numeric.rows import rows_of
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics import plane, statics
 from wirebayes.robot.mechanics import rotation as turning
@@ -38,29 +40,28 @@ def equilibria(
     Equilibria
         Distinct ones, the lowest energy first.
     """
-    low, high = robot.exit_m.min(0), robot.exit_m.max(0)
-    low = low - np.array([0.0, 0.0, 0.5 * zero_m.max()])
-    begin = rng.uniform(low, high, (starts, 3))
-    turn = np.eye(3) if robot.degrees == 3 else turning.matrix(1.2 * rng.standard_normal((starts, 3)))
-    turn = np.broadcast_to(turn, (starts, 3, 3))
+    begin, turn = _starts(robot, float(zero_m.max()), rng, starts)
     if known is not None:
-        begin, turn = np.concatenate([known[0][None], begin]), np.concatenate([known[1][None], turn])
+        begin = np.concatenate([known[0][None], begin])
+        turn = np.concatenate([known[1][None], turn])
     begin, turn = plane.onto(robot, begin, turn)
     tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
     found = solve_equilibrium(robot, wires, tiled, offset_m, begin, turn, 400)
+    turned = batch_last(found.rotation)
+    energy = statics.potential(robot, wires, found.position_m.T, turned, zero_m[:, None], offset_m[:, None])
     good = np.flatnonzero(found.found)
-    height = statics.potential(
-        robot, wires, found.position_m.T, np.moveaxis(found.rotation, 0, -1), zero_m[:, None], offset_m[:, None]
-    )
-    pick = _distinct(robot, found, good[np.argsort(height[good], kind="stable")])
-    return Equilibria(
-        found.position_m[pick],
-        found.rotation[pick],
-        found.tension_N[pick],
-        found.status[pick],
-        found.iterations[pick],
-        found.residual_N[pick],
-    )
+    lowest_first = good[np.argsort(energy[good], kind="stable")]
+    return rows_of(found, _distinct(robot, found, lowest_first))
+
+
+def _starts(robot: Robot, longest_m: float, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
+    """Poses anywhere below and among the exit points."""
+    low, high = robot.exit_m.min(0), robot.exit_m.max(0)
+    low = low - np.array([0.0, 0.0, 0.5 * longest_m])
+    position = rng.uniform(low, high, (count, 3))
+    if robot.degrees == 3:
+        return position, np.broadcast_to(np.eye(3), (count, 3, 3))
+    return position, turning.matrix(1.2 * rng.standard_normal((count, 3)))
 
 
 def _distinct(robot: Robot, found: Equilibria, order: Indices) -> Indices:

@@ -8,9 +8,10 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import statics
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import downhill, one_sided, outcome
 
@@ -75,33 +76,40 @@ def solve_equilibrium(
     n = len(zero_m)
     offset_m = np.broadcast_to(offset_m, zero_m.shape)
     start_m, start_rotation = np.broadcast_to(start_m, (n, 3)), np.broadcast_to(start_rotation, (n, 3, 3))
-    sane = np.flatnonzero(np.logical_and.reduce([np.isfinite(v).all(1) for v in (zero_m, offset_m, start_m)]))
+    finite = [np.isfinite(values).all(1) for values in (zero_m, offset_m, start_m)]
+    sane = np.flatnonzero(np.logical_and.reduce(finite))
     if not len(sane):
         return put_back(None, sane, n, robot.legs)
-    if len(sane) < n:
-        part = wires.part(sane), zero_m[sane], offset_m[sane], start_m[sane], start_rotation[sane]
-        return put_back(solve_equilibrium(robot, *part, max_iterations), sane, n)
+    lengths, start = (zero_m[sane], offset_m[sane]), (start_m[sane], start_rotation[sane])
+    found = _solved(robot, wires if len(sane) == n else wires.part(sane), lengths, start, max_iterations)
+    return found if len(sane) == n else put_back(found, sane, n)
+
+
+def _solved(robot: Robot, wires: Wires, lengths: Lengths, start: Poses, max_iterations: int) -> Equilibria:
+    """The equilibria of finite lengths."""
     # Counted from the middle of the exit points, so that nothing depends on where the robot's origin is.
     middle = robot.exit_m.mean(0)
     robot = replace(robot, exit_m=robot.exit_m - middle)
-    position = np.array(start_m.T) - middle[:, None]
-    rotation = np.array(np.moveaxis(start_rotation, 0, -1))
-    zero, offset = np.ascontiguousarray(zero_m.T), np.ascontiguousarray(offset_m.T)
+    position = np.array(start[0].T) - middle[:, None]
+    rotation = np.array(batch_last(start[1]))
+    zero, offset = np.ascontiguousarray(lengths[0].T), np.ascontiguousarray(lengths[1].T)
     solved = downhill.lead_downhill(robot, wires, zero, offset, position, rotation, max_iterations)
     _look_again(robot, wires, zero, offset, solved)
-    rotation = np.moveaxis(solved.R, -1, 0)
-    return Equilibria(solved.x.T + middle, rotation, solved.tau.T, solved.status, solved.count, solved.left)
+    turn = batch_first(solved.R)
+    return Equilibria(solved.x.T + middle, turn, solved.tau.T, solved.status, solved.count, solved.left)
 
 
 def _look_again(robot: Robot, wires: Wires, zero: Floats, offset: Floats, solved: downhill.Solved) -> None:
     """Take back balances inside a pulley, where there is no wire, and take in poses that wires hold one-sidedly."""
     if robot.pulleys is not None:
         clear = statics.geometry(robot, solved.x, solved.R).clear
-        solved.status[(solved.status == outcome.FOUND) & ~clear] = outcome.NOT_CONVERGED
+        inside = (solved.status == outcome.FOUND) & ~clear
+        solved.status[inside] = outcome.NOT_CONVERGED
     loose = np.flatnonzero(solved.status == outcome.NOT_HELD)
     if loose.size:  # by wires that are taut; those that are just not slack may hold it yet
-        pose = solved.x[:, loose].T, np.moveaxis(solved.R[..., loose], -1, 0)
-        held = one_sided.held(robot, wires.part(loose), pose, (zero[:, loose].T, offset[:, loose].T))
+        pose = solved.x[:, loose].T, batch_first(solved.R[..., loose])
+        lengths = zero[:, loose].T, offset[:, loose].T
+        held = one_sided.held(robot, wires.part(loose), pose, lengths)
         solved.status[loose[held]] = outcome.FOUND
 
 

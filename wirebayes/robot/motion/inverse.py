@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_last
+from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -57,10 +59,10 @@ def tensions(robot: Robot, position_m: Floats, rotation: Floats, choice: Choice 
     """
     rule = robot.rule
     chosen = choice or CHOICES[rule.choice]
-    R = np.moveaxis(rotation, 0, -1)
-    shape = statics.geometry(robot, position_m.T, R)
+    turn = batch_last(rotation)
+    shape = statics.geometry(robot, position_m.T, turn)
     structure = -statics.wire_jacobian(robot, shape)
-    load = -statics.weight(robot, R)
+    load = -statics.weight(robot, turn)
     # Moments are brought to newtons so that the rank test and the residual weigh both alike.
     structure[3:] /= robot.size_m
     load[3:] /= robot.size_m
@@ -103,10 +105,10 @@ def commands(
     each = _of_each_line(robot, wires, position_m, rotation, tension_N, creep, error_m)
     if robot.winch is None:
         return each
-    n = len(each.joint_m)
-    x = np.broadcast_to(position_m, (n, 3))
+    x = np.broadcast_to(position_m, (len(each.joint_m), 3))
     found = tied(robot, wires, x, each.rotation, each.tension_N, each.joint_m, creep, error_m)
-    joint, pull = (np.where(found.held[:, None], v, np.nan) for v in (found.joint_m, found.tension_N))
+    joint = chosen_rows(found.held, found.joint_m, np.nan)
+    pull = chosen_rows(found.held, found.tension_N, np.nan)
     bare, offset = lengths(robot, joint)
     zero = (bare.T + error_m) * (1.0 + creep)
     return Commands(zero.T, joint, offset, pull, found.held, found.rotation)
@@ -135,8 +137,7 @@ def _of_each_line(
     error_m: Floats | float,
 ) -> Commands:
     """`commands` as if every line had a winch of its own."""
-    grown = 1.0 + creep
-    tau = tension_N.T
+    grown, tau = 1.0 + creep, tension_N.T
     offset = robot.beyond_m[:, None]
     shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
     free = statics.stretched(robot, shape, offset)
@@ -150,7 +151,13 @@ def _of_each_line(
         zero = np.where(linear, fixed, zero)
         joint = np.where(linear, moved / ratio, joint)
         offset = offset + np.where(linear, moved, 0.0)
+    return _of_draws(zero, joint, offset, tau, rotation)
+
+
+def _of_draws(zero: Floats, joint: Floats, offset: Floats, tau: Floats, rotation: Floats) -> Commands:
+    """Commands of values ``(w, n)``, ``(w, 1)`` or ``(w, p)``, all of as many draws."""
     feasible = np.isfinite(zero).all(0) & np.isfinite(tau).all(0)
     zero, joint, offset, tau = np.broadcast_arrays(zero, joint, offset, tau)
-    turn = np.broadcast_to(rotation, (zero.shape[1], 3, 3))
-    return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, zero.shape[1:]), turn)
+    n = zero.shape[1]
+    turn = np.broadcast_to(rotation, (n, 3, 3))
+    return Commands(zero.T, joint.T, offset.T, tau.T, np.broadcast_to(feasible, (n,)), turn)

@@ -9,30 +9,29 @@ from wirebayes.json_files.pose import (
     Claim,
     ClaimHolds,
     DriftBands,
-    EquilibriaJson,
-    EquilibriumPose,
-    ForwardKinematics,
     InverseKinematics,
     MotorAngles,
     PoseJson,
     VarianceShares,
+    Workspace,
 )
 from wirebayes.json_files.values import Band
 from wirebayes.notice import Notice, NoticeJson, to_json
 from wirebayes.numeric.typing import Floats
-from wirebayes.robot.mechanics import draws, drums, plane, sag, statics
+from wirebayes.robot.mechanics import draws, drums, sag, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import claim, control, drift, equilibria, forward, inverse, one_sided, outcome, plausible
+from wirebayes.robot.motion import claim, control, drift, inverse, plausible
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose import controllers, on_plane, stability, variance_shares
 from wirebayes.robot.pose.maps import Map, map_slices, summaries
 from wirebayes.robot.pose.orientation import Orientation, by_lines
 from wirebayes.robot.pose.request import PoseRequest, band_over_draws
+from wirebayes.robot.pose.round_trip import round_trip, stable_poses
 from wirebayes.robot.proof import proofs
 
 _LEVEL = 1e-6  # sine of a wire's angle to the horizontal: so little is rounding in the robot's file
@@ -74,16 +73,13 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
     """
     x, R = request.position_m, request.rotation
     tau = inverse.tensions(robot, x[None], R[None])
-    balanced = bool(np.isfinite(tau).all())
-    lifted = on_plane.lifted(robot, x, R, tau[0]) if balanced else ""
-    content = _requested(robot, line, x, R, feasible=balanced and not lifted)
     turned = request.orientation or Orientation(x, R)
-    if turned.found is not None:
-        content["orientation"] = turned.found
-    if turned.nearest_m is not None:
-        content["nearest_position_m"] = turned.nearest_m
-    if not content["feasible"]:
-        return _unheld(robot, content, *((lifted, "unheld") if lifted else _why_not(robot, x, turned)))
+    content = _requested(robot, line, x, R, turned)
+    if not np.isfinite(tau).all():
+        return _unheld(robot, content, *_why_not(robot, x, turned))
+    lifted = on_plane.lifted(robot, x, R, tau[0])
+    if lifted:
+        return _unheld(robot, content, lifted)
     shared = draws.for_robot(robot, line)
     commands = inverse.commands(robot, shared, x[None], R[None], tau)
     content["feasible_draws"] = float(commands.feasible.mean())
@@ -119,23 +115,31 @@ def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, cont
     content["inverse"] = _inverse(robot, held.commands, held.tension_N[0])
     if robot.plane is not None:
         content["plane"] = on_plane.on_plane(robot, held.wires, held.commands, x, R, held.tension_N[0])
-    content["forward"] = _round_trip(robot, held.wires, held.commands, x, R)
-    content["equilibria"] = _all_equilibria(robot, held.wires, x, R, rng)
+    content["forward"] = round_trip(robot, held.wires, held.commands, x, R)
+    content["equilibria"] = stable_poses(robot, held.wires, x, R, rng)
     proved = proofs.only_equilibrium(robot, held.wires, x, R)
     courses = _courses(held, rng)
-    content["certificate"] = {**proved, **proofs.enclosed(robot, held.wires, courses[0.0], x, R)}
+    band = proofs.enclosed(robot, held.wires, courses[0.0], x, R)
+    content["certificate"] = {**proved, **band}
     content["drift"] = [{"specimen_spread": s, **_drift(c, x, R)} for s, c in courses.items()]
     content["stability"] = [{"specimen_spread": s, **stability.summary(c)} for s, c in courses.items()]
     content["claim"] = _claim(courses, x, R, request)
     content["pose_error"] = controllers.errors(robot, line, request, rng, other)
     content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
     content["variance_shares"] = _shares(robot, line, courses, x, R)
-    content["warnings"] = to_json(_warnings(held, courses, content["equilibria"]["commanded_stable"], turned))
+    warnings = _warnings(held, courses, content["equilibria"]["commanded_stable"], turned)
+    content["warnings"] = to_json(warnings)
     spaces = map_slices(robot, line, request.slices)
-    reached = [one for one in spaces if len(one.drift.position_m)]
-    # the first orientation as a whole, then every slice of each
-    content["workspace"] = {**claim.claim_summary(reached[0].drift), "slices": summaries(spaces)} if reached else None
+    content["workspace"] = _workspace(spaces)
     return PoseAnswer(content, courses, spaces)
+
+
+def _workspace(spaces: tuple[Map, ...]) -> Workspace | None:
+    """The first orientation that is held anywhere as a whole, then every slice of each."""
+    reached = [one for one in spaces if len(one.drift.position_m)]
+    if not reached:
+        return None
+    return {**claim.claim_summary(reached[0].drift), "slices": summaries(spaces)}
 
 
 def _courses(held: _Held, rng: Generator) -> dict[float, Course]:
@@ -199,9 +203,9 @@ def unheld(robot: Robot, sentence: str, kind: str = "unheld") -> list[NoticeJson
     return to_json([Notice(kind, sentence[:1].lower() + sentence[1:].rstrip(".")), *plausible.robot_notices(robot)])
 
 
-def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible: bool) -> PoseJson:
+def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, turned: Orientation) -> PoseJson:
     """The request, the robot and the wires."""
-    return {
+    content: PoseJson = {
         "version": 1,
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
@@ -212,9 +216,14 @@ def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, *, feasible:
             "lowest_N": robot.rule.lowest_N,
             "highest_N": robot.rule.highest_N,
         },
-        "feasible": feasible,
+        "feasible": True,
         "warnings": [],
     }
+    if turned.found is not None:
+        content["orientation"] = turned.found
+    if turned.nearest_m is not None:
+        content["nearest_position_m"] = turned.nearest_m
+    return content
 
 
 def _inverse(robot: Robot, commands: inverse.Commands, tension_N: Floats) -> InverseKinematics:
@@ -251,7 +260,8 @@ def _emptied(known: Drums, joint_m: Floats) -> list[Notice]:
 def _motors(robot: Robot, known: Drums, joint_m: Floats) -> MotorAngles:
     """Motor angles and the wire that a radian pays out there; null for legs without a drum of known radius."""
     angle = drums.motor_angle(known, joint_m)
-    angle, slope = (of_each_winch(robot, v) for v in (angle, drums.paid_out(known, angle)[1]))
+    _, slope = drums.paid_out(known, angle)
+    angle, slope = of_each_winch(robot, angle), of_each_winch(robot, slope)
     return {"motor_angle_rad": _by_leg(angle), "wire_per_motor_angle_m_rad": _by_leg(slope)}
 
 
@@ -261,62 +271,6 @@ def _by_leg(values: Floats) -> Band:
     columns = zip(*(b.values() for b in bands), strict=True)
     mean, sd, low, middle, high = ([None if v is None else v[0] for v in column] for column in columns)
     return {"mean": mean, "sd": sd, "q05": low, "q50": middle, "q95": high}
-
-
-def _round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Floats, R: Floats) -> ForwardKinematics:
-    """Forward kinematics of the commands, from a start beside the pose, must return to it."""
-    lengths = commands.zero_m, commands.offset_m
-    near, turned = plane.onto(robot, (x + 0.01 * robot.size_m)[None], R[None])
-    back = forward.solve_equilibrium(robot, wires, *lengths, near[0], turned[0])
-    off_m = np.abs(back.position_m - x)[back.found]
-    pose = np.repeat(x[None], len(commands.zero_m), axis=0), commands.rotation
-    stiffness = one_sided.lowest_stiffness(robot, wires, pose, lengths)
-    return {
-        "solved": float(back.found.mean()),
-        "statuses": {text: int((back.status == code).sum()) for code, text in outcome.STATUS.items()},
-        "largest_round_trip_error_m": float(off_m.max(initial=0.0)),
-        "slack_wires": int((commands.tension_N[0] <= 0).sum()),
-        "lowest_stiffness_N_m": band_over_draws(stiffness[commands.feasible]),
-    }
-
-
-def _all_equilibria(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: Generator) -> EquilibriaJson:
-    """The commanded pose, and every stable pose that the same lengths of the mean wire allow, from many starts."""
-    mean = control.known(wires)
-    tau = inverse.tensions(robot, x[None], R[None])
-    commands = inverse.commands(robot, mean, x[None], R[None], tau)
-    lengths = commands.zero_m[0], commands.offset_m[0]
-    if robot.winch is not None:
-        R = commands.rotation[0]
-    if not commands.feasible[0]:  # some draws are strong enough, their mean is not
-        return {"stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []}
-    here = forward.solve_equilibrium(robot, mean, commands.zero_m, commands.offset_m, x, R)
-    near_m = 1e-6 * robot.span_m
-    stable = bool(here.found[0]) and bool(np.abs(here.position_m[0] - x).max() < near_m)
-    found = equilibria.equilibria(robot, mean, *lengths, rng, known=(x, R))
-    moved = np.abs(found.position_m - x).max(1)
-    turned = robot.size_m * np.abs(found.rotation - R).max((1, 2))
-    own = np.maximum(moved, turned) < near_m
-    each = zip(found.position_m, found.rotation, found.tension_N, own, strict=True)
-    poses = [_equilibrium(*one, stable=True) for one in each]
-    if not own.any():
-        poses.append(_equilibrium(x, R, tau[0], True, stable=False))
-    return {
-        "stable_found": len(found.position_m),
-        "starts": 65,
-        "commanded_stable": stable,
-        "poses": poses,
-    }
-
-
-def _equilibrium(x: Floats, R: Floats, tension_N: Floats, commanded: bool, *, stable: bool) -> EquilibriumPose:
-    return {
-        "position_m": x,
-        "rotation_vector_rad": turning.vector(R[None])[0],
-        "slack_wires": int((tension_N <= 0).sum()),
-        "commanded": bool(commanded),
-        "stable": stable,
-    }
 
 
 def _drift(course: Course, x: Floats, R: Floats) -> DriftBands:
@@ -342,7 +296,9 @@ def _claim(courses: dict[float, Course], x: Floats, R: Floats, request: PoseRequ
         value = None
         if k.size:
             distance = np.linalg.norm(course.position_m[:, k[0]] - x, axis=-1)
-            value = float(((distance < DISTANCE_M) & (turning.tilt(course.rotation[:, k[0]], R) < TILT_RAD)).mean())
+            tilt = turning.tilt(course.rotation[:, k[0]], R)
+            inside = (distance < DISTANCE_M) & (tilt < TILT_RAD)
+            value = float(inside.mean())
         probability.append({"specimen_spread": spread, "probability": value})
     return {
         "time_s": TIME_S,
@@ -354,7 +310,10 @@ def _claim(courses: dict[float, Course], x: Floats, R: Floats, request: PoseRequ
 
 def _shares(robot: Robot, line: WireDraws, courses: dict[float, Course], x: Floats, R: Floats) -> VarianceShares:
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
-    size = {s: np.linalg.norm(drift.distance_moved(c, x, R)[0][:, -1], axis=-1) for s, c in courses.items()}
+    size = {}
+    for spread, course in courses.items():
+        shift, _ = drift.distance_moved(course, x, R)
+        size[spread] = np.linalg.norm(shift[:, -1], axis=-1)
     held = np.isfinite(size[0.0])
     result: VarianceShares = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
     if robot.is_on_given_wires:

@@ -81,15 +81,24 @@ def map_slices(robot: Robot, line: WireDraws, slices: Slices) -> tuple[Map, ...]
         return ()
     few = line.part(evenly(line.count, _DRAWS))
     wires = draws.for_robot(robot, few)
-    where = claim.grid(robot, _GRID if (robot.upper_m > robot.lower_m).all() else _FLAT)
-    if slices.heights_m is not None:
+    where = _points(robot, slices.heights_m)
+    maps = []
+    for turn in slices.rotations_rad:
+        drift = claim.over_workspace(robot, wires, where, rotation=matrix(turn))
+        maps.append(Map(turn, where, drift))
+    return tuple(maps)
+
+
+def _points(robot: Robot, heights_m: Floats | None) -> Floats:
+    """(p, 3) positions of the slices' grid."""
+    boxy = (robot.upper_m > robot.lower_m).all()
+    where = claim.grid(robot, _GRID if boxy else _FLAT)
+    if heights_m is not None:
         level = where[where[:, 2] == where[0, 2]]
-        where = np.concatenate([np.column_stack([level[:, :2], np.full(len(level), z)]) for z in slices.heights_m])
-    where = plane.onto(robot, where, np.broadcast_to(np.eye(3), (len(where), 3, 3)))[0]
-    return tuple(
-        Map(turn, where, claim.over_workspace(robot, wires, where, rotation=matrix(turn)))
-        for turn in slices.rotations_rad
-    )
+        slices = [np.column_stack([level[:, :2], np.full(len(level), z)]) for z in heights_m]
+        where = np.concatenate(slices)
+    position, _ = plane.onto(robot, where, np.broadcast_to(np.eye(3), (len(where), 3, 3)))
+    return position
 
 
 def summaries(found: tuple[Map, ...]) -> list[SliceOfWorkspace]:
@@ -97,16 +106,19 @@ def summaries(found: tuple[Map, ...]) -> list[SliceOfWorkspace]:
     out: list[SliceOfWorkspace] = []
     for one in found:
         through = one.slice_axis
-        for level in np.unique(one.requested_m[:, through]):
+        requested = one.requested_m[:, through]
+        for level in np.unique(requested):
             here = one.drift.position_m[:, through] == level
-            share = float(here.sum() / (one.requested_m[:, through] == level).sum())
             where: SliceOfWorkspace = {
                 "rotation_vector_rad": one.rotation_rad,
                 "axis": "xyz"[through],
                 "at_m": float(level),
                 "feasible": 0.0,
             }
-            out.append({**where, **claim.claim_summary(one.drift.part(here, share))} if here.any() else where)
+            if here.any():
+                share = float(here.sum() / (requested == level).sum())
+                where = {**where, **claim.claim_summary(one.drift.part(here, share))}
+            out.append(where)
     return out
 
 
@@ -114,19 +126,24 @@ def rows(found: tuple[Map, ...]) -> list[tuple[float, ...]]:
     """A row of `TABLE` for every point; NaN where no tensions hold it."""
     out: list[tuple[float, ...]] = []
     for one in found:
-        where = {tuple(x): i for i, x in enumerate(one.drift.position_m)}
+        held = {tuple(x): i for i, x in enumerate(one.drift.position_m)}
         inside = one.drift.holds()
         for x in one.requested_m:
-            i = where.get(tuple(x))
+            i = held.get(tuple(x))
             values = [0.0] + [np.nan] * 9
             if i is not None:
-                far, tilt = 1e3 * one.drift.distance_m[i], np.degrees(one.drift.tilt_rad[i])
-                held = np.isfinite(far)
-                bands = [q for v in (far, tilt) for q in _quantiles(v[held])]
-                tension = one.drift.tension_N[i]
-                values = [held.mean(), *bands, inside[i], tension.min(), tension.max()]
+                values = _at_point(one.drift, i, inside[i])
             out.append((*map(float, one.rotation_rad), *map(float, x), *map(float, values)))
     return out
+
+
+def _at_point(drift: WorkspaceDrift, i: int, inside: float) -> list[float]:
+    """What a row says of a point that tensions hold."""
+    far_mm, tilt_deg = 1e3 * drift.distance_m[i], np.degrees(drift.tilt_rad[i])
+    held = np.isfinite(far_mm)
+    tension = drift.tension_N[i]
+    bands = _quantiles(far_mm[held]) + _quantiles(tilt_deg[held])
+    return [held.mean(), *bands, inside, tension.min(), tension.max()]
 
 
 def _quantiles(values: Floats) -> list[float]:

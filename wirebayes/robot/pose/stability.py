@@ -24,12 +24,10 @@ def summary(course: Course) -> FallsReport:
         return {"began": 0.0}
     fell, fell_at_s = falls.fell[began], falls.time_s[began]
     slack_s = falls.slack_s[began]
-    slack = np.isfinite(slack_s)
     drop_m = falls.drop_m[began][fell]
     caught = np.isfinite(drop_m)
     holds = began & ~falls.fell  # margins mean something where there is a hold to lose
-    tension_share = falls.tension_share[holds]
-    lowest = np.where(np.isfinite(tension_share), tension_share, np.inf).min(axis=1, initial=np.inf)
+    lowest = _finite_or_infinite(falls.tension_share[holds]).min(axis=1, initial=np.inf)
     return {
         "began": float(began.mean()),
         "fall_probability": float(fell.mean()),
@@ -38,12 +36,16 @@ def summary(course: Course) -> FallsReport:
         "fall_wires": _by_wire(falls.wire[began][fell], course.tension_N.shape[-1], len(fell)),
         "fall_distance_mm": _spread(1e3 * drop_m[caught]),
         "caught_probability": float(caught.mean()) if fell.any() else None,
-        "slack_probability": slack.mean(0),
+        "slack_probability": np.isfinite(slack_s).mean(0),
         "slack_time_s": [_spread(times[np.isfinite(times)]) for times in slack_s.T],
         "least_tension_wire": int(_nearest(falls, began)) + 1,
         "least_tension_share": band_over_draws(lowest),
         "stiffness_share": band_over_draws(falls.stiffness_share[holds]),
     }
+
+
+def _finite_or_infinite(values: Floats) -> Floats:
+    return np.where(np.isfinite(values), values, np.inf)
 
 
 def _spread(values: Floats) -> Times | None:
@@ -58,7 +60,7 @@ def _by_wire(wires: Ints, legs: int, draws: int) -> Floats:
 
 def _nearest(falls: Falls, began: Bools) -> int:
     """The wire that comes nearest to slackness in most draws."""
-    share = np.where(np.isfinite(falls.tension_share), falls.tension_share, np.inf)[began]
+    share = _finite_or_infinite(falls.tension_share)[began]
     return int(np.bincount(share.argmin(1), minlength=share.shape[1]).argmax())
 
 
@@ -122,11 +124,10 @@ def _fallen(found: FallsReport) -> str | None:
 
 
 def _slack(found: FallsReport) -> str | None:
-    each = [
-        f"wire {i + 1} in {_percent(p)} of the draws, first after {t['first']:.3g} s"
-        for i, (p, t) in enumerate(zip(found["slack_probability"], found["slack_time_s"], strict=True))
-        if t is not None
-    ]
+    each = []
+    for i, (share, times) in enumerate(zip(found["slack_probability"], found["slack_time_s"], strict=True)):
+        if times is not None:
+            each.append(f"wire {i + 1} in {_percent(share)} of the draws, first after {times['first']:.3g} s")
     return ", ".join(each) or None
 
 

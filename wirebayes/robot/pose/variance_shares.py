@@ -31,23 +31,29 @@ def shares(parameters: Mapping[str, Floats], output: Floats) -> dict[str, float]
     total = float(np.var(output))
     if total == 0 or not names:
         return dict.fromkeys(parameters, 0.0) | {"unexplained": 0.0}
-    y = (output - output.mean()) / output.std()
-    columns = {name: _columns(parameters[name]) for name in names}
-    explained: dict[tuple[str, ...], float] = {(): 0.0}
-    for size in range(1, len(names) + 1):
-        for subset in combinations(names, size):
-            X = np.column_stack([columns[name] for name in subset])
-            fit = X @ np.linalg.lstsq(X, y, rcond=None)[0]
-            explained[subset] = float(1.0 - np.mean((y - fit) ** 2))
+    explained = _explained({name: _columns(parameters[name]) for name in names}, output)
     out = dict.fromkeys(parameters, 0.0)
     d = len(names)
     for name in names:
         rest = [other for other in names if other != name]
         for size in range(d):
+            orders = d * comb(d - 1, size)
             for subset in combinations(rest, size):
                 with_it = tuple(other for other in names if other in subset or other == name)
-                out[name] += (explained[with_it] - explained[subset]) / (d * comb(d - 1, size))
+                out[name] += (explained[with_it] - explained[subset]) / orders
     return out | {"unexplained": 1.0 - explained[tuple(names)]}
+
+
+def _explained(columns: dict[str, Floats], output: Floats) -> dict[tuple[str, ...], float]:
+    """Share of an output's variance that the regression on every subset of parameters explains."""
+    y = (output - output.mean()) / output.std()
+    explained: dict[tuple[str, ...], float] = {(): 0.0}
+    for size in range(1, len(columns) + 1):
+        for subset in combinations(columns, size):
+            X = np.column_stack([columns[name] for name in subset])
+            fit = X @ np.linalg.lstsq(X, y, rcond=None)[0]
+            explained[subset] = float(1.0 - np.mean((y - fit) ** 2))
+    return explained
 
 
 def _columns(value: Floats) -> Floats:

@@ -98,14 +98,20 @@ def from_dict(values: Any, robot: Robot, line: WireDraws) -> Calibrated:
         The values are not those of such a robot and line.
     """
     prior = LengthPrior(line, 1e-3 * float(values["reference_sd_mm"]), float(values["specimen_spread"]))
-    mean, covariance = np.array(values["mean"], float), np.array(values["covariance"], float)
+    mean = np.array(values["mean"], float)
+    covariance = np.array(values["covariance"], float)
     d = len(prior.moments(robot.legs)[0])
     if list(values["line"]) != prior.names or mean.shape != (d,) or covariance.shape != (d, d):
         raise ValueError("other unknowns")
-    gone = values["session"]
-    joint, duration = np.array(gone["joint_m"], float), np.array(gone["duration_s"], float)
-    place, turn = np.array(gone["position_m"], float), np.array(gone["rotation_vector_rad"], float)
-    if joint.shape != (len(duration), robot.legs) or place.shape != (len(duration), 3):
+    return Calibrated(robot, prior, _session(values["session"], robot), mean, covariance)
+
+
+def _session(values: Any, robot: Robot) -> Session:
+    joint, duration, place, turn = (
+        np.array(values[name], float) for name in ("joint_m", "duration_s", "position_m", "rotation_vector_rad")
+    )
+    holds = len(duration)
+    if joint.shape != (holds, robot.legs) or place.shape != (holds, 3):
         raise ValueError("another robot's session")
-    unread = np.zeros(len(duration), bool)  # the readings are in the posterior
-    return Calibrated(robot, prior, Session(place, matrix(turn), joint, duration, unread, np.nan), mean, covariance)
+    unread = np.zeros(holds, bool)  # the readings are in the posterior
+    return Session(place, matrix(turn), joint, duration, unread, np.nan)

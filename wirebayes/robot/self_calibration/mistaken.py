@@ -5,12 +5,14 @@ there, whatever the wires are. That is checked before anything is fitted, for no
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.notice import Notice
+from wirebayes.numeric.batches import batch_last
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
@@ -81,11 +83,13 @@ def tension_notices(robot: Robot, session: Session, readings: Floats) -> list[No
 
 def _refuse_lengths(robot: Robot, session: Session, rows: Bools, table: CsvTable, joints: Sequence[str]) -> None:
     """Two columns of joint values that are the lengths of each other's wires."""
-    shape = statics.geometry(robot, session.position_m[rows].T, np.moveaxis(session.rotation[rows], 0, -1))
+    poses = session.position_m[rows], session.rotation[rows]
+    shape = statics.geometry(robot, poses[0].T, batch_last(poses[1]))
 
     def apart(order: Sequence[int]) -> Floats:
         bare, offset = lengths(robot, session.joint_m[rows][:, order])
-        return np.asarray((statics.stretched(robot, shape, offset.T).T - bare).std(0))  # references may err
+        way = statics.stretched(robot, shape, offset.T).T
+        return np.asarray((way - bare).std(0))  # references may err
 
     as_read = apart(range(robot.legs))
     for i, j in combinations(range(robot.legs), 2):
@@ -131,32 +135,59 @@ def _tension_mistake(
 
     The columns, what was found and what was expected.
     """
-    turn = np.moveaxis(rotation, 0, -1)
-    shape = statics.geometry(robot, position_m.T, turn)
-    force, load = -statics.wire_jacobian(robot, shape), -statics.weight(robot, turn)
-    scale = np.where(np.arange(len(load)) < 3, 1.0, 1.0 / robot.size_m)[:, None]
-    load = scale * load
+    balance = _Balance.at(robot, position_m, rotation, tension_N)
     names = [f"tension_{i}_N" for i in range(1, robot.legs + 1)]
-
-    def pulled(order: Sequence[int]) -> Floats:
-        return scale * (force * tension_N[:, order].T).sum(1)
-
-    def left(pull: Floats) -> float:
-        return float(np.linalg.norm(pull - load) / np.linalg.norm(load))
-
-    pull = pulled(range(robot.legs))
-    times = float((pull * load).sum() / max((pull * pull).sum(), 1e-300))
-    if not 1 / _ANOTHER_UNIT < times < _ANOTHER_UNIT and left(times * pull) < _EVEN:
+    pull = balance.pull(range(robot.legs))
+    times = float((pull * balance.load).sum() / max((pull * pull).sum(), 1e-300))
+    if not 1 / _ANOTHER_UNIT < times < _ANOTHER_UNIT and balance.left(times * pull) < _EVEN:
         found = f"tensions that are, all together, {number(1 / times)} times what carries the platform's weight"
         return f"{names[0]} to {names[-1]}", found, "newtons (or another mass_kg)"
-    if left(pull) < _EVEN:
+    left = balance.left(pull)
+    if left < _EVEN:
         return None
     for i, j in combinations(range(robot.legs), 2):
-        other = left(pulled(_swapped(robot.legs, i, j)))
-        if _BETTER * other < left(pull):
-            found = f"tensions that leave {100 * left(pull):.2g} % of the weight unbalanced"
+        other = balance.left(balance.pull(_swapped(robot.legs, i, j)))
+        if _BETTER * other < left:
+            found = f"tensions that leave {100 * left:.2g} % of the weight unbalanced"
             return f"columns {names[i]} and {names[j]}", found, _in_place(f"{100 * other:.2g} %")
     return None
+
+
+@dataclass(frozen=True)
+class _Balance:
+    """Forces and moments in newtons on a platform at ``p`` poses.
+
+    Attributes
+    ----------
+    structure : (d, w, p) array
+        Of 1 N in each wire.
+    scale : (d, 1) array
+        Of moments.
+    load : (d, p) array
+        What the wires shall carry.
+    tension_N : (p, w) array
+    """
+
+    structure: Floats
+    scale: Floats
+    load: Floats
+    tension_N: Floats
+
+    @classmethod
+    def at(cls, robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> "_Balance":
+        turn = batch_last(rotation)
+        shape = statics.geometry(robot, position_m.T, turn)
+        load = -statics.weight(robot, turn)
+        scale = np.where(np.arange(len(load)) < 3, 1.0, 1.0 / robot.size_m)[:, None]
+        return cls(-statics.wire_jacobian(robot, shape), scale, scale * load, tension_N)
+
+    def pull(self, order: Sequence[int]) -> Floats:
+        """What wires pull whose tensions stand in this order."""
+        return np.asarray(self.scale * (self.structure * self.tension_N[:, order].T).sum(1))
+
+    def left(self, pull: Floats) -> float:
+        """What is left unbalanced, of the load."""
+        return float(np.linalg.norm(pull - self.load) / np.linalg.norm(self.load))
 
 
 def _swapped(count: int, i: int, j: int) -> list[int]:

@@ -12,6 +12,7 @@ import numpy as np
 from wirebayes.numeric.linear_algebra import inv, solve
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics import rotation as turns
+from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.equations import Equations, Holds, State, moved
 from wirebayes.robot.self_calibration.linearisation import linearised
@@ -53,24 +54,41 @@ def next_poses(found: Whole, holds: Holds, count: int, rng: np.random.Generator)
     unknowns = found.unknowns
     parts = unknowns.parts(found.state.white)
     robot = moved(unknowns.robot, parts)
+    poses = _candidates(robot, rng)
+    if count == 0 or not len(poses.x):
+        return NextPoses(np.empty((0, 3)), np.empty(0))
+    told = _as_read(holds, poses)
+    wires, _ = unknowns.prior.wires(unknowns.robot, parts.wires[None])
+    commands = inverse.commands(robot, wires, poses.x, poses.R, poses.tau)
+    told = replace(told, session=replace(told.session, joint_m=commands.joint_m))
+    motion = _follows(_at(found, _blind(told), poses), robot.degrees)
+    root = np.moveaxis(motion[:, :3], 0, 1).reshape(-1, motion.shape[2])  # what counts: the position
+    information = _information(_at(found, told, poses))
+    picked, sd = _one_after_another(found.covariance, information, root, min(count, len(poses.x)))
+    return NextPoses(poses.x[picked], sd)
+
+
+@dataclass(frozen=True)
+class _Candidates:
+    """Poses ``(n, 3)`` and ``(n, 3, 3)`` in the workspace with tensions ``(n, w)`` that hold them."""
+
+    x: Floats
+    R: Floats
+    tau: Floats
+
+
+def _candidates(robot: Robot, rng: np.random.Generator) -> _Candidates:
     x = rng.uniform(robot.lower_m, robot.upper_m, (_CANDIDATES, 3))
     R = np.broadcast_to(turns.matrix(robot.home_rotation_rad), (_CANDIDATES, 3, 3))
     tau = inverse.tensions(robot, x, R)
     good = np.isfinite(tau).all(1)
-    if count == 0 or not good.any():
-        return NextPoses(np.empty((0, 3)), np.empty(0))
-    x, R, tau = x[good], R[good], tau[good]
-    told = _as_read(holds, x, R, tau)
-    wires = unknowns.prior.wires(unknowns.robot, parts.wires[None])[0]
-    commands = inverse.commands(robot, wires, x, R, tau)
-    told = replace(told, session=replace(told.session, joint_m=commands.joint_m))
-    equations = _at(found, told, x, R, tau)
-    blind = replace(told, tension_N=np.full_like(tau, np.nan), session=told.session.without_poses(), tilt=None)
-    motion = _follows(_at(found, blind, x, R, tau), robot.degrees)
-    information = _information(equations)
-    root = np.moveaxis(motion[:, :3], 0, 1).reshape(-1, motion.shape[2])  # what counts: the position
-    picked, sd = _one_after_another(found.covariance, information, root, min(count, len(x)))
-    return NextPoses(x[picked], sd)
+    return _Candidates(x[good], R[good], tau[good])
+
+
+def _blind(holds: Holds) -> Holds:
+    """The same where nothing but the joint values is read."""
+    unread = np.full_like(holds.tension_N, np.nan)
+    return replace(holds, tension_N=unread, session=holds.session.without_poses(), tilt=None)
 
 
 def _one_after_another(covariance: Floats, information: Floats, root: Floats, count: int) -> tuple[list[int], Floats]:
@@ -90,27 +108,35 @@ def _rms(covariance: Floats, root: Floats, poses: int) -> float:
     return float(np.sqrt(np.einsum("ri,ij,rj->", root, covariance, root) / poses))
 
 
-def _as_read(holds: Holds, x: Floats, R: Floats, tau: Floats) -> Holds:
+def _as_read(holds: Holds, poses: _Candidates) -> Holds:
     """Candidates as holds, with what most of the session's holds have."""
-    session, n = holds.session, len(x)
-    read = np.isfinite(holds.tension_N).all(1).mean() >= 0.5
-    placed = holds.placed.mean() >= 0.5
+    session, n = holds.session, len(poses.x)
+    read = bool(np.isfinite(holds.tension_N).all(1).mean() >= 0.5)
     there = Session(
-        x if placed else np.full_like(x, np.nan),
-        R if placed else np.full(R.shape, np.nan),
-        np.zeros_like(tau),
+        poses.x,
+        poses.R,
+        np.zeros_like(poses.tau),
         np.full(n, float(np.median(session.duration_s))),
         np.full(n, read),
         session.tension_sd_N,
         session.tilt_sd_rad,
     )
-    tilt = None if holds.tilt is None else np.where(np.isfinite(holds.tilt).any(), R[:, :2, 2], np.nan)
-    return Holds(there, tau if read else np.full_like(tau, np.nan), tilt)
+    if holds.placed.mean() < 0.5:
+        there = there.without_poses()
+    tension_N = poses.tau if read else np.full_like(poses.tau, np.nan)
+    return Holds(there, tension_N, _tilt_as_read(holds, poses))
 
 
-def _at(found: Whole, holds: Holds, x: Floats, R: Floats, tau: Floats) -> Equations:
-    state = State(found.state.white, x, np.array(R), tau)
-    return linearised(found.unknowns, holds, found.noise, state, _no_creep(found, len(x)), state)
+def _tilt_as_read(holds: Holds, poses: _Candidates) -> Floats | None:
+    if holds.tilt is None:
+        return None
+    return np.where(np.isfinite(holds.tilt).any(), poses.R[:, :2, 2], np.nan)
+
+
+def _at(found: Whole, holds: Holds, poses: _Candidates) -> Equations:
+    state = State(found.state.white, poses.x, np.array(poses.R), poses.tau)
+    no_creep = _no_creep(found, len(poses.x))
+    return linearised(found.unknowns, holds, found.noise, state, no_creep, state)
 
 
 def _no_creep(found: Whole, count: int) -> Grown:
@@ -121,10 +147,10 @@ def _no_creep(found: Whole, count: int) -> Grown:
 
 def _information(e: Equations) -> Floats:
     """(n, m, m) what each hold says of the robot's unknowns."""
-    z, g = e.by_hold, e.by_robot
-    zt = z.swapaxes(1, 2)
-    B = zt @ g
-    return np.asarray(g.swapaxes(1, 2) @ g - B.swapaxes(1, 2) @ solve(zt @ z, B), np.float64)
+    by_hold, by_robot = e.by_hold, e.by_robot
+    mixed = by_hold.mT @ by_robot
+    follows = solve(by_hold.mT @ by_hold, mixed)
+    return np.asarray(by_robot.mT @ by_robot - mixed.mT @ follows, np.float64)
 
 
 def _follows(e: Equations, degrees: int) -> Floats:

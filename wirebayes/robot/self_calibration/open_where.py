@@ -31,18 +31,24 @@ def most_open(found: Whole, session: Session) -> str:
     share = _shares(found)
     if not np.isfinite(share).all():
         return ""
-    holds, wires = share.sum(1), share.sum(0)
-    order = np.argsort(wires)[::-1]
-    said = []
-    if len(wires) >= _WIRES and wires[order[0]] > _ONE:
-        said.append(f"joint value {order[0] + 1} ({100 * wires[order[0]]:.0f} % of the sum of squares)")
-    elif len(wires) >= _MORE_WIRES and wires[order[:2]].sum() > _TWO:
-        two = listed([str(leg + 1) for leg in sorted(order[:2])])
-        said.append(f"joint values {two} ({100 * wires[order[:2]].sum():.0f} % of the sum of squares)")
+    said = _open_wires(share.sum(0))
+    holds = share.sum(1)
     worst = int(holds.argmax())
     if len(holds) >= _HOLDS and holds[worst] > _HOLD:
         said.append(f"hold {session.numbers[worst]:g} ({100 * holds[worst]:.0f} %)")
     return f", mostly in {' and in '.join(said)}" if said else ""
+
+
+def _open_wires(share: Floats) -> list[str]:
+    """The wire or two that have most of what is open; none where all have their part."""
+    order = np.argsort(share)[::-1]
+    largest, two_largest = share[order[0]], share[order[:2]].sum()
+    if len(share) >= _WIRES and largest > _ONE:
+        return [f"joint value {order[0] + 1} ({100 * largest:.0f} % of the sum of squares)"]
+    if len(share) >= _MORE_WIRES and two_largest > _TWO:
+        two = listed([str(leg + 1) for leg in sorted(order[:2])])
+        return [f"joint values {two} ({100 * two_largest:.0f} % of the sum of squares)"]
+    return []
 
 
 def odd_hold(found: Whole, session: Session) -> list[Notice]:
@@ -56,16 +62,13 @@ def odd_hold(found: Whole, session: Session) -> list[Notice]:
     """
     if found.unknowns.errors.joint_m is not None:
         return []  # then the joint test knows
-    rows = found.equations.rows["loop"]
-    free = np.maximum(1.0 - leverage(found, rows), 0.0).sum(1)
     holds = _shares(found).sum(1)
-    others = free.sum() - free
-    with np.errstate(invalid="ignore"):
-        p = np.where((free > 0) & (others > 0), betainc(0.5 * others, 0.5 * free, 1.0 - holds), 1.0)
+    p = _chances(found, holds)
     worst = int(p.argmin())
-    open_m = found.equations.residual[worst, rows] * found.noise.joint_m / found.unknowns.robot.lines
-    rms = root_mean_square(open_m)
-    if not (len(p) * p[worst] < _CHANCE and rms > USUAL * found.unknowns.robot.span_m):
+    residual = found.equations.residual[worst, found.equations.rows["loop"]]
+    open_m = residual * found.noise.joint_m / found.unknowns.robot.lines
+    visible = root_mean_square(open_m) > USUAL * found.unknowns.robot.span_m
+    if not (len(p) * p[worst] < _CHANCE and visible):
         return []
     leg = int(np.abs(open_m).argmax())
     text = (
@@ -74,6 +77,16 @@ def odd_hold(found: Whole, session: Session) -> list[Notice]:
         f"all joint values, {number(1e3 * found.noise.joint_m, 2)} mm, was estimated with it"
     )
     return [Notice("data", text)]
+
+
+def _chances(found: Whole, share: Floats) -> Floats:
+    """(p,) Probability that a hold of a sound session has so large a share."""
+    left = 1.0 - leverage(found, found.equations.rows["loop"])
+    free = np.maximum(left, 0.0).sum(1)
+    others = free.sum() - free
+    with np.errstate(invalid="ignore"):
+        p = betainc(0.5 * others, 0.5 * free, 1.0 - share)
+    return np.where((free > 0) & (others > 0), p, 1.0)
 
 
 def _shares(found: Whole) -> Floats:

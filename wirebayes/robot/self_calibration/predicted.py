@@ -71,28 +71,38 @@ def predict_session(
         Where the holds are known to begin, about; default: the requested poses.
     """
     wires, error = prior.wires(robot, unknowns)
-    n = len(unknowns)
-    bias, sign = prior.bias_N(robot.legs, unknowns), iter(session.bias_sign)
-    solved = np.ones(n, bool)
-    tensions, lengths, begun, read, ended = [], [], [], [], []
+    bias = prior.bias_N(robot.legs, unknowns)
+    begun, ended, read, tensions, lengths = [], [], [], [], []
     for k, hold in enumerate(holds(robot, wires, error, session, session.tension_sd_N, longest_step, near)):
-        here, length = hold.here, hold.bare_m * (1 + hold.state.strain(wires).T)
+        strain = hold.state.strain(wires).T
+        length = hold.bare_m * (1 + strain)
         begun.append(hold.begun)
-        ended.append(here)
-        solved &= here.found
+        ended.append(hold.here)
         if session.read[k]:
-            read.append(here)
-            tensions.append(here.tension_N + bias * next(sign))
+            read.append(hold.here)
+            tensions.append(hold.here.tension_N + bias * session.signs[k])
             lengths.append(length)
     position, turn = _poses(read)
-    readings = np.concatenate(tensions, 1) / session.tension_sd_N
-    if session.tilt_sd_rad is not None:
-        normals = turn[:, :, :2, 2].reshape(n, -1)
-        readings = np.concatenate([readings, normals / session.tilt_sd_rad], 1)
-    strain = np.broadcast_to(hold.state.strain(wires).T, length.shape)
     return PredictedSession(
-        readings, length, strain, position, turn, *_poses(begun), *_poses(ended), np.stack(lengths, 1), solved
+        _standardised(session, np.concatenate(tensions, 1), turn),
+        length,
+        np.broadcast_to(strain, length.shape),
+        position,
+        turn,
+        *_poses(begun),
+        *_poses(ended),
+        np.stack(lengths, 1),
+        np.all([here.found for here in ended], axis=0),
     )
+
+
+def _standardised(session: Session, tension_N: Floats, turn: Floats) -> Floats:
+    """Readings ``(n, r)`` in units of their standard errors."""
+    readings = tension_N / session.tension_sd_N
+    if session.tilt_sd_rad is None:
+        return readings
+    normals = turn[:, :, :2, 2].reshape(len(turn), -1)
+    return np.concatenate([readings, normals / session.tilt_sd_rad], 1)
 
 
 def _poses(solved: Sequence[forward.Equilibria]) -> tuple[Floats, Floats]:

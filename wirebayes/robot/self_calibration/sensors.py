@@ -18,6 +18,7 @@ from wirebayes.progress import ShareDone
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance
+from wirebayes.robot.self_calibration.unknowns import Unknowns
 from wirebayes.robot.self_calibration.whole import estimate
 
 LEAST_HOLDS = 2  # read: at a single one an error of a sensor and one of a length look the same
@@ -97,21 +98,29 @@ def suspects(found: Whole, holds: Holds, progress: ShareDone = lambda share: Non
     widest = float(holds.tension_N[read].max())  # no sensor is off by more than it ever read
     if not widest > 0:
         return None
-    # the error of the loops stays: it explains nothing that a sensor would, and the balance is exact
-    errors = replace(unknowns.errors, joint_m=found.noise.joint_m)
-    free = replace(unknowns, prior=replace(unknowns.prior, bias_sd_N=widest), errors=errors)
-    legs, at = unknowns.robot.legs, free.slices["wires"]
-    white = np.insert(found.state.white, at.stop - legs, np.zeros(legs))
-    sensors, state = slice(at.stop - legs, at.stop), replace(found.state, white=white)
-    bias, covariance = np.full(legs, np.inf), np.eye(legs)
+    free = _with_biases(found, widest)
+    legs, end = unknowns.robot.legs, free.slices["wires"].stop
+    sensors = slice(end - legs, end)
+    white = np.insert(found.state.white, end - legs, np.zeros(legs))
+    state = replace(found.state, white=white)
+    bias = np.full(legs, np.inf)
     for _ in range(_TRIES):
         other = estimate(free, holds, state, progress)
-        before, bias, state = bias, widest * other.state.white[sensors], other.state
+        state, before = other.state, bias
+        bias = widest * state.white[sensors]
         covariance = widest**2 * other.covariance[sensors, sensors]
         still = np.abs(bias - before) < _STILL * np.sqrt(np.diag(covariance))
         if other.converged or still.all():
             return weighed(bias, covariance, widest)
     return None
+
+
+def _with_biases(found: Whole, sd_N: float) -> Unknowns:
+    """The unknowns with an error of every tension sensor."""
+    unknowns = found.unknowns
+    # the error of the loops stays: it explains nothing that a sensor would, and the balance is exact
+    errors = replace(unknowns.errors, joint_m=found.noise.joint_m)
+    return replace(unknowns, prior=replace(unknowns.prior, bias_sd_N=sd_N), errors=errors)
 
 
 def sensors_json(found: Suspects | None) -> SensorsAtFault | None:
@@ -141,18 +150,19 @@ def sensor_notices(found: Suspects | None) -> list[Notice]:
     """
     if found is None or not found.p_none < SIGNIFICANT:
         return []
-    if not found.wires:
+    wires = found.wires
+    if not wires:
         text = f"several tension sensors are off ({chance(found.p_none)} if none were): do not use these values"
         return [Notice("misfit", text)]
-    texts = [
-        f"wire {i + 1} (reads {abs(found.bias_N[i]):.3g} +- {found.sd_N[i]:.2g} N too "
-        f"{'much' if found.bias_N[i] > 0 else 'little'})"
-        for i in found.wires
-    ]
-    one = len(texts) == 1
-    share = 100 * found.explains[found.wires].min()
-    whole = bool((found.p_alone[found.wires] >= SIGNIFICANT).all()) or share >= _NEARLY_ALL
+    texts = [_in_words(i, found.bias_N[i], found.sd_N[i]) for i in wires]
+    share = 100 * found.explains[wires].min()
+    whole = bool((found.p_alone[wires] >= SIGNIFICANT).all()) or share >= _NEARLY_ALL
     much = "" if whole else f"{share:.0f} % of "
     said = f"the tension sensor of {' or of '.join(texts)} would explain {much}what contradicts"
-    advice = f"do not use these values; {'zero it' if one else 'find out which, zero it'}, or give --tension-bias"
-    return [Notice("misfit", f"{said}: {advice}")]
+    correct = "zero it" if len(wires) == 1 else "find out which, zero it"
+    return [Notice("misfit", f"{said}: do not use these values; {correct}, or give --tension-bias")]
+
+
+def _in_words(wire: int, bias_N: float, sd_N: float) -> str:
+    much = "much" if bias_N > 0 else "little"
+    return f"wire {wire + 1} (reads {abs(bias_N):.3g} +- {sd_N:.2g} N too {much})"

@@ -1,0 +1,53 @@
+"""What a step of a live estimator answers."""
+
+from dataclasses import dataclass
+
+from wirebayes.numeric.typing import Floats
+
+
+@dataclass(frozen=True)
+class LivePose:
+    """Where the platform is, and what would bring it back.
+
+    Attributes
+    ----------
+    time_s : float
+    position_m, position_sd_m : (3,) arrays
+        Mean and standard deviation.
+    low_m, high_m : (3,) arrays
+        5 and 95 % of the position.
+    rotation : (3, 3) array
+        Mean orientation.
+    rotation_sd_rad : (3,) array
+        About the world's axes.
+    joint_m, joint_sd_m : (j,) arrays
+        Joint values that bring the platform to where the nominal joint values would hold it if no wire crept.
+    correction_m : (j,) array
+        What that is beyond the nominal joint values: wire of all lines.
+    straight_correction_m : (j,) array
+        The same in one line, as firmware counts: `correction_m` over the number of lines.
+    tension_N : (w,) array
+        Mean.
+    held : float
+        Share of the draws that hold the platform.
+
+    Examples
+    --------
+    >>> now = wb.live("linear-7", posterior, draws=16).step(0.0, held.summary()["inverse"]["joint_value_m"]["q50"])
+    >>> now.held
+    1.0
+    """
+
+    time_s: float
+    position_m: Floats
+    position_sd_m: Floats
+    low_m: Floats
+    high_m: Floats
+    rotation: Floats
+    rotation_sd_rad: Floats
+    joint_m: Floats
+    joint_sd_m: Floats
+    correction_m: Floats
+    straight_correction_m: Floats
+    tension_N: Floats
+    held: float
