@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wirebayes.robot.mechanics import draws
-from wirebayes.robot.motion import drift, equilibria, inverse, outcome, path
+from wirebayes.robot.motion import creeping_hold, drift, equilibria, inverse, outcome, path
 from wirebayes.robot.pose import stability
 from wirebayes.robot.pose.answer import pose_report
 from wirebayes.robot.pose.request import PoseRequest
@@ -133,7 +133,7 @@ def test_where_a_fall_is_within_a_step_is_looked_for_once_the_step_is_short(monk
         return course.falls.time_s, len(taken)
 
     times, steps = fallen()
-    monkeypatch.setattr(drift, "_GLANCE", path.SMALLEST)
+    monkeypatch.setattr(creeping_hold, "_GLANCE", path.SMALLEST)
     exact, more = fallen()
     assert np.isfinite(exact).sum() >= 3
     np.testing.assert_allclose(times, exact, rtol=1e-3)

@@ -177,7 +177,7 @@ def test_a_tackle_of_lines_is_solved_as_one_line_of_their_stiffness():
         found.append(forward.solve_equilibrium(one, wires, m * free, np.zeros(8), c.position_m, c.rotation))
         R = np.moveaxis(c.rotation, 0, -1)
         start = m * free.T, np.zeros((8, n)), c.position_m.T, R
-        begun.append(downhill._begin(one, wires, *start, np.ones((6, 1))))
+        begun.append(downhill._begin(one, wires, *start))
     np.testing.assert_allclose(found[1].position_m, found[0].position_m, atol=1e-12)
     np.testing.assert_allclose(4.0 * found[1].tension_N, found[0].tension_N, atol=1e-9)
     np.testing.assert_array_equal(found[1].status, found[0].status)
@@ -197,7 +197,7 @@ def stepped(monkeypatch, *, gradient=1.0, stiffness=2.0, damping=0.0, level=4.0,
         g[0], H[0, 0] = gradient, stiffness
         return downhill._Point(np.array([value]), g, H, np.zeros((4, 1)), np.array([force]))
 
-    def evaluate(robot, wires, zero, offset, new_x, new_R, scale):
+    def evaluate(robot, wires, zero, offset, new_x, new_R):
         return point(energy - gain, new_size)
 
     monkeypatch.setattr(downhill, "_evaluate", evaluate)
@@ -216,7 +216,7 @@ def stepped(monkeypatch, *, gradient=1.0, stiffness=2.0, damping=0.0, level=4.0,
         floor * one,
         span * one,
     )
-    new, ended = downhill._iterate(WEIGHED, cases_, np.ones((3, 1)))
+    new, ended = downhill._iterate(WEIGHED, cases_)
     moved = float(new.x[0, 0] - x)
     assert new.at.energy[0] == (energy - gain if moved else energy)
     return moved, float(new.damping[0]), int(ended[0])
@@ -309,7 +309,7 @@ def test_a_case_begins_with_the_force_and_the_stiffness_that_rounding_and_dampin
     zero = np.linspace(1.0, 2.5, 16).reshape(8, 2)
     x, R = np.tile(robot.home_m[:, None], 2), np.tile(np.eye(3)[..., None], 2)
     size = robot.size_m
-    begun = downhill._begin(robot, wires, zero, np.zeros((8, 2)), x, R, np.array([[1.0]] * 3 + [[1.0 / size]] * 3))
+    begun = downhill._begin(robot, wires, zero, np.zeros((8, 2)), x, R)
     arm = max(1.0, np.abs(platform).max() / size)
     force = 3.0 * k1.max(0) + robot.mass_kg * 9.80665
     np.testing.assert_allclose(begun.floor, 32 * 2.0**-52 * arm * force)
@@ -318,7 +318,7 @@ def test_a_case_begins_with_the_force_and_the_stiffness_that_rounding_and_dampin
     assert (begun.damping == 0).all() and begun.number.tolist() == [0, 1]
     point = replace(WEIGHED, mass_kg=2.0)
     wires = Wires("hooke", "saturating", {"k1": np.array([[300.0]])}, np.full((4, 1), 1000.0))
-    begun = downhill._begin(point, wires, np.ones((4, 1)), np.zeros((4, 1)), x[:, :1], R[..., :1], np.ones((3, 1)))
+    begun = downhill._begin(point, wires, np.ones((4, 1)), np.zeros((4, 1)), x[:, :1], R[..., :1])
     force = 300.0 * point.lines.max() + 2.0 * 9.80665
     np.testing.assert_allclose(begun.floor, 32 * 2.0**-52 * force)
 
@@ -330,7 +330,7 @@ def test_a_point_has_the_energy_and_the_forces_of_its_pose():
     c = cases.disturbed(robot, "hooke", 4, np.random.default_rng(2))
     R, n = np.moveaxis(c.rotation, 0, -1), len(c.position_m)
     scale = np.array([[1.0]] * 3 + [[1.0 / robot.size_m]] * 3)
-    at = downhill._evaluate(robot, c.wires, c.zero_m.T, c.offset_m.T, c.position_m.T, R, scale)
+    at = downhill._evaluate(robot, c.wires, c.zero_m.T, c.offset_m.T, c.position_m.T, R)
     energy = statics.potential(robot, c.wires, c.position_m.T, R, c.zero_m.T, c.offset_m.T)
     np.testing.assert_allclose(at.energy, energy, rtol=1e-12)
     stiff = statics.stiffness(robot, c.wires, c.position_m.T, R, c.zero_m.T, c.offset_m.T)

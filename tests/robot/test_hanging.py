@@ -131,7 +131,8 @@ def test_three_hundred_drawn_robots_agree_with_the_energy_minimiser():
 
 @pytest.mark.parametrize(("hindrance", "goes_on"), [(0.99e-6, False), (1.01e-6, True)])
 def test_a_bound_is_left_where_it_keeps_a_search_from_its_goal_by_more_than_rounding(four, hindrance, goes_on):
-    search = nearest_balance._Search.beginning(four, np.tile(four.home_m, (2, 1)), np.tile(np.eye(3), (2, 1, 1)))
+    aim = nearest_balance._Aim(four, np.full(3, np.nan), False)
+    search = nearest_balance._Search.beginning(aim, np.tile(four.home_m, (2, 1)), np.tile(np.eye(3), (2, 1, 1)))
     search.bound[:, 2] = 1
     each = np.array([[0.0, 0.0, hindrance, 0.0]] * 2)
     rest = np.array([True, False])  # only what has come to rest lets go

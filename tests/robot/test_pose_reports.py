@@ -15,7 +15,7 @@ from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import claim, control, drift, forward, outcome
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.course import Course, Falls
-from wirebayes.robot.pose import answer, controllers, stability
+from wirebayes.robot.pose import answer, controllers, round_trip, stability
 from wirebayes.robot.pose.request import PoseRequest, band_over_draws
 
 NEVER, NAN = np.inf, np.nan
@@ -375,9 +375,9 @@ def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pyt
         assert lengths == (commands.zero_m, commands.offset_m)
         return np.array([10.0, 20.0, 99.0, 60.0])
 
-    monkeypatch.setattr(answer.forward, "solve_equilibrium", solve)
-    monkeypatch.setattr(answer.one_sided, "lowest_stiffness", stiffness)
-    found = answer._round_trip(robot, None, commands, x, R)  # type: ignore[arg-type]
+    monkeypatch.setattr(round_trip.forward, "solve_equilibrium", solve)
+    monkeypatch.setattr(round_trip.one_sided, "lowest_stiffness", stiffness)
+    found = round_trip.round_trip(robot, None, commands, x, R)  # type: ignore[arg-type]
     assert found["solved"] == 0.5 and found["largest_round_trip_error_m"] == pytest.approx(3e-9)
     assert found["slack_wires"] == 2 and found["lowest_stiffness_N_m"]["mean"] == 30.0
     assert found["statuses"] == {
@@ -388,7 +388,7 @@ def test_a_round_trip_counts_what_came_back_and_the_slack_wires(monkeypatch: pyt
         outcome.STATUS[outcome.FELL]: 0,
     }
     back.found = np.zeros(4, bool)
-    assert answer._round_trip(robot, None, commands, x, R)["largest_round_trip_error_m"] == 0.0  # type: ignore[arg-type]
+    assert round_trip.round_trip(robot, None, commands, x, R)["largest_round_trip_error_m"] == 0.0  # type: ignore[arg-type]
 
 
 def test_what_holds_the_commanded_pose_is_marked_among_all_poses(hung: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -397,7 +397,7 @@ def test_what_holds_the_commanded_pose_is_marked_among_all_poses(hung: Any, monk
     wires = draws.for_robot(robot, line)
     x, R, near = robot.home_m, np.eye(3), 1e-6 * robot.span_m
     rng = np.random.default_rng(0)
-    found = answer._all_equilibria(robot, wires, x, R, rng)
+    found = round_trip.stable_poses(robot, wires, x, R, rng)
     assert found["commanded_stable"] and found["starts"] == 65 and found["stable_found"] == len(found["poses"]) >= 1
     assert [pose["commanded"] for pose in found["poses"]].count(True) == 1
     assert all(pose["stable"] and pose["slack_wires"] == 0 for pose in found["poses"] if pose["commanded"])
@@ -410,32 +410,32 @@ def test_what_holds_the_commanded_pose_is_marked_among_all_poses(hung: Any, monk
             x + away, np.tile(R, (n, 1, 1)), tension, np.zeros(n, int), np.zeros(n, int), np.zeros(n)
         )
 
-    monkeypatch.setattr(answer.equilibria, "equilibria", others)
+    monkeypatch.setattr(round_trip.equilibria, "equilibria", others)
     rows = [0, 1, 2]
-    found = answer._all_equilibria(robot, wires, x, R, rng)
+    found = round_trip.stable_poses(robot, wires, x, R, rng)
     assert [pose["commanded"] for pose in found["poses"]] == [False, True, False] and found["stable_found"] == 3
     assert [pose["slack_wires"] for pose in found["poses"]] == [2, 2, 2]
     rows = [0, 2]
-    found = answer._all_equilibria(robot, wires, x, R, rng)
+    found = round_trip.stable_poses(robot, wires, x, R, rng)
     assert found["stable_found"] == 2 and len(found["poses"]) == 3
     last = found["poses"][2]
     assert last["position_m"] is x and last["commanded"] and not last["stable"] and last["slack_wires"] == 0
     assert np.array_equal(last["rotation_vector_rad"], np.zeros(3))
     for shift, stable in ((0.9, True), (1.1, False)):
         here = SimpleNamespace(found=np.array([True]), position_m=x[None] - [0.0, 0.0, shift * near])
-        monkeypatch.setattr(answer.forward, "solve_equilibrium", lambda *given, here=here: here)
-        assert answer._all_equilibria(robot, wires, x, R, rng)["commanded_stable"] is stable
+        monkeypatch.setattr(round_trip.forward, "solve_equilibrium", lambda *given, here=here: here)
+        assert round_trip.stable_poses(robot, wires, x, R, rng)["commanded_stable"] is stable
     here = SimpleNamespace(found=np.array([False]), position_m=x[None])
-    monkeypatch.setattr(answer.forward, "solve_equilibrium", lambda *given: here)
-    assert answer._all_equilibria(robot, wires, x, R, rng)["commanded_stable"] is False
+    monkeypatch.setattr(round_trip.forward, "solve_equilibrium", lambda *given: here)
+    assert round_trip.stable_poses(robot, wires, x, R, rng)["commanded_stable"] is False
     with monkeypatch.context() as patch:
         held: Any = SimpleNamespace(feasible=np.array([True]), zero_m=[0], offset_m=[0])
-        patch.setattr(answer.inverse, "commands", lambda *given: held)
-        patch.setattr(answer.inverse, "tensions", lambda *given: np.array([[0.0, -1.0, 2.0, 3.0]]))
-        assert answer._all_equilibria(robot, wires, x, R, rng)["poses"][-1]["slack_wires"] == 2
+        patch.setattr(round_trip.inverse, "commands", lambda *given: held)
+        patch.setattr(round_trip.inverse, "tensions", lambda *given: np.array([[0.0, -1.0, 2.0, 3.0]]))
+        assert round_trip.stable_poses(robot, wires, x, R, rng)["poses"][-1]["slack_wires"] == 2
     weak: Any = SimpleNamespace(feasible=np.array([False]), zero_m=[0], offset_m=[0])
-    monkeypatch.setattr(answer.inverse, "commands", lambda *given: weak)
-    assert answer._all_equilibria(robot, wires, x, R, rng) == {
+    monkeypatch.setattr(round_trip.inverse, "commands", lambda *given: weak)
+    assert round_trip.stable_poses(robot, wires, x, R, rng) == {
         "stable_found": 0,
         "starts": 0,
         "commanded_stable": False,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, cast
 from wirebayes.answers import terminal
 from wirebayes.json_files.pose import PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
-from wirebayes.robot.mechanics.draws import specimens_in_words
+from wirebayes.robot.mechanics.wires_used import specimens_in_words
 from wirebayes.sentences import coordinates
 
 if TYPE_CHECKING:

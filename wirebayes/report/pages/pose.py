@@ -32,7 +32,7 @@ from wirebayes.report.pages import pose_history
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pages.wires_known import wires_known
 from wirebayes.report.pictures.robot import CONTROLLERS
-from wirebayes.robot.mechanics.draws import specimens_in_words
+from wirebayes.robot.mechanics.wires_used import specimens_in_words
 from wirebayes.sentences import lasting, quantity, specimens_are
 
 _FIRST = 2  # pictures that prove the answer: how far it moves, and how far it turns

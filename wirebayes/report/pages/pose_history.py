@@ -26,7 +26,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.wires_known import wires_known
-from wirebayes.robot.mechanics.draws import specimens_in_words
+from wirebayes.robot.mechanics.wires_used import specimens_in_words
 from wirebayes.sentences import counted, from_to
 
 _CAPTIONS = {

@@ -82,13 +82,15 @@ def _reprapfirmware(text: str, where: str) -> tuple[list[list[float]], _Settings
         if command in ("M669", "M666"):
             for letter, value in _WORD.findall(code[len(command) :]):
                 found.put(f"{command} {letter}", value, ":", where, number)
-    names = [f"M669 {letter}" for letter in _ANCHORS]
     count = int(found.values.get("M669 N", [4])[0])
-    anchors = _anchors(found, names[:count], where, "M669 with A, B, C, D")
+    names = [f"M669 {letter}" for letter in _ANCHORS[:count]]
+    anchors = _anchors(found, names, where, "M669 with A, B, C, D")
     renamed = {"U": "lines", "O": "on spool", "W": "mass", "Y": "beyond", "I": "least", "X": "most"}
     for letter, name in renamed.items():
-        if f"M666 {letter}" in found.values:
-            found.values[name], found.line[name] = found.values[f"M666 {letter}"], found.line[f"M666 {letter}"]
+        code = f"M666 {letter}"
+        if code in found.values:
+            found.values[name] = found.values[code]
+            found.line[name] = found.line[code]
     return anchors, found
 
 

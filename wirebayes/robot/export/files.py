@@ -50,14 +50,14 @@ def _anchors(robot: Robot) -> Floats:
 def reprapfirmware(robot: Robot, line: WireDraws) -> str:
     """Lines for ``config.g`` of RepRapFirmware (M669 and M666), each value with its 90 % interval in a comment."""
     count = "" if robot.joints == ANCHORS_UNLESS_SAID else f"N{robot.joints} "
-    anchors = " ".join(
-        f"{letter}{_joined(1e3 * a, '.2f')}" for letter, a in zip(ANCHORS, _anchors(robot), strict=False)
-    )
-    parts, beyond = (mean_of_each_winch(robot, v) for v in (robot.lines, robot.beyond_m))
-    on_spool = turned_by(robot).sum(0)
+    anchors = []
+    for letter, anchor in zip(ANCHORS, _anchors(robot), strict=False):
+        anchors.append(letter + _joined(1e3 * anchor, ".2f"))
+    parts = mean_of_each_winch(robot, robot.lines)
+    beyond = mean_of_each_winch(robot, robot.beyond_m)
     spring = working_spring(robot, line)
     rows = [
-        (f"M669 K6 {count}{anchors}", "anchors, mm"),
+        (f"M669 K6 {count}{' '.join(anchors)}", "anchors, mm"),
         (f"M666 U{_joined(parts, '.0f')}", "mechanical advantages"),
         (f"M666 W{robot.mass_kg:g}", "mover, kg"),
         (f"M666 S{spring.mean_N:.0f}", f"spring constant per unit length, N: {spring.described}"),
@@ -65,27 +65,37 @@ def reprapfirmware(robot: Robot, line: WireDraws) -> str:
         (f"M666 I{_joined(np.full(robot.joints, robot.rule.lowest_N), 'g')}", "smallest planned force, N"),
         (f"M666 X{_joined(np.full(robot.joints, robot.rule.highest_N), 'g')}", "largest planned force, N"),
     ]
+    on_spool = turned_by(robot).sum(0)
     if robot.winch is not None:
-        rows.append(
-            (f"M666 O{_joined(on_spool, '.0f')}", "lines on each spool; anchors are the middle of their points")
-        )
+        said = "lines on each spool; anchors are the middle of their points"
+        rows.append((f"M666 O{_joined(on_spool, '.0f')}", said))
     drums = _measured_drums(robot)
     if drums is not None:
-        radius, growth = _spools(robot, drums)
-        growth_mm = 1e3 * growth / on_spool
-        gear = of_each_winch(robot, drums.gear)
-        rows += [
-            (f"M666 R{_joined(1e3 * radius, '.3f')}", "spool radii at the origin, mm"),
-            (f"M666 Q{growth_mm.mean():.5f}", f"buildup of one line, mm: {_joined(growth_mm, '.5f', ', ')}"),
-            ("", f"M666 L and H, teeth of motor and spool: their ratio is {_joined(gear, 'g', ', ')}"),
-        ]
-    return _head(robot, line, spring, ";") + "".join(f"{code} ; {comment}\n".lstrip() for code, comment in rows)
+        rows += _reprapfirmware_spools(robot, drums, on_spool)
+    text = _head(robot, line, spring, ";")
+    for code, comment in rows:
+        text += f"{code} ; {comment}\n".lstrip()
+    return text
+
+
+def _reprapfirmware_spools(robot: Robot, drums: Drums, on_spool: Floats) -> list[tuple[str, str]]:
+    """Codes and comments of spools, on each of which so many lines are wound."""
+    radius, growth = _spools(robot, drums)
+    growth_mm = 1e3 * growth / on_spool
+    gear = of_each_winch(robot, drums.gear)
+    return [
+        (f"M666 R{_joined(1e3 * radius, '.3f')}", "spool radii at the origin, mm"),
+        (f"M666 Q{growth_mm.mean():.5f}", f"buildup of one line, mm: {_joined(growth_mm, '.5f', ', ')}"),
+        ("", f"M666 L and H, teeth of motor and spool: their ratio is {_joined(gear, 'g', ', ')}"),
+    ]
 
 
 def klipper(robot: Robot, line: WireDraws) -> str:
     """Sections for ``printer.cfg``: anchors for every Klipper, spring settings for the Hangprinter branch."""
     spring = working_spring(robot, line)
-    parts, beyond = (mean_of_each_winch(robot, v) for v in (robot.lines, robot.beyond_m))
+    parts = mean_of_each_winch(robot, robot.lines)
+    beyond = mean_of_each_winch(robot, robot.beyond_m)
+    lowest, highest = np.full(robot.joints, robot.rule.lowest_N), np.full(robot.joints, robot.rule.highest_N)
     text = _head(robot, line, spring, "#") + (
         "[printer]\nkinematics: winch\n"
         "# The next options are those of the Hangprinter branch of Klipper; upstream does not know them.\n"
@@ -93,21 +103,29 @@ def klipper(robot: Robot, line: WireDraws) -> str:
         f"winch_spring_constant: {spring.mean_N:.0f}  # N per unit strain: {spring.described}\n"
         f"winch_mechanical_advantage: {_joined(parts, '.0f', ', ')}\n"
         f"winch_guy_wire_lengths: {_joined(1e3 * beyond, '.0f', ', ')}  # mm\n"
-        f"winch_min_force: {_joined(np.full(robot.joints, robot.rule.lowest_N), 'g', ', ')}  # N\n"
-        f"winch_max_force: {_joined(np.full(robot.joints, robot.rule.highest_N), 'g', ', ')}  # N\n"
+        f"winch_min_force: {_joined(lowest, 'g', ', ')}  # N\n"
+        f"winch_max_force: {_joined(highest, 'g', ', ')}  # N\n"
     )
     drums = _measured_drums(robot)
+    of_spools = [""] * robot.joints
     if drums is not None:
-        radius, growth = (1e3 * values for values in _spools(robot, drums))
-        turns = 2 * np.pi * radius / parts
-        gear = of_each_winch(robot, drums.gear)
-        text += f"winch_buildup_factor: {growth.mean():.5f}  # mm: {_joined(growth, '.5f', ', ')}\n"
-    for winch, (letter, (x, y, z)) in enumerate(zip(STEPPERS, 1e3 * _anchors(robot), strict=False)):
-        text += f"\n[stepper_{letter}]\nanchor_x: {x:.2f}\nanchor_y: {y:.2f}\nanchor_z: {z:.2f}\n"
-        if drums is not None:
-            text += f"rotation_distance: {turns[winch]:.4f}  # straight mm a turn of the spool, at the origin\n"
-            text += f"gear_ratio: {gear[winch]:g}:1\n"
+        radius, growth = _spools(robot, drums)
+        growth_mm = 1e3 * growth
+        text += f"winch_buildup_factor: {growth_mm.mean():.5f}  # mm: {_joined(growth_mm, '.5f', ', ')}\n"
+        of_spools = _klipper_spools(robot, drums, 2 * np.pi * (1e3 * radius) / parts)
+    for letter, anchor, spool in zip(STEPPERS, 1e3 * _anchors(robot), of_spools, strict=False):
+        x, y, z = anchor
+        text += f"\n[stepper_{letter}]\nanchor_x: {x:.2f}\nanchor_y: {y:.2f}\nanchor_z: {z:.2f}\n{spool}"
     return text
+
+
+def _klipper_spools(robot: Robot, drums: Drums, turn_mm: Floats) -> list[str]:
+    """What each winch's section says of its spool."""
+    out = []
+    for turn, gear in zip(turn_mm, of_each_winch(robot, drums.gear), strict=True):
+        distance = f"rotation_distance: {turn:.4f}  # straight mm a turn of the spool, at the origin\n"
+        out.append(f"{distance}gear_ratio: {gear:g}:1\n")
+    return out
 
 
 def _measured_drums(robot: Robot) -> Drums | None:
@@ -235,16 +253,18 @@ def working_spring(robot: Robot, line: WireDraws, wire: str | None = None) -> Wo
     """
     wire = wire or _first(robot)
     wires = for_robot(robot, line)
-    tau = inverse.tensions(robot, robot.home_m[None], matrix(robot.home_rotation_rad)[None])[0]
+    x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
+    tau = inverse.tensions(robot, x, R)[0]
     held = bool(np.isfinite(tau).all())
-    where = (
-        float(tau[[name == wire for name in robot.wire]].mean()) if held else line.each.get(wire, line).tension_ref_N
-    )
+    where = line.each.get(wire, line).tension_ref_N
+    if held:
+        of_wire = [name == wire for name in robot.wire]
+        where = float(tau[of_wire].mean())
     stiffness = _sample(robot, wires, wire).stiffness_N(where)
     good = np.isfinite(stiffness)
     fitted, of = wire not in robot.given, wire if len({*robot.wire}) > 1 else ""
     if not good.any():
-        which = f"the wire {of}" if of else "the fitted line" if fitted else f"the wire {wire}"
+        which = "the fitted line" if fitted and not of else f"the wire {wire}"
         raise InputError(f"{robot.name}: {which} cannot carry {where:.3g} N, so no spring constant is known")
     if wires.law == "hooke" and not wires.at("strain"):
         return WorkingSpring(stiffness, "", fitted, of)
@@ -288,17 +308,17 @@ def mujoco(robot: Robot, line: WireDraws) -> str | None:
     wires, commands = _at_home(robot, line)
     if not commands.feasible.all():
         return None
-    zero, tau = commands.zero_m.T, commands.tension_N.T
-    k1 = np.broadcast_to(wires.theta["k1"], zero.shape)
+    zero, tau = commands.zero_m[0], commands.tension_N[0]
     if robot.winch is not None:
         robot = replace(robot, home_rotation_rad=vector(commands.rotation)[0])
     which = cut_from(robot)
     if wires.law == "hooke" and not wires.at("strain"):
-        return mjcf(robot, k1[:, 0], zero[:, 0], commands.offset_m[0], remark=which)
-    stretched = stretched_length(wires, zero, tau)
-    slope = tension(wires, stretched, zero)[1]
-    rest = stretched - tau / slope
-    pulls = ", ".join(f"{value:.4g}" for value in tau[:, 0])
+        k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, 1))[:, 0]
+        return mjcf(robot, k1, zero, commands.offset_m[0], remark=which)
+    stretched = stretched_length(wires, zero[:, None], tau[:, None])
+    _, slope = tension(wires, stretched, zero[:, None])
+    rest = stretched - tau[:, None] / slope
+    pulls = ", ".join(f"{value:.4g}" for value in tau)
     remark = f"linear springs with the tension and tangent stiffness of the home pose, where the wires carry {pulls} N"
     remark += f"; {which}" if which else ""
     return mjcf(robot, (slope * rest)[:, 0], rest[:, 0], commands.offset_m[0], remark=remark)
@@ -318,20 +338,26 @@ def _head(robot: Robot, line: WireDraws, spring: WorkingSpring, mark: str) -> st
     """What the numbers belong to, as comments."""
     of_leg = lines_of(robot, line)
     names = list(dict.fromkeys(robot.wire))
-    about = {name: _origin(name in robot.given, of_leg[robot.wire.index(name)]) for name in names}
-    lines = [f"{robot.name}: line {about[names[0]]}."]
-    if len(names) > 1:
-        lines = [f"{robot.name}: {cut_from(robot)}."]
-        for name in names:
-            own = working_spring(robot, line, name)
-            constant = f"spring constant {own.mean_N:.0f} N, {own.band}"
-            lines.append(" ".join([f"Wire {name}: {about[name]}; {constant}.", own.remark]).strip())
+    about = {}
+    for name in names:
+        about[name] = _origin(name in robot.given, of_leg[robot.wire.index(name)])
+    several = len(names) > 1
+    lines = [f"{robot.name}: {cut_from(robot)}." if several else f"{robot.name}: line {about[names[0]]}."]
+    lines.append("The firmware knows no creep; creep-table.csv says how much a line grows under load.")
+    lines += [f"Beware: {doubt.text}." for doubt in doubts(robot, line)]
+    if several:
+        lines += [_wire_in_words(robot, line, name, about[name]) for name in names]
         lines.append(f"The firmware takes one spring constant for all wires: here that of wire {spring.of}.")
     else:
-        lines += [spring.remark] if spring.remark else []
-    lines[1:1] = [f"Beware: {doubt.text}." for doubt in doubts(robot, line)]
-    lines.insert(1, "The firmware knows no creep; creep-table.csv says how much a line grows under load.")
-    return "".join(f"{mark} {text}\n" for text in (*lines, _pulleys_left_out(robot)) if text)
+        lines.append(spring.remark)
+    lines.append(_pulleys_left_out(robot))
+    return "".join(f"{mark} {text}\n" for text in lines if text)
+
+
+def _wire_in_words(robot: Robot, line: WireDraws, name: str, origin: str) -> str:
+    own = working_spring(robot, line, name)
+    said = f"Wire {name}: {origin}; spring constant {own.mean_N:.0f} N, {own.band}."
+    return f"{said} {own.remark}".strip()
 
 
 def _origin(is_given: bool, line: WireDraws) -> str:

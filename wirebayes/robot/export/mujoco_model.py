@@ -54,11 +54,11 @@ def mjcf(
         towards_m = robot.home_m + robot.platform_m @ turn.T
     radius, axis = wheels(robot)
     exits, points = _sites("exit", robot.exit_m - radius * axis), _sites("point", robot.platform_m)
-    wheeled = np.flatnonzero(radius[:, 0])
-    pulleys = "".join(_rim(int(i), robot.exit_m[i], float(radius[i, 0]), axis[i], towards_m[i]) for i in wheeled)
+    pulleys = ""
+    for i in np.flatnonzero(radius[:, 0]).tolist():
+        pulleys += _rim(i, robot.exit_m[i], float(radius[i, 0]), axis[i], towards_m[i])
     tendons = _tendons(robot, k1_N, zero_m, offset_m, radius[:, 0])
-    remarks = [text for text in (remark, _STILL if pulleys else "") if text]
-    comment = "".join(f"<!-- {text.replace('--', '- -')} -->" for text in remarks)
+    comment = _comment(remark) + _comment(_STILL if pulleys else "")
     inertia = spaced(np.full(3, mass * robot.size_m**2))
     return (
         f'<mujoco model={quoteattr(robot.name)}>{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
@@ -67,6 +67,10 @@ def mjcf(
         f'<inertial pos="{spaced(robot.centre_of_mass_m)}" mass="{mass!r}" diaginertia="{inertia}"/>{points}'
         f"</body>{pulleys}</worldbody><tendon>{tendons}</tendon></mujoco>\n"
     )
+
+
+def _comment(text: str) -> str:
+    return f"<!-- {text.replace('--', '- -')} -->" if text else ""
 
 
 def _sites(kind: str, points_m: Floats) -> str:
@@ -78,30 +82,41 @@ def _tendons(robot: Robot, k1_N: Floats, zero_m: Floats, offset_m: Floats, radiu
     stiffness = k1_N * robot.lines**2 / zero_m
     free = (zero_m - offset_m) / robot.lines
     rest = np.where(radius_m > 0, free + radius_m, free).clip(0.0)
-    return "".join(
-        f'<spatial stiffness="{float(k)!r}" springlength="0 {float(rest_m)!r}">'
-        f'<site site="exit{i}"/>{_wrapped(i) if radius_m[i] else ""}<site site="point{i}"/></spatial>'
-        for i, (k, rest_m) in enumerate(zip(stiffness, rest, strict=True))
-    )
+    out = ""
+    for i in range(robot.legs):
+        wrapped = _wrapped(i) if radius_m[i] else ""
+        out += (
+            f'<spatial stiffness="{float(stiffness[i])!r}" springlength="0 {float(rest[i])!r}">'
+            f'<site site="exit{i}"/>{wrapped}<site site="point{i}"/></spatial>'
+        )
+    return out
 
 
 def _joints(robot: Robot, turn: Floats, damping_N_s_m: float) -> str:
     """Joints of all motions that the platform has; axes are written in the body's frame, of orientation `turn`."""
-    axes, about = np.eye(3), f'<joint type="ball" damping="{damping_N_s_m * robot.size_m**2!r}"/>'
-    if robot.plane is not None:
-        normal = robot.plane.normal
-        axes = np.linalg.svd(np.eye(3) - np.outer(normal, normal))[2][:2]
-        if np.abs(normal).max() == 1.0:  # along an axis: the others are the plane's
-            axes = np.eye(3)[normal == 0]
-        about = f'<joint type="hinge" axis="{spaced(normal @ turn)}" damping="{damping_N_s_m * robot.size_m**2!r}"/>'
-    slides = "".join(
-        f'<joint type="slide" axis="{spaced(axis @ turn)}" ref="{float(axis @ robot.home_m)!r}" '
-        f'damping="{damping_N_s_m!r}"/>'
-        for axis in axes
-    )
+    damping = repr(damping_N_s_m * robot.size_m**2)
+    about = f'<joint type="ball" damping="{damping}"/>'
     if robot.freedom == "orientation":  # the ball joint is where the body's frame is
         return about
-    return slides + (about if robot.degrees == 6 else "")
+    axes = np.eye(3)
+    if robot.plane is not None:
+        normal = robot.plane.normal
+        axes = _in_plane(normal)
+        about = f'<joint type="hinge" axis="{spaced(normal @ turn)}" damping="{damping}"/>'
+    out = ""
+    for axis in axes:
+        out += (
+            f'<joint type="slide" axis="{spaced(axis @ turn)}" ref="{float(axis @ robot.home_m)!r}" '
+            f'damping="{damping_N_s_m!r}"/>'
+        )
+    return out + (about if robot.degrees == 6 else "")
+
+
+def _in_plane(normal: Floats) -> Floats:
+    """(2, 3) orthonormal axes of a plane."""
+    if np.abs(normal).max() == 1.0:  # along an axis: the others are the plane's
+        return np.eye(3)[normal == 0]
+    return np.linalg.svd(np.eye(3) - np.outer(normal, normal))[2][:2]
 
 
 def wheels(robot: Robot) -> tuple[Floats, Floats]:

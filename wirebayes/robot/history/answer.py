@@ -23,10 +23,11 @@ from wirebayes.robot.history.follow import RESTART, Track, follow_log
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.tables import correction_table, pose_table, rotation_vectors
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
-from wirebayes.robot.mechanics import draws, winches
 from wirebayes.robot.mechanics import rotation as turning
+from wirebayes.robot.mechanics import winches
 from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
+from wirebayes.robot.mechanics.wires_used import wires_summary
 from wirebayes.robot.motion import drift as drifting
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.motion.creep import fresh
@@ -196,7 +197,7 @@ def _requested(robot: Robot, line: WireDraws, history: History, errors: Uncertai
         "version": 1,
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
-        "wires": draws.wires_summary(robot, line),
+        "wires": wires_summary(robot, line),
         "feasible": True,
         "warnings": [],
         "history": {

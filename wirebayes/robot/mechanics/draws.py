@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.json_files.pose import Specimens, WiresUsed
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics.description import GivenWire, Robot
@@ -82,14 +81,16 @@ class WireDraws:
     def part(self, index: Indices | slice) -> "WireDraws":
         """Some of the draws, each with all its parameters."""
         others = {name: line.part(index) for name, line in self.others.items()}
-        parts = ({k: v[index] for k, v in values.items()} for values in (self.parameters, self.spread))
-        return replace(self, parameters=next(parts), spread=next(parts), others=others)
+        parameters = {name: values[index] for name, values in self.parameters.items()}
+        spread = {name: values[index] for name, values in self.spread.items()}
+        return replace(self, parameters=parameters, spread=spread, others=others)
 
     def centre(self) -> "WireDraws":
         """One wire with the posterior mean of every parameter: what a controller would use."""
         others = {name: line.centre() for name, line in self.others.items()}
-        means = ({k: np.array([v.mean()]) for k, v in values.items()} for values in (self.parameters, self.spread))
-        return replace(self, parameters=next(means), spread=next(means), others=others)
+        parameters = {name: np.array([values.mean()]) for name, values in self.parameters.items()}
+        spread = {name: np.array([values.mean()]) for name, values in self.spread.items()}
+        return replace(self, parameters=parameters, spread=spread, others=others)
 
     @property
     def each(self) -> dict[str, "WireDraws"]:
@@ -128,32 +129,48 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
         With ``(1, n)`` parameters when all legs share everything, else ``(w, n)``.
     """
     lines = lines_of(robot, line)
-    n = line.count
     effects = _united(line)
-    names = CORE + tuple(c for e in effects for c in e.columns())
-    by_length = [e for e in effects if e.place == "sample"]
-    scaled = any(LENGTH_EXPONENT in one.parameters for one in lines)
-    theta: dict[str, Floats]
-    if spread == 0 and not robot.given and not line.others and not scaled and not by_length:  # shared by all legs
-        theta = {name: line.parameters[name][None] for name in names}
-    else:
-        theta = {name: _of_legs([_value(wire, name, effects) for wire in lines], n) for name in names}
+    theta = _of_all_legs(robot, line, lines, spread > 0)
     if spread > 0:
         if rng is None:
             raise ValueError("a specimen spread needs a random generator")
         for name in differing(line):
-            sd = _of_legs([spread_of(one, name, spread) for one in lines], n)
-            theta[name] = theta[name] * np.exp(sd * rng.standard_normal((robot.legs, n)))
+            sd = _of_legs([spread_of(one, name, spread) for one in lines], line.count)
+            noise = rng.standard_normal((robot.legs, line.count))
+            theta[name] = theta[name] * np.exp(sd * noise)
     length = np.array([wire.length_mm for wire in lines])[:, None]
-    longer = np.where(_is_given(robot), 1.0, 1e3 * nominal_length(robot)[:, None] / length)
-    if scaled:
-        exponent = _of_legs([one.parameters.get(LENGTH_EXPONENT, np.ones(1)) for one in lines], n)
+    hung = 1e3 * nominal_length(robot)[:, None] / length
+    longer = np.where(_is_given(robot), 1.0, hung)
+    if _grows_with_length(lines):
+        exponent = _of_legs([one.parameters.get(LENGTH_EXPONENT, np.ones(1)) for one in lines], line.count)
         theta["B"] = theta["B"] * longer ** (exponent - 1.0)
     reference = _reference_tension(line, lines)
     hold = steady_hold(theta, length * longer, reference, length_ref_mm=length)
-    theta = dict(Placed(by_length, theta).change("sample", theta, hold))
-    others = tuple(e for e in effects if e.place != "sample")
+    by_length = Placed(_at_sample(effects), theta)
+    theta = dict(by_length.change("sample", theta, hold))
+    others = tuple(effect for effect in effects if effect.place != "sample")
     return Wires(line.law, line.history, theta, length, others, reference)
+
+
+def _of_all_legs(robot: Robot, line: WireDraws, lines: Sequence[WireDraws], spread: bool) -> dict[str, Floats]:
+    """All parameters: ``(1, n)`` where all legs share them, else ``(w, n)``."""
+    effects = _united(line)
+    names = list(CORE)
+    for effect in effects:
+        names += effect.columns()
+    several = spread or robot.given or line.others
+    if not several and not _grows_with_length(lines) and not _at_sample(effects):
+        return {name: line.parameters[name][None] for name in names}
+    return {name: _of_legs([_value(wire, name, effects) for wire in lines], line.count) for name in names}
+
+
+def _grows_with_length(lines: Sequence[WireDraws]) -> bool:
+    return any(LENGTH_EXPONENT in one.parameters for one in lines)
+
+
+def _at_sample(effects: Sequence[Effect]) -> list[Effect]:
+    """Effects that follow a wire's length."""
+    return [effect for effect in effects if effect.place == "sample"]
 
 
 def _reference_tension(line: WireDraws, lines: Sequence[WireDraws]) -> Any:
@@ -194,24 +211,6 @@ def typical_spread(line: WireDraws, stated: float) -> float:
     if not line.spread:
         return stated
     return round(float(np.sqrt(np.mean([line.spread[name] ** 2 for name in DIFFER]))), 4)
-
-
-def specimens_in_words(wires: WiresUsed) -> list[str]:
-    """A sentence for each line whose spread was estimated, of `wires_summary`'s content.
-
-    Parameters
-    ----------
-    wires : WiresUsed
-        ``wires`` of ``pose.json``.
-    """
-    sentences = []
-    for name, one in wires.get("specimens", {}).items():
-        shares = []
-        for parameter in CORE:
-            low, middle, high = (100 * one["spread"][parameter][key] for key in ("q05", "q50", "q95"))
-            shares.append(f"{parameter} by {middle:.2g} % ({low:.2g} to {high:.2g} %)")
-        sentences.append(f"Specimens of {name} differ as estimated from {one['tests']} tests: {', '.join(shares)}.")
-    return sentences
 
 
 def lines_of(robot: Robot, line: WireDraws) -> list[WireDraws]:
@@ -272,39 +271,14 @@ def _value(wire: WireDraws, name: str, effects: tuple[Effect, ...]) -> Floats:
     raise KeyError(name)
 
 
-def wires_summary(robot: Robot, line: WireDraws) -> WiresUsed:
-    """Which wires an answer is for, as ``pose.json`` says it."""
-    kept = line.material()
-    used: WiresUsed = {
-        "draws": line.count,
-        "tested_length_mm": line.length_mm,
-        "elastic_law": line.law,
-        "history": line.history,
-        "effects": [e.key for e in kept],
-        "left_out": [e.key for e in line.effects if e not in kept],
-        "legs": list(robot.wire),
-        "lines": list(line.each),
-    }
-    several = {name: _specimens(one) for name, one in line.each.items() if one.spread}
-    if several:
-        used["specimens"] = several
-    return used
-
-
-def _specimens(line: WireDraws) -> Specimens:
-    """How many were tested, and how much they differ."""
-    spread = {name: np.quantile(draws, [0.05, 0.5, 0.95]).tolist() for name, draws in line.spread.items()}
-    return {
-        "tests": line.specimens,
-        "spread": {name: {"q05": low, "q50": middle, "q95": high} for name, (low, middle, high) in spread.items()},
-    }
-
-
 def doubts(robot: Robot, line: WireDraws) -> list[Notice]:
     """What the fits of the lines that legs hang on say against using them."""
     of_leg = lines_of(robot, line)
-    used = {name: one for name, one in line.each.items() if any(leg is one for leg in of_leg)}
-    return [doubt.of(f"wire {name}") if line.others else doubt for name, one in used.items() for doubt in one.doubts]
+    out = []
+    for name, one in line.each.items():
+        if any(leg is one for leg in of_leg):
+            out += [doubt.of(f"wire {name}") if line.others else doubt for doubt in one.doubts]
+    return out
 
 
 def wire_warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[Notice]:
@@ -349,31 +323,36 @@ _VANISHES = 1e-3  # share of the largest value: its third digit
 
 
 def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[Notice]:
-    beyond, dropped = list[str](), list[str]()
+    out = [Notice("extrapolation", text) for text in _beyond(line, tension_N, time_s, zero_m)]
+    kept = line.material()
+    for effect in kept:
+        if effect.place == "zero_length":
+            text = f"the robot knows no temperature: the effect {effect.name} sees none, as at the first reading of"
+            out.append(Notice("left-out", f"{text} the test"))
+    for effect in line.effects:
+        if effect.scope == "material" and effect not in kept:
+            text = f"the material effect {effect.name} has no place in the robot and is left out"
+            out.append(Notice("left-out", text))
+    if any(effect.name == "discrepancy" for effect in line.effects):
+        text = "what the fit could not name is not in the robot: its wires follow the named model only"
+        out.append(Notice("left-out", text))
+    return out
+
+
+def _beyond(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
+    """In which ways a use leaves what was tested."""
+    out = []
     loads = tension_N[np.isfinite(tension_N) & (tension_N > 0)]
     if line.tension_range_N is not None and loads.size:
         low, high = line.tension_range_N
         if loads.min() < low or loads.max() > high:
-            beyond.append(f"tensions {_span(loads, '.3g')} N leave the tested range {low:.3g} to {high:.3g} N")
+            out.append(f"tensions {_span(loads, '.3g')} N leave the tested range {low:.3g} to {high:.3g} N")
     if line.time_range_s is not None and time_s > line.time_range_s[1]:
-        beyond.append(f"{time_s:.4g} s is longer than the longest tested hold, {line.time_range_s[1]:.4g} s")
+        out.append(f"{time_s:.4g} s is longer than the longest tested hold, {line.time_range_s[1]:.4g} s")
     lengths = 1e3 * zero_m[np.isfinite(zero_m)]
     if lengths.size and (lengths.min() < 0.5 * line.length_mm or lengths.max() > 2.0 * line.length_mm):
         rule = "is taken to be a strain of the whole wire"
         if LENGTH_EXPONENT in line.parameters:
             rule = "grows with length by the exponent fitted to the tested lengths"
-        beyond.append(f"wires of {_span(lengths, '.0f')} mm, tested at {line.length_mm:.0f} mm: creep {rule}")
-    kept = line.material()
-    dropped.extend(
-        f"the robot knows no temperature: the effect {e.name} sees none, as at the first reading of the test"
-        for e in kept
-        if e.place == "zero_length"
-    )
-    dropped.extend(
-        f"the material effect {e.name} has no place in the robot and is left out"
-        for e in line.effects
-        if e.scope == "material" and e not in kept
-    )
-    if any(e.name == "discrepancy" for e in line.effects):
-        dropped.append("what the fit could not name is not in the robot: its wires follow the named model only")
-    return [Notice("extrapolation", text) for text in beyond] + [Notice("left-out", text) for text in dropped]
+        out.append(f"wires of {_span(lengths, '.0f')} mm, tested at {line.length_mm:.0f} mm: creep {rule}")
+    return out

@@ -45,26 +45,41 @@ def _nearest(reference: Floats, structure: Floats, load: Floats, lowest: float, 
     if np.abs(structure @ particular - load).max() > 1e-9 * np.abs(load).max():
         return None
     null = right[rank:].T
-    tau = particular + null @ (null.T @ (reference - particular))
+    tau = np.asarray(particular + null @ (null.T @ (reference - particular)))
     outside = float(max(lowest - tau.min(), tau.max() - highest))
-    margin = 1e-9 * max(1.0, float(np.abs(tau).max()))
-    if outside <= (margin if null.shape[1] == 0 else 0.0):
-        return np.asarray(tau)
-    if null.shape[1] == 0:
-        return None
-    G = np.vstack([null, -null])
+    if null.shape[1] == 0:  # there is no choice
+        return tau if outside <= 1e-9 * _size(tau) else None
+    return tau if outside <= 0.0 else _brought_inside(tau, null, outside, lowest, highest)
+
+
+def _size(tau: Floats) -> float:
+    """The largest tension, or that of the load."""
+    return max(1.0, float(np.abs(tau).max()))
+
+
+def _brought_inside(tau: Floats, null: Floats, outside: float, lowest: float, highest: float) -> Floats | None:
+    """The tensions within bounds that are nearest to others, which leave them by `outside`, in a null space.
+
+    Lawson and Hanson's least-distance problem, as a non-negative one with a row more.
+    """
     # In units of the worst violation, so that the size of the answer does not look like an answer.
     h = np.concatenate([lowest - tau, tau - highest]) / outside
-    E = np.vstack([G.T, h])
-    f = np.zeros(len(E))
-    f[-1] = 1.0
-    residual = E @ nnls(E, f, maxiter=50 * E.shape[1])[0] - f
+    residual = _least_distance(np.vstack([null, -null]), h)
     if np.abs(residual[-1]) < 1e-10:
         return None
     result = tau + null @ (-outside * residual[:-1] / residual[-1])
-    margin = 1e-8 * max(1.0, float(np.abs(result).max()))
+    margin = 1e-8 * _size(result)
     inside = result.min() >= lowest - margin and result.max() <= highest + margin
     return np.asarray(result) if inside else None
+
+
+def _least_distance(G: Floats, h: Floats) -> Floats:
+    """Residuals of the non-negative problem that is dual to the least vector with ``G x >= h``."""
+    E = np.vstack([G.T, h])
+    f = np.zeros(len(E))
+    f[-1] = 1.0
+    solution, _ = nnls(E, f, maxiter=50 * E.shape[1])
+    return np.asarray(E @ solution - f)
 
 
 def minimum_norm(structure: Floats, load: Floats, lowest_N: float, highest_N: float) -> Floats | None:

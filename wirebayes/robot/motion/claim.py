@@ -8,7 +8,7 @@ from wirebayes.json_files.pose import ClaimNumbers
 from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import rotation as turning
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, hanging, inverse
@@ -110,24 +110,32 @@ def over_workspace(
     turn = hanging.orientations(robot, position_m, level)
     tau = inverse.tensions(robot, position_m, turn)
     good = np.isfinite(tau).all(1)
-    x, tau = position_m[good], tau[good]
-    n, p = wires.count, len(x)
-    if not p:
+    x, tau, turn = position_m[good], tau[good], turn[good]
+    if not good.any():
         empty = np.empty((0, 1))
         return WorkspaceDrift(x, empty, empty, tau, 0.0, 0.0)
+    distance, tilt, found = _drifts(robot, wires, (x, turn), tau, time_s, loaded_s)
+    return WorkspaceDrift(x, distance, tilt, tau, float(good.mean()), found)
+
+
+def _drifts(
+    robot: Robot, wires: Wires, poses: Poses, tension_N: Floats, time_s: float, loaded_s: float
+) -> tuple[Floats, Floats, float]:
+    """Distances and tilts (p, n) after a time, and the share of positions and draws that still have a pose."""
+    n, p = wires.count, len(tension_N)
     many = _at_each(wires, n, p)
-    where, pull = np.repeat(x, n, 0), np.repeat(tau, n, 0)
+    where, turn, pull = (np.repeat(values, n, 0) for values in (*poses, tension_N))
     state = fresh(robot.legs, n * p)
     if loaded_s > 0:
         state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
-    commands = inverse.commands(robot, many, where, np.repeat(turn[good], n, 0), pull, state.strain(many))
+    commands = inverse.commands(robot, many, where, turn, pull, state.strain(many))
     R = commands.rotation
     held = drift.stably(robot, many, commands, where, R)
     joint = chosen_rows(held, commands.joint_m, np.nan)
     course = drift.hold(robot, many, joint, np.array([time_s]), where, R, state)
-    distance = np.linalg.norm(course.position_m[:, 0] - where, axis=1).reshape(p, n)
-    tilt = turning.tilt(course.rotation[:, 0], R).reshape(p, n)
-    return WorkspaceDrift(x, distance, tilt, tau, float(good.mean()), float(course.found.mean()))
+    distance = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
+    tilt = turning.tilt(course.rotation[:, 0], R)
+    return distance.reshape(p, n), tilt.reshape(p, n), float(course.found.mean())
 
 
 def _at_each(wires: Wires, draws: int, positions: int) -> Wires:

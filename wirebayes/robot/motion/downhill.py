@@ -215,12 +215,11 @@ def _iterate(robot: Robot, cases: _Cases) -> tuple[_Cases, Ints]:
     new = _evaluate(robot, cases.wires, cases.zero, cases.offset, x, R)
     noise = 1e-14 * (np.abs(cases.at.energy) + robot.mass_kg * GRAVITY * cases.span)
     accept = _leads_down(robot, cases, step, new, noise)
-    moved = cases.moved(accept, x, R, new)
     more = np.maximum(1e-3, cases.damping * 10)
     damping = np.where(accept, _calmer(cases, step, new, noise), more)
-    balanced = moved.at.size <= cases.floor
-    damping = np.where(balanced, 0.0, damping)  # so that the next step uses the bare stiffness
-    moved = replace(moved, damping=damping)
+    moved = cases.moved(accept, x, R, new)
+    bare = moved.at.size <= cases.floor  # balanced: the next step uses the bare stiffness
+    moved = replace(moved, damping=np.where(bare, 0.0, damping))
     still = step.length < 1e-9 * robot.size_m
     return moved, _ended(cases, moved, step, accept & still)
 
@@ -280,21 +279,27 @@ class _Step:
 def _newton_step(robot: Robot, cases: _Cases) -> _Step:
     """Steps of all cases; one across the room is no Newton step: it is cut, the direction kept."""
     gradient = cases.at.gradient
-    damped = cases.at.H.copy()
-    for i in range(robot.degrees):
-        damped[i, i] += cases.damping * cases.level
-    step, positive = cholesky.solve_symmetric(damped, -gradient)
-    saddle = np.flatnonzero(~positive)
-    if saddle.size:
-        step[:, saddle] = _off_saddle(
-            damped[..., saddle], gradient[:, saddle], cases.level[saddle], cases.floor[saddle]
-        )
+    step, positive = _downhill_or_off_saddle(robot, cases)
     np.clip(step, -1e100, 1e100, out=step)  # the square of a step along no stiffness at all would overflow
     length = np.sqrt((step * step).sum(0))
     longest = np.where(positive, 0.25 * _FAR * cases.span, _LOOSE * cases.span)
     cut = np.minimum(1.0, longest / np.maximum(length, 1e-300))
     step *= cut
     return _Step(step, length * cut, positive, (gradient * step).sum(0))
+
+
+def _downhill_or_off_saddle(robot: Robot, cases: _Cases) -> tuple[Floats, Bools]:
+    """Whole damped steps ``(d, n)``, and where the damped stiffness is positive definite; else off the saddle."""
+    gradient = cases.at.gradient
+    damped = cases.at.H.copy()
+    for i in range(robot.degrees):
+        damped[i, i] += cases.damping * cases.level
+    step, positive = cholesky.solve_symmetric(damped, -gradient)
+    saddle = np.flatnonzero(~positive)
+    if saddle.size:
+        level, floor = cases.level[saddle], cases.floor[saddle]
+        step[:, saddle] = _off_saddle(damped[..., saddle], gradient[:, saddle], level, floor)
+    return step, positive
 
 
 def _calmer(cases: _Cases, step: _Step, new: "_Point", noise: Floats) -> Floats:

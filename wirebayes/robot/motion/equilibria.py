@@ -47,11 +47,11 @@ def equilibria(
     begin, turn = plane.onto(robot, begin, turn)
     tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
     found = solve_equilibrium(robot, wires, tiled, offset_m, begin, turn, 400)
-    turned = batch_last(found.rotation)
-    energy = statics.potential(robot, wires, found.position_m.T, turned, zero_m[:, None], offset_m[:, None])
+    pose = found.position_m.T, batch_last(found.rotation)
+    energy = statics.potential(robot, wires, *pose, zero_m[:, None], offset_m[:, None])
     good = np.flatnonzero(found.found)
-    lowest_first = good[np.argsort(energy[good], kind="stable")]
-    return rows_of(found, _distinct(robot, found, lowest_first))
+    order = np.argsort(energy[good], kind="stable")
+    return rows_of(found, _distinct(robot, found, good[order]))
 
 
 def _starts(robot: Robot, longest_m: float, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:

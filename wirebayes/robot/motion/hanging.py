@@ -77,15 +77,23 @@ def hang(robot: Robot, position_m: Floats, reference: Floats, asked_rad: Floats 
     found, good = _balances(robot, position_m, near, asked)
     out = np.full((p, 3, 3), np.nan)
     tension = np.full((p, robot.legs), np.nan)
-    choice = np.zeros(p, np.int64)
     others = []
     for k in range(p):
         rows = _nearest_first(found, np.flatnonzero(good[k]) + k * good.shape[1])
         others.append(turning.vector(found.rotation[rows[1:]]).reshape(-1, 3))
         if rows.size:
-            out[k], tension[k] = found.rotation[rows[0]], found.tension_N[rows[0]]
-            choice[k] = len(chosen(robot, position_m[k], out[k], tension[k]))
+            out[k] = found.rotation[rows[0]]
+            tension[k] = found.tension_N[rows[0]]
+    choice = _choices(robot, position_m, out, tension)
     return Hanging(out, tension, tuple(others), choice)
+
+
+def _choices(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> Ints:
+    """(p,) How many components of the rotation can be chosen; 0 where nothing hangs."""
+    out = np.zeros(len(position_m), np.int64)
+    for k in np.flatnonzero(np.isfinite(tension_N).all(1)):
+        out[k] = len(chosen(robot, position_m[k], rotation[k], tension_N[k]))
+    return out
 
 
 def _balances(robot: Robot, position_m: Floats, near: Floats, asked: Floats) -> tuple[Balances, Bools]:

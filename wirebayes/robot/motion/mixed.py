@@ -139,17 +139,21 @@ def _lowest(energy: _Quadratic, taut: Bools) -> tuple[Floats, Floats]:
         there, positive = energy.least_with(taut)
         pull = energy.tensions(there)
         settled = positive & ((pull > 0) == taut).all(0)
-        at = rows[settled]
-        step[:, at] = there[:, settled]
-        tau[:, at] = np.maximum(pull, 0.0)[:, settled]
+        step[:, rows[settled]] = there[:, settled]
+        tau[:, rows[settled]] = np.maximum(pull[:, settled], 0.0)
         left = np.flatnonzero(positive & ~settled)
         if not left.size:
             break
-        rows, energy, here = rows[left], energy.part(left), here[:, left]
-        way = there[:, left] - here
-        here = here + _share(energy, here, way) * way
+        rows, energy = rows[left], energy.part(left)
+        here = _lowest_between(energy, here[:, left], there[:, left])
         taut = energy.tensions(here) > 0
     return step.T, tau.T
+
+
+def _lowest_between(energy: _Quadratic, here: Floats, there: Floats) -> Floats:
+    """The lowest points of the straight ways from displacements to others."""
+    way = there - here
+    return here + _share(energy, here, way) * way
 
 
 def _share(energy: _Quadratic, here: Floats, way: Floats) -> Floats:
@@ -188,18 +192,22 @@ def approach(
     ahead, tau = newton_step_with_tensions(robot, wires, pose, tension_N, lengths)
     x, R = after_step(robot, pose, ahead)
     zero, offset = lengths[0], np.broadcast_to(lengths[1], lengths[0].shape)
-    step, rows = ahead, np.arange(len(x))
+    rows, step = np.arange(len(x)), ahead
     for _ in range(_STEPS):
-        length = np.linalg.norm(step, axis=1)
-        further = (length > _NEAR * robot.size_m) & (length < robot.span_m)
+        further = _goes_on(robot, step)
         rows, tau = rows[further], tau[further]
         if not rows.size:
             break
-        here = x[rows], R[rows]
-        own = zero[rows], offset[rows]
+        here, own = (x[rows], R[rows]), (zero[rows], offset[rows])
         step, tau = newton_step_with_tensions(robot, wires.part(rows), here, tau, own)
         x[rows], R[rows] = after_step(robot, here, step)
     return (x, R), ahead
+
+
+def _goes_on(robot: Robot, step: Floats) -> Bools:
+    """(n,) After which steps another one is worth its while."""
+    length = np.linalg.norm(step, axis=1)
+    return np.asarray((length > _NEAR * robot.size_m) & (length < robot.span_m))
 
 
 def after_step(robot: Robot, pose: Poses, step: Floats) -> Poses:

@@ -61,7 +61,7 @@ def nearest_balances(
     aim = _Aim(robot, asked, movable)
     search = _Search.beginning(aim, position_m, begin)
     for _ in range(_STEPS):
-        rows = np.flatnonzero(~search.done & ~search.dead)
+        rows = search.going_on()
         if not rows.size:
             break
         goal = position_m[rows], target[rows]
@@ -130,6 +130,10 @@ class _Search:
     def at(self, rows: Indices) -> tuple[Floats, Floats, Floats]:
         """Poses and tensions of some searches."""
         return self.x[rows], self.R[rows], self.tau[rows]
+
+    def going_on(self) -> Indices:
+        """The searches that have neither come to rest nor are lost."""
+        return np.flatnonzero(~self.done & ~self.dead)
 
     def take(self, rows: Indices, step: _Step) -> None:
         """Take the steps of some searches, then hold wires at their bounds or let them go."""
@@ -246,11 +250,9 @@ class _Aim:
         B = chosen_rows(sound, A / weight, 0.0)
         wished = chosen_rows(sound, wish * weight, np.nan)
         missed = value + (B @ wished[..., None])[..., 0]
-        inverse = np.linalg.pinv(B, rcond=DEPENDENT)
-        back = inverse @ missed[..., None]
-        multiplier = (inverse.mT @ back)[..., 0]  # Lagrange's; the bounds' equations are the last
-        hindrance = -bound * multiplier[:, -bound.shape[1] :]
-        return _Step(_cut((wished - back[..., 0]) / weight), imbalance, hindrance)
+        back, multiplier = _least_change(B, missed)
+        hindrance = -bound * multiplier[:, -bound.shape[1] :]  # the bounds' equations are the last
+        return _Step(_cut((wished - back) / weight), imbalance, hindrance)
 
     def _linearised(self, at: tuple[Floats, Floats, Floats], bound: Ints) -> tuple[Floats, Floats]:
         """Slopes (n, e, 6 + w) and values (n, e) of all equations."""
@@ -286,11 +288,14 @@ class _Aim:
         rows[:, :3, 3:6] = np.where(wanted[:, None], vector_by_turn(vector), 0.0)
         values[:, :3] = np.where(wanted, vector - np.where(wanted, self.asked, 0.0), 0.0)
         held = bound != 0
-        rule = self.robot.rule
-        off = tau - np.where(bound < 0, rule.lowest_N, rule.highest_N)
         rows[:, 3:, 6:] = np.eye(legs) * held[:, None]
-        values[:, 3:] = np.where(held, off / self.unit, 0.0)
+        values[:, 3:] = np.where(held, self._beyond(tau, bound) / self.unit, 0.0)
         return rows, values
+
+    def _beyond(self, tau: Floats, bound: Ints) -> Floats:
+        """(n, w) How far tensions are beyond the bounds at which they are held, N."""
+        rule = self.robot.rule
+        return tau - np.where(bound < 0, rule.lowest_N, rule.highest_N)
 
     def newly_bound(self, tau: Floats, bound: Ints) -> Bools:
         """(n, w) Of each row the wire that is farthest beyond its bounds, where there is one."""
@@ -310,6 +315,13 @@ class _Aim:
 def _all_finite(A: Floats, value: Floats) -> Bools:
     """(n,) Which equations are finite."""
     return np.asarray(np.isfinite(A).all((1, 2)) & np.isfinite(value).all(1))
+
+
+def _least_change(A: Floats, value: Floats) -> tuple[Floats, Floats]:
+    """The smallest vectors that linear equations map to values, and Lagrange's multipliers."""
+    inverse = np.linalg.pinv(A, rcond=DEPENDENT)
+    least = inverse @ value[..., None]
+    return least[..., 0], (inverse.mT @ least)[..., 0]
 
 
 def _cut(change: Floats) -> Floats:

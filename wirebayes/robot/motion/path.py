@@ -90,21 +90,22 @@ def follow(
     Followed
     """
     followed, good = _undivided(robot, wires, start, old, new)
-    whole = followed.here
+    here = followed.here
     divided = _Divided(np.full(len(good), 0.5), np.zeros(len(good), bool))
-    live = np.flatnonzero(~good & np.isfinite(whole.position_m).all(1))
+    live = np.flatnonzero(~good & np.isfinite(here.position_m).all(1))
     while live.size:
-        to = np.minimum(followed.share[live] + divided.step[live], 1.0)
-        between = _between(old, new, live, to)
+        share = np.minimum(followed.share[live] + divided.step[live], 1.0)
+        between = _between(old, new, live, share)
         part = wires.part(live)
-        pose = whole.position_m[live], whole.rotation[live]
-        there, held = _step(robot, part, pose, whole.tension_N[live], between)
-        followed._go_on(live[held], there, held, to)
+        pose = here.position_m[live], here.rotation[live]
+        there, held = _step(robot, part, pose, here.tension_N[live], between)
+        followed._go_on(live[held], there, held, share)
         divided.adapt(live, held)
         fell = ~held & (divided.step[live] < smallest)
         if fell.any():
             followed._fall(robot, part, live, fell, between, pose)
-        live = live[~fell & (followed.share[live] < 1.0)]
+        going_on = ~fell & (followed.share[live] < 1.0)
+        live = live[going_on]
     return followed
 
 
@@ -164,11 +165,9 @@ def _step(
     # Where the stiffness predicts nothing, as of wires that part just now, what does not jump has not fallen.
     ahead = np.where(np.isfinite(ahead), ahead, 0.0)
     believed = _believed(robot, ahead)
-    zero, offset = lengths
-    there = forward.solve_equilibrium(robot, wires, chosen_rows(believed, zero, np.nan), offset, *near)
-    loose = np.flatnonzero(there.status == outcome.NOT_HELD)
-    if loose.size:
-        _let_go(robot, wires, there, loose, lengths)
+    zero = chosen_rows(believed, lengths[0], np.nan)
+    there = forward.solve_equilibrium(robot, wires, zero, lengths[1], *near)
+    _let_go(robot, wires, there, lengths)
     trusted = _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
     near_prediction = _apart_m(robot, there, predicted) <= trusted
     return there, np.asarray(there.found & believed & near_prediction)
@@ -191,20 +190,28 @@ def _apart_m(robot: Robot, there: forward.Equilibria, predicted: Poses) -> Float
     return np.maximum(displaced, robot.size_m * turned)
 
 
-def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, loose: Indices, lengths: Lengths) -> None:
+def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, lengths: Lengths) -> None:
     """Put in place of unstable balances the equilibria next to them, to which the least disturbance leads.
 
     Where wires that were just not slack part from a symmetric platform, it tilts until some are taut again.
     """
+    loose = np.flatnonzero(there.status == outcome.NOT_HELD)
+    if not loose.size:
+        return
     zero, offset = lengths[0], np.broadcast_to(lengths[1], lengths[0].shape)
     part, own = wires.part(loose), (zero[loose], offset[loose])
     balance = there.position_m[loose], there.rotation[loose]
-    _, hessian = balance_at(robot, part, *balance, *own)
-    _, directions = np.linalg.eigh(batch_first(hessian))
-    softest = directions[..., 0]
+    softest = _softest(robot, part, balance, own)
     aside = mixed.after_step(robot, balance, _ASIDE * robot.size_m * softest)
     found = forward.solve_equilibrium(robot, part, *own, *aside)
     _put_in(there, loose[found.found], rows_of(found, found.found))
+
+
+def _softest(robot: Robot, wires: Wires, balance: Poses, lengths: Lengths) -> Floats:
+    """(n, d) motions against which the stiffness is least."""
+    _, hessian = balance_at(robot, wires, *balance, *lengths)
+    _, directions = np.linalg.eigh(batch_first(hessian))
+    return np.asarray(directions[..., 0])
 
 
 def _put_in(out: forward.Equilibria, rows: Indices, found: forward.Equilibria) -> None:
@@ -232,10 +239,8 @@ def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: flo
     Equilibria
     """
     step = newton_step(robot, wires, near, lengths)
-    x, R = mixed.after_step(robot, near, step)
-    tau = tensions_at(robot, wires, x, R, *lengths)
-    n = len(x)
-    out = forward.Equilibria(x, R, tau, np.full(n, outcome.FOUND), np.ones(n, np.int64), np.zeros(n))
+    pose = mixed.after_step(robot, near, step)
+    out = _as_found(*pose, tensions_at(robot, wires, *pose, *lengths))
     # the error left is of the order of the step's square over a wire's length
     exact = np.linalg.norm(step, axis=1) < small * robot.size_m
     far = np.flatnonzero(~exact)
@@ -244,6 +249,13 @@ def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: flo
         rest = forward.solve_equilibrium(robot, wires.part(far), *own, *start)
         _put_in(out, far, rest)
     return out
+
+
+def _as_found(position_m: Floats, rotation: Floats, tension_N: Floats) -> forward.Equilibria:
+    """Poses as equilibria that one step led to."""
+    n = len(position_m)
+    status, count = np.full(n, outcome.FOUND), np.ones(n, np.int64)
+    return forward.Equilibria(position_m, rotation, tension_N, status, count, np.zeros(n))
 
 
 def newton_step(robot: Robot, wires: Wires, start: Poses, lengths: Lengths) -> Floats:

@@ -11,6 +11,8 @@ import numpy as np
 
 from wirebayes.errors import shown
 from wirebayes.notice import Notice
+from wirebayes.numeric.batches import batch_last
+from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
@@ -51,12 +53,12 @@ def wrong(robot: Robot, joint_m: Floats) -> tuple[tuple[int, int], str] | None:
     """
     wires = robot.lines * np.maximum(_straight_at_home(robot), robot.span_m) + robot.beyond_m
     most = _FAR * float(wires.max())
-    for bad, expected in (
-        (~(joint_m > 0) & ~robot.is_linear, "a length above 0"),
-        (np.abs(joint_m) > most, f"metres, at most {most:.3g}, {_FAR:g} times the robot's size"),
-    ):
-        if bad.any():
-            return _first(bad), expected
+    none = ~(joint_m > 0) & ~robot.is_linear
+    if none.any():
+        return _first(none), "a length above 0"
+    far = np.abs(joint_m) > most
+    if far.any():
+        return _first(far), f"metres, at most {most:.3g}, {_FAR:g} times the robot's size"
     short = overstretched(robot, joint_m)
     if short.any():
         whole = "the length of the whole wire, lines x straight + beyond_exit_m"
@@ -134,14 +136,15 @@ def _outside(robot: Robot) -> list[Notice]:
     """That the home position is not in the workspace of the same file; one that is far from all has been said."""
     if _home(robot):
         return []
-    beyond = np.maximum(robot.lower_m - robot.home_m, robot.home_m - robot.upper_m)
+    lower, upper, home = robot.lower_m, robot.upper_m, robot.home_m
+    beyond = np.maximum(lower - home, home - upper)
     axis = int(beyond.argmax())
     if not beyond[axis] > _ROUNDED * robot.span_m:
         return []
-    low, high, here = (number(v[axis]) for v in (robot.lower_m, robot.upper_m, robot.home_m))
     text = (
-        f"pose.position_m: the home position is {number(beyond[axis])} m outside the workspace, {'xyz'[axis]} = {here} "
-        f"m, where workspace.lower_m and upper_m say {low} to {high} m"
+        f"pose.position_m: the home position is {number(beyond[axis])} m outside the workspace, {'xyz'[axis]} = "
+        f"{number(home[axis])} m, where workspace.lower_m and upper_m say {number(lower[axis])} to "
+        f"{number(upper[axis])} m"
     )
     return [Notice("geometry", text)]
 
@@ -207,23 +210,24 @@ def _home(robot: Robot) -> str:
 def _lengths_of_legs(robot: Robot) -> list[str]:
     """Of each key of a leg that is longer than the robot, or any part of that kind, lets it be, the first leg."""
     size = max(robot.span_m, min(float(_straight_at_home(robot).max()), _FAR * robot.span_m))
-    nothing = np.zeros(robot.legs)
-    drum = nothing if robot.drums is None else robot.drums.radius_m
-    pulley = nothing if robot.pulleys is None else robot.pulleys.radius_m
     half = 0.5 * size  # a drum as wide as the robot
-    wheel = _beyond(size, 0.5) if half < _WHEEL_M else f"and none has a radius of more than {_WHEEL_M:g} m"
-    limits = (
-        ("beyond_exit_m", robot.beyond_m, _FAR * size, _beyond(size, _FAR)),
-        ("drum_radius_m", drum, min(half, _WHEEL_M), wheel),
-        ("pulley_radius_m", pulley, min(half, _WHEEL_M), wheel),
-    )
-    out = []
-    for key, length, most, said in limits:
-        legs = np.flatnonzero(length > most)
-        if legs.size:
-            more = f" and {legs.size - 1} more" if legs.size > 1 else ""
-            out.append(f"leg.{key} of wire {legs[0] + 1}{more}: {number(length[legs[0]])} m, {said}")
+    wheel = min(half, _WHEEL_M)
+    said = _beyond(size, 0.5) if half < _WHEEL_M else f"and none has a radius of more than {_WHEEL_M:g} m"
+    out = _longer("beyond_exit_m", robot.beyond_m, _FAR * size, _beyond(size, _FAR))
+    if robot.drums is not None:
+        out += _longer("drum_radius_m", robot.drums.radius_m, wheel, said)
+    if robot.pulleys is not None:
+        out += _longer("pulley_radius_m", robot.pulleys.radius_m, wheel, said)
     return out
+
+
+def _longer(key: str, length_m: Floats, most_m: float, said: str) -> list[str]:
+    """The first leg whose value of a key is larger than it can be, and how many more there are."""
+    legs = np.flatnonzero(length_m > most_m)
+    if not legs.size:
+        return []
+    more = f" and {legs.size - 1} more" if legs.size > 1 else ""
+    return [f"leg.{key} of wire {legs[0] + 1}{more}: {number(length_m[legs[0]])} m, {said}"]
 
 
 def _straight_at_home(robot: Robot) -> Floats:
@@ -249,22 +253,28 @@ def strain_notices(robot: Robot, line: WireDraws, tension_N: Floats) -> list[Not
     tension_N : (w,) array
     """
     out: dict[str, str] = {}
-    for leg, (name, wire) in enumerate(zip(robot.wire, lines_of(robot, line), strict=True)):
-        one = wire.centre().parameters
-        pull = float(tension_N[leg])
+    for leg, wire in enumerate(lines_of(robot, line)):
+        name, pull = robot.wire[leg], float(tension_N[leg])
         place = f"[wires.{name}]" if name in robot.given else "the fitted wire"
-        if not pull > 0 or place in out:
-            continue
-        stretch, creep = pull / one["k1"][0], one["B"][0] * pull ** one["U"][0] / wire.length_mm
-        if stretch > _TWICE - 1:
-            out[place] = f"k1_N = {one['k1'][0]:.4g}: {pull:.3g} N stretch wire {leg + 1} by {number(100 * stretch)} %"
-        elif creep > _TWICE - 1:
-            keys = f"B_mm = {one['B'][0]:.4g}, length_mm = {wire.length_mm:.4g}"
-            out[place] = f"{keys}: wire {leg + 1} creeps by {number(100 * creep)} % at {pull:.3g} N"
-    return [
-        Notice("geometry", f"{place}, {text}, expected less than 100 %; are the units those of the keys?")
-        for place, text in out.items()
-    ]
+        if pull > 0 and place not in out:
+            said = _strained(wire, leg, pull)
+            if said:
+                out[place] = said
+    rest = "expected less than 100 %; are the units those of the keys?"
+    return [Notice("geometry", f"{place}, {text}, {rest}") for place, text in out.items()]
+
+
+def _strained(wire: WireDraws, leg: int, pull_N: float) -> str:
+    """That a tension stretches a wire, or lets it creep, by more than its own length; empty where it does not."""
+    mean = {name: values[0] for name, values in wire.centre().parameters.items()}
+    stretch = pull_N / mean["k1"]
+    if stretch > _TWICE - 1:
+        return f"k1_N = {mean['k1']:.4g}: {pull_N:.3g} N stretch wire {leg + 1} by {number(100 * stretch)} %"
+    creep = mean["B"] * pull_N ** mean["U"] / wire.length_mm
+    if creep > _TWICE - 1:
+        keys = f"B_mm = {mean['B']:.4g}, length_mm = {wire.length_mm:.4g}"
+        return f"{keys}: wire {leg + 1} creeps by {number(100 * creep)} % at {pull_N:.3g} N"
+    return ""
 
 
 def _first(bad: Bools) -> tuple[int, int]:
@@ -288,21 +298,28 @@ def overstretched(robot: Robot, joint_m: Floats) -> Bools:
     out = np.zeros(joint_m.shape, bool)
     home = robot.home_m, matrix(robot.home_rotation_rad)
     # where the home pose itself does not strain them so far there is nothing to look for
-    rows = np.flatnonzero((_stretch_at(robot, joint_m, *home) > _TWICE).any(1))
+    strained = _stretch_at(robot, joint_m, *home) > _TWICE
+    rows = np.flatnonzero(strained.any(1))
     if not rows.size:
         return out
+    least = _least_stretch(robot, joint_m[rows])
+    found = np.isfinite(least).all(1)
+    out[rows[found]] = least[found] > _TWICE
+    return out
+
+
+def _least_stretch(robot: Robot, joint_m: Floats) -> Floats:
+    """Stretched by zero-tension length ``(t, w)`` where rigid wires are stretched least; infinite where none hold."""
     rng = np.random.default_rng(0)
     starts = [robot.home_m, *rng.uniform(robot.lower_m, robot.upper_m, (_STARTS, 3))]
-    least = np.full((len(rows), robot.legs), np.inf)
+    least = np.full(joint_m.shape, np.inf)
     for start in starts:
-        stretch = _stretch(robot, joint_m[rows], start)
+        stretch = _stretch(robot, joint_m, start)
         better = stretch.max(1) < least.max(1)
         least[better] = stretch[better]
         if not (least.max(1) > _TWICE).any():
             break
-    found = np.isfinite(least).all(1)
-    out[rows[found]] = least[found] > _TWICE
-    return out
+    return least
 
 
 def _stretch_at(robot: Robot, joint_m: Floats, position_m: Floats, rotation: Floats) -> Floats:
@@ -318,6 +335,7 @@ def _stretch(robot: Robot, joint_m: Floats, start_m: Floats) -> Floats:
     stiff = {"k1": np.full((1, 1), _RIGID * robot.mass_kg * GRAVITY)}
     rigid = Wires("hooke", "saturating", stiff, np.full((robot.legs, 1), 1000.0))
     there = forward.solve_equilibrium(robot, rigid, zero, offset, start_m, matrix(robot.home_rotation_rad))
-    shape = statics.geometry(robot, there.position_m.T, np.moveaxis(there.rotation, 0, -1))
-    stretch = statics.stretched(robot, shape, np.broadcast_to(offset, zero.shape).T).T / zero
-    return np.where(there.found[:, None], stretch, np.inf)
+    shape = statics.geometry(robot, there.position_m.T, batch_last(there.rotation))
+    beyond = np.broadcast_to(offset, zero.shape).T
+    stretch = statics.stretched(robot, shape, beyond).T / zero
+    return chosen_rows(there.found, stretch, np.inf)

@@ -46,6 +46,12 @@ class Tied:
     tension_N: Floats
     held: Bools
 
+    @classmethod
+    def nothing(cls, rotation: Floats, tension_N: Floats) -> "Tied":
+        """No balance is known yet."""
+        none = np.full(tension_N.shape, np.nan)
+        return cls(np.array(rotation), none, none.copy(), np.zeros(len(none), bool))
+
 
 @dataclass(frozen=True)
 class _Goal:
@@ -110,19 +116,19 @@ def tied(
         As for `inverse.commands`.
     """
     creep, error = (np.broadcast_to(v, tension_N.T.shape).T for v in (creep, error_m))
-    none = np.full(tension_N.shape, np.nan)
-    out = Tied(np.array(rotation), none, none.copy(), np.zeros(len(none), bool))
+    out = Tied.nothing(rotation, tension_N)
     live = np.flatnonzero(np.isfinite(joint_m).all(1) & np.isfinite(tension_N).all(1))
     goal = _Goal(position_m, rotation, tension_N)
     cases = _Cases.beginning(rows_of(goal, live), mean_of_each_winch(robot, joint_m)[live])
     for _ in range(_STEPS):
         if not live.size:
             break
+        own = rows_of(goal, live)
         here = _here(robot, wires.part(live), cases, creep[live], error[live])
-        step = _step(robot, here, cases, rows_of(goal, live))
+        step = _step(robot, here, cases, own)
         done = _settled(robot, here, cases, step)
         _keep(out, robot, live, done, cases, here)
-        off = np.abs(cases.x - position_m[live]).max(1)
+        off = np.abs(cases.x - own.x).max(1)
         out.held[live[done]] = off[done] < _REACHED * robot.span_m
         go = ~done & np.isfinite(step).all(1)
         live = live[go]
@@ -160,11 +166,19 @@ def _here(robot: Robot, wires: Wires, cases: _Cases, creep: Floats, error: Float
     tau, slope = tension(wires, stretched, zero.T)
     gradient, hessian = statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)
     force_by_pose = batch_first(hessian) * scale * scale[:, None]
-    # a tension depends on the strain alone: by the zero-tension length it falls as it grows by the stretched one
-    by_joint = slope.T * np.where(robot.is_linear, robot.ratio, -(stretched.T / zero) * grown)
+    tension_by_joint = _by_joint(robot, slope.T, stretched.T / zero, grown)
     J = statics.wire_jacobian(robot, shape) * scale[:, None, None]
-    by_force, by_tension = _slopes(J, force_by_pose, slope, by_joint[:, :, None] * turned_by(robot))
+    by_force, by_tension = _slopes(J, force_by_pose, slope, tension_by_joint)
     return _Here(gradient.T * scale, by_force, tau.T, by_tension)
+
+
+def _by_joint(robot: Robot, slope: Floats, ratio: Floats, grown: Floats) -> Floats:
+    """(n, w, j) slopes of tensions by joint values, where wires are stretched to ratios ``(n, w)``.
+
+    A tension depends on the strain alone: by the zero-tension length it falls as it grows by the stretched one.
+    """
+    by_line = slope * np.where(robot.is_linear, robot.ratio, -ratio * grown)
+    return np.asarray(by_line[:, :, None] * turned_by(robot))
 
 
 def _slopes(J: Floats, force_by_pose: Floats, slope: Floats, tension_by_joint: Floats) -> tuple[Floats, Floats]:

@@ -24,6 +24,7 @@ from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.winches import of_each_winch
 from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.robot.mechanics.wires_used import wires_summary
 from wirebayes.robot.motion import claim, control, drift, inverse, plausible
 from wirebayes.robot.motion.claim import DISTANCE_M, TILT_RAD, TIME_S
 from wirebayes.robot.motion.course import Course
@@ -210,7 +211,7 @@ def _requested(robot: Robot, line: WireDraws, x: Floats, R: Floats, turned: Orie
         "robot": robot.name,
         "mass_kg": robot.mass_kg,
         "pose": {"position_m": x, "rotation_vector_rad": turning.vector(R[None])[0]},
-        "wires": draws.wires_summary(robot, line),
+        "wires": wires_summary(robot, line),
         "tension_distribution": {
             "choice": robot.rule.choice,
             "lowest_N": robot.rule.lowest_N,

@@ -74,12 +74,29 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
     clear = _clear(robot, position_m, near)
     if robot.freedom == "position":
         in_space = clear and robot.plane is None
-        nowhere = in_space and not _held(robot, position_m, near)
-        return _nowhere(robot, position_m, near) if nowhere else Orientation(position_m, near)
-    fully_asked = bool(np.isfinite(asked).all())
-    commanded = not robot.is_underactuated and (fully_asked or (asked_rad is None and _held(robot, position_m, near)))
-    if commanded or not clear:
+        if in_space and not _held(robot, position_m, near):
+            return _nowhere(robot, position_m, near)
         return Orientation(position_m, near)
+    if not clear or _commanded(robot, position_m, near, asked_rad):
+        return Orientation(position_m, near)
+    there = _hung(robot, position_m, near, asked)
+    balance_decides = robot.is_underactuated and np.any(there.position_m != robot.home_m)
+    if there.found is None or asked_rad is not None or balance_decides:
+        return there
+    return replace(there, turned_away=tuple(turned_away(robot, there.rotation)))
+
+
+def _commanded(robot: Robot, position_m: Floats, near: Floats, asked_rad: Floats | None) -> bool:
+    """Whether the wires command the orientation as a whole: all that is asked for, or home where it is held."""
+    if robot.is_underactuated:
+        return False
+    if asked_rad is None:
+        return _held(robot, position_m, near)
+    return bool(np.isfinite(asked_rad).all())
+
+
+def _hung(robot: Robot, position_m: Floats, near: Floats, asked: Floats) -> Orientation:
+    """The orientation in balance that has the components asked for, or those of them that can be had."""
     had = np.isfinite(asked)
     found = hanging.hang(robot, position_m[None], near, asked)
     if not found.held[0]:
@@ -94,11 +111,7 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
             if not part.held[0]:
                 return Orientation(position_m, near, None, _out_of_reach(asked, had, found))
             found = part
-    there = _described(robot, position_m, found, asked, had)
-    balance_decides = robot.is_underactuated and np.any(position_m != robot.home_m)
-    if asked_rad is not None or balance_decides:
-        return there
-    return replace(there, turned_away=tuple(turned_away(robot, there.rotation)))
+    return _described(robot, position_m, found, asked, had)
 
 
 def by_lines(robot: Robot, rotation: Floats) -> OrientationFound:
@@ -161,29 +174,36 @@ def _to_be_had(ways: Floats, asked: Floats) -> Floats:
 def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, had: Bools) -> Orientation:
     """The orientation that was found, with what was commanded."""
     R, tau = found.rotation[0], found.tension_N[0]
-    vector = turning.vector(R[None])[0]
     places, degrees = hanging.commandable(robot, x, R, tau)
     movable = _movable(robot, R)
     had = had & movable
     free = _names(movable & ~had)
-    left = int(found.choice[0]) - int(had.sum())
-    refused = [i for i in range(3) if np.isfinite(asked[i]) and movable[i] and not had[i]]
+    refused = np.isfinite(asked) & movable & ~had
+    choice = int(found.choice[0])
+    left = choice - int(had.sum())
     content: OrientationFound = {
         "commanded_degrees": degrees,
         "of_degrees": robot.freedoms,
         "position_directions": len(places),
-        "rotation_choice": int(found.choice[0]),
+        "rotation_choice": choice,
         "commanded_components": _names(had),
         "free_components": free,
-        "refused_components": [COMPONENTS[i] for i in refused],
+        "refused_components": _names(refused),
         "other_rotation_vectors_rad": found.others[0],
         "sentence": _summary(robot, degrees, len(places), left, free, len(found.others[0])),
     }
-    missed = [
-        f"{COMPONENTS[i]} = {asked[i]:g} (it is {vector[i]:.5g})" for i in refused if abs(asked[i] - vector[i]) > _SAME
-    ]
-    words = f"the rotation asked for cannot be had: balance decides {', '.join(missed)}" if missed else ""
-    return Orientation(x, R, content, "", words)
+    return Orientation(x, R, content, "", _missed(asked, turning.vector(R[None])[0], refused))
+
+
+def _missed(asked: Floats, vector: Floats, refused: Bools) -> str:
+    """That components asked for cannot be had, where balance makes others of them; else empty."""
+    missed = []
+    for i in np.flatnonzero(refused):
+        if abs(asked[i] - vector[i]) > _SAME:
+            missed.append(f"{COMPONENTS[i]} = {asked[i]:g} (it is {vector[i]:.5g})")
+    if not missed:
+        return ""
+    return f"the rotation asked for cannot be had: balance decides {', '.join(missed)}"
 
 
 def _movable(robot: Robot, rotation: Floats) -> Bools:

@@ -135,9 +135,8 @@ class Balance:
         pull = [-a for a in u]
         if by_turn is None:
             return Strand(stretched, u, pull)
-        # u . (s x r) = s . (r x u): the stretch by a turn is the moment
         moment = _cross(r, u)
-        by_turning = (row(moment) * by_turn).entries()
+        by_turning = (row(moment) * by_turn).entries()  # u . (s x r) = s . (r x u): the moment
         return Strand(stretched, u + by_turning, pull + [-v / self.size for v in moment])
 
     def _line(self, i: int, y: list[Any], turn: Any) -> tuple[list[Any], list[Any]]:
@@ -157,26 +156,26 @@ class Balance:
 
     def _over_pulley(self, line: list[Any], axis: list[Any], rho: Any) -> Span:
         """A line that leaves a pulley of radius `rho` which swivels about an axis."""
-        arb = self.arb
         s = [a / _square(axis).sqrt() for a in axis]
         z = _dot(line, s)
         beside = [a - z * b for a, b in zip(line, s, strict=True)]
         away = _square(beside).sqrt()
         e = [a / away for a in beside]
-        h = away - rho
+        tangent = self._tangent(away - rho, z, rho)
+        cosine, sine = tangent.cosine, tangent.sine
+        u = [sine * a + cosine * b for a, b in zip(e, s, strict=True)]
+        normal = [cosine * a - sine * b for a, b in zip(e, s, strict=True)]
+        bends = _bends(normal, tangent.straight, _cross(s, e), sine, away)
+        return Span(rho * tangent.wrap + tangent.straight, u, bends)
+
+    def _tangent(self, h: Any, z: Any, rho: Any) -> "_RimTangent":
+        """The tangent from a rim to the point ``(h, z)``, seen from the pulley's centre."""
         straight = (h * h + z * z - rho * rho).sqrt()
         size = h * h + z * z
         cosine = (z * straight - h * rho) / size
         sine = (z * rho + h * straight) / size
-        wrap = arb.pi() / 2 - arb.atan2(cosine, sine)  # cut where no pulley in use is wrapped that far
-        u = [sine * a + cosine * b for a, b in zip(e, s, strict=True)]
-        normal = [cosine * a - sine * b for a, b in zip(e, s, strict=True)]
-        across = _cross(s, e)
-        bends: list[list[Any]] = []
-        for j in range(3):
-            swivelling = [across[j] * across[k] * sine / away for k in range(3)]
-            bends.append([normal[j] * normal[k] / straight + swivelling[k] for k in range(3)])
-        return Span(rho * wrap + straight, u, bends)
+        wrap = self.arb.pi() / 2 - self.arb.atan2(cosine, sine)  # cut where no pulley in use is wrapped that far
+        return _RimTangent(straight, cosine, sine, wrap)
 
     def strain(self, i: int, S: Any) -> Any:
         """Strain at a stretched length."""
@@ -244,6 +243,25 @@ def _straight(line: list[Any]) -> Span:
     u = [a / length for a in line]
     bends = [[((1 if j == k else 0) - u[j] * u[k]) / length for k in range(3)] for j in range(3)]
     return Span(length, u, bends)
+
+
+class _RimTangent(NamedTuple):
+    """Straight part of a line that leaves a rim, its direction in the pulley's plane, and the arc on the rim."""
+
+    straight: Any
+    cosine: Any
+    sine: Any
+    wrap: Any
+
+
+def _bends(normal: list[Any], straight: Any, across: list[Any], sine: Any, away: Any) -> list[list[Any]]:
+    """Curvature of a line's length by the platform point: in the pulley's plane, and as the pulley swivels."""
+    out = []
+    for j in range(3):
+        in_plane = [normal[j] * normal[k] / straight for k in range(3)]
+        swivelling = [across[j] * across[k] * sine / away for k in range(3)]
+        out.append(_sum(in_plane, swivelling))
+    return out
 
 
 def _times(turn: Any, vector: Floats) -> list[Any]:

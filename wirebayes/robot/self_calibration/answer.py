@@ -20,6 +20,7 @@ from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts
 from wirebayes.robot.mechanics.sag import sag_warnings_of_poses
+from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import control, hanging, home, inverse, plausible
 from wirebayes.robot.self_calibration import observability, sensors
 from wirebayes.robot.self_calibration.calibrated import Calibrated, calibrated
@@ -191,15 +192,20 @@ def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: Len
     if not known.converged[0]:
         return []
     shift = np.linalg.norm(known.begun_m[0] - session.position_m, axis=1)
-    angle = np.linalg.norm(rotation.vector(np.swapaxes(session.rotation, 1, 2) @ known.begun_rotation[0]), axis=1)
+    turn = rotation.vector(session.rotation.mT @ known.begun_rotation[0])
+    angle = np.linalg.norm(turn, axis=1)
     apart = np.maximum(shift, robot.size_m * angle)
-    plausible = _FAR * (prior.reference_sd_m + float((known.creep[0] * known.length_m[0]).max()))
-    texts = [
-        f"hold {session.numbers[i]:g}: the requested pose is {shift[i]:.3g} m and {angle[i]:.2g} rad from the one that "
-        f"its joint values lead to, more than errors of the lengths and creep explain ({plausible:.2g} m); check both"
-        for i in np.flatnonzero(apart > plausible)
-    ]
-    return [Notice("misfit", text) for text in texts]
+    creep_m = float((known.creep[0] * known.length_m[0]).max())
+    plausible = _FAR * (prior.reference_sd_m + creep_m)
+    out = []
+    for i in np.flatnonzero(apart > plausible):
+        text = (
+            f"hold {session.numbers[i]:g}: the requested pose is {shift[i]:.3g} m and {angle[i]:.2g} rad from the one "
+            f"that its joint values lead to, more than errors of the lengths and creep explain ({plausible:.2g} m); "
+            "check both"
+        )
+        out.append(Notice("misfit", text))
+    return out
 
 
 def _at_fault(
@@ -239,20 +245,13 @@ def _lengths(robot: Robot, prior: LengthPrior, known: LengthPosterior) -> Estima
 
 def _observed(robot: Robot, prior: LengthPrior, session: Session, rng: np.random.Generator, visits: int) -> Observed:
     """Rank and sentence for the poses that were read; poses worth reading next."""
-    wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
+    mean, _ = prior.moments(robot.legs)
+    wires, _ = prior.wires(robot, mean[None])
     wires = control.known(wires)
     zero, offset = inverse.lengths(robot, session.joint_m[session.read])
-    done = observability.length_sensitivity(
-        robot, wires, session.position_m[session.read], session.rotation[session.read], zero, offset
-    )[1]
+    read = session.position_m[session.read], session.rotation[session.read]
+    _, done = observability.length_sensitivity(robot, wires, *read, zero, offset)
     seen = observability.observe(done, session.tension_sd_N, prior.reference_sd_m, prior.bias_sd_N, session.bias_sign)
-    x = rng.uniform(robot.lower_m, robot.upper_m, (CANDIDATES, 3))
-    R = hanging.orientations(robot, x, rotation.matrix(robot.home_rotation_rad))
-    tau = inverse.tensions(robot, x, R)
-    good = np.isfinite(tau).all(1)
-    commands = inverse.commands(robot, wires, x[good], R[good], tau[good])
-    ahead = observability.length_sensitivity(robot, wires, x[good], R[good], commands.zero_m, commands.offset_m)[1]
-    pick = observability.choose_poses(ahead, visits, session.tension_sd_N, prior.reference_sd_m)
     return {
         "observability": {
             "rank": seen.rank,
@@ -260,5 +259,20 @@ def _observed(robot: Robot, prior: LengthPrior, session: Session, rng: np.random
             "weakest_combination": seen.weakest,
             "sentence": seen.sentence,
         },
-        "next_positions_m": x[good][pick],
+        "next_positions_m": _next_positions(robot, wires, prior, session, rng, visits),
     }
+
+
+def _next_positions(
+    robot: Robot, wires: Wires, prior: LengthPrior, session: Session, rng: np.random.Generator, visits: int
+) -> Floats:
+    """(v, 3) positions worth reading next."""
+    x = rng.uniform(robot.lower_m, robot.upper_m, (CANDIDATES, 3))
+    R = hanging.orientations(robot, x, rotation.matrix(robot.home_rotation_rad))
+    tau = inverse.tensions(robot, x, R)
+    good = np.isfinite(tau).all(1)
+    x, R = x[good], R[good]
+    commands = inverse.commands(robot, wires, x, R, tau[good])
+    _, ahead = observability.length_sensitivity(robot, wires, x, R, commands.zero_m, commands.offset_m)
+    pick = observability.choose_poses(ahead, visits, session.tension_sd_N, prior.reference_sd_m)
+    return x[pick]

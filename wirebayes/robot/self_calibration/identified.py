@@ -70,31 +70,38 @@ def identified(found: Whole) -> Identified:
     found : Whole
     """
     unknowns = found.unknowns
-    prior, errors, at = unknowns.prior, unknowns.errors, unknowns.slices
+    prior, at = unknowns.prior, unknowns.slices
     geometry = np.r_[0 : at["wires"].start, unknowns.references]
     if prior.reference_sd_m <= 0:
         geometry = geometry[: at["wires"].start]
-    size = np.linalg.eigvalsh(found.covariance[np.ix_(geometry, geometry)]) if len(geometry) else np.zeros(0)
-    combinations = []
-    if errors.exit_m > 0:
-        inside = found.covariance[at["exit"], at["exit"]]
-        for name, direction in _motions(unknowns.robot).items():
-            left = float(np.sqrt(direction @ inside @ direction))
-            before = 1e3 * errors.exit_m / np.sqrt(len(unknowns.robot.exit_m))
-            combinations.append(Combination(name, before, before * left, left < _DETERMINED))
-    sentences = [
-        _SAYS[one.name] + f": known to {one.before_mm:.2g} mm before, to {one.after_mm:.2g} mm now"
-        for one in combinations
-        if not one.determined
-    ]
-    known = np.sqrt(np.diag(found.covariance)[unknowns.references])
+    size = np.zeros(0)
+    if len(geometry):
+        size = np.linalg.eigvalsh(found.covariance[np.ix_(geometry, geometry)])
+    combinations = _of_exit_points(found) if unknowns.errors.exit_m > 0 else []
+    sentences = []
+    for one in combinations:
+        if not one.determined:
+            known = f"known to {one.before_mm:.2g} mm before, to {one.after_mm:.2g} mm now"
+            sentences.append(f"{_SAYS[one.name]}: {known}")
+    sd = np.sqrt(np.diag(found.covariance)[unknowns.references])
     before = 1e3 * prior.reference_sd_m
-    for i in np.flatnonzero(known >= _DETERMINED):
-        sentences.append(
-            f"the reference length of wire {i + 1}: known to {before:.2g} mm before, to {before * known[i]:.2g} mm now"
-        )
+    for i in np.flatnonzero(sd >= _DETERMINED):
+        known = f"known to {before:.2g} mm before, to {before * sd[i]:.2g} mm now"
+        sentences.append(f"the reference length of wire {i + 1}: {known}")
     count = int((np.sqrt(np.maximum(size, 0.0)) < _DETERMINED).sum())
     return Identified(count, len(size), combinations, sentences)
+
+
+def _of_exit_points(found: Whole) -> list[Combination]:
+    """How well each motion of all exit points together is known."""
+    robot, at = found.unknowns.robot, found.unknowns.slices["exit"]
+    inside = found.covariance[at, at]
+    before = 1e3 * found.unknowns.errors.exit_m / np.sqrt(len(robot.exit_m))
+    out = []
+    for name, direction in _motions(robot).items():
+        left = float(np.sqrt(direction @ inside @ direction))
+        out.append(Combination(name, before, before * left, left < _DETERMINED))
+    return out
 
 
 def _motions(robot: Robot) -> dict[str, Floats]:
@@ -106,15 +113,23 @@ def _motions(robot: Robot) -> dict[str, Floats]:
     about = points - points.mean(0)
     flat = _flat(robot)
     turning = flat if flat.any() else np.ones(3, bool)
-    ways = {f"moved along {_AXES[i]}": np.tile(np.eye(3)[i], (len(points), 1)) for i in np.flatnonzero(~flat)}
-    ways |= {f"turned about {_AXES[i]}": np.cross(np.eye(3)[i], about) for i in np.flatnonzero(turning)}
+    ways = {}
+    for i in np.flatnonzero(~flat):
+        ways[f"moved along {_AXES[i]}"] = np.tile(np.eye(3)[i], (len(points), 1))
+    for i in np.flatnonzero(turning):
+        ways[f"turned about {_AXES[i]}"] = np.cross(np.eye(3)[i], about)
     ways["scaled"] = about
     least = 1e-6 * max(float(np.linalg.norm(about)), 1e-12)
-    sizes = {name: float(np.linalg.norm(way)) for name, way in ways.items()}
-    return {name: way.ravel() / sizes[name] for name, way in ways.items() if sizes[name] > least}
+    out = {}
+    for name, way in ways.items():
+        size = float(np.linalg.norm(way))
+        if size > least:
+            out[name] = way.ravel() / size
+    return out
 
 
 def _flat(robot: Robot) -> Bools:
     """(3,) axes along which neither exit points nor platform have any extent."""
     platform = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
-    return np.asarray(np.ptp(np.vstack([robot.exit_m, platform]), axis=0) < _FLAT * robot.span_m)
+    extent = np.ptp(np.vstack([robot.exit_m, platform]), axis=0)
+    return np.asarray(extent < _FLAT * robot.span_m)

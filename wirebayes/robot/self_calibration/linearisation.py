@@ -139,20 +139,25 @@ def _more_creep(about: _About, creep: Grown, since: State) -> Floats:
 
 def _loops(out: Equations, about: _About, creep: Grown, since: State) -> None:
     """Every wire is as long as its way: stretched from what the joint value, its reference and creep make of it."""
-    unknowns, robot = about.unknowns, about.unknowns.robot
-    loop, leg, d = out.rows["loop"], np.arange(robot.legs), robot.degrees
+    loop, leg, d = out.rows["loop"], np.arange(about.here.legs), about.here.degrees
     lengths = _Lengths.at(about, creep, since)
-    way = statics.stretched(robot, about.shape, lengths.offset.T).T
+    way = statics.stretched(about.here, about.shape, lengths.offset.T).T
     out.residual[:, loop] = way - lengths.bare * lengths.longer
     out.by_hold[:, loop, :d] = about.J
     out.by_hold[:, leg, d + leg] = -lengths.bare * lengths.by_pull(creep)
-    wires = out.by_robot[:, loop, unknowns.slices["wires"]]
+    _loops_by_wires(out, about, lengths, creep)
+    if about.unknowns.errors.drum > 0:
+        _loops_by_drum(out, about.unknowns, lengths)
+    _loops_by_points(out, about)
+    _weigh_loops(out, about.here, about.noise)
+
+
+def _loops_by_wires(out: Equations, about: _About, lengths: _Lengths, creep: Grown) -> None:
+    """Slopes by the wires' unknowns, the errors of the reference lengths among them."""
+    unknowns, leg = about.unknowns, np.arange(about.here.legs)
+    wires = out.by_robot[:, out.rows["loop"], unknowns.slices["wires"]]
     wires -= lengths.bare[..., None] * lengths.by_wires(creep)
     wires[:, leg, leg] -= lengths.longer * unknowns.prior.reference_sd_m
-    if unknowns.errors.drum > 0:
-        _loops_by_drum(out, unknowns, lengths)
-    _loops_by_points(out, about)
-    _weigh_loops(out, robot, about.noise)
 
 
 def _loops_by_points(out: Equations, about: _About) -> None:
@@ -193,14 +198,13 @@ def _errors_apart(robot: Robot) -> Floats | None:
 
 def _balance(out: Equations, about: _About) -> None:
     """The wires carry the platform."""
-    robot, scale = about.unknowns.robot, about.unknowns.robot.edge_scale
-    balance, d = out.rows["balance"], robot.degrees
+    scale, d = about.here.edge_scale, about.here.degrees
     pull, taut = pulled(about.state.pull_N, about.noise.soft_N)
-    gradient, hessian = statics.unbalance_and_stiffness(
-        about.here, about.shape, about.turn, pull.T, np.zeros_like(pull.T)
-    )
+    none = np.zeros_like(pull.T)
+    gradient, hessian = statics.unbalance_and_stiffness(about.here, about.shape, about.turn, pull.T, none)
     stiffness = batch_first(hessian) * scale * scale[:, None]
-    force = about.noise.balance * robot.mass_kg * GRAVITY
+    force = about.noise.balance * about.here.mass_kg * GRAVITY
+    balance = out.rows["balance"]
     out.residual[:, balance] = gradient.T * scale / force
     out.by_hold[:, balance, :d] = stiffness / force
     out.by_hold[:, balance, d:] = about.J.mT * taut[:, None] / force
@@ -261,17 +265,17 @@ def _turn_of_pull(shape: statics.Geometry, tau: Floats) -> Floats:
 
 def _tensions(out: Equations, about: _About) -> None:
     """Tensions that were read, and what is usual where none was."""
-    robot, noise = about.unknowns.robot, about.noise
-    session, parts = about.holds.session, about.parts
+    session, noise = about.holds.session, about.noise
     read = np.isfinite(about.holds.tension_N)
     pull, taut = pulled(about.state.pull_N, noise.soft_N)
-    off = pull + session.signs * parts.bias_N - about.holds.tension_N
-    usual = about.state.pull_N - parts.level_N - noise.usual_N
-    rows, leg = out.rows["tension"], np.arange(robot.legs)
+    off = pull + session.signs * about.parts.bias_N - about.holds.tension_N
+    usual = about.state.pull_N - about.parts.level_N - noise.usual_N
+    rows = out.rows["tension"]
     out.known[:, rows] = read
     out.residual[:, rows] = np.where(read, off / session.tension_sd_N, usual / noise.pull_N)
     by_pull = np.where(read, taut / session.tension_sd_N, 1.0 / noise.pull_N)
-    out.by_hold[:, rows.start + leg, robot.degrees + leg] = by_pull
+    leg = np.arange(about.here.legs)
+    out.by_hold[:, rows.start + leg, about.here.degrees + leg] = by_pull
     _tensions_by_robot(out, about, read)
 
 

@@ -83,21 +83,23 @@ def tension_notices(robot: Robot, session: Session, readings: Floats) -> list[No
 
 def _refuse_lengths(robot: Robot, session: Session, rows: Bools, table: CsvTable, joints: Sequence[str]) -> None:
     """Two columns of joint values that are the lengths of each other's wires."""
-    poses = session.position_m[rows], session.rotation[rows]
-    shape = statics.geometry(robot, poses[0].T, batch_last(poses[1]))
-
-    def apart(order: Sequence[int]) -> Floats:
-        bare, offset = lengths(robot, session.joint_m[rows][:, order])
-        way = statics.stretched(robot, shape, offset.T).T
-        return np.asarray((way - bare).std(0))  # references may err
-
-    as_read = apart(range(robot.legs))
+    as_read = _apart(robot, session, rows, range(robot.legs))
     for i, j in combinations(range(robot.legs), 2):
-        there = apart(_swapped(robot.legs, i, j))[[i, j]].max()
+        swapped = _apart(robot, session, rows, _swapped(robot.legs, i, j))
+        there = swapped[[i, j]].max()
         if as_read[[i, j]].min() > max(_APART * robot.span_m, _BETTER * there):
             found = f"{joints[i]} as far as {number(as_read[i])} m from the lengths to the stated poses"
             expected = _in_place(f"{number(there)} m")
             raise InputError(f"{table.path}, columns {joints[i]} and {joints[j]}: found {found}, expected {expected}")
+
+
+def _apart(robot: Robot, session: Session, rows: Bools, order: Sequence[int]) -> Floats:
+    """(w,) How far joint values in an order are from the lengths to stated poses, but for a constant of each wire."""
+    turn = batch_last(session.rotation[rows])
+    shape = statics.geometry(robot, session.position_m[rows].T, turn)
+    bare, offset = lengths(robot, session.joint_m[rows][:, order])
+    way = statics.stretched(robot, shape, offset.T).T
+    return np.asarray((way - bare).std(0))  # references may err
 
 
 def _refuse_tensions(robot: Robot, session: Session, tension_N: Floats, rows: Bools, table: CsvTable) -> None:

@@ -62,25 +62,30 @@ def summarised(found: Whole) -> Summary:
     ----------
     found : Whole
     """
+    sds = _standard_deviations(found)
+    halves = {name: np.full(np.shape(sd), ndtri(0.95)) for name, sd in sds.items()}
+    if np.isfinite(found.degrees):
+        wider = _standard_deviations(at_joint_error(found, _FACTOR))
+        halves = {name: _half(sd, wider[name], found.degrees) for name, sd in sds.items()}
+    moments = {}
+    for name, mean in _means(found).items():
+        moments[name] = Moment(mean, sds[name], halves[name])
+    return Summary(**moments, strain=found.creep.strain[-1])
+
+
+def _means(found: Whole) -> dict[str, Floats]:
     state, parts = found.state, found.unknowns.parts(found.state.white)
-    strain = found.creep.strain[-1]
-    means = {
+    return {
         "exit_m": parts.exit_m,
         "platform_m": parts.platform_m,
         "reference_m": parts.reference_m,
-        "length_m": (found.last_m + parts.reference_m) * (1 + strain),
+        "length_m": (found.last_m + parts.reference_m) * (1 + found.creep.strain[-1]),
         "drum": parts.drum,
         "bias_N": parts.bias_N,
         "position_m": state.position_m,
         "turn_rad": turns.vector(state.rotation),
         "pull_N": np.maximum(state.pull_N, 0.0),
     }
-    sds = _standard_deviations(found)
-    halves = {name: np.full(np.shape(sd), ndtri(0.95)) for name, sd in sds.items()}
-    if np.isfinite(found.degrees):
-        wider = _standard_deviations(at_joint_error(found, _FACTOR))
-        halves = {name: _half(sd, wider[name], found.degrees) for name, sd in sds.items()}
-    return Summary(**{name: Moment(mean, sds[name], halves[name]) for name, mean in means.items()}, strain=strain)
 
 
 def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
@@ -94,36 +99,39 @@ def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
 def _slope_of_lengths(found: Whole) -> Floats:
     """The last zero-tension lengths by all unknowns: references, drums and the strain, with all that it depends on."""
     unknowns, robot = found.unknowns, found.unknowns.robot
-    joint, strain = found.last_m, found.creep.strain[-1]
-    bare = joint + unknowns.parts(found.state.white).reference_m
+    strain = found.creep.strain[-1]
+    bare = found.last_m + unknowns.parts(found.state.white).reference_m
     slope = np.zeros((robot.legs, unknowns.count))
     slope[:, unknowns.slices["wires"]] = bare[:, None] * found.creep.by_wires[-1]
     leg = np.arange(robot.legs)
     slope[leg, unknowns.references.start + leg] += (1 + strain) * unknowns.prior.reference_sd_m
     if unknowns.errors.drum > 0:
         drum = leg if robot.winch is None else robot.winch
-        slope[leg, unknowns.slices["drum"].start + drum] = unknowns.errors.drum * joint * ~robot.is_linear
+        by_drum = unknowns.errors.drum * found.last_m * ~robot.is_linear
+        slope[leg, unknowns.slices["drum"].start + drum] = by_drum
     return slope
 
 
 def _standard_deviations(found: Whole) -> dict[str, Floats]:
-    unknowns, robot, prior, at = found.unknowns, found.unknowns.robot, found.unknowns.prior, found.unknowns.slices
+    unknowns, robot, prior = found.unknowns, found.unknowns.robot, found.unknowns.prior
     w, d = robot.legs, robot.degrees
     sd = np.sqrt(np.diag(found.covariance))
     hold = np.sqrt(np.maximum(np.einsum("pii->pi", found.hold_covariance), 0.0))
 
     def unknown(name: str, error: float, shape: tuple[int, ...]) -> Floats:
-        own = sd[at[name]]
+        own = sd[unknowns.slices[name]]
         return np.asarray(error * own.reshape(shape) if len(own) else np.zeros(shape))
 
     slope = _slope_of_lengths(found)
+    drum = unknown("drum", unknowns.errors.drum, (robot.joints,))
+    bias = prior.bias_sd_N * sd[unknowns.slices["wires"]][-w:]
     return {
         "exit_m": unknown("exit", unknowns.errors.exit_m, (w, 3)),
         "platform_m": unknown("platform", unknowns.errors.platform_m, (w, 3)),
         "reference_m": prior.reference_sd_m * sd[unknowns.references],
         "length_m": np.sqrt(np.einsum("wi,ij,wj->w", slope, found.covariance, slope)),
-        "drum": of_each_leg(robot, unknown("drum", unknowns.errors.drum, (robot.joints,))),
-        "bias_N": prior.bias_sd_N * sd[at["wires"]][-w:] if prior.bias_sd_N > 0 else np.zeros(w),
+        "drum": of_each_leg(robot, drum),
+        "bias_N": bias if prior.bias_sd_N > 0 else np.zeros(w),
         "position_m": hold[:, :3],
         "turn_rad": hold[:, 3:d] / robot.size_m if d == 6 else np.zeros((len(hold), 3)),
         "pull_N": hold[:, d:],

@@ -1,0 +1,53 @@
+"""Which wires an answer is for, as its JSON and its sentences say it."""
+
+import numpy as np
+
+from wirebayes.json_files.pose import Specimens, WiresUsed
+from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.draws import CORE, WireDraws
+
+
+def wires_summary(robot: Robot, line: WireDraws) -> WiresUsed:
+    """Which wires an answer is for, as ``pose.json`` says it."""
+    kept = line.material()
+    used: WiresUsed = {
+        "draws": line.count,
+        "tested_length_mm": line.length_mm,
+        "elastic_law": line.law,
+        "history": line.history,
+        "effects": [e.key for e in kept],
+        "left_out": [e.key for e in line.effects if e not in kept],
+        "legs": list(robot.wire),
+        "lines": list(line.each),
+    }
+    several = {name: _specimens(one) for name, one in line.each.items() if one.spread}
+    if several:
+        used["specimens"] = several
+    return used
+
+
+def _specimens(line: WireDraws) -> Specimens:
+    """How many were tested, and how much they differ."""
+    spread = {name: np.quantile(draws, [0.05, 0.5, 0.95]).tolist() for name, draws in line.spread.items()}
+    return {
+        "tests": line.specimens,
+        "spread": {name: {"q05": low, "q50": middle, "q95": high} for name, (low, middle, high) in spread.items()},
+    }
+
+
+def specimens_in_words(wires: WiresUsed) -> list[str]:
+    """A sentence for each line whose spread was estimated, of `wires_summary`'s content.
+
+    Parameters
+    ----------
+    wires : WiresUsed
+        ``wires`` of ``pose.json``.
+    """
+    sentences = []
+    for name, one in wires.get("specimens", {}).items():
+        shares = []
+        for parameter in CORE:
+            low, middle, high = (100 * one["spread"][parameter][key] for key in ("q05", "q50", "q95"))
+            shares.append(f"{parameter} by {middle:.2g} % ({low:.2g} to {high:.2g} %)")
+        sentences.append(f"Specimens of {name} differ as estimated from {one['tests']} tests: {', '.join(shares)}.")
+    return sentences
