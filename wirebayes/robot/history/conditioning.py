@@ -222,8 +222,8 @@ def _moved(prior: Floats, read: LogReadings, mode: Mode, way: Way, rng: Generato
             break
         draws[todo] += move[todo]
         track = track.with_columns(todo, way(draws[todo, :d], "poses", every))
-    weight = np.where(size <= _NEAR, _log_weight(read, draws, residual, found), -np.inf)
-    return _Batch(draws, track, weight)
+    weight = _log_weight(read, draws, residual, found)
+    return _Batch(draws, track, np.where(size <= _NEAR, weight, -np.inf))
 
 
 def _linear_draws(prior: Floats, mode: Mode, noise: Floats) -> Floats:

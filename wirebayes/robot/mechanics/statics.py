@@ -162,23 +162,22 @@ def unbalance_and_stiffness(
         Stiffness matrix, its rotational block symmetrised (which it is by itself at an equilibrium).
     """
     J = jacobian(robot, shape)
-    m = robot.lines[:, None]
-    pull = tension_N * m
+    lines = robot.lines[:, None]
+    pull = tension_N * lines
     beta = pull / shape.straight_m
-    alpha = slope_N_m * (m * m) - beta
+    alpha = slope_N_m * (lines * lines) - beta
     degrees = robot.degrees
     gradient = (J * pull).sum(1)
     force = robot.mass_kg * GRAVITY
     gradient[2] += force
-    scaled = J * alpha
-    H = np.empty((degrees, degrees, scaled.shape[-1]))
-    for i in range(degrees):  # the upper triangle, a row at once
-        H[i, i:] = (scaled[i] * J[i:]).sum(1)
+    H = np.empty((degrees, degrees, pull.shape[-1]))
+    for i in range(degrees):
+        H[i, i:] = _upper_row(J, alpha, i)
     if shape.over is not None:
         side = _with_moments(robot, shape.over.across, shape.arm_m)
-        swivel = side * (pull * shape.over.swing_1_m)
+        swivel = pull * shape.over.swing_1_m
         for i in range(degrees):
-            H[i, i:] += (swivel[i] * side[i:]).sum(1)
+            H[i, i:] += _upper_row(side, swivel, i)
     total = beta.sum(0)
     for i in range(3):
         H[i, i] += total
@@ -190,6 +189,11 @@ def unbalance_and_stiffness(
     for i in range(degrees):
         H[i + 1 :, i] = H[i, i + 1 :]
     return (gradient, H) if robot.motions is None else _carried(robot, gradient, H)
+
+
+def _upper_row(J: Floats, weight: Floats, i: int) -> Floats:
+    """A row of the sum of weighted outer products of columns of `J`, from its diagonal on."""
+    return (J[i] * weight * J[i:]).sum(1)
 
 
 def _carried(robot: Robot, gradient: Floats, H: Floats) -> tuple[Floats, Floats]:
@@ -212,16 +216,16 @@ def _add_rotation(shape: Geometry, moment: Floats, pull: Floats, beta: Floats, H
     """
     r, u = shape.arm_m, shape.direction
     swung = beta * r
-    s = swung.sum(1)
     # -Σβ[r]×, the coupling of displacement and rotation
-    H[0, 4] += s[2]
-    H[0, 5] -= s[1]
-    H[1, 3] -= s[2]
-    H[1, 5] += s[0]
-    H[2, 3] += s[1]
-    H[2, 4] -= s[0]
+    x, y, z = swung.sum(1)
+    H[0, 4] += z
+    H[0, 5] -= y
+    H[1, 3] -= z
+    H[1, 5] += x
+    H[2, 3] += y
+    H[2, 4] -= x
     q = pull * u - swung  # Σ τ u rᵀ - β r rᵀ in one outer product
-    outer = np.stack([(q[i] * r).sum(1) for i in range(3)])
+    outer = np.stack([(component * r).sum(1) for component in q])
     outer[2] += moment  # the weight, an arm of its own
     trace = outer[0, 0] + outer[1, 1] + outer[2, 2]
     turned_twice = 0.5 * (outer + outer.swapaxes(0, 1))

@@ -12,6 +12,7 @@ from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, hanging, inverse
+from wirebayes.robot.motion.course import Course
 from wirebayes.robot.motion.creep import HoldCreep, fresh
 
 TIME_S, DISTANCE_M, TILT_RAD = 60.0, 0.3e-3, float(np.radians(0.055))  # section 4 of the paper
@@ -129,13 +130,17 @@ def _drifts(
     if loaded_s > 0:
         state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
     commands = inverse.commands(robot, many, where, turn, pull, state.strain(many))
-    R = commands.rotation
-    held = drift.stably(robot, many, commands, where, R)
+    held = drift.stably(robot, many, commands, where, commands.rotation)
     joint = chosen_rows(held, commands.joint_m, np.nan)
-    course = drift.hold(robot, many, joint, np.array([time_s]), where, R, state)
-    distance = np.linalg.norm(course.position_m[:, 0] - where, axis=1)
-    tilt = turning.tilt(course.rotation[:, 0], R)
+    course = drift.hold(robot, many, joint, np.array([time_s]), where, commands.rotation, state)
+    distance, tilt = _moved(course, where, commands.rotation)
     return distance.reshape(p, n), tilt.reshape(p, n), float(course.found.mean())
+
+
+def _moved(course: Course, position_m: Floats, rotation: Floats) -> tuple[Floats, Floats]:
+    """Distances, m, and tilts, rad, of the first poses of a course from others, (n,) each."""
+    distance = np.linalg.norm(course.position_m[:, 0] - position_m, axis=1)
+    return distance, turning.tilt(course.rotation[:, 0], rotation)
 
 
 def _at_each(wires: Wires, draws: int, positions: int) -> Wires:

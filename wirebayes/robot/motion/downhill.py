@@ -215,10 +215,9 @@ def _iterate(robot: Robot, cases: _Cases) -> tuple[_Cases, Ints]:
     new = _evaluate(robot, cases.wires, cases.zero, cases.offset, x, R)
     noise = 1e-14 * (np.abs(cases.at.energy) + robot.mass_kg * GRAVITY * cases.span)
     accept = _leads_down(robot, cases, step, new, noise)
-    more = np.maximum(1e-3, cases.damping * 10)
-    damping = np.where(accept, _calmer(cases, step, new, noise), more)
     moved = cases.moved(accept, x, R, new)
     bare = moved.at.size <= cases.floor  # balanced: the next step uses the bare stiffness
+    damping = np.where(accept, _calmer(cases, step, new, noise), np.maximum(1e-3, cases.damping * 10))
     moved = replace(moved, damping=np.where(bare, 0.0, damping))
     still = step.length < 1e-9 * robot.size_m
     return moved, _ended(cases, moved, step, accept & still)

@@ -7,7 +7,7 @@ from wirebayes.numeric.rows import rows_of
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics import plane, statics
 from wirebayes.robot.mechanics import rotation as turning
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.forward import Equilibria, solve_equilibrium
 
@@ -40,11 +40,7 @@ def equilibria(
     Equilibria
         Distinct ones, the lowest energy first.
     """
-    begin, turn = _starts(robot, float(zero_m.max()), rng, starts)
-    if known is not None:
-        begin = np.concatenate([known[0][None], begin])
-        turn = np.concatenate([known[1][None], turn])
-    begin, turn = plane.onto(robot, begin, turn)
+    begin, turn = plane.onto(robot, *_starts(robot, float(zero_m.max()), rng, starts, known))
     tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
     found = solve_equilibrium(robot, wires, tiled, offset_m, begin, turn, 400)
     pose = found.position_m.T, batch_last(found.rotation)
@@ -54,14 +50,19 @@ def equilibria(
     return rows_of(found, _distinct(robot, found, good[order]))
 
 
-def _starts(robot: Robot, longest_m: float, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
-    """Poses anywhere below and among the exit points."""
+def _starts(
+    robot: Robot, longest_m: float, rng: np.random.Generator, count: int, known: Poses | None
+) -> tuple[Floats, Floats]:
+    """Poses anywhere below and among the exit points, the known one first."""
     low, high = robot.exit_m.min(0), robot.exit_m.max(0)
     low = low - np.array([0.0, 0.0, 0.5 * longest_m])
     position = rng.uniform(low, high, (count, 3))
-    if robot.degrees == 3:
-        return position, np.broadcast_to(np.eye(3), (count, 3, 3))
-    return position, turning.matrix(1.2 * rng.standard_normal((count, 3)))
+    turn = np.broadcast_to(np.eye(3), (count, 3, 3))
+    if robot.degrees == 6:
+        turn = turning.matrix(1.2 * rng.standard_normal((count, 3)))
+    if known is None:
+        return position, turn
+    return np.concatenate([known[0][None], position]), np.concatenate([known[1][None], turn])
 
 
 def _distinct(robot: Robot, found: Equilibria, order: Indices) -> Indices:

@@ -137,21 +137,24 @@ def _of_each_line(
     error_m: Floats | float,
 ) -> Commands:
     """`commands` as if every line had a winch of its own."""
-    grown, tau = 1.0 + creep, tension_N.T
-    offset = robot.beyond_m[:, None]
+    tau, offset = tension_N.T, robot.beyond_m[:, None]
     shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
     free = statics.stretched(robot, shape, offset)
     zero = zero_tension_length(wires, free, tau)
-    joint = zero / grown - (robot.beyond_joint_m[:, None] + error_m)
+    joint = zero / (1.0 + creep) - (robot.beyond_joint_m[:, None] + error_m)
     linear = robot.is_linear[:, None]
     if linear.any():
-        fixed = (robot.wire_m[:, None] + error_m) * grown
-        moved = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
-        ratio = np.where(linear, robot.ratio[:, None], 1.0)
+        fixed = (robot.wire_m[:, None] + error_m) * (1.0 + creep)
+        drawn = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
         zero = np.where(linear, fixed, zero)
-        joint = np.where(linear, moved / ratio, joint)
-        offset = offset + np.where(linear, moved, 0.0)
+        joint = np.where(linear, drawn / _ratio(robot), joint)
+        offset = offset + np.where(linear, drawn, 0.0)
     return _of_draws(zero, joint, offset, tau, rotation)
+
+
+def _ratio(robot: Robot) -> Floats:
+    """(w, 1) wire that a linear actuator draws by its displacement; 1 of drums."""
+    return np.where(robot.is_linear, robot.ratio, 1.0)[:, None]
 
 
 def _of_draws(zero: Floats, joint: Floats, offset: Floats, tau: Floats, rotation: Floats) -> Commands:

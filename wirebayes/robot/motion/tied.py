@@ -157,18 +157,16 @@ def _settled(robot: Robot, here: _Here, cases: _Cases, step: Floats) -> Bools:
 
 def _here(robot: Robot, wires: Wires, cases: _Cases, creep: Floats, error: Floats) -> _Here:
     """Balance and tensions at the cases' poses and joint values, with their slopes."""
-    grown, scale = 1.0 + creep, robot.edge_scale
+    scale = robot.edge_scale
     bare, offset = lengths(robot, cases.joint @ turned_by(robot).T)
-    zero = (bare + error) * grown
+    zero = (bare + error) * (1.0 + creep)
     turn = batch_last(cases.R)
     shape = statics.geometry(robot, cases.x.T, turn)
     stretched = statics.stretched(robot, shape, offset.T)
     tau, slope = tension(wires, stretched, zero.T)
     gradient, hessian = statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)
-    force_by_pose = batch_first(hessian) * scale * scale[:, None]
-    tension_by_joint = _by_joint(robot, slope.T, stretched.T / zero, grown)
-    J = statics.wire_jacobian(robot, shape) * scale[:, None, None]
-    by_force, by_tension = _slopes(J, force_by_pose, slope, tension_by_joint)
+    by_joint = _by_joint(robot, slope.T, stretched.T / zero, 1.0 + creep)
+    by_force, by_tension = _slopes(robot, shape, hessian, slope, by_joint)
     return _Here(gradient.T * scale, by_force, tau.T, by_tension)
 
 
@@ -181,8 +179,13 @@ def _by_joint(robot: Robot, slope: Floats, ratio: Floats, grown: Floats) -> Floa
     return np.asarray(by_line[:, :, None] * turned_by(robot))
 
 
-def _slopes(J: Floats, force_by_pose: Floats, slope: Floats, tension_by_joint: Floats) -> tuple[Floats, Floats]:
+def _slopes(
+    robot: Robot, shape: statics.Geometry, hessian: Floats, slope: Floats, tension_by_joint: Floats
+) -> tuple[Floats, Floats]:
     """Slopes of balance and tensions by pose and joint values."""
+    scale = robot.edge_scale
+    J = statics.wire_jacobian(robot, shape) * scale[:, None, None]
+    force_by_pose = batch_first(hessian) * scale * scale[:, None]
     force_by_joint = batch_first(J) @ tension_by_joint
     tension_by_pose = batch_first(slope * J).mT
     by_force = np.concatenate([force_by_pose, force_by_joint], 2)

@@ -130,14 +130,18 @@ class Balance:
         turn, by_turn = self._turn(y[3:]) if self.robot.degrees == 6 else (self.R, None)
         r, line = self._line(i, y, turn)
         span = self._span(i, line)
-        stretched = m * span.length + self.offset[i]
+        length = m * span.length + self.offset[i]
         u = [m * a for a in span.direction]
         pull = [-a for a in u]
         if by_turn is None:
-            return Strand(stretched, u, pull)
+            return Strand(length, u, pull)
+        by_turning, moment = self._turning(r, u, by_turn)
+        return Strand(length, u + by_turning, pull + moment)
+
+    def _turning(self, r: list[Any], u: list[Any], by_turn: Any) -> tuple[list[Any], list[Any]]:
+        """Stretch by a turn, which is the moment (u . (s x r) = s . (r x u)), and the moment of a pull."""
         moment = _cross(r, u)
-        by_turning = (row(moment) * by_turn).entries()  # u . (s x r) = s . (r x u): the moment
-        return Strand(stretched, u + by_turning, pull + [-v / self.size for v in moment])
+        return (row(moment) * by_turn).entries(), [-v / self.size for v in moment]
 
     def _line(self, i: int, y: list[Any], turn: Any) -> tuple[list[Any], list[Any]]:
         """Platform point from the reference point, and from the exit point."""

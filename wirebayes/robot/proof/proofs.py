@@ -129,6 +129,10 @@ def _middle(low: Floats, high: Floats, share: float) -> tuple[Floats, Floats]:
     return middle - half, middle + half
 
 
+def _centre(band: _Band) -> Floats:
+    return 0.5 * (band[0] + band[1])
+
+
 class _Way:
     """Proofs from the commanded lengths to the crept ones, piece by piece, each joined to the one before.
 
@@ -167,11 +171,10 @@ class _Way:
         here, at = self._certain((x, R), k1_N, np.zeros(self.robot.legs)), k1_N
         if here is None or np.abs(here[0] - x).max() > 1e-6 * self.robot.span_m:  # not held stably
             return None
-        low, high = self.strain
         pieces, strain = [(0.0, 1.0)], np.zeros(self.robot.legs)
-        while here is not None and pieces:
+        while pieces:
             a, b = pieces.pop()
-            ahead = np.maximum(a * low - _STEP * high, 0.0), np.minimum(b + _STEP, 1.0) * high
+            ahead = self._ahead(a, b)
             piece = self._reach(here, at, strain, ahead)
             if piece is None:
                 if b - a < _STEP:  # what varies now is not the creep: smaller pieces are as wide
@@ -179,11 +182,16 @@ class _Way:
                 middle = 0.5 * (a + b)
                 pieces += [(middle, b), (a, middle)]
                 continue
-            at, strain = 0.5 * (self.k1[0] + self.k1[1]), 0.5 * b * (low + high)
+            at, strain = 0.5 * (self.k1[0] + self.k1[1]), 0.5 * b * (self.strain[0] + self.strain[1])
             here = self._certain((here[0], here[1]), at, strain)
             if here is None or not self._joined(piece, here, at, strain, ahead):
                 return None
-        return None if here is None else self._reach(here, at, strain, self.strain)
+        return self._reach(here, at, strain, self.strain)
+
+    def _ahead(self, a: float, b: float) -> _Band:
+        """Creep strains of a piece of the way, from share a to share b."""
+        low, high = self.strain
+        return np.maximum(a * low - _STEP * high, 0.0), np.minimum(b + _STEP, 1.0) * high
 
     def _certain(self, near: Poses, k1_N: Floats, strain: Floats) -> _Pose | None:
         """A pose proved for known wires, with the width of its proof."""
@@ -205,18 +213,16 @@ class _Way:
 
     def _reach(self, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> Reach | None:
         """A piece's proof about its middle, if the pose here is the equilibrium that it proves."""
-        stiff = 0.5 * (self.k1[0] + self.k1[1])
-        grown = 0.5 * (band[0] + band[1])
+        stiff, grown = _centre(self.k1), _centre(band)
         middle = self._solved((here[0], here[1]), stiff, grown)
         if middle is None:
             return None
         half_k1 = 0.5 * (self.k1[1] - self.k1[0])
         half_zero = 0.5 * self.bare * (band[1] - band[0])
-        generators = each_on_its_own(half_k1, half_zero)
-        proof = reach(self.robot, self.law, stiff, self.bare * (1 + grown), generators, self.offset, *middle)
-        if proof.proved and self._joined(proof, here, k1_N, strain, band):
-            return proof
-        return None
+        zero = self.bare * (1 + grown)
+        proof = reach(self.robot, self.law, stiff, zero, each_on_its_own(half_k1, half_zero), self.offset, *middle)
+        joined = proof.proved and self._joined(proof, here, k1_N, strain, band)
+        return proof if joined else None
 
     def _joined(self, proof: Reach, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> bool:
         p = []

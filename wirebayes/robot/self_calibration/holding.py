@@ -71,16 +71,21 @@ def holds(
     """
     n, legs = error_m.shape
     state, pace = fresh(legs, n), _Pace(_FIRST, longest_step)
-    begin: list[Poses] = list(zip(session.position_m, session.rotation, strict=True))
-    if near is not None:
-        begin = list(zip(near[0].swapaxes(0, 1), near[1].swapaxes(0, 1), strict=True))
-    for k, joint in enumerate(session.joint_m):
+    starts = _starts(session, near)
+    for joint, duration, start in zip(session.joint_m, session.duration_s, starts, strict=True):
         bare, offset = inverse.lengths(robot, np.broadcast_to(joint, (n, legs)))
-        walk = _Walk(robot, wires, (bare + error_m, offset), begin[k], state, resolved_N)
+        walk = _Walk(robot, wires, (bare + error_m, offset), start, state, resolved_N)
         begun = walk.here
-        walk.through(float(session.duration_s[k]), pace, longest_step)
+        walk.through(float(duration), pace, longest_step)
         state = walk.creep.state()
         yield SessionHold(begun, walk.here, walk.bare, state)
+
+
+def _starts(session: Session, near: Poses | None) -> list[Poses]:
+    """Where the solutions of every hold start from."""
+    if near is None:
+        return list(zip(session.position_m, session.rotation, strict=True))
+    return list(zip(near[0].swapaxes(0, 1), near[1].swapaxes(0, 1), strict=True))
 
 
 class _Walk:

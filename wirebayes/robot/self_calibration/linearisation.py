@@ -168,11 +168,9 @@ def _loops_by_points(out: Equations, about: _About) -> None:
 
 def _loops_by_drum(out: Equations, unknowns: Unknowns, lengths: _Lengths) -> None:
     """Slopes by the errors of drums: of what is drawn of the line, or of the line that is longer than bare."""
-    robot = unknowns.robot
-    leg = np.arange(robot.legs)
-    drum = leg if robot.winch is None else robot.winch
-    by_drum = np.where(robot.is_linear, lengths.drawn, -lengths.drawn * lengths.longer)
-    out.by_robot[:, leg, unknowns.slices["drum"].start + drum] = by_drum * unknowns.errors.drum
+    lengthens = np.where(unknowns.robot.is_linear, lengths.drawn, -lengths.drawn * lengths.longer)
+    leg = np.arange(unknowns.robot.legs)
+    out.by_robot[:, leg, unknowns.drum_columns] = lengthens * unknowns.errors.drum
 
 
 def _weigh_loops(out: Equations, robot: Robot, noise: Noise) -> None:
@@ -265,18 +263,26 @@ def _turn_of_pull(shape: statics.Geometry, tau: Floats) -> Floats:
 
 def _tensions(out: Equations, about: _About) -> None:
     """Tensions that were read, and what is usual where none was."""
-    session, noise = about.holds.session, about.noise
     read = np.isfinite(about.holds.tension_N)
-    pull, taut = pulled(about.state.pull_N, noise.soft_N)
-    off = pull + session.signs * about.parts.bias_N - about.holds.tension_N
-    usual = about.state.pull_N - about.parts.level_N - noise.usual_N
-    rows = out.rows["tension"]
+    rows, leg = out.rows["tension"], np.arange(about.here.legs)
+    sd_N, pull_N = about.holds.session.tension_sd_N, about.noise.pull_N
+    pull, taut = pulled(about.state.pull_N, about.noise.soft_N)
     out.known[:, rows] = read
-    out.residual[:, rows] = np.where(read, off / session.tension_sd_N, usual / noise.pull_N)
-    by_pull = np.where(read, taut / session.tension_sd_N, 1.0 / noise.pull_N)
-    leg = np.arange(about.here.legs)
+    out.residual[:, rows] = np.where(read, _off_reading(about, pull) / sd_N, _off_usual(about) / pull_N)
+    by_pull = np.where(read, taut / sd_N, 1.0 / pull_N)
     out.by_hold[:, rows.start + leg, about.here.degrees + leg] = by_pull
     _tensions_by_robot(out, about, read)
+
+
+def _off_reading(about: _About, pull: Floats) -> Floats:
+    """(p, w) N beyond what was read, with the sensors' biases."""
+    bias = about.holds.session.signs * about.parts.bias_N
+    return np.asarray(pull + bias - about.holds.tension_N)
+
+
+def _off_usual(about: _About) -> Floats:
+    """(p, w) N beyond what is usual."""
+    return np.asarray(about.state.pull_N - about.parts.level_N - about.noise.usual_N)
 
 
 def _tensions_by_robot(out: Equations, about: _About, read: Bools) -> None:

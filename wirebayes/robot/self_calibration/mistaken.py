@@ -140,7 +140,7 @@ def _tension_mistake(
     balance = _Balance.at(robot, position_m, rotation, tension_N)
     names = [f"tension_{i}_N" for i in range(1, robot.legs + 1)]
     pull = balance.pull(range(robot.legs))
-    times = float((pull * balance.load).sum() / max((pull * pull).sum(), 1e-300))
+    times = balance.times(pull)
     if not 1 / _ANOTHER_UNIT < times < _ANOTHER_UNIT and balance.left(times * pull) < _EVEN:
         found = f"tensions that are, all together, {number(1 / times)} times what carries the platform's weight"
         return f"{names[0]} to {names[-1]}", found, "newtons (or another mass_kg)"
@@ -189,7 +189,13 @@ class _Balance:
 
     def left(self, pull: Floats) -> float:
         """What is left unbalanced, of the load."""
+        """What is left unbalanced, of the load."""
         return float(np.linalg.norm(pull - self.load) / np.linalg.norm(self.load))
+
+    def times(self, pull: Floats) -> float:
+        """By what a pull is to be multiplied to balance the load best."""
+        along = (pull * self.load).sum()
+        return float(along / max((pull * pull).sum(), 1e-300))
 
 
 def _swapped(count: int, i: int, j: int) -> list[int]:

@@ -52,20 +52,25 @@ def next_poses(found: Whole, holds: Holds, count: int, rng: np.random.Generator)
         Draws the candidates in the workspace.
     """
     unknowns = found.unknowns
-    parts = unknowns.parts(found.state.white)
-    robot = moved(unknowns.robot, parts)
+    robot = moved(unknowns.robot, unknowns.parts(found.state.white))
     poses = _candidates(robot, rng)
     if count == 0 or not len(poses.x):
         return NextPoses(np.empty((0, 3)), np.empty(0))
-    told = _as_read(holds, poses)
-    wires, _ = unknowns.prior.wires(unknowns.robot, parts.wires[None])
-    commands = inverse.commands(robot, wires, poses.x, poses.R, poses.tau)
-    told = replace(told, session=replace(told.session, joint_m=commands.joint_m))
+    told = _commanded(found, robot, _as_read(holds, poses), poses)
     motion = _follows(_at(found, _blind(told), poses), robot.degrees)
     root = np.moveaxis(motion[:, :3], 0, 1).reshape(-1, motion.shape[2])  # what counts: the position
     information = _information(_at(found, told, poses))
     picked, sd = _one_after_another(found.covariance, information, root, min(count, len(poses.x)))
     return NextPoses(poses.x[picked], sd)
+
+
+def _commanded(found: Whole, robot: Robot, told: Holds, poses: "_Candidates") -> Holds:
+    """Holds with the joint values that lead to candidates."""
+    unknowns = found.unknowns
+    parts = unknowns.parts(found.state.white)
+    wires, _ = unknowns.prior.wires(unknowns.robot, parts.wires[None])
+    commands = inverse.commands(robot, wires, poses.x, poses.R, poses.tau)
+    return replace(told, session=replace(told.session, joint_m=commands.joint_m))
 
 
 @dataclass(frozen=True)

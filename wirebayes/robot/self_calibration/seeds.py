@@ -42,20 +42,23 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: Generator) -> Sta
     """
     robot, session = unknowns.robot, holds.session
     unread = ~np.isfinite(holds.tension_N)
-    read = np.where(unread, robot.rule.lowest_N, holds.tension_N)
-    pull = np.maximum(read, 1e-3 * robot.rule.lowest_N)
-    home = turns.matrix(robot.home_rotation_rad)
+    pull = np.where(unread, robot.rule.lowest_N, holds.tension_N)
+    pull = np.maximum(pull, 1e-3 * robot.rule.lowest_N)
     position = chosen_rows(holds.placed, session.position_m, robot.home_m)
-    turn = chosen_rows(holds.oriented, session.rotation, home)
+    turn = chosen_rows(holds.oriented, session.rotation, turns.matrix(robot.home_rotation_rad))
     lost = ~holds.placed | (~holds.oriented & (robot.degrees == 6))
     if lost.any():
         ratio = stretch(unknowns, white, pull).ratio
         _locate(unknowns, holds, white, ratio, np.flatnonzero(lost), (position, turn), rng)
-    here = moved(robot, unknowns.parts(white))
-    for k in np.flatnonzero(unread.any(1)):
-        carried = _carrying(here, position[k], turn[k])
-        pull[k, unread[k]] = carried[unread[k]]
+    _fill_unread(moved(robot, unknowns.parts(white)), pull, unread, (position, turn))
     return State(np.array(white), position, turn, pull)
+
+
+def _fill_unread(robot: Robot, pull: Floats, unread: Bools, poses: Poses) -> None:
+    """Put what carries the platform in place of tensions ``(p, w)`` that nobody read."""
+    for k in np.flatnonzero(unread.any(1)):
+        carried = _carrying(robot, poses[0][k], poses[1][k])
+        pull[k, unread[k]] = carried[unread[k]]
 
 
 def _carrying(robot: Robot, position_m: Floats, turn: Floats) -> Floats:
@@ -80,10 +83,7 @@ def _locate(
     bare, offset = inverse.lengths(robot, holds.session.joint_m[lost])
     goal = (bare + parts.reference_m) * ratio[lost]
     search = _PoseSearch(robot, _trials(goal), _trials(offset))
-    stated = _trials(holds.placed[lost])
-    drawn = search.drawn(len(stated), rng)
-    x = chosen_rows(stated, _trials(position[lost]), drawn).T
-    x, R = search.descended(x, batch_last(_trials(turn[lost])), stated)
+    x, R = search.descended(_trials(position[lost]), _trials(turn[lost]), _trials(holds.placed[lost]), rng)
     misfit = search.misfit(x, R).reshape(len(lost), _TRIALS)
     chosen = np.arange(len(lost)) * _TRIALS + misfit.argmin(1)
     position[lost] = x.T[chosen]
@@ -122,8 +122,17 @@ class _PoseSearch:
         """(count, 3) places in the workspace, and a little outside."""
         return np.asarray(self.middle + 1.2 * self.half * rng.uniform(-1, 1, (count, 3)))
 
-    def descended(self, x: Floats, R: Floats, stated: Bools) -> tuple[Floats, Floats]:
-        """Poses after all steps; positions that are `stated`, (n,), stay."""
+    def descended(self, position: Floats, turn: Floats, stated: Bools, rng: Generator) -> tuple[Floats, Floats]:
+        """Poses ``(3, n)``, ``(3, 3, n)`` after all steps from drawn places; positions that are `stated` stay.
+
+        Parameters
+        ----------
+        position, turn : (n, 3), (n, 3, 3) arrays
+        stated : (n,) bool array
+        rng : numpy Generator
+        """
+        x = chosen_rows(stated, position, self.drawn(len(stated), rng)).T
+        R = batch_last(turn)
         for _ in range(_STEPS):
             step = self.step(x, R)
             x = x + chosen_rows(~stated, step[:, :3], 0.0).T

@@ -76,10 +76,8 @@ def starting_references(
     mean, _ = prior.moments(robot.legs)
     expected = predict_session(robot, prior, session, mean[None])
     loops = _loops(robot, prior, session, readings, expected)
-    m = len(readings)
-    x = np.tile(expected.position_m[0], (m, 1)).T
-    R = batch_last(np.tile(expected.rotation[0], (m, 1, 1)))
-    error = np.zeros((m, robot.legs))
+    x, R = _expected_poses(expected, len(readings))
+    error = np.zeros((len(readings), robot.legs))
     for _ in range(iterations):
         equations = _linearised(robot, loops, x, R, error)
         change, move = _step(equations, error, prior.reference_sd_m)
@@ -90,6 +88,12 @@ def starting_references(
     # Absurd readings lead nowhere: such a robot starts from its references.
     known = np.asarray(np.isfinite(error).all(1))
     return chosen_rows(known, error, 0.0)
+
+
+def _expected_poses(expected: PredictedSession, m: int) -> tuple[Floats, Floats]:
+    """Poses ``(3, r)``, ``(3, 3, r)`` of the readings of m robots, where they are expected."""
+    x = np.tile(expected.position_m[0], (m, 1))
+    return x.T, batch_last(np.tile(expected.rotation[0], (m, 1, 1)))
 
 
 def _moved(robot: Robot, x: Floats, R: Floats, move: Floats) -> tuple[Floats, Floats]:
@@ -108,13 +112,11 @@ def _loops(robot: Robot, prior: LengthPrior, session: Session, readings: Floats,
     crept = expected.read_length_m[0] / bare
     tension = readings[:, : joint.size] * session.tension_sd_N
     tau = tension.reshape(-1, robot.legs)
-    alike = len(readings), 1
-    bare, offset = np.tile(bare, alike), np.tile(offset, alike)
+    bare, offset, crept = (np.tile(values, (len(readings), 1)) for values in (bare, offset, crept))
     wires, _ = prior.wires(robot, prior.moments(robot.legs)[0][None])
-    stretch = _elastic(wires, tau) * np.tile(crept, alike)
     sd_N = float(np.hypot(session.tension_sd_N, prior.bias_sd_N))
     weight = _weight(tau, sd_N, bare * sd_N / wires.theta["k1"].mean())
-    return _Loops(bare, offset, tau, stretch, weight, sd_N)
+    return _Loops(bare, offset, tau, _elastic(wires, tau) * crept, weight, sd_N)
 
 
 def _elastic(wires: Wires, tension_N: Floats) -> Floats:

@@ -98,17 +98,14 @@ def _half(sd: Floats, wider: Floats, degrees: float) -> Floats:
 
 def _slope_of_lengths(found: Whole) -> Floats:
     """The last zero-tension lengths by all unknowns: references, drums and the strain, with all that it depends on."""
-    unknowns, robot = found.unknowns, found.unknowns.robot
-    strain = found.creep.strain[-1]
+    unknowns, strain = found.unknowns, found.creep.strain[-1]
     bare = found.last_m + unknowns.parts(found.state.white).reference_m
-    slope = np.zeros((robot.legs, unknowns.count))
+    leg = np.arange(len(bare))
+    slope = np.zeros((len(bare), unknowns.count))
     slope[:, unknowns.slices["wires"]] = bare[:, None] * found.creep.by_wires[-1]
-    leg = np.arange(robot.legs)
     slope[leg, unknowns.references.start + leg] += (1 + strain) * unknowns.prior.reference_sd_m
     if unknowns.errors.drum > 0:
-        drum = leg if robot.winch is None else robot.winch
-        by_drum = unknowns.errors.drum * found.last_m * ~robot.is_linear
-        slope[leg, unknowns.slices["drum"].start + drum] = by_drum
+        slope[leg, unknowns.drum_columns] = unknowns.errors.drum * found.last_m * ~unknowns.robot.is_linear
     return slope
 
 

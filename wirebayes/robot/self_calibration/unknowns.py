@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.winches import of_each_leg
 from wirebayes.robot.self_calibration.session import LengthPrior
@@ -123,23 +123,32 @@ class Unknowns:
         first = self.slices["wires"].start
         return slice(first, first + self.robot.legs)
 
+    @property
+    def drum_columns(self) -> Indices:
+        """(w,) Where the error of each leg's drum stands."""
+        robot = self.robot
+        drum = np.arange(robot.legs) if robot.winch is None else robot.winch
+        return np.asarray(self.slices["drum"].start + drum)
+
     def parts(self, white: Floats) -> Parts:
         """Physical values of a vector ``(m,)``."""
-        at, legs = self.slices, self.robot.legs
         mean, root = self.moments
-        wires = mean + root @ white[at["wires"]]
-
-        def moved(name: str, points: Floats, sd: float) -> Floats:
-            part = white[at[name]]
-            return points + sd * part.reshape(-1, 3) if len(part) else points
-
-        drum, level = white[at["drum"]], white[at["level"]]
+        wires = mean + root @ white[self.slices["wires"]]
+        drum, level = white[self.slices["drum"]], white[self.slices["level"]]
+        none = np.zeros(self.robot.legs)
         return Parts(
-            moved("exit", self.robot.exit_m, self.errors.exit_m),
-            moved("platform", self.robot.platform_m, self.errors.platform_m),
-            wires[:legs],
-            self.prior.bias_N(legs, wires[None])[0],
-            of_each_leg(self.robot, self.errors.drum * drum) if len(drum) else np.zeros(legs),
-            wires,
-            self.errors.level_N * level if len(level) else np.zeros(legs),
+            exit_m=self._moved("exit", white, self.robot.exit_m, self.errors.exit_m),
+            platform_m=self._moved("platform", white, self.robot.platform_m, self.errors.platform_m),
+            reference_m=wires[: self.robot.legs],
+            bias_N=self.prior.bias_N(self.robot.legs, wires[None])[0],
+            drum=of_each_leg(self.robot, self.errors.drum * drum) if len(drum) else none,
+            wires=wires,
+            level_N=self.errors.level_N * level if len(level) else none,
         )
+
+    def _moved(self, name: str, white: Floats, points_m: Floats, sd_m: float) -> Floats:
+        """Points where a vector of unknowns has them."""
+        own = white[self.slices[name]]
+        if not len(own):
+            return points_m
+        return np.asarray(points_m + sd_m * own.reshape(-1, 3))

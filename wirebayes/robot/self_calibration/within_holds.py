@@ -188,8 +188,7 @@ def _held(wires: Wires, carried: CreepState, loaded: Loaded, course: TensionCour
     for _ in range(_PASSES):
         states = _creeping(wires, carried, times, path)
         strains = np.array([state.strain(wires) for state in states])
-        ahead = (strains - strains[-1]) / (1.0 + strains[-1])
-        change = _tensions(loaded, course, hold, ahead) - path
+        change = _tensions(loaded, course, hold, strains) - path
         same = bool(np.abs(change).max() < _SAME * loaded.sd_N)
         further = 0.0 if same or before is None else _extrapolated(before, change)
         path = np.maximum(path + (1.0 + further) * change, 0.0)
@@ -198,13 +197,18 @@ def _held(wires: Wires, carried: CreepState, loaded: Loaded, course: TensionCour
         before = change if before is None else None
     coarse = _creeping(wires, carried, times[::2], path[::2])[-1]
     off = strains[-1] - coarse.strain(wires)
-    return _Held(strains[-1], off, ahead[..., 0], path, same, states[-1])
+    return _Held(strains[-1], off, _ahead(strains)[..., 0], path, same, states[-1])
 
 
-def _tensions(loaded: Loaded, course: TensionCourse, hold: int, ahead: Floats) -> Floats:
-    """Tensions ``(t, w, n)`` in a hold of wires that are longer by strains than at its end."""
+def _ahead(strains: Floats) -> Floats:
+    """Strains beyond those at a hold's end, of the lengths there."""
+    return np.asarray((strains - strains[-1]) / (1.0 + strains[-1]))
+
+
+def _tensions(loaded: Loaded, course: TensionCourse, hold: int, strains: Floats) -> Floats:
+    """Tensions ``(t, w, n)`` in a hold of wires with creep strains."""
     bend = course.bend_N[hold][..., None]
-    tension = loaded.end_N[hold] + loaded.response_N[hold] @ ahead + bend
+    tension = loaded.end_N[hold] + loaded.response_N[hold] @ _ahead(strains) + bend
     return np.maximum(tension, 0.0)
 
 
