@@ -253,26 +253,30 @@ def working_spring(robot: Robot, line: WireDraws, wire: str | None = None) -> Wo
     """
     wire = wire or _first(robot)
     wires = for_robot(robot, line)
-    x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
-    tau = inverse.tensions(robot, x, R)[0]
-    held = bool(np.isfinite(tau).all())
-    where = line.each.get(wire, line).tension_ref_N
-    if held:
-        of_wire = [name == wire for name in robot.wire]
-        where = float(tau[of_wire].mean())
-    stiffness = _sample(robot, wires, wire).stiffness_N(where)
+    home = _mean_tension_at_home(robot, wire)
+    at_N = line.each.get(wire, line).tension_ref_N if home is None else home
+    stiffness = _sample(robot, wires, wire).stiffness_N(at_N)
     good = np.isfinite(stiffness)
     fitted, of = wire not in robot.given, wire if len({*robot.wire}) > 1 else ""
     if not good.any():
         which = "the fitted line" if fitted and not of else f"the wire {wire}"
-        raise InputError(f"{robot.name}: {which} cannot carry {where:.3g} N, so no spring constant is known")
+        raise InputError(f"{robot.name}: {which} cannot carry {at_N:.3g} N, so no spring constant is known")
     if wires.law == "hooke" and not wires.at("strain"):
         return WorkingSpring(stiffness, "", fitted, of)
-    point = "the mean tension of the lines at the home pose" if held else "a middle tension of the test"
-    remark = f"The spring constant depends on the tension: it is the tangent at {where:.4g} N, {point}."
+    point = "a middle tension of the test" if home is None else "the mean tension of the lines at the home pose"
+    remark = f"The spring constant depends on the tension: it is the tangent at {at_N:.4g} N, {point}."
     if not good.all():
         remark += f" {100 * np.mean(~good):.2g} % of the draws cannot carry that tension and are left out."
     return WorkingSpring(stiffness[good], remark, fitted, of)
+
+
+def _mean_tension_at_home(robot: Robot, wire: str) -> float | None:
+    """Of the legs that hang on a wire; None where no tensions hold the home pose."""
+    x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
+    tau = inverse.tensions(robot, x, R)[0]
+    if not np.isfinite(tau).all():
+        return None
+    return float(tau[[name == wire for name in robot.wire]].mean())
 
 
 def simulators(robot: Robot, line: WireDraws) -> dict[str, str]:
@@ -308,20 +312,27 @@ def mujoco(robot: Robot, line: WireDraws) -> str | None:
     wires, commands = _at_home(robot, line)
     if not commands.feasible.all():
         return None
-    zero, tau = commands.zero_m[0], commands.tension_N[0]
     if robot.winch is not None:
         robot = replace(robot, home_rotation_rad=vector(commands.rotation)[0])
     which = cut_from(robot)
+    zero, offset = commands.zero_m[0], commands.offset_m[0]
     if wires.law == "hooke" and not wires.at("strain"):
         k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, 1))[:, 0]
-        return mjcf(robot, k1, zero, commands.offset_m[0], remark=which)
-    stretched = stretched_length(wires, zero[:, None], tau[:, None])
-    _, slope = tension(wires, stretched, zero[:, None])
-    rest = stretched - tau[:, None] / slope
-    pulls = ", ".join(f"{value:.4g}" for value in tau)
+        return mjcf(robot, k1, zero, offset, remark=which)
+    stiffness, rest = _tangent_springs(wires, commands)
+    pulls = ", ".join(f"{value:.4g}" for value in commands.tension_N[0])
     remark = f"linear springs with the tension and tangent stiffness of the home pose, where the wires carry {pulls} N"
     remark += f"; {which}" if which else ""
-    return mjcf(robot, (slope * rest)[:, 0], rest[:, 0], commands.offset_m[0], remark=remark)
+    return mjcf(robot, stiffness, rest, offset, remark=remark)
+
+
+def _tangent_springs(wires: Wires, commands: inverse.Commands) -> tuple[Floats, Floats]:
+    """(w,) stiffness, N per unit strain, and rest length of springs that are tangent to wires at their commands."""
+    zero, tau = commands.zero_m.T, commands.tension_N.T
+    stretched = stretched_length(wires, zero, tau)
+    _, slope = tension(wires, stretched, zero)
+    rest = stretched - tau / slope
+    return (slope * rest)[:, 0], rest[:, 0]
 
 
 def _first(robot: Robot) -> str:

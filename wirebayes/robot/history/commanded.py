@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wirebayes.numeric.typing import Floats, Indices
+from wirebayes.numeric.typing import Floats, Indices, Ints
 from wirebayes.progress import Progress, silent
 from wirebayes.robot.history.balanced import balanced
 from wirebayes.robot.history.estimate import Estimate
@@ -74,10 +74,16 @@ def drift_along(
         progress("poses", row + 1, len(tau))
 
     track = follow_log(robot, wires, fine, joint, start, starts, error, watched, carried)
-    strain = np.zeros((1, *tau.shape))
-    plain = Track(fine.position_m[None], fine.rotation[None], tau[None], strain, track.hold)
+    plain = _without_drift(fine, tau, track.hold)
     found = Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error, starts)
     return found, np.swapaxes(joint[kept], 0, 1)
+
+
+def _without_drift(history: History, tau: Floats, hold: Ints) -> Track:
+    """The commanded poses as a track of wires that do not creep."""
+    assert history.position_m is not None and history.rotation is not None
+    strain = np.zeros((1, *tau.shape))
+    return Track(history.position_m[None], history.rotation[None], tau[None], strain, hold)
 
 
 def _held_tensions(robot: Robot, history: History) -> Floats:

@@ -7,7 +7,7 @@ import numpy as np
 from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.progress import Progress, silent
-from wirebayes.robot.history.conditioning import Draws, LogReadings, draw_posterior, find_mode, slack_wires
+from wirebayes.robot.history.conditioning import Draws, LogReadings, Mode, draw_posterior, find_mode, slack_wires
 from wirebayes.robot.history.follow import Track, clock_starts, follow_log, refined_joints
 from wirebayes.robot.history.history import History
 from wirebayes.robot.history.readings import reading_weight, sensors
@@ -92,19 +92,21 @@ def estimate_poses(
     if not history.read:
         return way.followed(known.draws)
     read = LogReadings(log_readings(history, robot.legs), weights(history.times_s), sensors(robot, errors))
-    loose = slack_wires(read, robot.legs)
-    mode = find_mode(known, read, way.white, loose) or find_mode(known, read, way.white, np.zeros_like(loose))
+    mode = _mode(known, read, way)
     if mode is None:  # not even the mean wires hang in balance
         return replace(way.followed(known.draws), converged=False, effective=0.0, used=False)
     out = draw_posterior(lambda: unknowns(robot, line, errors, rng), read, mode, way.white, rng)
     used = out.effective >= min(_TOO_FEW, 0.5 * line.count)
-    if used:
-        columns = known.columns(out.white[:, : known.count])
-        found = Estimate(out.track, way.plain, *columns, way.starts_s)
-    else:
-        found = way.followed(known.draws)
+    found = way.estimate(out) if used else way.followed(known.draws)
     misfit = _misfit(read, out)
     return replace(found, misfit=misfit, converged=mode.converged, effective=out.effective, used=used)
+
+
+def _mode(known: LogUnknowns, read: LogReadings, way: "_Way") -> Mode | None:
+    """The mode without the wires that are read as slack, or with all where there is none; None where nothing hangs."""
+    loose = slack_wires(read, known.robot.legs)
+    mode = find_mode(known, read, way.white, loose)
+    return mode or find_mode(known, read, way.white, np.zeros_like(loose))
 
 
 def _misfit(read: LogReadings, out: Draws) -> float:
@@ -233,3 +235,8 @@ class _Way:
         wires, error = self.known.columns(white)
         track = self.track(wires, error, self.known.carried(white), "poses")
         return Estimate(track, self.plain, wires, error, self.starts_s)
+
+    def estimate(self, out: Draws) -> Estimate:
+        """Draws of the posterior that were followed."""
+        columns = self.known.columns(out.white[:, : self.known.count])
+        return Estimate(out.track, self.plain, *columns, self.starts_s)

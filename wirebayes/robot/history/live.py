@@ -201,12 +201,18 @@ class LiveEstimator:
         refuse_bad(name, given, finite | ~linear, "a finite number")
         refuse_bad(name, given, (finite & (given > 0)) | linear, "a finite length above 0")
         each = of_each_leg(self.robot, given)
-        unlikely = plausible.wrong(self.robot, each[None]) if self._leaps(each) else None
-        if unlikely is not None:
-            (_, leg), expected = unlikely
-            joint = leg if self.robot.winch is None else self.robot.winch[leg]
-            raise InputError(f"{name}[{joint}]: found {each[leg]:g}, expected {expected}; wire_m() turns straight ones")
+        if self._leaps(each):
+            self._refuse_unlikely(name, each)
         return each
+
+    def _refuse_unlikely(self, name: str, each: Floats) -> None:
+        """Refuse joint values, leg by leg, that cannot be meant."""
+        unlikely = plausible.wrong(self.robot, each[None])
+        if unlikely is None:
+            return
+        (_, leg), expected = unlikely
+        joint = leg if self.robot.winch is None else self.robot.winch[leg]
+        raise InputError(f"{name}[{joint}]: found {each[leg]:g}, expected {expected}; wire_m() turns straight ones")
 
     def _leaps(self, given: Floats) -> bool:
         """Whether joint values are the first, or far from the last: only those may be of another kind."""
@@ -277,20 +283,19 @@ class LiveEstimator:
 
     def _go(self, zero: Floats, offset: Floats) -> None:
         """Poses at new lengths, a short way on."""
-        robot, wires = self.robot, self._wires
         for _ in range(3):
-            step = path.newton_step(robot, wires, (self._x, self._R), (zero, offset))
+            step = path.newton_step(self.robot, self._wires, (self._x, self._R), (zero, offset))
             length = np.sqrt((step * step).sum(1))
-            short = length < _LONG * robot.size_m
+            short = length < _LONG * self.robot.size_m
             hard = self._live & ~short
             step[hard] = np.nan
-            self._x, self._R = mixed.after_step(robot, (self._x, self._R), step)
+            self._x, self._R = mixed.after_step(self.robot, (self._x, self._R), step)
             if hard.any():
                 self._carefully(np.flatnonzero(hard), zero, offset)
             moved = length[self._live & ~hard]
-            if not (moved > _AGAIN * robot.size_m).any():
+            if not (moved > _AGAIN * self.robot.size_m).any():
                 break
-        self._tension = balance.tensions_at(robot, wires, self._x, self._R, zero, offset)
+        self._tension = balance.tensions_at(self.robot, self._wires, self._x, self._R, zero, offset)
         self._lengths = zero, offset
 
     def _carefully(self, rows: Indices, zero: Floats, offset: Floats) -> None:

@@ -81,13 +81,11 @@ def correction_table(
     mean = winches.of_each_winch(robot, described["mean"])
     sd = winches.of_each_winch(robot, described["sd"])
     joint = winches.of_each_winch(robot, joint_m) + mean
-    for i in range(robot.joints):
-        columns[f"joint_{i + 1}_m"] = joint[:, i]
+    columns |= {f"joint_{i + 1}_m": joint[:, i] for i in range(robot.joints)}
     if robot.drums is not None:
         columns |= _motor_columns(robot, robot.drums, joint_m + described["mean"])
     for i in range(robot.joints):
-        columns[f"change_{i + 1}_mm"] = 1e3 * mean[:, i]
-        columns[f"change_{i + 1}_sd_mm"] = 1e3 * sd[:, i]
+        columns |= {f"change_{i + 1}_mm": 1e3 * mean[:, i], f"change_{i + 1}_sd_mm": 1e3 * sd[:, i]}
     return _as_table(columns)
 
 

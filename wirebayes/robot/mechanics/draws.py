@@ -129,15 +129,11 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
         With ``(1, n)`` parameters when all legs share everything, else ``(w, n)``.
     """
     lines = lines_of(robot, line)
-    effects = _united(line)
     theta = _of_all_legs(robot, line, lines, spread > 0)
     if spread > 0:
         if rng is None:
             raise ValueError("a specimen spread needs a random generator")
-        for name in differing(line):
-            sd = _of_legs([spread_of(one, name, spread) for one in lines], line.count)
-            noise = rng.standard_normal((robot.legs, line.count))
-            theta[name] = theta[name] * np.exp(sd * noise)
+        _spread_specimens(theta, robot, line, spread, rng)
     length = np.array([wire.length_mm for wire in lines])[:, None]
     hung = 1e3 * nominal_length(robot)[:, None] / length
     longer = np.where(_is_given(robot), 1.0, hung)
@@ -146,10 +142,21 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
         theta["B"] = theta["B"] * longer ** (exponent - 1.0)
     reference = _reference_tension(line, lines)
     hold = steady_hold(theta, length * longer, reference, length_ref_mm=length)
-    by_length = Placed(_at_sample(effects), theta)
-    theta = dict(by_length.change("sample", theta, hold))
+    effects = _united(line)
+    theta = dict(Placed(_at_sample(effects), theta).change("sample", theta, hold))
     others = tuple(effect for effect in effects if effect.place != "sample")
     return Wires(line.law, line.history, theta, length, others, reference)
+
+
+def _spread_specimens(
+    theta: dict[str, Floats], robot: Robot, line: WireDraws, spread: float, rng: np.random.Generator
+) -> None:
+    """Let parameters differ from leg to leg."""
+    lines = lines_of(robot, line)
+    for name in differing(line):
+        sd = _of_legs([spread_of(one, name, spread) for one in lines], line.count)
+        noise = rng.standard_normal((robot.legs, line.count))
+        theta[name] = theta[name] * np.exp(sd * noise)
 
 
 def _of_all_legs(robot: Robot, line: WireDraws, lines: Sequence[WireDraws], spread: bool) -> dict[str, Floats]:
@@ -350,9 +357,14 @@ def _beyond(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -
     if line.time_range_s is not None and time_s > line.time_range_s[1]:
         out.append(f"{time_s:.4g} s is longer than the longest tested hold, {line.time_range_s[1]:.4g} s")
     lengths = 1e3 * zero_m[np.isfinite(zero_m)]
-    if lengths.size and (lengths.min() < 0.5 * line.length_mm or lengths.max() > 2.0 * line.length_mm):
-        rule = "is taken to be a strain of the whole wire"
-        if LENGTH_EXPONENT in line.parameters:
-            rule = "grows with length by the exponent fitted to the tested lengths"
-        out.append(f"wires of {_span(lengths, '.0f')} mm, tested at {line.length_mm:.0f} mm: creep {rule}")
-    return out
+    return out + _other_lengths(line, lengths) if lengths.size else out
+
+
+def _other_lengths(line: WireDraws, length_mm: Floats) -> list[str]:
+    """That wires are much shorter or longer than what was tested, and what is then taken of creep."""
+    if length_mm.min() >= 0.5 * line.length_mm and length_mm.max() <= 2.0 * line.length_mm:
+        return []
+    rule = "is taken to be a strain of the whole wire"
+    if LENGTH_EXPONENT in line.parameters:
+        rule = "grows with length by the exponent fitted to the tested lengths"
+    return [f"wires of {_span(length_mm, '.0f')} mm, tested at {line.length_mm:.0f} mm: creep {rule}"]

@@ -13,7 +13,7 @@ from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import drift, hanging, inverse
 from wirebayes.robot.motion.course import Course
-from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
 
 TIME_S, DISTANCE_M, TILT_RAD = 60.0, 0.3e-3, float(np.radians(0.055))  # section 4 of the paper
 
@@ -126,15 +126,21 @@ def _drifts(
     n, p = wires.count, len(tension_N)
     many = _at_each(wires, n, p)
     where, turn, pull = (np.repeat(values, n, 0) for values in (*poses, tension_N))
-    state = fresh(robot.legs, n * p)
-    if loaded_s > 0:
-        state = HoldCreep(many, state, pull.T).advance(loaded_s, pull.T)
+    state = _loaded(many, pull, loaded_s)
     commands = inverse.commands(robot, many, where, turn, pull, state.strain(many))
     held = drift.stably(robot, many, commands, where, commands.rotation)
     joint = chosen_rows(held, commands.joint_m, np.nan)
     course = drift.hold(robot, many, joint, np.array([time_s]), where, commands.rotation, state)
     distance, tilt = _moved(course, where, commands.rotation)
     return distance.reshape(p, n), tilt.reshape(p, n), float(course.found.mean())
+
+
+def _loaded(wires: Wires, tension_N: Floats, time_s: float) -> CreepState:
+    """What wires carry that bore tensions ``(n, w)`` for a time; 0: they are new."""
+    state = fresh(tension_N.shape[1], len(tension_N))
+    if time_s > 0:
+        return HoldCreep(wires, state, tension_N.T).advance(time_s, tension_N.T)
+    return state
 
 
 def _moved(course: Course, position_m: Floats, rotation: Floats) -> tuple[Floats, Floats]:

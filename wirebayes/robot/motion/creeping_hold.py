@@ -152,13 +152,14 @@ class CreepingHold:
         done = np.maximum(self.creep.progress(time), 1e-300)
         guess = self.creep.onward(time, self.slope)
         there = self._follow(guess, time, _GLANCE if long else path.SMALLEST)
+        found = there.here.found
         last, off = self._corrected(guess, there.here, time, done)
-        worst = self._worst(off, last, self.live & there.here.found)
+        worst = self._worst(off, last, self.live & found)
         if worst > self.tolerance and not least:
             return worst
         here = self._settle(last, time, there.here)
-        fell = self.live & ~(there.here.found & here.found)
-        if fell.any() and long:
+        fell = self.live & ~(found & here.found)
+        if long and fell.any():
             return np.inf
         self._note(fell, there, here, (self.creep.time_s, time))
         self._take(last, here, done)

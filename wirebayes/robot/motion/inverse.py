@@ -142,12 +142,11 @@ def _of_each_line(
     free = statics.stretched(robot, shape, offset)
     zero = zero_tension_length(wires, free, tau)
     joint = zero / (1.0 + creep) - (robot.beyond_joint_m[:, None] + error_m)
-    linear = robot.is_linear[:, None]
-    if linear.any():
+    if robot.is_linear.any():
+        linear = robot.is_linear[:, None]
         fixed = (robot.wire_m[:, None] + error_m) * (1.0 + creep)
         drawn = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
-        zero = np.where(linear, fixed, zero)
-        joint = np.where(linear, drawn / _ratio(robot), joint)
+        zero, joint = np.where(linear, fixed, zero), np.where(linear, drawn / _ratio(robot), joint)
         offset = offset + np.where(linear, drawn, 0.0)
     return _of_draws(zero, joint, offset, tau, rotation)
 

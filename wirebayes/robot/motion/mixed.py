@@ -132,15 +132,15 @@ def _lowest(energy: _Quadratic, taut: Bools) -> tuple[Floats, Floats]:
     taut : (w, n) bool array
         The first guess.
     """
-    d, n = energy.load.shape
-    step, tau = np.full((d, n), np.nan), np.full(taut.shape, np.nan)
-    rows, here = np.arange(n), np.zeros((d, n))
+    step, tau = np.full(energy.load.shape, np.nan), np.full(taut.shape, np.nan)
+    rows, here = np.arange(taut.shape[1]), np.zeros(energy.load.shape)
     for _ in range(_SETS):
         there, positive = energy.least_with(taut)
         pull = energy.tensions(there)
         settled = positive & ((pull > 0) == taut).all(0)
-        step[:, rows[settled]] = there[:, settled]
-        tau[:, rows[settled]] = np.maximum(pull[:, settled], 0.0)
+        done = rows[settled]
+        step[:, done] = there[:, settled]
+        tau[:, done] = np.maximum(pull[:, settled], 0.0)
         left = np.flatnonzero(positive & ~settled)
         if not left.size:
             break
@@ -191,17 +191,21 @@ def approach(
     """
     ahead, tau = newton_step_with_tensions(robot, wires, pose, tension_N, lengths)
     x, R = after_step(robot, pose, ahead)
-    zero, offset = lengths[0], np.broadcast_to(lengths[1], lengths[0].shape)
     rows, step = np.arange(len(x)), ahead
     for _ in range(_STEPS):
         further = _goes_on(robot, step)
         rows, tau = rows[further], tau[further]
         if not rows.size:
             break
-        here, own = (x[rows], R[rows]), (zero[rows], offset[rows])
-        step, tau = newton_step_with_tensions(robot, wires.part(rows), here, tau, own)
+        here = x[rows], R[rows]
+        step, tau = newton_step_with_tensions(robot, wires.part(rows), here, tau, _rows_of(lengths, rows))
         x[rows], R[rows] = after_step(robot, here, step)
     return (x, R), ahead
+
+
+def _rows_of(lengths: Lengths, rows: Indices) -> Lengths:
+    zero, offset = lengths
+    return zero[rows], np.broadcast_to(offset, zero.shape)[rows]
 
 
 def _goes_on(robot: Robot, step: Floats) -> Bools:

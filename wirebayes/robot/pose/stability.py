@@ -78,14 +78,15 @@ def stability_warnings(courses: dict[float, Course], stable: bool = True) -> lis
     found = {_who(spread): summary(course) for spread, course in courses.items()}
     began = {who: one for who, one in found.items() if one["began"]}
     reason = "no stable equilibrium is found there" if stable else "the pose is balanced but not stable"
+    told: list[tuple[str, str, dict[str, str]]] = []
+    told.append(("fall", f"draws cannot begin at the pose, {reason}", _told(found, _not_begun)))
+    told.append(("fall", f"the platform falls within {last:g} s", _told(began, _fallen)))
     slack = _told(began, _slack)
-    told = [
-        ("fall", f"draws cannot begin at the pose, {reason}", _told(found, _not_begun)),
-        ("fall", f"the platform falls within {last:g} s", _told(began, _fallen)),
-        ("slack", f"wires go slack within {last:g} s", slack),
-        ("slack", f"a wire may keep little of its tension within {last:g} s", {} if slack else _told(began, _weak)),
-        ("fall", f"the stiffness against the softest motion may fall within {last:g} s", _told(began, _loose)),
-    ]
+    told.append(("slack", f"wires go slack within {last:g} s", slack))
+    if not slack:
+        told.append(("slack", f"a wire may keep little of its tension within {last:g} s", _told(began, _weak)))
+    softest = f"the stiffness against the softest motion may fall within {last:g} s"
+    told.append(("fall", softest, _told(began, _loose)))
     return [Notice(kind, f"{head}: {_beside(by_who)}") for kind, head, by_who in told if by_who]
 
 

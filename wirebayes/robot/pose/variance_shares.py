@@ -28,20 +28,25 @@ def shares(parameters: Mapping[str, Floats], output: Floats) -> dict[str, float]
         One share a parameter, and "unexplained".
     """
     names = [name for name, value in parameters.items() if np.std(value) > 0]
-    total = float(np.var(output))
-    if total == 0 or not names:
+    if not names or np.var(output) == 0:
         return dict.fromkeys(parameters, 0.0) | {"unexplained": 0.0}
     explained = _explained({name: _columns(parameters[name]) for name in names}, output)
     out = dict.fromkeys(parameters, 0.0)
-    d = len(names)
     for name in names:
-        rest = [other for other in names if other != name]
-        for size in range(d):
-            orders = d * comb(d - 1, size)
-            for subset in combinations(rest, size):
-                with_it = tuple(other for other in names if other in subset or other == name)
-                out[name] += (explained[with_it] - explained[subset]) / orders
+        out[name] = _mean_gain(explained, names, name)
     return out | {"unexplained": 1.0 - explained[tuple(names)]}
+
+
+def _mean_gain(explained: dict[tuple[str, ...], float], names: list[str], name: str) -> float:
+    """What a parameter adds to the explained share, over all orders in which the parameters can be learnt."""
+    rest = [other for other in names if other != name]
+    gain = 0.0
+    for size in range(len(names)):
+        orders = len(names) * comb(len(rest), size)
+        for subset in combinations(rest, size):
+            with_it = tuple(other for other in names if other in subset or other == name)
+            gain += (explained[with_it] - explained[subset]) / orders
+    return gain
 
 
 def _explained(columns: dict[str, Floats], output: Floats) -> dict[tuple[str, ...], float]:

@@ -177,7 +177,6 @@ def _image(
     beside: Floats,
 ) -> Floats:
     """Largest distance of Krawczyk's image from the linear answer, (d,)."""
-    d, q = Y.shape
     box = _Box(balls((along + beside) * _UP), balls(beside), ball_matrix(Y))
     wires = []
     for i, (G, H) in enumerate(zip(*generators, strict=True)):
@@ -185,12 +184,16 @@ def _image(
     _, slope = wide.evaluate(box.whole, [wire.pull for wire in wires])
     precondition = ball_matrix(C)
     turned = precondition * slope
-    remainder = (identity(d) - turned) * column(box.beside)
-    change = turned * box.line
+    remainder = (identity(len(C)) - turned) * column(box.beside)
+    by_parameters = _by_parameters(precondition, turned * box.line, wires)
+    return upper_bounds(remainder + image_of_centre(middle, precondition) - by_parameters)
+
+
+def _by_parameters(precondition: Any, change: Any, wires: list[_WireInBox]) -> Any:
+    """(d, 1) what all parameters change beside the linear answer, which the poses change by (d, q)."""
     for wire in wires:
         change += (precondition * wire.wrench) * row(wire.by_parameter)
-    by_parameters = change * column(balls(np.ones(q)))
-    return upper_bounds(remainder + image_of_centre(middle, precondition) - by_parameters)
+    return change * column(balls(np.ones(change.ncols())))
 
 
 def _wire_in_box(middle: Balance, wide: Balance, i: int, box: _Box, G: Floats, H: Floats) -> _WireInBox:

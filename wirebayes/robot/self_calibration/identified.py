@@ -70,13 +70,6 @@ def identified(found: Whole) -> Identified:
     found : Whole
     """
     unknowns = found.unknowns
-    prior, at = unknowns.prior, unknowns.slices
-    geometry = np.r_[0 : at["wires"].start, unknowns.references]
-    if prior.reference_sd_m <= 0:
-        geometry = geometry[: at["wires"].start]
-    size = np.zeros(0)
-    if len(geometry):
-        size = np.linalg.eigvalsh(found.covariance[np.ix_(geometry, geometry)])
     combinations = _of_exit_points(found) if unknowns.errors.exit_m > 0 else []
     sentences = []
     for one in combinations:
@@ -84,12 +77,24 @@ def identified(found: Whole) -> Identified:
             known = f"known to {one.before_mm:.2g} mm before, to {one.after_mm:.2g} mm now"
             sentences.append(f"{_SAYS[one.name]}: {known}")
     sd = np.sqrt(np.diag(found.covariance)[unknowns.references])
-    before = 1e3 * prior.reference_sd_m
+    before = 1e3 * unknowns.prior.reference_sd_m
     for i in np.flatnonzero(sd >= _DETERMINED):
         known = f"known to {before:.2g} mm before, to {before * sd[i]:.2g} mm now"
         sentences.append(f"the reference length of wire {i + 1}: {known}")
+    size = _sizes(found)
     count = int((np.sqrt(np.maximum(size, 0.0)) < _DETERMINED).sum())
     return Identified(count, len(size), combinations, sentences)
+
+
+def _sizes(found: Whole) -> Floats:
+    """Variances of independent combinations of geometry and references, of their prior's."""
+    unknowns = found.unknowns
+    geometry = np.arange(unknowns.slices["wires"].start)
+    if unknowns.prior.reference_sd_m > 0:
+        geometry = np.r_[geometry, unknowns.references]
+    if not len(geometry):
+        return np.zeros(0)
+    return np.linalg.eigvalsh(found.covariance[np.ix_(geometry, geometry)])
 
 
 def _of_exit_points(found: Whole) -> list[Combination]:

@@ -46,12 +46,17 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: Generator) -> Sta
     pull = np.maximum(pull, 1e-3 * robot.rule.lowest_N)
     position = chosen_rows(holds.placed, session.position_m, robot.home_m)
     turn = chosen_rows(holds.oriented, session.rotation, turns.matrix(robot.home_rotation_rad))
-    lost = ~holds.placed | (~holds.oriented & (robot.degrees == 6))
-    if lost.any():
+    if _lost(unknowns, holds).any():
         ratio = stretch(unknowns, white, pull).ratio
-        _locate(unknowns, holds, white, ratio, np.flatnonzero(lost), (position, turn), rng)
+        _locate(unknowns, holds, white, ratio, (position, turn), rng)
     _fill_unread(moved(robot, unknowns.parts(white)), pull, unread, (position, turn))
     return State(np.array(white), position, turn, pull)
+
+
+def _lost(unknowns: Unknowns, holds: Holds) -> Bools:
+    """(p,) Whether a part of the hold's pose is not stated."""
+    turns_freely = unknowns.robot.degrees == 6
+    return np.asarray(~holds.placed | (~holds.oriented & turns_freely))
 
 
 def _fill_unread(robot: Robot, pull: Floats, unread: Bools, poses: Poses) -> None:
@@ -73,21 +78,19 @@ def _carrying(robot: Robot, position_m: Floats, turn: Floats) -> Floats:
     return np.asarray(lowest + above)
 
 
-def _locate(
-    unknowns: Unknowns, holds: Holds, white: Floats, ratio: Floats, lost: Indices, poses: Poses, rng: Generator
-) -> None:
+def _locate(unknowns: Unknowns, holds: Holds, white: Floats, ratio: Floats, poses: Poses, rng: Generator) -> None:
     """Put in place of the poses of lost holds those that close the loops best, of many trials each."""
     position, turn = poses
+    lost = np.flatnonzero(_lost(unknowns, holds))
     parts = unknowns.parts(white)
     robot = moved(unknowns.robot, parts)
     bare, offset = inverse.lengths(robot, holds.session.joint_m[lost])
     goal = (bare + parts.reference_m) * ratio[lost]
     search = _PoseSearch(robot, _trials(goal), _trials(offset))
     x, R = search.descended(_trials(position[lost]), _trials(turn[lost]), _trials(holds.placed[lost]), rng)
-    misfit = search.misfit(x, R).reshape(len(lost), _TRIALS)
-    chosen = np.arange(len(lost)) * _TRIALS + misfit.argmin(1)
-    position[lost] = x.T[chosen]
-    turn[lost] = batch_first(R)[chosen]
+    best = search.best_trials(x, R)
+    position[lost] = x.T[best]
+    turn[lost] = batch_first(R)[best]
 
 
 def _trials(values: Array) -> Array:
@@ -171,6 +174,11 @@ class _PoseSearch:
         outside = np.abs(x.T - self.middle) - 1.2 * self.half
         out = np.maximum(outside, 0.0)
         return np.nan_to_num((gap**2).sum(1) + (out**2).sum(1), nan=np.inf)
+
+    def best_trials(self, x: Floats, R: Floats) -> Indices:
+        """(l,) The trial of each hold that closes the loops best."""
+        misfit = self.misfit(x, R).reshape(-1, _TRIALS)
+        return np.arange(len(misfit)) * _TRIALS + misfit.argmin(1)
 
 
 def best(
