@@ -348,27 +348,27 @@ def _sample(robot: Robot, wires: Wires, wire: str) -> FreshSample:
 def _head(robot: Robot, line: WireDraws, spring: WorkingSpring, mark: str) -> str:
     """What the numbers belong to, as comments."""
     of_leg = lines_of(robot, line)
-    names = list(dict.fromkeys(robot.wire))
     about = {}
-    for name in names:
+    for name in dict.fromkeys(robot.wire):
         about[name] = _origin(name in robot.given, of_leg[robot.wire.index(name)])
-    several = len(names) > 1
-    lines = [f"{robot.name}: {cut_from(robot)}." if several else f"{robot.name}: line {about[names[0]]}."]
+    several = len(about) > 1
+    lines = [f"{robot.name}: {cut_from(robot)}." if several else f"{robot.name}: line {about[robot.wire[0]]}."]
     lines.append("The firmware knows no creep; creep-table.csv says how much a line grows under load.")
     lines += [f"Beware: {doubt.text}." for doubt in doubts(robot, line)]
-    if several:
-        lines += [_wire_in_words(robot, line, name, about[name]) for name in names]
-        lines.append(f"The firmware takes one spring constant for all wires: here that of wire {spring.of}.")
-    else:
-        lines.append(spring.remark)
+    lines += _wires_in_words(robot, line, about, spring) if several else [spring.remark]
     lines.append(_pulleys_left_out(robot))
     return "".join(f"{mark} {text}\n" for text in lines if text)
 
 
-def _wire_in_words(robot: Robot, line: WireDraws, name: str, origin: str) -> str:
-    own = working_spring(robot, line, name)
-    said = f"Wire {name}: {origin}; spring constant {own.mean_N:.0f} N, {own.band}."
-    return f"{said} {own.remark}".strip()
+def _wires_in_words(robot: Robot, line: WireDraws, about: dict[str, str], spring: WorkingSpring) -> list[str]:
+    """Each wire with where its numbers come from, and which of them the firmware gets."""
+    out = []
+    for name, origin in about.items():
+        own = working_spring(robot, line, name)
+        said = f"Wire {name}: {origin}; spring constant {own.mean_N:.0f} N, {own.band}."
+        out.append(f"{said} {own.remark}".strip())
+    out.append(f"The firmware takes one spring constant for all wires: here that of wire {spring.of}.")
+    return out
 
 
 def _origin(is_given: bool, line: WireDraws) -> str:

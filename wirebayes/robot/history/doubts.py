@@ -44,10 +44,16 @@ def unreached(history: History, found: Estimate, to: Target, change_m: Floats) -
     for reason, why in reasons.items():
         rows = np.flatnonzero(never & why)
         if rows.size:
-            times = ", ".join(f"{history.times_s[k]:.10g}" for k in rows[:_NAMED])
-            more = f" s and {rows.size - _NAMED} times more" if rows.size > _NAMED else " s"
-            out.append(Notice("unheld", f"{reason} commanded at {times}{more}: no corrections lead there"))
+            times = _times_in_words(history.times_s[rows])
+            out.append(Notice("unheld", f"{reason} commanded at {times}: no corrections lead there"))
     return out
+
+
+def _times_in_words(times_s: Floats) -> str:
+    """The first times, and how many there are more."""
+    named = ", ".join(f"{time:.10g}" for time in times_s[:_NAMED])
+    more = len(times_s) - _NAMED
+    return f"{named} s and {more} times more" if more > 0 else f"{named} s"
 
 
 def history_warnings(
@@ -138,9 +144,7 @@ def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
     """
     if len(times_s) < 3:
         return []
-    step = np.diff(times_s)
-    speed = np.diff(position_m, axis=0) / step[:, None]
-    share = np.linalg.norm(np.diff(speed, axis=0), axis=1) / (0.5 * (step[1:] + step[:-1])) / GRAVITY
+    share = _accelerations(times_s, position_m) / GRAVITY
     share = np.where(np.isfinite(share), share, 0.0)
     k = int(share.argmax())
     if share[k] <= _INERTIA:
@@ -150,3 +154,11 @@ def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
         "to accelerate it, so tensions and poses are those of a slower motion along the same way"
     )
     return [Notice("left-out", text)]
+
+
+def _accelerations(times_s: Floats, position_m: Floats) -> Floats:
+    """(t - 2,) m/s² at the rows between the first and the last."""
+    step = np.diff(times_s)
+    speed = np.diff(position_m, axis=0) / step[:, None]
+    change = np.linalg.norm(np.diff(speed, axis=0), axis=1)
+    return np.asarray(change / (0.5 * (step[1:] + step[:-1])))

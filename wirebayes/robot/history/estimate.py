@@ -96,10 +96,14 @@ def estimate_poses(
     if mode is None:  # not even the mean wires hang in balance
         return replace(way.followed(known.draws), converged=False, effective=0.0, used=False)
     out = draw_posterior(lambda: unknowns(robot, line, errors, rng), read, mode, way.white, rng)
-    used = out.effective >= min(_TOO_FEW, 0.5 * line.count)
-    found = way.estimate(out) if used else way.followed(known.draws)
-    misfit = _misfit(read, out)
-    return replace(found, misfit=misfit, converged=mode.converged, effective=out.effective, used=used)
+    return replace(_used(way, out, line.count), misfit=_misfit(read, out), converged=mode.converged)
+
+
+def _used(way: "_Way", out: Draws, count: int) -> Estimate:
+    """The posterior's draws, or those of the joint values alone where too few of the former are worth anything."""
+    used = out.effective >= min(_TOO_FEW, 0.5 * count)
+    found = way.estimate(out) if used else way.followed(way.known.draws)
+    return replace(found, effective=out.effective, used=used)
 
 
 def _mode(known: LogUnknowns, read: LogReadings, way: "_Way") -> Mode | None:

@@ -230,15 +230,19 @@ class LiveEstimator:
             self._settle(each)
             self._begin(time_s)
         else:
-            before, joints = self._last, self._joint
-            for part in self._parts(time_s):
-                share = (part - before) / (time_s - before)
-                self._advance(part, joints + share * (each - joints))
+            self._move(time_s, each)
         self._joint = each
         if np.isfinite(readings).any():
             self._read(time_s, readings)
         self._last = time_s
         return self._pose(time_s, nominal)
+
+    def _move(self, time_s: float, joint: Floats) -> None:
+        """On to other joint values, which change evenly, by parts of the time since the step before."""
+        before, joints = self._last, self._joint
+        for part in self._parts(time_s):
+            share = (part - before) / (time_s - before)
+            self._advance(part, joints + share * (joint - joints))
 
     def _parts(self, time_s: float) -> list[float]:
         """Where a long step is divided: while a hold is young, its creep is fast."""
@@ -284,12 +288,7 @@ class LiveEstimator:
     def _go(self, zero: Floats, offset: Floats) -> None:
         """Poses at new lengths, a short way on."""
         for _ in range(3):
-            step = path.newton_step(self.robot, self._wires, (self._x, self._R), (zero, offset))
-            length = np.sqrt((step * step).sum(1))
-            short = length < _LONG * self.robot.size_m
-            hard = self._live & ~short
-            step[hard] = np.nan
-            self._x, self._R = mixed.after_step(self.robot, (self._x, self._R), step)
+            length, hard = self._newton(zero, offset)
             if hard.any():
                 self._carefully(np.flatnonzero(hard), zero, offset)
             moved = length[self._live & ~hard]
@@ -297,6 +296,16 @@ class LiveEstimator:
                 break
         self._tension = balance.tensions_at(self.robot, self._wires, self._x, self._R, zero, offset)
         self._lengths = zero, offset
+
+    def _newton(self, zero: Floats, offset: Floats) -> tuple[Floats, Bools]:
+        """Newton's step of every column whose own is short: how long each is, and which columns stay where they are."""
+        step = path.newton_step(self.robot, self._wires, (self._x, self._R), (zero, offset))
+        length = np.sqrt((step * step).sum(1))
+        short = length < _LONG * self.robot.size_m
+        hard = self._live & ~short
+        step[hard] = np.nan
+        self._x, self._R = mixed.after_step(self.robot, (self._x, self._R), step)
+        return length, hard
 
     def _carefully(self, rows: Indices, zero: Floats, offset: Floats) -> None:
         """Columns whose way is long or unstable: followed in parts; lost where the platform falls."""

@@ -88,11 +88,7 @@ def parse_log(table: CsvTable, robot: Robot, columns_of: Callable[[Robot, Sequen
     if len(cells) < 2:
         found = counted(len(cells), "row")
         raise InputError(f"{table.path}: found {found} of values, expected two or more")
-    time = cells[:, table.header.index("time_s")]
-    late = np.flatnonzero(np.diff(time) <= 0)
-    if len(late):
-        before, row = time[late[0]], int(late[0]) + 1
-        raise table.complain(row, "time_s", f"{time[row]:.10g}", f"a time after {before:.10g} s")
+    _refuse_late(table, cells[:, table.header.index("time_s")])
     joints = header.required[1:] if header.required[1] not in POSITION else ()
     history = _history(robot, joints, table.header, cells)
     if history.joint_m is not None:
@@ -100,6 +96,14 @@ def parse_log(table: CsvTable, robot: Robot, columns_of: Callable[[Robot, Sequen
     if history.position_m is not None:
         plausible.refuse_far(robot, history.position_m, table, POSITION)
     return history
+
+
+def _refuse_late(table: CsvTable, time_s: Floats) -> None:
+    """Refuse times that do not rise."""
+    late = np.flatnonzero(np.diff(time_s) <= 0)
+    if len(late):
+        before, row = time_s[late[0]], int(late[0]) + 1
+        raise table.complain(row, "time_s", f"{time_s[row]:.10g}", f"a time after {before:.10g} s")
 
 
 def may_be_unread(name: str) -> bool:
@@ -129,14 +133,14 @@ def _history(robot: Robot, joints: Sequence[str], names: Sequence[str], cells: F
     joint = some(joints)
     vector = np.tile(robot.home_rotation_rad, (rows, 1)) if turn is None else turn
     return History(
-        cells[:, names.index("time_s")],
-        None if joint is None else joint_values(robot, joints, joint),
-        position,
-        None if position is None else matrix(vector),
-        np.zeros(rows) if payload is None else payload[:, 0],
-        np.tile(robot.centre_of_mass_m, (rows, 1)) if centre is None else centre,
-        None if hold is None else hold[:, 0].astype(np.int64),
-        some(_tensions(robot)),
-        None if tilt is None else np.radians(tilt),
-        turn is not None,
+        times_s=cells[:, names.index("time_s")],
+        joint_m=None if joint is None else joint_values(robot, joints, joint),
+        position_m=position,
+        rotation=None if position is None else matrix(vector),
+        payload_kg=np.zeros(rows) if payload is None else payload[:, 0],
+        payload_m=np.tile(robot.centre_of_mass_m, (rows, 1)) if centre is None else centre,
+        hold=None if hold is None else hold[:, 0].astype(np.int64),
+        tension_N=some(_tensions(robot)),
+        tilt_rad=None if tilt is None else np.radians(tilt),
+        rotation_is_stated=turn is not None,
     )

@@ -33,18 +33,23 @@ def pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> t
     """
     track = found.track
     columns: dict[str, Any] = {"time_s": history.times_s, "hold": track.hold + 1}
-    for i, axis in enumerate("xyz"):
-        columns |= _with_bands(axis, "m", track.position_m[..., i])
+    columns |= _with_bands_along("", "m", track.position_m)
     if robot.degrees == 6:
-        turn = rotation_vectors(track.rotation)
-        for i, axis in enumerate("xyz"):
-            columns |= _with_bands(f"r{axis}", "rad", turn[..., i])
+        columns |= _with_bands_along("r", "rad", rotation_vectors(track.rotation))
     distance = np.linalg.norm(track.position_m - to.position_m, axis=-1)
     columns |= _with_bands("distance", "mm", 1e3 * distance)
     for i in range(robot.legs):
         columns[f"tension_{i + 1}_N"] = mean_of_finite(track.tension_N[..., i])
     columns["held"] = track.held.mean(0)
     return _as_table(columns)
+
+
+def _with_bands_along(mark: str, unit: str, values: Floats) -> dict[str, Floats]:
+    """Columns of the three components of a vector, named after the axes."""
+    columns: dict[str, Floats] = {}
+    for i, axis in enumerate("xyz"):
+        columns |= _with_bands(mark + axis, unit, values[..., i])
+    return columns
 
 
 def _with_bands(quantity: str, unit: str, values: Floats) -> dict[str, Floats]:
@@ -78,8 +83,7 @@ def correction_table(
     columns: dict[str, Any] = {"time_s": history.times_s}
     joint_m = mean_of_finite(joint_m) if joint_m.ndim == 3 else joint_m
     described = _described(change_m)
-    mean = winches.of_each_winch(robot, described["mean"])
-    sd = winches.of_each_winch(robot, described["sd"])
+    mean, sd = (winches.of_each_winch(robot, described[name]) for name in ("mean", "sd"))
     joint = winches.of_each_winch(robot, joint_m) + mean
     columns |= {f"joint_{i + 1}_m": joint[:, i] for i in range(robot.joints)}
     if robot.drums is not None:

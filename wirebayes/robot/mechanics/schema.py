@@ -334,8 +334,13 @@ def _drum(leg: Keys | None) -> dict[str, float]:
         row["drum_turns"] = leg.number("drum_layer_turns", least=1)
         row["drum_layer"] = leg.number("drum_layer_height_m", above=0)
         row["drum_wire"] = leg.number("wire_length_m", above=0)
-        layers = row["drum_wire"] / (2 * math.pi * row["drum_radius"] * row["drum_turns"])
-        if layers > _MOST_LAYERS:
-            expected = f"wire for no more than {_MOST_LAYERS} layers on the drum"
-            raise leg.complain("wire_length_m", f"{row['drum_wire']:g}, {layers:.3g} layers", expected)
+        _refuse_many_layers(leg, row)
     return row
+
+
+def _refuse_many_layers(leg: Keys, row: dict[str, float]) -> None:
+    innermost = 2 * math.pi * row["drum_radius"] * row["drum_turns"]
+    layers = row["drum_wire"] / innermost
+    if layers > _MOST_LAYERS:
+        expected = f"wire for no more than {_MOST_LAYERS} layers on the drum"
+        raise leg.complain("wire_length_m", f"{row['drum_wire']:g}, {layers:.3g} layers", expected)

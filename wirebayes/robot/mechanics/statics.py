@@ -216,14 +216,7 @@ def _add_rotation(shape: Geometry, moment: Floats, pull: Floats, beta: Floats, H
     """
     r, u = shape.arm_m, shape.direction
     swung = beta * r
-    # -Σβ[r]×, the coupling of displacement and rotation
-    x, y, z = swung.sum(1)
-    H[0, 4] += z
-    H[0, 5] -= y
-    H[1, 3] -= z
-    H[1, 5] += x
-    H[2, 3] += y
-    H[2, 4] -= x
+    _couple(swung.sum(1), H)
     q = pull * u - swung  # Σ τ u rᵀ - β r rᵀ in one outer product
     outer = np.stack([(component * r).sum(1) for component in q])
     outer[2] += moment  # the weight, an arm of its own
@@ -232,6 +225,17 @@ def _add_rotation(shape: Geometry, moment: Floats, pull: Floats, beta: Floats, H
     for i in range(3):  # nothing is in the lower triangle yet, not even a number
         H[3 + i, 3 + i :] += turned_twice[i, i:]
         H[3 + i, 3 + i] -= trace
+
+
+def _couple(swung: Floats, H: Floats) -> None:
+    """-Σβ[r]×, the coupling of displacement and rotation."""
+    x, y, z = swung
+    H[0, 4] += z
+    H[0, 5] -= y
+    H[1, 3] -= z
+    H[1, 5] += x
+    H[2, 3] += y
+    H[2, 4] -= x
 
 
 def stiffness(

@@ -140,23 +140,26 @@ class HoldCreep:
 
     def advance(self, time_s: float, tension_N: Floats) -> CreepState:
         """Creep to a later time of the hold; `tension_N` ended the last step and is followed onward."""
-        hold, law = self.hold, self.law
         self.time_s = time_s
         self._look(time_s)
-        reached, clock = law.fraction(self.k2, hold), law.clock(hold)
+        reached = self.law.fraction(self.k2, self.hold)
+        clock = self.law.clock(self.hold)
         if self.follow == "start":
             self.grown = self.amount * reached
         else:
-            progress = reached - self.reached
-            self.amount = law.amount(self._onward(progress, tension_N), hold)
-            if self._open_ended:
-                self.grown = self.grown + self.amount * progress
-            else:
-                # The share of what is left: composes to eq (5) exactly when the tension stays.
-                share = -np.expm1(-self._passed(clock))
-                self.grown = self.grown + (self.amount - self.grown) * share
+            self._grow(reached - self.reached, clock, tension_N)
         self.reached, self.counted = reached, clock
         return self.state()
+
+    def _grow(self, progress: Floats, clock: Floats, tension_N: Floats) -> None:
+        """Creep of a step to creep's own `clock`, in which its share grows by `progress`."""
+        self.amount = self.law.amount(self._onward(progress, tension_N), self.hold)
+        if self._open_ended:
+            self.grown = self.grown + self.amount * progress
+            return
+        # The share of what is left: composes to eq (5) exactly when the tension stays.
+        share = -np.expm1(-self._passed(clock))
+        self.grown = self.grown + (self.amount - self.grown) * share
 
     def state(self) -> CreepState:
         """What the wires carry now."""

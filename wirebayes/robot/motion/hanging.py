@@ -71,21 +71,19 @@ def hang(robot: Robot, position_m: Floats, reference: Floats, asked_rad: Floats 
     Hanging
         Stable means for wires that do not stretch.
     """
-    p = len(position_m)
-    near = np.broadcast_to(reference, (p, 3, 3))
+    near = np.broadcast_to(reference, (len(position_m), 3, 3))
     asked = np.full(3, np.nan) if asked_rad is None else asked_rad
     found, good = _balances(robot, position_m, near, asked)
-    out = np.full((p, 3, 3), np.nan)
-    tension = np.full((p, robot.legs), np.nan)
+    out = np.full(near.shape, np.nan)
+    tension = np.full((len(near), robot.legs), np.nan)
     others = []
-    for k in range(p):
-        rows = _nearest_first(found, np.flatnonzero(good[k]) + k * good.shape[1])
+    for k, fine in enumerate(good):
+        rows = _nearest_first(found, np.flatnonzero(fine) + k * len(fine))
         others.append(turning.vector(found.rotation[rows[1:]]).reshape(-1, 3))
         if rows.size:
             out[k] = found.rotation[rows[0]]
             tension[k] = found.tension_N[rows[0]]
-    choice = _choices(robot, position_m, out, tension)
-    return Hanging(out, tension, tuple(others), choice)
+    return Hanging(out, tension, tuple(others), _choices(robot, position_m, out, tension))
 
 
 def _choices(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> Ints:

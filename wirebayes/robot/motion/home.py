@@ -54,9 +54,9 @@ def home_notices(robot: Robot) -> list[Notice]:
         if found.held[0]:
             return turned_away(robot, found.rotation[0])
     text = "no tensions within the bounds hold the home pose of the robot's file (pose.position_m)"
-    near = hanging.nearest_position(robot, x, R) if robot.motions is None else None
-    if near is not None:
-        text += f"; {nearest_balance(x, near)}"
+    if robot.motions is None:
+        near = hanging.nearest_position(robot, x, R)
+        text += "" if near is None else f"; {nearest_balance(x, near)}"
     return [Notice("unheld", text)]
 
 

@@ -59,6 +59,17 @@ def tensions(robot: Robot, position_m: Floats, rotation: Floats, choice: Choice 
     """
     rule = robot.rule
     chosen = choice or CHOICES[rule.choice]
+    clear, structure, load = _balance(robot, position_m, rotation)
+    out = np.full((len(position_m), robot.legs), np.nan)
+    for p in np.flatnonzero(clear):
+        tau = chosen(structure[:, :, p], load[:, p], rule.lowest_N, rule.highest_N)
+        if tau is not None:
+            out[p] = tau
+    return out
+
+
+def _balance(robot: Robot, position_m: Floats, rotation: Floats) -> tuple[Bools, Floats, Floats]:
+    """Where wires run, ``(p,)``, the structure matrices ``(d, w, p)`` and the loads ``(d, p)``."""
     turn = batch_last(rotation)
     shape = statics.geometry(robot, position_m.T, turn)
     structure = -statics.wire_jacobian(robot, shape)
@@ -66,12 +77,7 @@ def tensions(robot: Robot, position_m: Floats, rotation: Floats, choice: Choice 
     # Moments are brought to newtons so that the rank test and the residual weigh both alike.
     structure[3:] /= robot.size_m
     load[3:] /= robot.size_m
-    out = np.full((len(position_m), robot.legs), np.nan)
-    for p in np.flatnonzero(shape.clear):
-        tau = chosen(structure[:, :, p], load[:, p], rule.lowest_N, rule.highest_N)
-        if tau is not None:
-            out[p] = tau
-    return out
+    return shape.clear, structure, load
 
 
 def commands(
@@ -145,8 +151,9 @@ def _of_each_line(
     if robot.is_linear.any():
         linear = robot.is_linear[:, None]
         fixed = (robot.wire_m[:, None] + error_m) * (1.0 + creep)
+        zero = np.where(linear, fixed, zero)
         drawn = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
-        zero, joint = np.where(linear, fixed, zero), np.where(linear, drawn / _ratio(robot), joint)
+        joint = np.where(linear, drawn / _ratio(robot), joint)
         offset = offset + np.where(linear, drawn, 0.0)
     return _of_draws(zero, joint, offset, tau, rotation)
 

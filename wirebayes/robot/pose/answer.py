@@ -86,14 +86,22 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
     content["feasible_draws"] = float(commands.feasible.mean())
     if not commands.feasible.any():
         return _unheld(robot, content, "These wires cannot pull as hard as the pose requires, however far stretched.")
+    held = _Held(robot, line, shared, request, commands, tau)
     if robot.winch is not None:
-        tau = commands.tension_N[commands.feasible].mean(0, keepdims=True)
-        R = inverse.commands(robot, control.known(shared), x[None], R[None], tau).rotation[0]
-        request = replace(request, rotation=R)
-        content["pose"]["rotation_vector_rad"] = turning.vector(R[None])[0]
-        if robot.joints < robot.freedoms:
-            content["orientation"] = by_lines(robot, R)
-    return _held_answer(_Held(robot, line, shared, request, commands, tau), other, turned, content)
+        held = _by_winches(held, content)
+    return _held_answer(held, other, turned, content)
+
+
+def _by_winches(held: "_Held", content: PoseJson) -> "_Held":
+    """The pose that winches make of a requested one which drive several lines; the answer is of that one."""
+    robot, request, commands = held.robot, held.request, held.commands
+    tau = commands.tension_N[commands.feasible].mean(0, keepdims=True)
+    x, asked = request.position_m[None], request.rotation[None]
+    R = inverse.commands(robot, control.known(held.wires), x, asked, tau).rotation[0]
+    content["pose"]["rotation_vector_rad"] = turning.vector(R[None])[0]
+    if robot.joints < robot.freedoms:
+        content["orientation"] = by_lines(robot, R)
+    return replace(held, request=replace(request, rotation=R), tension_N=tau)
 
 
 @dataclass(frozen=True)

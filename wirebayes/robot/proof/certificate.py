@@ -74,14 +74,13 @@ def certify(
         python-flint is not installed.
     """
     system = Balance(robot, law, k1_N, zero_m, offset_m, position_m, rotation)
-    nothing = Certificate(False, position_m, rotation, np.full(robot.degrees, np.nan), 0.0)
     C = preconditioner(system)
-    if C is None:
-        return nothing
-    image = partial(_image, system, C)
-    radius = box_around_image(image, robot.degrees, robot.span_m)
+    radius = None
+    if C is not None:
+        image = partial(_image, system, C)
+        radius = box_around_image(image, robot.degrees, robot.span_m)
     if radius is None:
-        return nothing
+        return Certificate(False, position_m, rotation, np.full(robot.degrees, np.nan), 0.0)
     # Inside, further images only shrink the enclosure.
     for _ in range(3):
         radius = np.minimum(radius, image(radius))

@@ -144,11 +144,16 @@ def _tension_mistake(
     if not 1 / _ANOTHER_UNIT < times < _ANOTHER_UNIT and balance.left(times * pull) < _EVEN:
         found = f"tensions that are, all together, {number(1 / times)} times what carries the platform's weight"
         return f"{names[0]} to {names[-1]}", found, "newtons (or another mass_kg)"
-    left = balance.left(pull)
-    if left < _EVEN:
+    if balance.left(pull) < _EVEN:
         return None
-    for i, j in combinations(range(robot.legs), 2):
-        other = balance.left(balance.pull(_swapped(robot.legs, i, j)))
+    return _mixed_up(balance, names)
+
+
+def _mixed_up(balance: "_Balance", names: Sequence[str]) -> tuple[str, str, str] | None:
+    """Two columns of tensions that would balance better in the place of each other."""
+    left = balance.left(balance.pull(range(len(names))))
+    for i, j in combinations(range(len(names)), 2):
+        other = balance.left(balance.pull(_swapped(len(names), i, j)))
         if _BETTER * other < left:
             found = f"tensions that leave {100 * left:.2g} % of the weight unbalanced"
             return f"columns {names[i]} and {names[j]}", found, _in_place(f"{100 * other:.2g} %")

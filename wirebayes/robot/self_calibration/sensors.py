@@ -150,17 +150,20 @@ def sensor_notices(found: Suspects | None) -> list[Notice]:
     """
     if found is None or not found.p_none < SIGNIFICANT:
         return []
-    wires = found.wires
-    if not wires:
+    if not found.wires:
         text = f"several tension sensors are off ({chance(found.p_none)} if none were): do not use these values"
         return [Notice("misfit", text)]
-    texts = [_in_words(i, found.bias_N[i], found.sd_N[i]) for i in wires]
-    share = 100 * found.explains[wires].min()
-    whole = bool((found.p_alone[wires] >= SIGNIFICANT).all()) or share >= _NEARLY_ALL
-    much = "" if whole else f"{share:.0f} % of "
-    said = f"the tension sensor of {' or of '.join(texts)} would explain {much}what contradicts"
-    correct = "zero it" if len(wires) == 1 else "find out which, zero it"
+    texts = [_in_words(i, found.bias_N[i], found.sd_N[i]) for i in found.wires]
+    said = f"the tension sensor of {' or of '.join(texts)} would explain {_how_much(found)}what contradicts"
+    correct = "zero it" if len(texts) == 1 else "find out which, zero it"
     return [Notice("misfit", f"{said}: do not use these values; {correct}, or give --tension-bias")]
+
+
+def _how_much(found: Suspects) -> str:
+    """Of what contradicts, what any of the sensors explains; empty where it is all."""
+    share = 100 * found.explains[found.wires].min()
+    all_explain = bool((found.p_alone[found.wires] >= SIGNIFICANT).all())
+    return "" if all_explain or share >= _NEARLY_ALL else f"{share:.0f} % of "
 
 
 def _in_words(wire: int, bias_N: float, sd_N: float) -> str:

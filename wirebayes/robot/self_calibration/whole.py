@@ -90,15 +90,20 @@ def estimate(unknowns: Unknowns, holds: Holds, state: State, progress: ShareDone
     creep = creep_of(unknowns, holds, state, roughly=ROUGHLY)
     state = _from_rough(unknowns, holds, noise, state, creep)
     if unknowns.errors.joint_m is None:
-        balance = _shown(unknowns, holds, noise, state, creep, "balance")
-        noise = replace(noise, balance=balance)
-        if np.isfinite(holds.tension_N).any():
-            joint_m = _shown(unknowns, holds, noise, state, creep, "loop")
-            noise = replace(noise, joint_m=joint_m)
+        noise = _noise_at(unknowns, holds, noise, state, creep)
     search = _Search(unknowns, holds, noise, state, creep)
     found = search.at_rest(progress)
     progress(1.0)
     return replace(found, converged=found.converged and not lost(found))
+
+
+def _noise_at(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> Noise:
+    """Noises as large as the residuals at a state show."""
+    balance = _shown(unknowns, holds, noise, state, creep, "balance")
+    noise = replace(noise, balance=balance)
+    if not np.isfinite(holds.tension_N).any():
+        return noise
+    return replace(noise, joint_m=_shown(unknowns, holds, noise, state, creep, "loop"))
 
 
 class _Search:
