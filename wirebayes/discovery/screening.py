@@ -146,13 +146,15 @@ def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array
 
 def best_probes(candidate: Candidate, scans: Sequence[Scan]) -> list[Ints]:
     """(n,) numbers of the probes that explain most in each of the candidate's blocks."""
+    if not candidate.others:
+        return [np.full(len(scans[b].effects), candidate.probe) for b in candidate.blocks]
     numbers = np.array([candidate.probe, *candidate.others])
     return [numbers[np.argmax(scans[b].effects[:, numbers], axis=1)] for b in candidate.blocks]
 
 
 def _each(values: Array, columns: Ints) -> Array:
     """(n,) of every row the value in its own column."""
-    return np.asarray(np.take_along_axis(values, columns[:, None], axis=1)[:, 0])
+    return np.asarray(values[np.arange(len(columns)), columns])
 
 
 def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:

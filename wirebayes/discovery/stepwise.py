@@ -9,7 +9,7 @@ amplitude is the same in every set, so the order of the chain does not matter.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import repeat
+from itertools import chain, repeat
 
 import numpy as np
 from numpy.random import Generator
@@ -188,8 +188,8 @@ def _further(
     scans = [scan(expand(block.target, block.z, trials)) for block in blocks]
     explained = {other for own in names for other in family_of(own, families)}  # what they were, they are no more
     before = {n: -np.inf if n in explained else value for n, value in parent.further.tried.items()}
-    by_scan = [float(screening.log_bayes(c, scans)[0][0]) for c in candidates]
-    if not candidates or max([*by_scan, *before.values()]) < WORTH_A_REFIT:
+    by_scan = (float(screening.log_bayes(c, scans)[0][0]) for c in candidates)
+    if not candidates or all(value < WORTH_A_REFIT for value in chain(before.values(), by_scan)):
         return None
     reach = parent.further.reach
     further = weigh_names(

@@ -141,7 +141,7 @@ class Problem:
                 values.append(found[0])
                 residuals.append(found[1])
             total: Any = sum(values)
-        return or_impossible(total), np.concatenate(residuals)
+        return or_impossible(total), residuals[0] if len(residuals) == 1 else np.concatenate(residuals)
 
     def without_each_hold(self, theta: Array) -> tuple[Array, list[Array]]:
         """(n,) log-likelihood, and per sample the (H, n) of the readings of all holds, of all samples, but one."""
