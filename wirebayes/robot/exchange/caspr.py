@@ -168,23 +168,31 @@ def _leg(cable: Element, centre: Floats) -> _Leg:
     ends = cable.one("attachments").children
     if len(ends) != 2:
         raise cable.fail(f"{len(ends)} attachments", "two: a wire runs straight from the base to the platform")
-    radius, axis = 0.0, np.array([0.0, 0.0, 1.0])
     first, last = ends
-    if first.tag == "base_rotating_pulley":
-        exit_m, radius = first.one("fixed_location").vector(), first.one("pulley_radius").number()
-        entry = first.one("cable_entry_vector")
-        axis = entry.vector()
-        if not radius > 0 or not axis.any():
-            raise first.fail("a pulley without radius or direction", "both above 0")
-    else:
-        if _link(first) == 1 and _link(last) == 0:
-            first, last = last, first
-        if _link(first) != 0:
-            raise first.fail(f"link {_link(first)}", "link 0, the base")
-        exit_m = first.one("location").vector()
+    pulley = first.tag == "base_rotating_pulley"
+    if not pulley and _link(first) == 1 and _link(last) == 0:
+        first, last = last, first
+    exit_m, radius, axis = _over_pulley(first) if pulley else _from_base(first)
     if _link(last) != 1:
         raise last.fail(f"link {_link(last)}", "link 1, the platform")
-    return _Leg(exit_m, last.one("location").vector() + (centre if reference == "com" else 0.0), radius, axis)
+    point = last.one("location").vector()
+    return _Leg(exit_m, point + (centre if reference == "com" else 0.0), radius, axis)
+
+
+def _over_pulley(end: Element) -> tuple[Floats, float, Floats]:
+    """Exit point, radius and swivel axis of a pulley at the base."""
+    exit_m, radius = end.one("fixed_location").vector(), end.one("pulley_radius").number()
+    axis = end.one("cable_entry_vector").vector()
+    if not radius > 0 or not axis.any():
+        raise end.fail("a pulley without radius or direction", "both above 0")
+    return exit_m, radius, axis
+
+
+def _from_base(end: Element) -> tuple[Floats, float, Floats]:
+    """Exit point at the base, without a pulley."""
+    if _link(end) != 0:
+        raise end.fail(f"link {_link(end)}", "link 0, the base")
+    return end.one("location").vector(), 0.0, np.array([0.0, 0.0, 1.0])
 
 
 def _link(attachment: Element) -> int:

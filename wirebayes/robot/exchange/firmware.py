@@ -75,13 +75,7 @@ def robot_of_firmware(path: Path) -> ImportedRobot:
 
 
 def _reprapfirmware(text: str, where: str) -> tuple[list[list[float]], _Settings]:
-    found = _Settings()
-    for number, line in enumerate(text.splitlines(), 1):
-        code = line.split(";")[0].strip().upper()
-        command = code.split(" ")[0]
-        if command in ("M669", "M666"):
-            for letter, value in _WORD.findall(code[len(command) :]):
-                found.put(f"{command} {letter}", value, ":", where, number)
+    found = _codes(text, where)
     count = int(found.values.get("M669 N", [4])[0])
     names = [f"M669 {letter}" for letter in _ANCHORS[:count]]
     anchors = _anchors(found, names, where, "M669 with A, B, C, D")
@@ -92,6 +86,18 @@ def _reprapfirmware(text: str, where: str) -> tuple[list[list[float]], _Settings
             found.values[name] = found.values[code]
             found.line[name] = found.line[code]
     return anchors, found
+
+
+def _codes(text: str, where: str) -> _Settings:
+    """The letters of all M669 and M666."""
+    found = _Settings()
+    for number, line in enumerate(text.splitlines(), 1):
+        code = line.split(";")[0].strip().upper()
+        command = code.split(" ")[0]
+        if command in ("M669", "M666"):
+            for letter, value in _WORD.findall(code[len(command) :]):
+                found.put(f"{command} {letter}", value, ":", where, number)
+    return found
 
 
 def _klipper(text: str, where: str) -> tuple[list[list[float]], _Settings]:

@@ -319,11 +319,13 @@ def mujoco(robot: Robot, line: WireDraws) -> str | None:
     if wires.law == "hooke" and not wires.at("strain"):
         k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, 1))[:, 0]
         return mjcf(robot, k1, zero, offset, remark=which)
-    stiffness, rest = _tangent_springs(wires, commands)
-    pulls = ", ".join(f"{value:.4g}" for value in commands.tension_N[0])
-    remark = f"linear springs with the tension and tangent stiffness of the home pose, where the wires carry {pulls} N"
-    remark += f"; {which}" if which else ""
-    return mjcf(robot, stiffness, rest, offset, remark=remark)
+    remark = _of_tangents(commands.tension_N[0]) + (f"; {which}" if which else "")
+    return mjcf(robot, *_tangent_springs(wires, commands), offset, remark=remark)
+
+
+def _of_tangents(tension_N: Floats) -> str:
+    pulls = ", ".join(f"{value:.4g}" for value in tension_N)
+    return f"linear springs with the tension and tangent stiffness of the home pose, where the wires carry {pulls} N"
 
 
 def _tangent_springs(wires: Wires, commands: inverse.Commands) -> tuple[Floats, Floats]:

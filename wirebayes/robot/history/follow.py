@@ -259,10 +259,7 @@ def _pose(walk: CreepingHold) -> tuple[Floats, Floats]:
 def uncreeping(wires: Wires) -> Wires:
     """One column: the mean wire, which never creeps."""
     elastic = {column for effect in wires.at("strain") for column in effect.columns()}
-    neutral = {}
-    for effect in wires.effects:
-        for amplitude, column in zip(effect.amplitudes, effect.columns(), strict=True):
-            neutral[column] = amplitude.neutral
+    neutral = _neutral_values(wires)
     theta = {}
     for name, value in wires.theta.items():
         mean = value.mean(-1, keepdims=True)
@@ -272,3 +269,12 @@ def uncreeping(wires: Wires) -> Wires:
             mean = np.full_like(mean, neutral[name])
         theta[name] = mean
     return replace(wires, theta=theta)
+
+
+def _neutral_values(wires: Wires) -> dict[str, float]:
+    """Of each amplitude of the wires' effects, the value at which it changes nothing."""
+    neutral = {}
+    for effect in wires.effects:
+        for amplitude, column in zip(effect.amplitudes, effect.columns(), strict=True):
+            neutral[column] = amplitude.neutral
+    return neutral

@@ -18,9 +18,9 @@ from wirebayes.robot.history.beside import beside, beside_fresh
 from wirebayes.robot.history.follow import RESTART
 from wirebayes.robot.history.history import roll_and_pitch, with_payload
 from wirebayes.robot.history.live_input import checked_number, checked_reading, checked_vector, refuse_bad
-from wirebayes.robot.history.live_pose import LivePose
+from wirebayes.robot.history.live_pose import LivePose, row_quantiles
 from wirebayes.robot.history.readings import Information, Sensors, reading_weight, sensors
-from wirebayes.robot.history.unknowns import Uncertain, slopes, unknowns
+from wirebayes.robot.history.unknowns import LogUnknowns, Uncertain, slopes, unknowns
 from wirebayes.robot.mechanics import firmware
 from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts
@@ -82,19 +82,24 @@ class LiveEstimator:
         known = unknowns(robot, line, errors, self._rng)
         self._bare, self.robot, self._reads = robot, robot, reads
         self.warnings = (*doubts(robot, line), *plausible.robot_notices(robot))
-        white = known.draws
-        if reads:
+        self._start, self._last = start, -np.inf
+        self._n = line.count
+        self._prepare_columns(known)
+        self._prepare_readings(known.count, sensors(robot, errors))
+
+    def _prepare_columns(self, known: LogUnknowns) -> None:
+        """Wires of the draws, of differences for derivatives where readings come, and the one that never creeps."""
+        white, legs = known.draws, self.robot.legs
+        if self._reads:
             differences = known.differences(np.zeros(known.count))
             white = np.concatenate([white, differences])
         wires, error = known.columns(white)
         self._wires = beside(wires, known.plain)
-        self._error = np.concatenate([error, np.zeros((1, robot.legs))])
-        self._start, self._state = start, beside_fresh(known.carried(white), robot.legs)
-        self._n, self._columns = line.count, len(self._error)
+        self._error = np.concatenate([error, np.zeros((1, legs))])
+        self._state = beside_fresh(known.carried(white), legs)
+        self._columns = len(self._error)
         self._live = np.ones(self._columns, bool)
-        self._joint = np.empty((self._columns, robot.legs))
-        self._last = -np.inf
-        self._prepare_readings(known.count, sensors(robot, errors))
+        self._joint = np.empty((self._columns, legs))
 
     def _prepare_readings(self, count: int, of: Sensors) -> None:
         """What the sensors will say, of so many unknowns: nothing yet."""
@@ -179,11 +184,7 @@ class LiveEstimator:
             something is not finite or of a wrong shape. Nothing is taken in then, and the next step goes on from the
             last good one.
         """
-        time = checked_number("time_s", time_s)
-        if not time > self._last:
-            raise InputError(f"time_s: found {time:g} after {self._last:g}, expected a later time")
-        if time == np.inf:
-            raise InputError("time_s: found inf, expected a finite time")
+        time = self._later(time_s)
         if (tension_N is not None or tilt_rad is not None) and not self._reads:
             raise InputError("readings: found some, expected none; make the estimator with reads=True")
         joint = self._joints("joint_m", joint_m)
@@ -192,6 +193,15 @@ class LiveEstimator:
         tilt = checked_reading("tilt_rad", tilt_rad, 2)
         with np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
             return self._step(time, joint, nominal, np.concatenate([tension, tilt]))
+
+    def _later(self, time_s: float) -> float:
+        """A time that is later than at the step before."""
+        time = checked_number("time_s", time_s)
+        if not time > self._last:
+            raise InputError(f"time_s: found {time:g} after {self._last:g}, expected a later time")
+        if time == np.inf:
+            raise InputError("time_s: found inf, expected a finite time")
+        return time
 
     def _joints(self, name: str, values: ArrayLike) -> Floats:
         """Joint values as they can be: a drum has paid out some length, a linear actuator may stand on either side."""
@@ -343,7 +353,7 @@ class LiveEstimator:
         centre = self._R[self._n if self._reads else -1]
         own = self._own_draws(centre)
         mean, sd = own.mean(0), own.std(0)
-        low, high = _quantiles(own[:, :3], np.array([0.05, 0.95]))
+        low, high = row_quantiles(own[:, :3], np.array([0.05, 0.95]))
         wanted, wanted_sd = mean[6 : 6 + w], sd[6 : 6 + w]
         change = of_each_winch(robot, wanted - nominal)
         return LivePose(
@@ -385,13 +395,3 @@ class LiveEstimator:
         live = self._live[: self._n]
         sane = live & self._sane
         return sane if sane.any() else live
-
-
-def _quantiles(values: Floats, probability: Floats) -> Floats:
-    """Quantiles ``(q, d)`` of ``(n, d)`` values, linear between neighbours."""
-    ordered, last = np.sort(values, 0), len(values) - 1
-    at = probability * last
-    below = at.astype(int)
-    above = np.minimum(below + 1, last)
-    rise = ordered[above] - ordered[below]
-    return ordered[below] + (at - below)[:, None] * rise

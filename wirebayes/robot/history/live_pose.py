@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from wirebayes.numeric.typing import Floats
 
 
@@ -51,3 +53,13 @@ class LivePose:
     straight_correction_m: Floats
     tension_N: Floats
     held: float
+
+
+def row_quantiles(values: Floats, probability: Floats) -> Floats:
+    """Quantiles ``(q, d)`` of ``(n, d)`` values, linear between neighbours."""
+    ordered, last = np.sort(values, 0), len(values) - 1
+    at = probability * last
+    below = at.astype(int)
+    above = np.minimum(below + 1, last)
+    rise = ordered[above] - ordered[below]
+    return ordered[below] + (at - below)[:, None] * rise

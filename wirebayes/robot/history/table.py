@@ -91,11 +91,16 @@ def parse_log(table: CsvTable, robot: Robot, columns_of: Callable[[Robot, Sequen
     _refuse_late(table, cells[:, table.header.index("time_s")])
     joints = header.required[1:] if header.required[1] not in POSITION else ()
     history = _history(robot, joints, table.header, cells)
+    _refuse_unlikely(robot, history, table, joints)
+    return history
+
+
+def _refuse_unlikely(robot: Robot, history: History, table: CsvTable, joints: Sequence[str]) -> None:
+    """Refuse joint values and positions that cannot be meant."""
     if history.joint_m is not None:
         plausible.refuse(robot, history.joint_m, table, joints)
     if history.position_m is not None:
         plausible.refuse_far(robot, history.position_m, table, POSITION)
-    return history
 
 
 def _refuse_late(table: CsvTable, time_s: Floats) -> None:

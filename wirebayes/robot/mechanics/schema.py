@@ -236,14 +236,19 @@ def _wires(top: Keys) -> tuple[dict[str, GivenWire], set[str], dict[str, float]]
     for name in tables.table:
         wire = tables.inside(name)
         masses[name] = wire.number("mass_kg_m", default=0.0, least=0)
-        fitted = wire.value("fitted", "true or no key", False) if name != "default" else True
-        if not isinstance(fitted, bool):
-            raise wire.complain("fitted", shown(fitted), "true or no key")
-        if not fitted:  # a posterior comes with the command
+        if not _is_fitted(wire, name):
             values = {short: wire.number(key, above=0) for key, short in _GIVEN.items()}
             given[name] = GivenWire(values, wire.number("length_mm", above=0))
         wire.finish()
     return given, set(tables.table), masses
+
+
+def _is_fitted(wire: Keys, name: str) -> bool:
+    """Whether a posterior of the wire comes with the command."""
+    fitted = wire.value("fitted", "true or no key", False) if name != "default" else True
+    if not isinstance(fitted, bool):
+        raise wire.complain("fitted", shown(fitted), "true or no key")
+    return fitted
 
 
 def _or_none(values: Floats) -> Floats | None:
@@ -331,16 +336,17 @@ def _drum(leg: Keys | None) -> dict[str, float]:
     row["drum_pitch"] = leg.number("drum_pitch_m", default=0.0, least=0)
     row["gear"] = leg.number("gear_ratio", default=1.0, above=0)
     if "drum_layer_turns" in leg.table:
-        row["drum_turns"] = leg.number("drum_layer_turns", least=1)
-        row["drum_layer"] = leg.number("drum_layer_height_m", above=0)
-        row["drum_wire"] = leg.number("wire_length_m", above=0)
-        _refuse_many_layers(leg, row)
+        row |= _layers(leg, row["drum_radius"])
     return row
 
 
-def _refuse_many_layers(leg: Keys, row: dict[str, float]) -> None:
-    innermost = 2 * math.pi * row["drum_radius"] * row["drum_turns"]
-    layers = row["drum_wire"] / innermost
+def _layers(leg: Keys, radius_m: float) -> dict[str, float]:
+    """What is known of the layers of a leg's drum."""
+    turns = leg.number("drum_layer_turns", least=1)
+    height = leg.number("drum_layer_height_m", above=0)
+    wire = leg.number("wire_length_m", above=0)
+    layers = wire / (2 * math.pi * radius_m * turns)
     if layers > _MOST_LAYERS:
         expected = f"wire for no more than {_MOST_LAYERS} layers on the drum"
-        raise leg.complain("wire_length_m", f"{row['drum_wire']:g}, {layers:.3g} layers", expected)
+        raise leg.complain("wire_length_m", f"{wire:g}, {layers:.3g} layers", expected)
+    return {"drum_turns": turns, "drum_layer": height, "drum_wire": wire}

@@ -60,6 +60,15 @@ class Solved:
         self.x[:, cases.number], self.R[..., cases.number] = cases.x, cases.R
         self.tau[:, cases.number], self.left[cases.number] = cases.at.tau, cases.at.size
 
+    def without_ended(self, cases: "_Cases", ended: Ints) -> "_Cases":
+        """The cases that go on; the others are noted, with how they ended."""
+        finished = ended != _GOING_ON
+        if not finished.any():
+            return cases
+        self.store(cases.part(np.flatnonzero(finished)))
+        self.status[cases.number[finished]] = ended[finished]
+        return cases.part(np.flatnonzero(~finished))
+
     def go_on(self, rows: Indices, later: "Solved") -> None:
         """Put what became of some cases, which had gone on, in their place."""
         for name in ("x", "R", "tau", "status", "left"):
@@ -173,15 +182,10 @@ def _in_one_chunk(
     for iteration in range(1, max_iterations + 1):
         cases, ended = _iterate(robot, cases)
         solved.count[cases.number] = iteration
-        finished = ended != _GOING_ON
-        if finished.any():
-            solved.store(cases.part(np.flatnonzero(finished)))
-            solved.status[cases.number[finished]] = ended[finished]
-            cases = cases.part(np.flatnonzero(~finished))
+        cases = solved.without_ended(cases, ended)
         if not cases.number.size:
-            break
-    if cases.number.size:
-        solved.store(cases)
+            return solved
+    solved.store(cases)
     return solved
 
 

@@ -1,11 +1,12 @@
 """Drift: what becomes of a pose while the wires creep under their own, changing tension."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from wirebayes.numeric.rows import chosen_rows
-from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import antisymmetric
 from wirebayes.robot.mechanics.wires import Wires
@@ -57,19 +58,35 @@ def hold(
     """
     times = np.asarray(times_s, float)
     walk = CreepingHold(robot, wires, joint_m, (start_m, start_rotation), carried, follow, tolerance)
-    rows = walk.n, len(times)
-    position = np.empty((*rows, 3))
-    rotation = np.empty((*rows, 3, 3))
-    tension = np.empty((*rows, robot.legs))
-    status = np.empty(rows, np.int64)
+    rows = _Rows.empty(walk.n, len(times), robot.legs)
     for k, time in enumerate(times):
         walk.to(float(time))
+        rows.put(k, walk)
+    carried_on, falls = walk.creep.state(), walk.falls()
+    return Course(times, rows.position_m, rows.rotation, rows.tension_N, rows.status, carried_on, falls)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Poses of ``n`` draws at ``t`` times, ``(n, t, ...)``; NaN of draws that have fallen."""
+
+    position_m: Floats
+    rotation: Floats
+    tension_N: Floats
+    status: Ints
+
+    @classmethod
+    def empty(cls, draws: int, times: int, legs: int) -> "_Rows":
+        rows = draws, times
+        return cls(np.empty((*rows, 3)), np.empty((*rows, 3, 3)), np.empty((*rows, legs)), np.empty(rows, np.int64))
+
+    def put(self, k: int, walk: CreepingHold) -> None:
+        """Write down where a hold is at the k-th time."""
         here, live = walk.here, walk.live
-        position[:, k] = chosen_rows(live, here.position_m, np.nan)
-        rotation[:, k] = chosen_rows(live, here.rotation, np.nan)
-        tension[:, k] = chosen_rows(live, here.tension_N, np.nan)
-        status[:, k] = here.status
-    return Course(times, position, rotation, tension, status, walk.creep.state(), walk.falls())
+        self.position_m[:, k] = chosen_rows(live, here.position_m, np.nan)
+        self.rotation[:, k] = chosen_rows(live, here.rotation, np.nan)
+        self.tension_N[:, k] = chosen_rows(live, here.tension_N, np.nan)
+        self.status[:, k] = here.status
 
 
 def from_command(

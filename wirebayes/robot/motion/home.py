@@ -38,6 +38,9 @@ def turned_away(robot: Robot, rotation: Floats) -> list[Notice]:
     return [Notice("unheld", text)]
 
 
+_UNHELD = "no tensions within the bounds hold the home pose of the robot's file (pose.position_m)"
+
+
 def home_notices(robot: Robot) -> list[Notice]:
     """That nothing holds the home pose of the robot's file, with the degrees or metres to the nearest balance.
 
@@ -53,11 +56,9 @@ def home_notices(robot: Robot) -> list[Notice]:
         found = hanging.hang(robot, x[None], R)
         if found.held[0]:
             return turned_away(robot, found.rotation[0])
-    text = "no tensions within the bounds hold the home pose of the robot's file (pose.position_m)"
-    if robot.motions is None:
-        near = hanging.nearest_position(robot, x, R)
-        text += "" if near is None else f"; {nearest_balance(x, near)}"
-    return [Notice("unheld", text)]
+    near = hanging.nearest_position(robot, x, R) if robot.motions is None else None
+    where = "" if near is None else f"; {nearest_balance(x, near)}"
+    return [Notice("unheld", f"{_UNHELD}{where}")]
 
 
 def nearest_balance(position_m: Floats, near_m: Floats) -> str:

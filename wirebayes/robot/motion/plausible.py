@@ -136,17 +136,19 @@ def _outside(robot: Robot) -> list[Notice]:
     """That the home position is not in the workspace of the same file; one that is far from all has been said."""
     if _home(robot):
         return []
-    lower, upper, home = robot.lower_m, robot.upper_m, robot.home_m
-    beyond = np.maximum(lower - home, home - upper)
+    beyond = np.maximum(robot.lower_m - robot.home_m, robot.home_m - robot.upper_m)
     axis = int(beyond.argmax())
     if not beyond[axis] > _ROUNDED * robot.span_m:
         return []
-    text = (
-        f"pose.position_m: the home position is {number(beyond[axis])} m outside the workspace, {'xyz'[axis]} = "
-        f"{number(home[axis])} m, where workspace.lower_m and upper_m say {number(lower[axis])} to "
-        f"{number(upper[axis])} m"
+    return [Notice("geometry", _outside_in_words(robot, axis, beyond[axis]))]
+
+
+def _outside_in_words(robot: Robot, axis: int, beyond_m: float) -> str:
+    low, high, here = (number(v[axis]) for v in (robot.lower_m, robot.upper_m, robot.home_m))
+    return (
+        f"pose.position_m: the home position is {number(beyond_m)} m outside the workspace, {'xyz'[axis]} = {here} "
+        f"m, where workspace.lower_m and upper_m say {low} to {high} m"
     )
-    return [Notice("geometry", text)]
 
 
 def _copies(robot: Robot) -> list[Notice]:

@@ -319,10 +319,7 @@ def _claim(courses: dict[float, Course], x: Floats, R: Floats, request: PoseRequ
 
 def _shares(robot: Robot, line: WireDraws, courses: dict[float, Course], x: Floats, R: Floats) -> VarianceShares:
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
-    size = {}
-    for spread, course in courses.items():
-        shift, _ = drift.distance_moved(course, x, R)
-        size[spread] = np.linalg.norm(shift[:, -1], axis=-1)
+    size = {spread: _last_distance(course, x, R) for spread, course in courses.items()}
     held = np.isfinite(size[0.0])
     result: VarianceShares = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
     if robot.is_on_given_wires:
@@ -335,6 +332,12 @@ def _shares(robot: Robot, line: WireDraws, courses: dict[float, Course], x: Floa
     result["shared_draw"] = variance_shares.shares(parameters, size[0.0][held])
     result["sd_mm"] = [{"specimen_spread": s, "sd_mm": _sd_mm(distance_m)} for s, distance_m in size.items()]
     return result
+
+
+def _last_distance(course: Course, x: Floats, R: Floats) -> Floats:
+    """(n,) m from a pose at the last time."""
+    shift, _ = drift.distance_moved(course, x, R)
+    return np.linalg.norm(shift[:, -1], axis=-1)
 
 
 def _parameters(line: WireDraws) -> dict[str, Floats]:

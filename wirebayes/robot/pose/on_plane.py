@@ -5,7 +5,7 @@ import numpy as np
 from wirebayes.json_files.pose import OnPlane
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import plane, statics
-from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.description import GRAVITY, Plane, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.pose.request import band_over_draws
@@ -54,15 +54,6 @@ def on_plane(
     x, R = np.repeat(position_m[:, None], good.size, 1), np.repeat(rotation[..., None], good.size, 2)
     K = statics.stiffness(robot, wires.part(good), x, R, commands.zero_m[good].T, commands.offset_m[good].T)
     width, turn = plane.friction_half_width(robot, K, force)
-    middle = 1e3 * np.median(width, axis=0)
-    about = f" and turned by ±{np.degrees(np.median(turn)):.2g}°" if turn.any() else ""
-    little = abs(force) < _ROUNDING * robot.mass_kg * GRAVITY
-    said = (
-        "The plane carries nothing of the platform" if little else f"The plane carries the platform with {force:.4g} N"
-    )
-    if known.friction:
-        along = ", ".join(f"±{v:.2g} mm along {axis}" for v, axis in zip(middle, "xyz", strict=True) if v > 1e-9)
-        said += f"; its friction, {known.friction * abs(force):.3g} N at most, can hold the platform {along}{about}"
     return {
         "normal": known.normal,
         "contact": known.contact,
@@ -71,5 +62,18 @@ def on_plane(
         "contact_radius_m": known.contact_radius_m,
         "friction_half_width_mm": band_over_draws(1e3 * width),
         "friction_half_width_rad": band_over_draws(turn),
-        "sentence": f"{said}.",
+        "sentence": _sentence(robot, known, force, width, turn),
     }
+
+
+def _sentence(robot: Robot, known: Plane, force: float, width: Floats, turn: Floats) -> str:
+    """With how much the plane carries the platform, and how far friction can hold it."""
+    said = f"The plane carries the platform with {force:.4g} N"
+    if abs(force) < _ROUNDING * robot.mass_kg * GRAVITY:
+        said = "The plane carries nothing of the platform"
+    if not known.friction:
+        return f"{said}."
+    middle = 1e3 * np.median(width, axis=0)
+    along = ", ".join(f"±{v:.2g} mm along {axis}" for v, axis in zip(middle, "xyz", strict=True) if v > 1e-9)
+    about = f" and turned by ±{np.degrees(np.median(turn)):.2g}°" if turn.any() else ""
+    return f"{said}; its friction, {known.friction * abs(force):.3g} N at most, can hold the platform {along}{about}."

@@ -68,22 +68,23 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
     -------
     Orientation
     """
-    home = robot.home_rotation_rad
     asked = np.full(3, np.nan) if asked_rad is None else asked_rad
-    near = turning.matrix(np.where(np.isfinite(asked), asked, home))
+    near = turning.matrix(np.where(np.isfinite(asked), asked, robot.home_rotation_rad))
     clear = _clear(robot, position_m, near)
     if robot.freedom == "position":
-        in_space = clear and robot.plane is None
-        if in_space and not _held(robot, position_m, near):
-            return _nowhere(robot, position_m, near)
-        return Orientation(position_m, near)
+        unheld = clear and robot.plane is None and not _held(robot, position_m, near)
+        return _nowhere(robot, position_m, near) if unheld else Orientation(position_m, near)
     if not clear or _commanded(robot, position_m, near, asked_rad):
         return Orientation(position_m, near)
     there = _hung(robot, position_m, near, asked)
-    balance_decides = robot.is_underactuated and np.any(there.position_m != robot.home_m)
-    if there.found is None or asked_rad is not None or balance_decides:
+    if there.found is None or asked_rad is not None or _decided_by_balance(robot, there):
         return there
     return replace(there, turned_away=tuple(turned_away(robot, there.rotation)))
+
+
+def _decided_by_balance(robot: Robot, there: Orientation) -> bool:
+    """Whether a platform hangs away from home, where its orientation is that of balance in any case."""
+    return robot.is_underactuated and bool(np.any(there.position_m != robot.home_m))
 
 
 def _commanded(robot: Robot, position_m: Floats, near: Floats, asked_rad: Floats | None) -> bool:

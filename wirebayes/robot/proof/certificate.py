@@ -75,17 +75,20 @@ def certify(
     """
     system = Balance(robot, law, k1_N, zero_m, offset_m, position_m, rotation)
     C = preconditioner(system)
-    radius = None
-    if C is not None:
-        image = partial(_image, system, C)
-        radius = box_around_image(image, robot.degrees, robot.span_m)
+    if C is None:
+        return _unproved(robot, position_m, rotation)
+    image = partial(_image, system, C)
+    radius = box_around_image(image, robot.degrees, robot.span_m)
     if radius is None:
-        return Certificate(False, position_m, rotation, np.full(robot.degrees, np.nan), 0.0)
-    # Inside, further images only shrink the enclosure.
-    for _ in range(3):
+        return _unproved(robot, position_m, rotation)
+    for _ in range(3):  # inside, further images only shrink the enclosure
         radius = np.minimum(radius, image(radius))
     unique = _alone_within(image, radius, robot.span_m) if how_alone else float(radius.min())
     return Certificate(True, position_m, rotation, radius, unique)
+
+
+def _unproved(robot: Robot, position_m: Floats, rotation: Floats) -> Certificate:
+    return Certificate(False, position_m, rotation, np.full(robot.degrees, np.nan), 0.0)
 
 
 def _alone_within(image: Callable[[Floats], Floats], radius: Floats, span_m: float) -> float:

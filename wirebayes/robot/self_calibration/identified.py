@@ -69,21 +69,27 @@ def identified(found: Whole) -> Identified:
     ----------
     found : Whole
     """
-    unknowns = found.unknowns
-    combinations = _of_exit_points(found) if unknowns.errors.exit_m > 0 else []
+    combinations = _of_exit_points(found) if found.unknowns.errors.exit_m > 0 else []
     sentences = []
     for one in combinations:
         if not one.determined:
             known = f"known to {one.before_mm:.2g} mm before, to {one.after_mm:.2g} mm now"
             sentences.append(f"{_SAYS[one.name]}: {known}")
-    sd = np.sqrt(np.diag(found.covariance)[unknowns.references])
-    before = 1e3 * unknowns.prior.reference_sd_m
-    for i in np.flatnonzero(sd >= _DETERMINED):
-        known = f"known to {before:.2g} mm before, to {before * sd[i]:.2g} mm now"
-        sentences.append(f"the reference length of wire {i + 1}: {known}")
+    sentences += _of_references(found)
     size = _sizes(found)
     count = int((np.sqrt(np.maximum(size, 0.0)) < _DETERMINED).sum())
     return Identified(count, len(size), combinations, sentences)
+
+
+def _of_references(found: Whole) -> list[str]:
+    """A sentence on each reference length that the readings do not determine."""
+    sd = np.sqrt(np.diag(found.covariance)[found.unknowns.references])
+    before = 1e3 * found.unknowns.prior.reference_sd_m
+    out = []
+    for i in np.flatnonzero(sd >= _DETERMINED):
+        known = f"known to {before:.2g} mm before, to {before * sd[i]:.2g} mm now"
+        out.append(f"the reference length of wire {i + 1}: {known}")
+    return out
 
 
 def _sizes(found: Whole) -> Floats:
@@ -116,13 +122,7 @@ def _motions(robot: Robot) -> dict[str, Floats]:
     """
     points = robot.exit_m
     about = points - points.mean(0)
-    flat = _flat(robot)
-    turning = flat if flat.any() else np.ones(3, bool)
-    ways = {}
-    for i in np.flatnonzero(~flat):
-        ways[f"moved along {_AXES[i]}"] = np.tile(np.eye(3)[i], (len(points), 1))
-    for i in np.flatnonzero(turning):
-        ways[f"turned about {_AXES[i]}"] = np.cross(np.eye(3)[i], about)
+    ways = _ways(_flat(robot), about)
     ways["scaled"] = about
     least = 1e-6 * max(float(np.linalg.norm(about)), 1e-12)
     out = {}
@@ -130,6 +130,18 @@ def _motions(robot: Robot) -> dict[str, Floats]:
         size = float(np.linalg.norm(way))
         if size > least:
             out[name] = way.ravel() / size
+    return out
+
+
+def _ways(flat: Bools, about: Floats) -> dict[str, Floats]:
+    """(w, 3) displacements of points by motions of the whole, those across a plane left out."""
+    turning = flat if flat.any() else np.ones(3, bool)
+    axes = np.eye(3)
+    out = {}
+    for i in np.flatnonzero(~flat):
+        out[f"moved along {_AXES[i]}"] = np.tile(axes[i], (len(about), 1))
+    for i in np.flatnonzero(turning):
+        out[f"turned about {_AXES[i]}"] = np.cross(axes[i], about)
     return out
 
 

@@ -40,6 +40,15 @@ class _About:
     shape: statics.Geometry
     J: Floats
 
+    @classmethod
+    def at(cls, unknowns: Unknowns, holds: Holds, noise: Noise, state: State) -> "_About":
+        parts = unknowns.parts(state.white)
+        here = moved(unknowns.robot, parts)
+        turn = batch_last(state.rotation)
+        shape = statics.geometry(here, state.position_m.T, turn)
+        J = batch_first(statics.wire_jacobian(here, shape)).mT * here.edge_scale
+        return cls(unknowns, holds, noise, state, parts, here, turn, shape, J)
+
 
 def linearised(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown, since: State) -> Equations:
     """The equations about a state.
@@ -54,12 +63,7 @@ def linearised(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, cre
         About `since`; straight from there.
     since : State
     """
-    parts = unknowns.parts(state.white)
-    here = moved(unknowns.robot, parts)
-    turn = batch_last(state.rotation)
-    shape = statics.geometry(here, state.position_m.T, turn)
-    J = batch_first(statics.wire_jacobian(here, shape)).mT * here.edge_scale
-    about = _About(unknowns, holds, noise, state, parts, here, turn, shape, J)
+    about = _About.at(unknowns, holds, noise, state)
     out = _empty(unknowns, holds)
     _loops(out, about, creep, since)
     _balance(out, about)

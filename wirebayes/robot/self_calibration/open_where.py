@@ -62,8 +62,8 @@ def odd_hold(found: Whole, session: Session) -> list[Notice]:
     """
     if found.unknowns.errors.joint_m is not None:
         return []  # then the joint test knows
-    holds = _shares(found).sum(1)
-    p = _chances(found, holds)
+    share = _shares(found).sum(1)
+    p = _chances(found, share)
     worst = int(p.argmin())
     residual = found.equations.residual[worst, found.equations.rows["loop"]]
     open_m = residual * found.noise.joint_m / found.unknowns.robot.lines
@@ -71,12 +71,15 @@ def odd_hold(found: Whole, session: Session) -> list[Notice]:
     if not (len(p) * p[worst] < _CHANCE and visible):
         return []
     leg = int(np.abs(open_m).argmax())
-    text = (
-        f"hold {session.numbers[worst]:g} contradicts the others: {100 * holds[worst]:.0f} % of the sum of squares of "
+    return [Notice("data", _odd_in_words(session.numbers[worst], share[worst], leg, found.noise.joint_m))]
+
+
+def _odd_in_words(hold: float, share: float, leg: int, joint_m: float) -> str:
+    return (
+        f"hold {hold:g} contradicts the others: {100 * share:.0f} % of the sum of squares of "
         f"all lengths is its own, most of it joint value {leg + 1}; correct that row or leave it out, for the error of "
-        f"all joint values, {number(1e3 * found.noise.joint_m, 2)} mm, was estimated with it"
+        f"all joint values, {number(1e3 * joint_m, 2)} mm, was estimated with it"
     )
-    return [Notice("data", text)]
 
 
 def _chances(found: Whole, share: Floats) -> Floats:
