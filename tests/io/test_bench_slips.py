@@ -1,10 +1,12 @@
 """Slips of hands and loggers that would change a test without a word: they are refused with their line, or left out."""
 
+import numpy as np
 import pytest
 
 import wirebayes as wb
 from tests.io.bench_files import convert
 from wirebayes.io.bench.about import About
+from wirebayes.io.bench.glitches import glitches
 from wirebayes.io.bench.undecided import Choices
 
 ABOUT = About("wire", "line", 1000.0)
@@ -58,6 +60,12 @@ def test_a_glitch_of_an_encoder_cuts_no_hold_of_a_recording(tmp_path):
         read(tmp_path, lines)
     made = read(tmp_path, lines, drop_breaks=True)
     assert [hold.setting for hold in made.experiment.holds] == pytest.approx([1.0, 2.0, 3.0, 4.0], abs=2e-3)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+def test_a_few_rows_have_none(count):
+    assert not len(glitches(np.array([1.0, 2.0, 1.0])[:count], np.array([5.0, 10.0, 5.0])[:count]))
 
 
 def test_a_number_with_the_other_decimal_sign_is_no_thousands(tmp_path):

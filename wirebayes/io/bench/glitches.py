@@ -58,6 +58,8 @@ def glitches(setting: Floats, read: Floats) -> Ints:
     -------
     (g,) array of int
     """
+    if len(setting) < 3:
+        return np.empty(0, dtype=np.int64)
     before, own, after = setting[:-2], setting[1:-1], setting[2:]
     off = np.abs(own - 0.5 * (before + after))
     back = np.abs(after - before) <= _BACK * off
