@@ -123,6 +123,11 @@ class Warned(TypedDict):
     warnings: list[NoticeJson]
 
 
+def warns_of(warned: Warned, kind: str) -> bool:
+    """Whether a file of results, or a part of it, has a warning of a kind."""
+    return any(notice["kind"] == kind for notice in warned["warnings"])
+
+
 def to_json(notices: Iterable[Notice]) -> list[NoticeJson]:
     """Warnings as files hold them, the gravest kinds first, each once.
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.robot.test_export import _line
-from wirebayes.answers import terminal
+from wirebayes.answers.robot import of_pose
 from wirebayes.commands import export
 from wirebayes.commands.asked_pose import asked_place
 from wirebayes.commands.wires import folder_of, robot_of
@@ -275,4 +275,4 @@ def test_a_long_drift_is_a_plain_number():
     found = {"robot": "six", "feasible": True}
     drift = {"specimen_spread": 0.05, "times_s": [3600.0]}
     drift["distance_mm"] = {"q05": [3761.0], "q50": [3984.0], "q95": [4254.0]}
-    assert "3980 mm [3760, 4250]" in terminal.of_pose(found | {"drift": [drift]})[0]
+    assert "3980 mm [3760, 4250]" in of_pose(found | {"drift": [drift]})[0]

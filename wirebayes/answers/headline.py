@@ -10,13 +10,13 @@ from wirebayes.answers.verdict import verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckedExperiment
-from wirebayes.json_files.comparison import ComparedModels
+from wirebayes.json_files.comparison import ComparedModels, Difference
 from wirebayes.json_files.discovery import ExperimentFindings
 from wirebayes.json_files.plan import PlanJson
 from wirebayes.json_files.pose import PoseJson, known_at_the_end
 from wirebayes.json_files.read_units import error_grows, read_value, unit_read
 from wirebayes.json_files.summary import SummaryJson
-from wirebayes.json_files.values import Statistics
+from wirebayes.json_files.values import Band, Statistics
 from wirebayes.sentences import (
     counted,
     from_to,
@@ -46,15 +46,22 @@ def check_in_a_sentence(name: str, test: CheckedExperiment) -> str:
         Of the experiment.
     test : dict
     """
-    alone = [parameter for parameter, p in test["parameters"].items() if p["determined_by"] == "prior"]
-    known = "k1" not in alone
-    k1 = test["parameters"].get("k1")
-    said = [f"k1 is about {quantity(k1['q50'], k1['q05'], k1['q95'], k1['unit'])}"] if k1 and known else []
-    said += [f"it does not determine {listed(alone)}"] if alone else ["every parameter is determined by the readings"]
-    shown = sum(effect["shows"] == "yes" for effect in test["effects"].values())
-    said.append(f"it would show {shown} of {counted(len(test['effects']), 'effect')}")
-    many = f"{counted(test['recorded_holds'], 'hold')} with {counted(test['readings'], 'reading')}"
-    return f"{name}, {many}: {', '.join(said)}; 90 % intervals in brackets."
+    parameters, effects = test["parameters"], test["effects"]
+    alone = [parameter for parameter, known in parameters.items() if known["determined_by"] == "prior"]
+    said = []
+    k1 = parameters.get("k1")
+    if k1 and "k1" not in alone:
+        stiffness = quantity(k1["q50"], k1["q05"], k1["q95"], k1["unit"])
+        said.append(f"k1 is about {stiffness}")
+    if alone:
+        said.append(f"it does not determine {listed(alone)}")
+    else:
+        said.append("every parameter is determined by the readings")
+    shown = sum(effect["shows"] == "yes" for effect in effects.values())
+    said.append(f"it would show {shown} of {counted(len(effects), 'effect')}")
+    holds = counted(test["recorded_holds"], "hold")
+    readings = counted(test["readings"], "reading")
+    return f"{name}, {holds} with {readings}: {', '.join(said)}; 90 % intervals in brackets."
 
 
 def fit_in_a_sentence(summary: SummaryJson) -> str:
@@ -64,17 +71,18 @@ def fit_in_a_sentence(summary: SummaryJson) -> str:
     ----------
     summary : dict
     """
-    derived, k1 = summary["derived"], summary["parameters"].get("k1")
+    name = summary["experiment"]
     trusted = summary["converged"] and summary.get("model_check", {}).get("passed") is not False
     doubt = "" if trusted else "If the model were right: "
+    k1 = summary["parameters"].get("k1")
     time, creep = creep_as_long_as_held(summary)
     if creep is None or k1 is None:
-        return f"{doubt}{summary['experiment']}: the readings do not say how much this wire creeps."
+        return f"{doubt}{name}: the readings do not say how much this wire creeps."
     stretched = quantity(creep["q50"], creep["q05"], creep["q95"], "mm")
     stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
-    tension = f"{short(derived['tension_N'])} N"
+    tension = f"{short(summary['derived']['tension_N'])} N"
     return (
-        f"{doubt}{summary['experiment']} creeps by {stretched} within {time} under {tension}, and its "
+        f"{doubt}{name} creeps by {stretched} within {time} under {tension}, and its "
         f"stiffness is {stiff} per unit of strain; 90 % intervals in brackets."
     )
 
@@ -90,41 +98,54 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
         Its part of ``discovery.json``.
     """
     effects = [spoken(effect) for effect in report["effects"]]
-    are = "are" if effects[1:] else "is"
-    candidates = likely(report)
-    known = what_it_is(report["effects"][0]) if len(effects) == 1 else ""
-    meaning = f" ({known})" if known else ""
-    what = {
-        "nothing-missing": f"{verdict_in_words(report)}: the plain model and its noise explain them",
-        "unknown": f"{verdict_in_words(report)}"
-        + (f"; its largest part may be {candidates}, and nothing is established" if candidates else ""),
-        "ambiguous": undecided(report),
-        "named": f"{listed(effects)} {are} missing{meaning}",
-        "partial": f"{listed(effects)} {are} missing{meaning}",
-    }[report["verdict"]]
-    sizes = {e: quantity(a["mean"], a["q05"], a["q95"], a["unit"]) for e, a in report["amplitudes"].items()}
-    undecided_yet = report["verdict"] == "ambiguous"  # then the model has the most likely of several
-    size = f", of size {listed(list(sizes.values()))}" if sizes and not undecided_yet else ""
-    with_it = "with them" if effects[1:] else "with it"
-    if undecided_yet:
-        with_it = f"with {listed([f'{spoken(effect)} of {has}' for effect, has in sizes.items()])}"
+    several = len(effects) > 1
+    sizes = {}
+    for effect, size in report["amplitudes"].items():
+        sizes[spoken(effect)] = quantity(size["mean"], size["q05"], size["q95"], size["unit"])
+    what = _missing(report, effects)
+    with_it = "with them" if several else "with it"
+    if report["verdict"] == "ambiguous":  # then the model has the most likely of several
+        with_it = f"with {listed([f'{effect} of {size}' for effect, size in sizes.items()])}"
+    elif sizes:
+        what += f", of size {listed(list(sizes.values()))}"
     if report["verdict"] == "partial":
-        size += "; and so is something that no effect in the catalogue explains"
-        with_it = "with all of them" if effects[1:] else "with both"
+        what += "; and so is something that no effect in the catalogue explains"
+        with_it = "with all of them" if several else "with both"
     gain = _gain_in_words(report, with_it)
-    sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})" if report["p_global"] is not None else ""
-    return f"{name}: {what}{size}{gain}{sure}."
+    sure = ""
+    if report["p_global"] is not None:
+        sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})"
+    return f"{name}: {what}{gain}{sure}."
+
+
+def _missing(report: ExperimentFindings, effects: Sequence[str]) -> str:
+    """What is missing, given the effects by their spoken names."""
+    verdict = report["verdict"]
+    if verdict == "nothing-missing":
+        return f"{verdict_in_words(report)}: the plain model and its noise explain them"
+    if verdict == "unknown":
+        candidates = likely(report)
+        largest = f"; its largest part may be {candidates}, and nothing is established" if candidates else ""
+        return f"{verdict_in_words(report)}{largest}"
+    if verdict == "ambiguous":
+        return undecided(report)
+    if len(effects) > 1:
+        return f"{listed(effects)} are missing"
+    known = what_it_is(report["effects"][0]) if effects else ""
+    meaning = f" ({known})" if known else ""
+    return f"{listed(effects)} is missing{meaning}"
 
 
 def _gain_in_words(report: ExperimentFindings, with_it: str) -> str:
     """What the effects take away of the error on holds that were not used; empty where none was kept."""
     held = report["held_out"]
-    before, after = (read_value(held[model], "rmse") for model in ("plain", "final"))
+    before = read_value(held["plain"], "rmse")
+    after = read_value(held["final"], "rmse")
     if not report["effects"] or before is None or after is None:
         return ""
-    grows = error_grows(held)
-    goes = f"; {'but ' if grows else ''}{with_it} the error on held-out holds {'grows' if grows else 'falls'}"
-    return f"{goes} from {number(before)} to {number(after)} {unit_read(held['plain'])}"
+    but, goes = ("but ", "grows") if error_grows(held) else ("", "falls")
+    change = f"{number(before)} to {number(after)} {unit_read(held['plain'])}"
+    return f"; {but}{with_it} the error on held-out holds {goes} from {change}"
 
 
 def comparison_in_words(name: str, table: ComparedModels) -> str:
@@ -137,21 +158,32 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
     table : dict
         Its part of ``comparison.json``.
     """
-    good = [row for row in table["models"] if row["failed"] is None]
-    if not good:
+    scored = [row for row in table["models"] if row["failed"] is None]
+    if not scored:
         return f"{name}: no model could be judged."
-    best, *others = good
-    gain = best["difference"]
-    against = ""
-    if gain is not None and best["name"] != table["base"]:
-        from wirebayes.comparison.compare import meaningful  # loaded by now, and by no other command
+    best, *others = scored
+    text = f"{name}: {spoken(best['name'])} predicts left-out holds best"
+    gain, base = best["difference"], table["base"]
+    if gain is not None and best["name"] != base:
+        text += f", {_ahead(gain)} against {base}"
+        text += _by_chance(gain)
+    if others:
+        come = "come" if len(others) > 1 else "comes"
+        names = [spoken(row["name"]) for row in others]
+        text += f"; then {come} {some_of(names, 3)}"
+    return f"{text}."
 
-        by = f"{number(gain['elpd'], 2)} ± {number(gain['se'], 2)} elpd (log probability of their readings)"
-        chance = "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
-        against = f", by {by} against {table['base']}{chance}"
-    come = "come" if others[1:] else "comes"
-    then = f"; then {come} {some_of([spoken(row['name']) for row in others], 3)}" if others else ""
-    return f"{name}: {spoken(best['name'])} predicts left-out holds best{against}{then}."
+
+def _ahead(gain: Difference) -> str:
+    """By how much a model predicts better."""
+    elpd, error = number(gain["elpd"], 2), number(gain["se"], 2)
+    return f"by {elpd} ± {error} elpd (log probability of their readings)"
+
+
+def _by_chance(gain: Difference) -> str:
+    from wirebayes.comparison.compare import meaningful  # loaded by now, and by no other command
+
+    return "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
 
 
 def batch_in_sentences(found: BatchJson) -> list[str]:
@@ -164,15 +196,20 @@ def batch_in_sentences(found: BatchJson) -> list[str]:
     rows = found["experiments"]
     materials = {row["material"] for row in rows if row["material"]}
     kinds = f"{len(materials)} materials" if len(materials) > 1 else "one material"
-    failed = [row["name"] for row in rows if row["error"]]
-    many = _count(len(rows), "test")
+    many = "One test" if len(rows) == 1 else f"{len(rows)} tests"
     converged = sum(bool(row["converged"]) for row in rows)
-    out = [f"{many[:1].upper()}{many[1:]} of {kinds}, {converged} converged{_stiffnesses(rows)}."]
-    out += [f"Not fitted: {some_of(failed)}."] if failed else []
+    out = [f"{many} of {kinds}, {converged} converged{_stiffnesses(rows)}."]
+    failed = [row["name"] for row in rows if row["error"]]
+    if failed:
+        out.append(f"Not fitted: {some_of(failed)}.")
     out += missing_in(rows)
-    refused = [row["name"] for row in rows if row["check"] == "failed" and row["verdict"] is None]
-    out += [f"The model does not describe the readings of {some_of(refused)}."] if refused else []
-    out += [outlier["sentence"].rstrip(".") + "." for outlier in found["outliers"][:MOST_OUTLIERS]]
+    unexplained = [row for row in rows if row["check"] == "failed" and row["verdict"] is None]
+    if unexplained:
+        names = [row["name"] for row in unexplained]
+        out.append(f"The model does not describe the readings of {some_of(names)}.")
+    for outlier in found["outliers"][:MOST_OUTLIERS]:
+        sentence = outlier["sentence"].rstrip(".")
+        out.append(f"{sentence}.")
     return out
 
 
@@ -189,18 +226,16 @@ def _stiffnesses(rows: Sequence[Row]) -> str:
 
 def _stiffness(material: str, each: Sequence[Statistics]) -> str:
     """k1 of the specimens of one material."""
-    medians = [k1["q50"] for k1 in each]
     if len(each) == 1:
-        return f"k1 of {material} {number(medians[0])} N ({span(each[0]['q05'], each[0]['q95'])}, 90 % interval)"
-    middle, among = number(float(np.median(medians))), "least to largest specimen"
-    return f"median k1 of {material} {middle} N ({span(min(medians), max(medians))}, {among})"
+        (k1,) = each
+        return f"k1 of {material} {number(k1['q50'])} N ({span(k1['q05'], k1['q95'])}, 90 % interval)"
+    medians = [k1["q50"] for k1 in each]
+    middle = number(float(np.median(medians)))
+    among = span(min(medians), max(medians))
+    return f"median k1 of {material} {middle} N ({among}, least to largest specimen)"
 
 
 _MOST_MATERIALS = 3  # whose stiffness a first sentence has room for
-
-
-def _count(number_of: int, what: str) -> str:
-    return f"one {what}" if number_of == 1 else f"{number_of} {what}s"
 
 
 def pose_in_a_sentence(found: PoseJson) -> str:
@@ -216,13 +251,19 @@ def pose_in_a_sentence(found: PoseJson) -> str:
     if not known:
         return f"No draw of the wires holds {found['robot']} to the end."
     drift = known[-1]
-    far, tilt, time = drift["distance_mm"], drift["tilt_deg"], drift["times_s"][-1]
-    moved, turned = (quantity(q["q50"][-1], q["q05"][-1], q["q95"][-1], unit) for q, unit in ((far, "mm"), (tilt, "")))
-    tilts = f" and tilts by {turned} degrees" if tilt["q95"][-1] else ""
+    moved = _at_the_end(drift["distance_mm"], "mm")
+    tilt = drift["tilt_deg"]
+    if tilt["q95"][-1]:
+        moved += f" and tilts by {_at_the_end(tilt, '')} degrees"
+    time = lasting(drift["times_s"][-1])
     return (
-        f"The platform of {found['robot']} moves by {moved}{tilts} within {lasting(time)} of standing still, "
+        f"The platform of {found['robot']} moves by {moved} within {time} of standing still, "
         f"if {specimens_are(drift['specimen_spread'])}; 90 % intervals in brackets."
     )
+
+
+def _at_the_end(band: Band, unit: str) -> str:
+    return quantity(band["q50"][-1], band["q05"][-1], band["q95"][-1], unit)
 
 
 def plan_in_a_sentence(found: PlanJson) -> str:
@@ -235,9 +276,11 @@ def plan_in_a_sentence(found: PlanJson) -> str:
     best = found["protocols"][0]
     creep = best["creep"]["creep_1h_mm"]
     what = f" ({best['words']})" if best["words"] else ""
+    time = f"{short(best['duration_min'])} min"
+    tension = f"{number(best['creep']['tension_N'])} N"
     return (
-        f"Do {best['name']}{what}: in {short(best['duration_min'])} min it would determine the creep after an "
-        f"hour at {number(best['creep']['tension_N'])} N to ± {number(creep['sd'], 2)} mm (now ± "
+        f"Do {best['name']}{what}: in {time} it would determine the creep after an "
+        f"hour at {tension} to ± {number(creep['sd'], 2)} mm (now ± "
         f"{number(creep['guess_sd'], 2)} mm; standard deviations)."
     )
 
@@ -252,14 +295,15 @@ def calibration_in_a_sentence(found: CalibrateJson) -> str:
     known = found["with_creep_model"]
     if not known["converged"]:
         return "Not converged: there are no lengths to use."
-    sd = [1e3 * value for value in known["length_m"]["sd"]]
-    lengths = f"{from_to(min(sd), max(sd))} mm (standard errors), from {found['read']} of "
-    lengths += f"{counted(found['holds'], 'hold')}."
+    sd_mm = [1e3 * sd_m for sd_m in known["length_m"]["sd"]]
+    wires = f"{found['robot']}'s {len(sd_mm)} wires"
+    holds = f"{found['read']} of {counted(found['holds'], 'hold')}"
+    lengths = f"{from_to(min(sd_mm), max(sd_mm))} mm (standard errors), from {holds}."
     points = 1e3 * np.array(found["exit_points_m"]["sd"], float)
     if not np.any(points > 0):
-        return f"The zero-tension lengths of {found['robot']}'s {len(sd)} wires are known to {lengths}"
-    before = found["prior"].get("anchor_sd_mm", 0.0)
+        return f"The zero-tension lengths of {wires} are known to {lengths}"
+    before = number(found["prior"].get("anchor_sd_mm", 0.0))
     return (
-        f"The exit points of {found['robot']}'s {len(sd)} wires are known to {from_to(points.min(), points.max())} mm "
-        f"(before: {number(before)} mm), their zero-tension lengths to {lengths}"
+        f"The exit points of {wires} are known to {from_to(points.min(), points.max())} mm "
+        f"(before: {before} mm), their zero-tension lengths to {lengths}"
     )

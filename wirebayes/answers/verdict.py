@@ -14,11 +14,14 @@ _FEW_HOLDS = {"nothing-missing": "nothing stands out", "unknown": "something is 
 def verdict_in_words(report: ExperimentFindings) -> str | None:
     """Of a verdict without names; None for the others."""
     few = any(warning["kind"] == "few-holds" for warning in report.get("warnings", []))
-    return (_FEW_HOLDS if few else _NAMED).get(report["verdict"])
+    words = _FEW_HOLDS if few else _NAMED
+    return words.get(report["verdict"])
 
 
 def what_it_is(effect: str) -> str:
     """An effect of the catalogue as the part of a sentence; empty for a user's own."""
     kind = CATALOGUE.get(effect.partition("@")[0])
-    first = kind.sentence.split(". ")[0].rstrip(".") if kind else ""
+    if kind is None:
+        return ""
+    first = kind.sentence.split(". ")[0].rstrip(".")
     return first[:1].lower() + first[1:]

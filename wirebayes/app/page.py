@@ -1,6 +1,7 @@
 """The pages of the app: where files are dropped, and one page for each test."""
 
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -181,19 +182,23 @@ class _TestPage:
     def work(self) -> None:
         """What can be done next, and how far it is."""
         job, read = self.jobs.of(self.test), self.test.record(READ)
-        running = job is not None and job.state == "running"
-        if job is not None and not running and job.state in ("refused", "broken", "stopped"):
+        if job is not None and job.state in ("refused", "broken", "stopped"):
             ui.label(_end_of(job)).classes("warning said").props("role=alert")
-        if running and job is not None:
-            with ui.card():
-                ui.label(f"{BUSY.get(job.step, 'Moving a robot')} …").props("role=status")
-                self.place_of_bars, self.bars = ui.column().classes("w-full"), {}
-                self.progress(job)
-                ui.button("Stop", on_click=job.stop).props("outline")
+        if job is not None and job.state == "running":
+            self._running(job)
         elif read is not None:
             with ui.row():
                 for step in ("check", "fit", "discover"):
-                    ui.button(step.capitalize(), on_click=lambda step=step: self.start(step))
+                    ui.button(step.capitalize(), on_click=partial(self.start, step))
+
+    def _running(self, job: AppJob) -> None:
+        """How far the work is."""
+        with ui.card():
+            ui.label(f"{BUSY.get(job.step, 'Moving a robot')} …").props("role=status")
+            self.place_of_bars = ui.column().classes("w-full")
+            self.bars = {}
+            self.progress(job)
+            ui.button("Stop", on_click=job.stop).props("outline")
 
     def progress(self, job: AppJob) -> None:
         """A bar for each part of the work that has begun."""
@@ -238,12 +243,18 @@ class _TestPage:
 
     def _downloads(self, step: str) -> None:
         files = self.test.files(step)
-        for names, folded in ((files[:MAIN_FILES], False), (files[MAIN_FILES:], True)):
-            if names:
-                with ui.expansion(f"{len(names)} more files") if folded else ui.row():
-                    for name in names:
-                        link = ui.link(name.partition("/")[2], self._address(name))
-                        link.props(f'download="{self.test.name}-{quote(name.replace("/", "-"))}"')
+        main, others = files[:MAIN_FILES], files[MAIN_FILES:]
+        if main:
+            with ui.row():
+                self._links(main)
+        if others:
+            with ui.expansion(f"{len(others)} more files"):
+                self._links(others)
+
+    def _links(self, names: list[str]) -> None:
+        for name in names:
+            link = ui.link(name.partition("/")[2], self._address(name))
+            link.props(f'download="{self.test.name}-{quote(name.replace("/", "-"))}"')
 
     def _robots(self) -> None:
         names = (self.test.record(READ) or {"experiments": []})["experiments"]

@@ -28,14 +28,20 @@ def do_step(send: Connection, folder: Path, step: str, options: dict[str, Any]) 
     from wirebayes.io.bench.undecided import Undecided
 
     test = Test(folder)
+    run = _ask
+    if step == READ:
+        run = _read
+    elif step not in STEPS:
+        run = _pose
     try:
-        run = _read if step == READ else _ask if step in STEPS else _pose
         record = run(test, step, options, lambda *report: send.send(("progress", report)))
         write_json(folder / f"{step}.json", record)
         send.send(("done", None))
-    except Undecided as question:
-        asked = [question, *question.others]
-        questions = [{"question": q.question, "found": _bare(q.found, test), "answers": q.answers} for q in asked]
+    except Undecided as undecided:
+        questions = []
+        for question in (undecided, *undecided.others):
+            found = _bare(question.found, test)
+            questions.append({"question": question.question, "found": found, "answers": question.answers})
         send.send(("undecided", questions))
     except InputError as error:
         send.send(("refused", _bare(str(error), test)))
@@ -56,8 +62,9 @@ def _read(test: Test, step: str, options: dict[str, Any], progress: Progress) ->
     given: dict[str, Any] = {key: options[key] or None for key in ("length_mm", "material", "area_mm2")}
     imported = wirebayes.import_bench(test.raw, output=target, **given, **_choices(options))
     names = list(imported.summary()["experiments"])
-    record = {"lines": imported.lines(), "warnings": [notice.text for notice in imported.warnings]}
-    return record | _understood(f"{names[0] if len(names) == 1 else 'experiments'}.toml", names)
+    file = names[0] if len(names) == 1 else "experiments"
+    warnings = [notice.text for notice in imported.warnings]
+    return _understood(f"{file}.toml", names, imported.lines(), warnings)
 
 
 def _ask(test: Test, step: str, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
@@ -67,7 +74,8 @@ def _ask(test: Test, step: str, options: dict[str, Any], progress: Progress) -> 
     load_early()
     record = test.record(READ) or {}
     run = getattr(wirebayes, step)
-    return _with_page(run(test.folder / record["file"], output=test.folder / step, progress=progress, **options))
+    found = run(test.folder / record["file"], output=test.folder / step, progress=progress, **options)
+    return _with_page(found)
 
 
 def _pose(test: Test, step: str, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
@@ -84,9 +92,11 @@ def _pose(test: Test, step: str, options: dict[str, Any], progress: Progress) ->
 
 def _own_robot(place: Path) -> tuple[Path, dict[str, Path]]:
     """The robot's file that was dropped, and the table beside it: of joint values, or of commanded poses."""
-    robots, tables = ([p for p in sorted(place.iterdir()) if p.suffix.lower() == end] for end in (".toml", ".csv"))
+    files = sorted(place.iterdir())
+    robots = [path for path in files if path.suffix.lower() == ".toml"]
+    tables = [path for path in files if path.suffix.lower() == ".csv"]
     if len(robots) != 1 or len(tables) > 1:
-        found = ", ".join(path.name for path in sorted(place.iterdir()))
+        found = ", ".join(path.name for path in files)
         raise InputError(f"found {found}; expected one robot's file (TOML), and one table of poses (CSV) or none")
     if not tables:
         return robots[0], {}
@@ -104,15 +114,25 @@ def _read_experiment_file(test: Test, target: Path) -> dict[str, Any]:
         raise InputError(f"found {files[0].name} and {files[1].name}, expected one experiment file at a time")
     experiments = wirebayes.read_experiments(files[0])
     shutil.copytree(files[0].parent, target)
+    warnings = []
     for experiment in experiments:
         understood(experiment, target / f"{experiment.name}.svg")
-    warnings = [notice.of(e.name).text for e in experiments for notice in data_checks.of_experiment(e)]
-    record = {"lines": [repr(e) for e in experiments], "warnings": warnings}
-    return record | _understood(files[0].name, [e.name for e in experiments])
+        notices = data_checks.of_experiment(experiment)
+        warnings += [notice.of(experiment.name).text for notice in notices]
+    names = [experiment.name for experiment in experiments]
+    lines = [repr(experiment) for experiment in experiments]
+    return _understood(files[0].name, names, lines, warnings)
 
 
-def _understood(file: str, names: list[str]) -> dict[str, Any]:
-    return {"file": f"{READ}/{file}", "experiments": names, "pictures": [f"{READ}/{name}.svg" for name in names]}
+def _understood(file: str, names: list[str], lines: list[str], warnings: list[str]) -> dict[str, Any]:
+    """The record of what was read."""
+    return {
+        "lines": lines,
+        "warnings": warnings,
+        "file": f"{READ}/{file}",
+        "experiments": names,
+        "pictures": [f"{READ}/{name}.svg" for name in names],
+    }
 
 
 def _choices(options: dict[str, Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor
 from concurrent.futures.process import BrokenProcessPool
@@ -32,7 +33,7 @@ from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes,
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.model.build import build
 from wirebayes.model.sample import MATERIAL, SAMPLE
-from wirebayes.notice import Notice, from_json, notices_by_part, to_json
+from wirebayes.notice import Notice, NoticeJson, from_json, notices_by_part, to_json
 from wirebayes.processes.workers import as_finished, computing, executor
 from wirebayes.progress import Progress, silent
 from wirebayes.results.outliers import outliers
@@ -129,17 +130,8 @@ def batch(
     own, left_out = path_of(own_effects), names_given(without)
     catalogue_without(left_out, catalogue(own))
     read, unreadable = _read(sources, train_holds, keep_going)
-    task = BatchTask(
-        discover,
-        check,
-        spec,
-        seed,
-        policy or DEFAULT,
-        left_out,
-        own,
-        simulations or SIMULATIONS,
-        posteriors,
-    )
+    effort = policy or DEFAULT
+    task = BatchTask(discover, check, spec, seed, effort, left_out, own, simulations or SIMULATIONS, posteriors)
     configuration = {
         "command": "batch",
         "version": __version__,
@@ -152,7 +144,7 @@ def batch(
         "without": sorted(left_out),
         "own_effects": source_of(own),
         "train_holds": train_holds,
-        **data_of(e for e, _ in read),
+        **data_of(experiment for experiment, _ in read),
         "unreadable": unreadable,
         **other_effort(policy, simulations),
     }
@@ -162,7 +154,7 @@ def batch(
     with computing():
         _compute(read, task, place.path, configuration, scheduler, progress or silent)
     with open_run(place.path, configuration) as run:
-        rows: list[Row] = [read_json(place.path / e.name / _ROW) for e, _ in read]
+        rows: list[Row] = [read_json(place.path / experiment.name / _ROW) for experiment, _ in read]
         rows += [_empty(file, error) for file, error in unreadable.items()]
         _tabulate(rows, outliers(rows), place.path)
         run.finish()
@@ -181,36 +173,49 @@ def _read(
             raise InputError(f"sources: found {type(source).__name__}, expected paths of files or Experiments")
         file = source.source.name if isinstance(source, Experiment) else str(source)
         try:
-            found = [source] if isinstance(source, Experiment) else read_experiments(Path(source))
-            found = found if train_holds is None else [e.first(train_holds) for e in found]
-            for e in found:
-                build([e])  # checks priors
+            found = _experiments(source, train_holds)
         except InputError as error:
             wrong[file] = str(error)
             continue
-        read += [(e, file) for e in found]
+        read += [(experiment, file) for experiment in found]
     if wrong and not (keep_going and read):
+        listed = "; ".join(list(wrong.values())[:_LISTED])
         more = f"; and {len(wrong) - _LISTED} more files" if len(wrong) > _LISTED else ""
-        raise InputError("; ".join(list(wrong.values())[:_LISTED]) + more)
+        raise InputError(listed + more)
     if not read:
         raise InputError("sources: found no experiments, expected one or more")
     return _distinct(read), wrong
 
 
+def _experiments(source: PathLike | Experiment, train_holds: int | None) -> list[Experiment]:
+    """The experiments of a file, checked."""
+    found = [source] if isinstance(source, Experiment) else read_experiments(Path(source))
+    if train_holds is not None:
+        found = [experiment.first(train_holds) for experiment in found]
+    for experiment in found:
+        build([experiment])  # checks priors
+    return found
+
+
 def _distinct(read: list[tuple[Experiment, str]]) -> list[tuple[Experiment, str]]:
     """The experiments, those of one name with the name of their file before it."""
-    times: dict[str, int] = {}
-    for e, _ in read:
-        times[e.name] = times.get(e.name, 0) + 1
-    out, by_name = list[tuple[Experiment, str]](), dict[str, str]()
-    for e, file in read:
-        name = e.name if times[e.name] == 1 else f"{Path(file).stem}.{e.name}"
-        if name in by_name or name in (TABLE, PARQUET):
-            taken = f"a second time (first in {by_name[name]})" if name in by_name else "which is a file of the results"
+    times = Counter(experiment.name for experiment, _ in read)
+    distinct = list[tuple[Experiment, str]]()
+    by_name = dict[str, str]()
+    for experiment, file in read:
+        name = experiment.name
+        if times[name] > 1:
+            name = f"{Path(file).stem}.{name}"
+            experiment = replace(experiment, name=name)
+        if name in by_name:
+            taken = f"a second time (first in {by_name[name]})"
+            raise InputError(f"{file}: found the experiment {name} {taken}, expected another name")
+        if name in (TABLE, PARQUET):
+            taken = "which is a file of the results"
             raise InputError(f"{file}: found the experiment {name} {taken}, expected another name")
         by_name[name] = file
-        out.append((e if name == e.name else replace(e, name=name), file))
-    return out
+        distinct.append((experiment, file))
+    return distinct
 
 
 def _compute(
@@ -223,9 +228,10 @@ def _compute(
 ) -> None:
     """Do whatever has no row yet; a process that dies takes no result with it."""
     for left in reversed(range(_TRIES)):
-        todo = [(e, file) for e, file in read if not (folder / e.name / _ROW).is_file()]
+        todo = [(experiment, file) for experiment, file in read if not (folder / experiment.name / _ROW).is_file()]
         if not todo:
             return
+        already = len(read) - len(todo)
         try:
             # the folder is opened when there is somebody to do the work
             with (
@@ -233,9 +239,9 @@ def _compute(
                 open_run(folder, configuration),
                 _scratch(folder, scheduler) as scratch,
             ):
-                progress("experiments", len(read) - len(todo), len(read))
+                progress("experiments", already, len(read))
                 results = _results(pool, todo, replace(task, scratch=scratch))
-                for done, (name, result) in enumerate(results, len(read) - len(todo) + 1):
+                for done, (name, result) in enumerate(results, already + 1):
                     _store(result, folder / name)
                     progress("experiments", done, len(read))
             return
@@ -265,15 +271,16 @@ def _scratch(folder: Path, scheduler: str | None) -> Iterator[Path | None]:
 
 def _results(pool: Executor, todo: Sequence[tuple[Experiment, str]], task: BatchTask) -> Iterator[tuple[str, Done]]:
     """Name and result of each experiment as they end."""
-    work = (((e, file), packed(e, file, task)) for e, file in todo)
+    work = (((experiment, file), packed(experiment, file, task)) for experiment, file in todo)
     for (experiment, file), future in as_finished(pool, do, work):
         error = future.exception()
-        if error is not None and type(error).__name__ != "KilledWorker":
-            raise error
-        if error is not None:  # Dask's, for work whose workers died again and again
-            yield experiment.name, Done(first_columns(experiment, file) | {"error": f"KilledWorker: {error}"}, {})
-        else:
+        if error is None:
             yield experiment.name, future.result()
+        elif type(error).__name__ == "KilledWorker":  # Dask's, for work whose workers died again and again
+            row = first_columns(experiment, file) | {"error": f"KilledWorker: {error}"}
+            yield experiment.name, Done(row, {})
+        else:
+            raise error
 
 
 def _store(done: Done, folder: Path) -> None:
@@ -308,16 +315,23 @@ def _empty(file: str, error: str) -> Row:
 
 def _tabulate(rows: Sequence[Row], far: Sequence[OutlierRow], folder: Path) -> None:
     """``batch.json``, ``summary.csv`` and, where pyarrow is installed, ``summary.parquet``."""
-    names = [n for n in (*MATERIAL, *SAMPLE) if any(n in row["parameters"] for row in rows)]
+    measured = {name for row in rows for name in row["parameters"]}
+    names = [name for name in (*MATERIAL, *SAMPLE) if name in measured]
     columns = [f"{name}_{quantile}" for name in names for quantile in QUANTITIES]
     header = [*_FIRST, *columns, *_LAST]
     table = [_line(row, far, names) for row in rows]
     write_csv(folder / TABLE, header, table)
     write_parquet(folder / PARQUET, header, table)
-    failed = [Notice("failed", f"{row['name']}: {row['error']}") for row in rows if row["error"]]
-    warnings = to_json([*failed, *from_json(notices_by_part({row["name"]: row for row in rows}))])
+    warnings = _warnings(rows)
     content: BatchJson = {"version": 1, "experiments": list(rows), "outliers": list(far), "warnings": warnings}
     write_json(folder / Batch._content, content)
+
+
+def _warnings(rows: Sequence[Row]) -> list[NoticeJson]:
+    """What could not be computed, and what each experiment's own warnings are."""
+    failed = [Notice("failed", f"{row['name']}: {row['error']}") for row in rows if row["error"]]
+    by_name = {row["name"]: row for row in rows}
+    return to_json([*failed, *from_json(notices_by_part(by_name))])
 
 
 def _line(row: Row, far: Sequence[OutlierRow], names: Sequence[str]) -> list[Any]:
@@ -327,8 +341,9 @@ def _line(row: Row, far: Sequence[OutlierRow], names: Sequence[str]) -> list[Any
         "outlier": [outlier["parameter"] for outlier in far if outlier["experiment"] == row["name"]],
         "warnings": [notice["text"] for notice in row["warnings"]],
     }
-    joined = {key: "; ".join(items) or None for key, items in lists.items()}
-    cells: dict[str, Any] = {**row, **joined}
+    cells: dict[str, Any] = dict(row)
+    for key, items in lists.items():
+        cells[key] = "; ".join(items) or None
     parameters: dict[str, Any] = dict(row["parameters"])
     values = [parameters.get(name, {}).get(quantile) for name in names for quantile in QUANTITIES]
     return [*(cells[key] for key in _FIRST), *values, *(cells[key] for key in _LAST)]

@@ -160,13 +160,10 @@ def calibrate(
     decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
-            prior = LengthPrior(
-                line, 1e-3 * max(given.reference_mm, _EXACT_MM), typical_spread(line, specimen_spread), bias_sd_N=bias
-            )
+            spread = typical_spread(line, specimen_spread)
+            prior = LengthPrior(line, 1e-3 * max(given.reference_mm, _EXACT_MM), spread, bias_sd_N=bias)
             found, known, whole = _estimated(machine, prior, given, (session, values), seed, next_poses, progress)
-            calibrated = machine if whole is None else whole
-            if found["usable"] and whole is not None:
-                calibrated = _write_robot(run.directory / ROBOT, robot, whole)
+            calibrated = _calibrated_robot(run.directory / ROBOT, robot, machine, whole, found["usable"])
             _write(run.directory, calibrated, found, known, _belongs_to(calibrated, wires, experiment))
             run.finish()
     return Calibration(place, own, computed=run.state != "done")
@@ -217,16 +214,18 @@ class _GivenErrors:
 
     def stated(self, robot: Robot, session: Session) -> StatedErrors | None:
         """Errors of geometry and poses in metres; None where the lengths alone are to be estimated."""
-        somewhere = bool(np.isfinite(session.position_m).all() and np.isfinite(session.rotation).all())
         exact = not (self.anchor_mm or self.platform_mm or self.drum_percent)
-        if exact and not self.pose_mm and self.joint_mm is None and somewhere and session.read.any():
+        stated = self.pose_mm or self.joint_mm is not None
+        poses_known = bool(np.isfinite(session.position_m).all() and np.isfinite(session.rotation).all())
+        if exact and not stated and poses_known and session.read.any():
             return None
-        joint = self.joint_mm if self.joint_mm is not None else (0.0 if exact else None)
+        joint_mm = 0.0 if exact and self.joint_mm is None else self.joint_mm
+        platform_mm = self.platform_mm if robot.degrees == 6 else 0.0  # of a point, they are errors of the exit points
         return StatedErrors(
             1e-3 * self.anchor_mm,
-            1e-3 * self.platform_mm if robot.degrees == 6 else 0.0,  # of a point, they are errors of the exit points
+            1e-3 * platform_mm,
             1e-3 * (self.pose_mm or 0.0),
-            None if joint is None else 1e-3 * joint,
+            None if joint_mm is None else 1e-3 * joint_mm,
             1e-2 * self.drum_percent,
         )
 
@@ -281,12 +280,21 @@ def _write(folder: Path, robot: Robot, found: CalibrateJson, known: Calibrated, 
 
 def _write_scene(path: Path, robot: Robot, found: CalibrateJson) -> None:
     """Write the points of the view that can be turned, where the platform's place is known."""
-    if found["pose_now"] is None:
+    pose = found["pose_now"]
+    if pose is None:
         return
     from wirebayes.report.pictures.robot import still_points  # matplotlib only where it is needed
 
-    here, turn = (np.asarray(found["pose_now"][key]) for key in ("position_m", "rotation_vector_rad"))
-    write_json(path, still_points(robot, here, matrix(turn)))
+    position = np.asarray(pose["position_m"])
+    rotation = matrix(np.asarray(pose["rotation_vector_rad"]))
+    write_json(path, still_points(robot, position, rotation))
+
+
+def _calibrated_robot(path: Path, given: RobotLike, before: Robot, whole: Robot | None, usable: bool) -> Robot:
+    """The robot as calibrated, where more than lengths was estimated; what its file says, where it may be used."""
+    if whole is None:
+        return before
+    return _write_robot(path, given, whole) if usable else whole
 
 
 def _write_robot(path: Path, given: RobotLike, calibrated: Robot) -> Robot:
@@ -323,14 +331,32 @@ def calibrated_of(
         It has not converged, is not usable, is of another robot or line, or is no calibration.
     """
     folder = calibration.folder if isinstance(calibration, Calibration) else Path(calibration)
-    expected = f"expected a calibration of {robot.name} that has converged"
+    _check_usable(folder, robot.name)
+    path = folder / UNKNOWNS
+    absent = f"{path}: found no such file, expected what calibrate writes; run it again in a new folder"
+    stored: UnknownsJson = read_json(path, absent)
+    with stored_results(path):
+        own = _belongs_to(robot, wires, experiment)
+        if stored["robot"] != own["robot"]:
+            of_another = f"found one of another {robot.name} in {folder}"
+            raise InputError(f"--calibration: {of_another}, expected one of the robot given")
+        if stored["wires"] != own["wires"]:
+            raise InputError(f"--calibration: found one with other wires in {folder}, expected those of --wires")
+        return from_dict(stored, robot, line)
+
+
+def _check_usable(folder: Path, name: str) -> None:
+    """Refuse what is no calibration of a robot, or one that says it is not to be used."""
+    expected = f"expected a calibration of {name} that has converged"
     summary = folder / "calibration.json"
     found: CalibrateJson = read_json(summary, f"--calibration: found no calibration.json in {folder}, {expected}")
     with stored_results(summary):
-        name, converged = str(found["robot"]), bool(found["with_creep_model"]["converged"])
-        usable, kinds = bool(found["usable"]), sorted({one["kind"] for one in found["warnings"]})
-    if name != robot.name:
-        raise InputError(f"--calibration: found one of {name} in {folder}, {expected}")
+        of_robot = str(found["robot"])
+        converged = bool(found["with_creep_model"]["converged"])
+        usable = bool(found["usable"])
+        kinds = sorted({notice["kind"] for notice in found["warnings"]})
+    if of_robot != name:
+        raise InputError(f"--calibration: found one of {of_robot} in {folder}, {expected}")
     if not converged:
         raise InputError(f"--calibration: found one that has not converged in {folder}, {expected}")
     if not usable:
@@ -339,16 +365,6 @@ def calibrated_of(
             f"--calibration: found one that says it is not usable in {folder}{reasons}, "
             f"expected a calibration of {name} that may be set in a controller"
         )
-    path = folder / UNKNOWNS
-    absent = f"{path}: found no such file, expected what calibrate writes; run it again in a new folder"
-    stored: UnknownsJson = read_json(path, absent)
-    with stored_results(path):
-        own = _belongs_to(robot, wires, experiment)
-        if stored["robot"] != own["robot"]:
-            raise InputError(f"--calibration: found one of another {name} in {folder}, expected one of the robot given")
-        if stored["wires"] != own["wires"]:
-            raise InputError(f"--calibration: found one with other wires in {folder}, expected those of --wires")
-        return from_dict(stored, robot, line)
 
 
 def _belongs_to(robot: Robot, wires: Wires, experiment: str | None) -> BelongsTo:

@@ -22,6 +22,7 @@ from wirebayes.strict.files import PathLike
 from wirebayes.views.check import CHECKED, Check
 from wirebayes.views.result import ResultFolder
 from wirebayes.wire.control import READ_UNIT
+from wirebayes.wire.effect import Kinds
 
 
 def check(
@@ -79,8 +80,8 @@ def check(
     seed, own, report = check_seed(seed), path_of(own_effects), progress or silent
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     kinds = catalogue(own)
-    for e in experiments:
-        build([e])  # checks priors
+    for one in experiments:
+        build([one])  # checks priors
     configuration = {
         "command": "check",
         "version": __version__,
@@ -94,20 +95,10 @@ def check(
             from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
 
             found: dict[str, CheckedExperiment] = {}
-            for done, e in enumerate(experiments):
+            for done, one in enumerate(experiments):
                 report("check", done, len(experiments))
-                with computing():
-                    previewed = preview(e, kinds, np.random.default_rng(seed_of(seed, e.name)))
-                ends = hold_ends_notice(previewed.hold_ends)
-                warnings = to_json([*data_checks.of_experiment(e), *previewed.warnings, *ends])
-                found[e.name] = {
-                    **_understood(e),
-                    "warnings": warnings,
-                    "parameters": previewed.parameters,
-                    "effects": previewed.effects,
-                    "hold_ends": previewed.hold_ends,
-                }
-                understood(e, place.path / f"{e.name}.svg")
+                found[one.name] = _checked(one, kinds, seed_of(seed, one.name))
+                understood(one, place.path / f"{one.name}.svg")
             report("check", len(experiments), len(experiments))
             content: CheckJson = {"experiments": found, "warnings": notices_by_part(found)}
             write_json(place.path / CHECKED, content)
@@ -115,37 +106,61 @@ def check(
     return Check(place, own, computed=run.state != "done")
 
 
+def _checked(experiment: Experiment, kinds: Kinds, seed: int) -> CheckedExperiment:
+    """What was understood of a test, what it can determine, and what is suspicious."""
+    with computing():
+        previewed = preview(experiment, kinds, np.random.default_rng(seed))
+    of_readings = data_checks.of_experiment(experiment)
+    of_ends = hold_ends_notice(previewed.hold_ends)
+    return {
+        **_understood(experiment),
+        "warnings": to_json([*of_readings, *previewed.warnings, *of_ends]),
+        "parameters": previewed.parameters,
+        "effects": previewed.effects,
+        "hold_ends": previewed.hold_ends,
+    }
+
+
 def _understood(e: Experiment) -> Understood:
     """What the files say, as plain values."""
-    holds = [_hold(hold) for hold in e.holds]
     recorded = e.recorded_holds
     measured = [hold.temperature_C for hold in recorded if hold.temperature_C is not None]
-    temperatures = np.concatenate([[], *measured])
+    extremes = None
+    if measured:
+        temperatures = np.concatenate(measured)
+        extremes = [float(temperatures.min()), float(temperatures.max())]
     found: Understood = {
         "material": e.material,
         "length_mm": e.length_mm,
         "control": e.control,
         "resolution_N": e.resolution or None,
-        "holds": holds,
+        "holds": [_hold(hold) for hold in e.holds],
         "recorded_holds": len(recorded),
         "unrecorded_holds": len(e.holds) - len(recorded),
         "readings": sum(hold.time_s.size for hold in recorded),
         "duration_s": sum(hold.duration_s for hold in e.holds),
-        "temperature_C": [float(temperatures.min()), float(temperatures.max())] if temperatures.size else None,
+        "temperature_C": extremes,
     }
     return in_unit(found, READ_UNIT[e.control])
 
 
 def _hold(hold: Hold) -> HoldUnderstood:
+    first_s = first = last = None
+    if hold.recorded:
+        first_s = float(hold.time_s[0])
+        first = float(hold.readings[0])
+        last = float(hold.readings[-1])
     out: HoldUnderstood = {
         "number": hold.number,
         "start_s": hold.start_s,
         "duration_s": hold.duration_s,
         "readings": int(hold.time_s.size),
-        "first_s": float(hold.time_s[0]) if hold.recorded else None,
-        "first_N": float(hold.readings[0]) if hold.recorded else None,
-        "last_N": float(hold.readings[-1]) if hold.recorded else None,
+        "first_s": first_s,
+        "first_N": first,
+        "last_N": last,
     }
     if hold.control == "force":
-        return {**out, "tension_N": hold.setting}
-    return {**out, "displacement_mm": hold.setting}
+        out["tension_N"] = hold.setting
+    else:
+        out["displacement_mm"] = hold.setting
+    return out

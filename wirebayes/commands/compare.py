@@ -25,7 +25,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.io.data_checks import of_experiment
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
-from wirebayes.json_files.comparison import ComparisonJson, ModelJson
+from wirebayes.json_files.comparison import ComparedModels, ComparisonJson, ModelJson
 from wirebayes.model.sample import Likelihood
 from wirebayes.notice import Notice, notices_by_part
 from wirebayes.processes.workers import computing
@@ -172,12 +172,16 @@ def plan_comparison(
     seed, train_holds = check_seed(seed), check_train_holds(train_holds)
     own, names = path_of(own_effects), names_given(only)
     experiments = experiments_of(source, experiment)
+    known = catalogue(own)
     base = ModelToCompare(BASE, "", "The plain model.", spec)
     tasks = []
+    models = {}
     for one in experiments:
         _check_holds(one, train_holds)
         problem_of(base, one, [])  # checks the file's priors
-        tasks += [Task(one, candidate, train_holds, own) for candidate in _chosen(one, base, catalogue(own), names)]
+        chosen = _chosen(one, base, known, names)
+        tasks += [Task(one, candidate, train_holds, own) for candidate in chosen]
+        models[one.name] = [candidate.name for candidate in chosen]
     configuration = {
         "command": "compare",
         "version": __version__,
@@ -187,7 +191,7 @@ def plan_comparison(
         "history": history,
         "likelihood": likelihood,
         "own_effects": source_of(own),
-        "models": {one.name: [t.candidate.name for t in tasks if t.experiment is one] for one in experiments},
+        "models": models,
         **data_of(experiments),
         **other_effort(policy),
     }
@@ -230,20 +234,29 @@ def carry_out(plan: ComparisonPlan, output: PathLike | None, progress: Progress 
     Comparison
     """
     place = ResultFolder.at(output)
-    with open_run(place.path, plan.configuration) as opened:
+    path = place.path
+    with open_run(path, plan.configuration) as opened:
         if opened.state == "done":
             return Comparison(place, plan.own_effects, computed=False)
         with computing():
-            judge_all(plan.tasks, place.path, plan.seed, plan.policy, report=progress or silent)
-        from wirebayes.report.pictures import compare as pictures  # matplotlib only where it is needed
-
-        content: ComparisonJson = {"version": 1, "seed": plan.seed, "experiments": {}, "warnings": []}
+            judge_all(plan.tasks, path, plan.seed, plan.policy, report=progress or silent)
+        tables: dict[str, ComparedModels] = {}
         for one in plan.experiments:
-            with stored_results(place.path / one.name):
-                models: list[ModelJson] = [read_json(place.path / t.file) for t in plan.tasks if t.experiment is one]
-                content["experiments"][one.name] = side_by_side(models, BASE, of_experiment(one))
-            pictures.save_pictures(place.path / one.name, one.name, content["experiments"][one.name], models)
-        content["warnings"] = notices_by_part(content["experiments"])
-        write_json(place.path / "comparison.json", content)
+            files = [path / task.file for task in plan.tasks if task.experiment is one]
+            tables[one.name] = _compared(one, path / one.name, files)
+        warnings = notices_by_part(tables)
+        content: ComparisonJson = {"version": 1, "seed": plan.seed, "experiments": tables, "warnings": warnings}
+        write_json(path / "comparison.json", content)
         opened.finish()
     return Comparison(place, plan.own_effects)
+
+
+def _compared(experiment: Experiment, folder: Path, files: Sequence[Path]) -> ComparedModels:
+    """The models of one experiment side by side, from the files of each; their pictures are drawn."""
+    from wirebayes.report.pictures import compare as pictures  # matplotlib only where it is needed
+
+    with stored_results(folder):
+        models: list[ModelJson] = [read_json(file) for file in files]
+        table = side_by_side(models, BASE, of_experiment(experiment))
+    pictures.save_pictures(folder, experiment.name, table, models)
+    return table

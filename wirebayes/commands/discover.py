@@ -24,7 +24,7 @@ from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import open_run, read_json, write_bytes, write_json
-from wirebayes.json_files.discovery import IntervalJson
+from wirebayes.json_files.discovery import IntervalJson, ParameterReport
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
@@ -125,17 +125,16 @@ def discover(
         **data_of(experiments),
         **other_effort(policy, simulations),
     }
+    settings = Settings(spec, kinds, simulations or SIMULATIONS)
+    effort, report = policy or DEFAULT, progress or silent
     place = ResultFolder.at(output)
     with open_run(place.path, configuration) as opened:
         if opened.state == "done":
             return Findings(place, own, computed=False)
-        settings = Settings(spec, kinds, simulations or SIMULATIONS)
-        found = _searched_and_sampled(
-            experiments, settings, own, place.path, seed, policy or DEFAULT, progress or silent
-        )
+        found = _searched_and_sampled(experiments, settings, own, place.path, seed, effort, report)
         write_findings(found, place.path, own)
-        for e in experiments:
-            write_next_hold(e, place.path / e.name)
+        for one in experiments:
+            write_next_hold(one, place.path / one.name)
         opened.finish()
     return Findings(place, own)
 
@@ -170,11 +169,16 @@ def _searched_and_sampled(
 
 def _void(found: Investigation, given: Sequence[Experiment], output: Path) -> list[Experiment]:
     """The experiments of which readings were struck out; their plain fits, begun before that, no longer count."""
-    hashes = {e.data_hash for e in given}
-    struck = [e for block in found.final for e in block.experiments if e.data_hash not in hashes]
-    for e in struck:
-        (output / e.name / "plain" / SUMMARY).unlink()
+    hashes = {one.data_hash for one in given}
+    struck = [one for one in _experiments(found) if one.data_hash not in hashes]
+    for one in struck:
+        (output / one.name / "plain" / SUMMARY).unlink()
     return struck
+
+
+def _experiments(found: Investigation) -> list[Experiment]:
+    """The experiments of all final models."""
+    return [experiment for block in found.final for experiment in block.experiments]
 
 
 def _in_gaps(work: Callable[[], object]) -> None:
@@ -233,24 +237,29 @@ def jobs_of(found: Concluded, spec: ModelSpec, own_effects: Path | None) -> list
         As for `plain_jobs`.
     """
     models = [("final", model) for model in final_models(found) if model.effects]
-    models += [(f"final/{_OTHERS}/{k}", m) for k, m in _others(found)]
+    models += [(f"final/{_OTHERS}/{number}", model) for number, model in _others(found)]
     return [_job(kind, model, spec, own_effects) for kind, model in models]
 
 
 def _job(kind: str, model: JointModel, spec: ModelSpec, own_effects: Path | None) -> Job:
-    folders = tuple(f"{e.name}/{kind}" for e in model.experiments)
-    keys = tuple(f.key for f in model.effects)
-    provenance = {"data_sha256": {e.name: e.data_hash for e in model.experiments}}
-    return Job(folders[0], model.experiments, keys, own_effects, spec, provenance, model.near, folders)
+    experiments = model.experiments
+    folders = tuple(f"{experiment.name}/{kind}" for experiment in experiments)
+    keys = tuple(effect.key for effect in model.effects)
+    hashes = {experiment.name: experiment.data_hash for experiment in experiments}
+    return Job(folders[0], experiments, keys, own_effects, spec, {"data_sha256": hashes}, model.near, folders)
 
 
 def _others(found: Concluded) -> list[tuple[int, JointModel]]:
     """The undecided models beside the final ones, each with its number among those of its experiments."""
-    out, count = [], dict[str, int]()
+    out: list[tuple[int, JointModel]] = []
+    count: dict[str, int] = {}
     for models in alternative_models(found):
-        k = 1 + count.get(models[0].experiments[0].name, 0)
-        count |= {e.name: k for model in models for e in model.experiments}
-        out += [(k, model) for model in models]
+        first = models[0].experiments[0]
+        number = 1 + count.get(first.name, 0)
+        for model in models:
+            out.append((number, model))
+            for experiment in model.experiments:
+                count[experiment.name] = number
     return out
 
 
@@ -259,8 +268,9 @@ def _finals_that_are_plain(found: Investigation, output: Path) -> None:
     for model in final_models(found):
         if model.effects:
             continue
-        for e in model.experiments:
-            plain, final = (output / e.name / kind for kind in ("plain", "final"))
+        for experiment in model.experiments:
+            plain = output / experiment.name / "plain"
+            final = output / experiment.name / "final"
             final.mkdir(exist_ok=True)
             for name in (POSTERIOR, SUMMARY):
                 write_bytes(final / name, (plain / name).read_bytes())
@@ -269,33 +279,47 @@ def _finals_that_are_plain(found: Investigation, output: Path) -> None:
 def _mixtures(found: Investigation, output: Path) -> None:
     """Say beside each final posterior which other models it shares the probability with."""
     for block, others in zip(found.final, found.undecided, strict=True):
-        for e in block.experiments if others else ():
-            keys = [[f.key for f in other.block.effects] + ["discrepancy"] * other.remains for other in others]
-            folders = [".", *(f"{_OTHERS}/{k}" for k in range(1, len(others)))]
-            weights = [other.probability for other in others]
-            write_mixture(output / e.name / "final", list(zip(folders, weights, keys, strict=True)))
+        if not others:
+            continue
+        members = []
+        for number, other in enumerate(others):
+            folder = f"{_OTHERS}/{number}" if number else "."
+            keys = [effect.key for effect in other.block.effects]
+            if other.remains:
+                keys.append("discrepancy")
+            members.append((folder, other.probability, keys))
+        for experiment in block.experiments:
+            write_mixture(output / experiment.name / "final", members)
 
 
 def _posterior_amplitudes(found: Investigation, output: Path) -> None:
     """Amplitudes as the final posterior has them, in place of the search's normal approximation."""
-    for e in (e for block in found.final for e in block.experiments):
-        summary: SummaryJson = read_json(output / e.name / "final" / SUMMARY)
-        parameters = summary["parameters"]
-        for name, amplitude in found.report["experiments"][e.name]["amplitudes"].items():
-            column = next(c for c in parameters if c.startswith(f"{name}."))
+    for experiment in _experiments(found):
+        parameters = _parameters_of(output / experiment.name / "final")
+        for name, amplitude in found.report["experiments"][experiment.name]["amplitudes"].items():
+            column = next(column for column in parameters if column.startswith(f"{name}."))
             of_posterior = parameters[column]
-            amplitude |= {"mean": of_posterior["mean"], "q05": of_posterior["q05"], "q95": of_posterior["q95"]}
+            amplitude["mean"] = of_posterior["mean"]
+            amplitude["q05"] = of_posterior["q05"]
+            amplitude["q95"] = of_posterior["q95"]
+
+
+def _parameters_of(folder: Path) -> dict[str, Parameter]:
+    """Parameters of the fit in a folder."""
+    summary: SummaryJson = read_json(folder / SUMMARY)
+    return summary["parameters"]
 
 
 def _parameters(found: Investigation, output: Path) -> None:
     """Every parameter before and after, as the two posteriors have it."""
     for name, report in found.report["experiments"].items():
-        plain, final = (read_json(output / name / model / SUMMARY)["parameters"] for model in ("plain", "final"))
-        units = {column: entry["unit"] for column, entry in (plain | final).items()}
-        report["parameters"] = {
-            column: {"unit": unit, "plain": _interval(plain.get(column)), "final": _interval(final.get(column))}
-            for column, unit in units.items()
-        }
+        plain = _parameters_of(output / name / "plain")
+        final = _parameters_of(output / name / "final")
+        parameters: dict[str, ParameterReport] = {}
+        for column, entry in (plain | final).items():
+            before, after = _interval(plain.get(column)), _interval(final.get(column))
+            parameters[column] = {"unit": entry["unit"], "plain": before, "final": after}
+        report["parameters"] = parameters
 
 
 def _interval(entry: Parameter | None) -> IntervalJson | None:
@@ -319,9 +343,9 @@ def _pictures(found: Investigation, output: Path, own_effects: Path | None) -> N
     from wirebayes.report.blocks import save_together  # matplotlib only where it is needed
     from wirebayes.report.pictures.discover import pictures
 
-    for e in (e for block in found.final for e in block.experiments):
-        verdict = found.report["experiments"][e.name]
-        plain, final = (
-            load_posterior(output / e.name / model, own_effects=own_effects) for model in ("plain", "final")
-        )
+    for experiment in _experiments(found):
+        folder = output / experiment.name
+        plain = load_posterior(folder / "plain", own_effects=own_effects)
+        final = load_posterior(folder / "final", own_effects=own_effects)
+        verdict = found.report["experiments"][experiment.name]
         save_together(pictures(plain, final, verdict), output)

@@ -73,26 +73,23 @@ def export(
     """
     own, seed = path_of(own_effects), check_seed(seed)
     machine = robot_of(robot)
-    loads, moments = numbers("--tensions", tensions), rising_times(times)
+    loads = numbers("--tensions", tensions)
+    moments = rising_times(times)
     if loads.min() <= 0:
         raise InputError(f"--tensions: found {text_of(tensions)!r}, expected numbers above 0")
     line = draws_for(machine, wires, draws, experiment, own)
-    contents: dict[str, str] = {}
-    if files.is_hangprinter(machine):
-        contents["reprapfirmware.g"] = files.reprapfirmware(machine, line)
-        contents["klipper.cfg"] = files.klipper(machine, line)
-    contents |= files.simulators(machine, line)
+    contents = _contents(machine, line)
     header, table = files.creep_tables(machine, line, loads, moments)
-    rows = [dict(zip(header, row, strict=True)) for row in table]
     summary: ExportSummary = {
         "files": sorted([*contents, TABLE]),
-        "creep_table": rows,
+        "creep_table": [dict(zip(header, row, strict=True)) for row in table],
         "warnings": to_json(_warnings(machine, line, contents)),
     }
     place = ResultFolder.at(output)
     options = {"--experiment": experiment, "--tensions": text_of(tensions), "--times": text_of(times)}
     posterior = posterior_of(wires, experiment)
-    with open_run(place.path, configuration("export", robot, posterior, draws, seed, own, options)) as run:
+    decides = configuration("export", robot, posterior, draws, seed, own, options)
+    with open_run(place.path, decides) as run:
         if run.state != "done":
             write_csv(run.directory / TABLE, header, table)
             for name, text in contents.items():
@@ -100,6 +97,15 @@ def export(
             write_json(run.directory / Export._content, summary)
             run.finish()
     return Export(place, own, computed=run.state != "done")
+
+
+def _contents(robot: Robot, line: WireDraws) -> dict[str, str]:
+    """The content of each file for firmware and simulators, by its name."""
+    contents: dict[str, str] = {}
+    if files.is_hangprinter(robot):
+        contents["reprapfirmware.g"] = files.reprapfirmware(robot, line)
+        contents["klipper.cfg"] = files.klipper(robot, line)
+    return contents | files.simulators(robot, line)
 
 
 def _warnings(robot: Robot, line: WireDraws, contents: Mapping[str, str]) -> list[Notice]:

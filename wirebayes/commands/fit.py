@@ -125,12 +125,13 @@ def fit(
     groups = _groups(experiments, together, file)
     if together is not None:
         spec = replace(spec, length_exponent=Normal(1.0, 1.0))
-    for members in groups.values():
+    jobs, fitted = list[Job](), list[Experiment]()
+    for folder, members in groups.items():
         for effect in added:
             _check_possible(effect, members, file, known, history)
         build(members, added, spec)  # checks priors
-    jobs = [Job(folder, members, keys, own, spec, _provenance(members, file)) for folder, members in groups.items()]
-    fitted = [e for members in groups.values() for e in members]
+        jobs.append(Job(folder, members, keys, own, spec, _provenance(members, file)))
+        fitted += members
     configuration = {
         "command": "fit",
         "version": __version__,
@@ -151,13 +152,14 @@ def fit(
         if opened.state != "done":
             _compute(jobs, place.path, seed, check, policy or DEFAULT, progress or silent)
             opened.finish()
-    return fits_in(place, [job.folder for job in jobs], own, computed=opened.state != "done")
+    return fits_in(place, list(groups), own, computed=opened.state != "done")
 
 
 def _effects_of(keys: Sequence[str], known: Mapping[str, type[Effect]]) -> list[Effect]:
     """The effects that were asked for; each may be asked for once."""
     added = [effect_named(key, known) for key in keys]
-    if len({e.name for e in added}) < len(added):
+    names = {effect.name for effect in added}
+    if len(names) < len(added):
         raise InputError(f"--effect: found {', '.join(keys)}, expected each effect once")
     return added
 
@@ -213,10 +215,10 @@ def fits_in(
 def _groups(experiments: Sequence[Experiment], together: str | None, file: Path) -> dict[str, tuple[Experiment, ...]]:
     """The experiments of each fit, by its folder."""
     if together is None:
-        return {e.name: (e,) for e in experiments}
-    members = tuple(e for e in experiments if e.material == together)
+        return {experiment.name: (experiment,) for experiment in experiments}
+    members = tuple(experiment for experiment in experiments if experiment.material == together)
     if not members:
-        materials = ", ".join(sorted({e.material for e in experiments}))
+        materials = ", ".join(sorted({experiment.material for experiment in experiments}))
         raise InputError(f"--together {together}: no such material in {file}; it has {materials}")
     return {members[0].material_folder: members}
 
@@ -225,26 +227,20 @@ def _check_possible(
     effect: Effect, members: Sequence[Experiment], file: Path, known: Mapping[str, type[Effect]], history: History
 ) -> None:
     """An effect that these holds cannot show at all is an error of the user's, not a prior-shaped posterior."""
+    option = f"--effect {effect.key}"
     if effect.needs_saturation and history == "additive":
-        raise InputError(
-            f"--effect {effect.key}: found --history additive, expected saturating: "
-            "creep that is added anew in every hold has no total"
-        )
+        found = "creep that is added anew in every hold has no total"
+        raise InputError(f"{option}: found --history additive, expected saturating: {found}")
     if effect.control is not None:
         found = f"an effect of the tests under {effect.control} alone"
-        raise InputError(
-            f"--effect {effect.key}: found {found}, expected {effect.name}: a fit has one amplitude a kind"
-        )
-    protocols = [e.protocol() for e in members]
+        raise InputError(f"{option}: found {found}, expected {effect.name}: a fit has one amplitude a kind")
     if effect.name not in known:
         return  # the flexible discrepancy shows anywhere
-    variants = [v.key for v in type(effect).variants(protocols)]
+    protocols = [experiment.protocol() for experiment in members]
+    variants = [variant.key for variant in type(effect).variants(protocols)]
     if effect.key in variants:
         return
     if isinstance(effect, EventEffect):
-        raise InputError(
-            f"--effect {effect.key}: no recorded hold {effect.hold} in experiment {members[0].name} of {file}"
-        )
-    raise InputError(
-        f"--effect {effect.key}: the holds of {', '.join(e.name for e in members)} cannot show it ({effect.shows})"
-    )
+        raise InputError(f"{option}: no recorded hold {effect.hold} in experiment {members[0].name} of {file}")
+    names = ", ".join(experiment.name for experiment in members)
+    raise InputError(f"{option}: the holds of {names} cannot show it ({effect.shows})")

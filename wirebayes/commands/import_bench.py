@@ -18,7 +18,7 @@ from wirebayes.io.bench.joined import HOLD, TEST, in_natural_order, name_setting
 from wirebayes.io.bench.undecided import Choices, Decimal, Specimens, TimeSince, Undecided
 from wirebayes.io.readings import READ
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
-from wirebayes.json_files.imported import ImportJson
+from wirebayes.json_files.imported import ImportedExperiment, ImportJson
 from wirebayes.notice import notices_by_part, to_json
 from wirebayes.sentences import listed
 from wirebayes.strict.files import PathLike, read_bytes
@@ -116,11 +116,15 @@ def import_bench(
     (2, 3)
     """
     _check_options(decimal, time_since, control, specimens)
-    above_zero(("--length-mm", length_mm), *([] if area_mm2 is None else [("--area-mm2", area_mm2)]))
-    given = [Path(raw)] if not isinstance(raw, Sequence) or isinstance(raw, str) else [Path(path) for path in raw]
-    paths = raw_files(given)
+    above_zero(("--length-mm", length_mm))
+    if area_mm2 is not None:
+        above_zero(("--area-mm2", area_mm2))
+    if isinstance(raw, str) or not isinstance(raw, Sequence):
+        raw = [raw]
+    paths = raw_files([Path(path) for path in raw])
     names = _names(paths, name, each_file)
-    zero, area = (None if value is None else float(value) for value in (zero_mm, area_mm2))
+    zero = None if zero_mm is None else float(zero_mm)
+    area = None if area_mm2 is None else float(area_mm2)
     said = names_given(mapping)
     choices = Choices(said, decimal, time_since, sheet, zero, control, specimens, each_file, drop_breaks)
     samples = [About(own, material, float(length_mm), area, name_is_stated=name is not None) for own in names]
@@ -168,25 +172,30 @@ def raw_files(given: Sequence[Path]) -> list[Path]:
     """
     found: list[Path] = []
     for path in given:
-        inside = [p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")] if path.is_dir() else [path]
+        inside = _files_in(path) if path.is_dir() else [path]
         if not inside:
             raise InputError(f"{path}: found an empty folder, expected files of a bench")
         found += inside
     return in_natural_order(found) if found != list(given) else found
 
 
+def _files_in(folder: Path) -> list[Path]:
+    """The files of a folder, without hidden ones."""
+    return [path for path in folder.iterdir() if path.is_file() and not path.name.startswith(".")]
+
+
 def _names(paths: Sequence[Path], name: str | None, each_file: str | None) -> list[str]:
     if not paths:
         raise InputError("raw: found nothing, expected at least one file")
-    of_one_test = each_file not in (None, TEST)
+    of_one_test = _are_of_one_test(each_file)
     if of_one_test and len(paths) == 1:
         raise InputError(f"--each-file: found {each_file!r} for one file, expected several files")
-    if name is not None:
-        if len(paths) > 1 and not of_one_test:
-            expected = f"it with one file only, or with --each-file {HOLD}"
-            raise InputError(f"--name: found {name!r} for {len(paths)} files, expected {expected}")
-        return [name] * len(paths)
-    return [default_name(path) for path in paths]
+    if name is None:
+        return [default_name(path) for path in paths]
+    if len(paths) > 1 and not of_one_test:
+        expected = f"it with one file only, or with --each-file {HOLD}"
+        raise InputError(f"--name: found {name!r} for {len(paths)} files, expected {expected}")
+    return [name] * len(paths)
 
 
 def _check_names(named: Sequence[tuple[Path, str]]) -> None:
@@ -206,16 +215,32 @@ def _read_all(
     """The tests of all files, each with the names of its files, and the choices made for them."""
     tests: list[tuple[Path, Converted]] = []
     for path, about in zip(paths, samples, strict=True):
-        found, choices = _decided(partial(_of_file, path, paths, about), choices, ask)
+        read = partial(_of_file, path, paths, about)
+        found, choices = _decided(read, choices, ask)
         tests += [(path, test) for test in found]
-    if len(paths) > 1 and all(len(test.experiment.holds) == 1 for _, test in tests):
-        _, choices = _decided(partial(_check_what_files_are, paths), choices, ask)
-    if choices.each_file not in (None, TEST):
-        about = samples[0] if samples[0].name_is_stated else replace(samples[0], name=common_name(paths))
-        joined, choices = _decided(partial(convert_joined, paths, about), choices, ask)
-        return [(", ".join(path.name for path in in_natural_order(paths)), joined)], choices
+    one_hold_each = all(len(test.experiment.holds) == 1 for _, test in tests)
+    if len(paths) > 1 and one_hold_each:
+        check = partial(_check_what_files_are, paths)
+        _, choices = _decided(check, choices, ask)
+    if _are_of_one_test(choices.each_file):
+        join = partial(_joined, paths, samples[0])
+        joined, choices = _decided(join, choices, ask)
+        return [joined], choices
     _check_names([(path, test.experiment.name) for path, test in tests])
     return [(path.name, test) for path, test in tests], choices
+
+
+def _joined(paths: Sequence[Path], about: About, choices: Choices) -> tuple[str, Converted]:
+    """The test that several files are holds of, with their names."""
+    if not about.name_is_stated:
+        about = replace(about, name=common_name(paths))
+    names = ", ".join(path.name for path in in_natural_order(paths))
+    return names, convert_joined(paths, about, choices)
+
+
+def _are_of_one_test(each_file: str | None) -> bool:
+    """Whether several files are said to be holds of one test."""
+    return each_file not in (None, TEST)
 
 
 def _of_file(path: Path, paths: Sequence[Path], about: About, choices: Choices) -> list[Converted]:
@@ -223,7 +248,7 @@ def _of_file(path: Path, paths: Sequence[Path], about: About, choices: Choices) 
 
     What no column says of a test may stand in the names of the files: then each may be a hold.
     """
-    if choices.each_file not in (None, TEST):
+    if _are_of_one_test(choices.each_file):
         return []
     try:
         return convert(path, about, choices)
@@ -266,21 +291,21 @@ def _decided(
 def _without_breaks(test: Converted) -> Converted:
     """A test without the readings of its gross events: their rows say that the hold went on, and no more."""
     events = gross_events.gross_events_of(test.experiment)
+    dropped = {int(reading) for event in events for reading in event.readings}
+    column = test.header.index(READ[test.experiment.control])
+    rows = [list(row) for row in test.rows]
+    with_reading = [row for row in rows if row[column] is not None]
+    for reading in dropped:
+        with_reading[reading][column] = None
+    if len(with_reading) - 1 in dropped:
+        while rows[-1][column] is None:  # such a row at the end would say that the last hold went on
+            rows.pop()
+    notes = [f"left out: {event.text}" for event in events]
     kept = without_breaks(test.experiment)
-    dropped = {int(i) for event in events for i in event.readings}
-    read = test.header.index(READ[test.experiment.control])
-    rows, count = [], 0
-    for row in test.rows:
-        gone = row[read] is not None and count in dropped
-        count += row[read] is not None
-        rows.append([None if gone and column == read else value for column, value in enumerate(row)])
-    while count - 1 in dropped and rows[-1][read] is None:
-        rows.pop()
     recording = test.recording
     if recording is not None:  # holds without a reading at the end are gone
         recording = replace(recording, start_s=recording.start_s[: len(kept.holds)])
-    notes = [*test.notes, *(f"left out: {e.text}" for e in events)]
-    return replace(test, experiment=kept, rows=rows, notes=notes, recording=recording)
+    return replace(test, experiment=kept, rows=rows, notes=[*test.notes, *notes], recording=recording)
 
 
 def _write(folder: Path, tests: Sequence[tuple[str, Converted]]) -> None:
@@ -290,25 +315,35 @@ def _write(folder: Path, tests: Sequence[tuple[str, Converted]]) -> None:
     content: ImportJson = {"experiments": {}, "warnings": []}
     for raw, test in tests:
         experiment = test.experiment
-        write_csv(folder / f"{experiment.name}.csv", test.header, test.rows)
-        sentences = [f"{note[:1].upper()}{note[1:]}." for note in (f"from {raw}", *test.notes)]
-        tables.append(toml_of(experiment, sentences, test.unrecorded))
-        understood(experiment, folder / f"{experiment.name}.svg", test.recording)
-        steps = experiment.control == "displacement"
-        content["experiments"][experiment.name] = {
-            "raw": raw,
-            "length_mm": experiment.length_mm,
-            "material": experiment.material,
-            "control": experiment.control,
-            "resolution_N": (experiment.resolution or None) if steps else None,
-            "resolution_mm": None if steps else (experiment.resolution or None),
-            "holds": len(experiment.recorded_holds),
-            "readings": sum(h.time_s.size for h in experiment.holds),
-            "notes": test.notes,
-            "warnings": to_json([*test.warnings, *data_checks.of_experiment(experiment)]),
-        }
-        write_text(folder / f"{experiment.name}.toml", tables[-1])
+        name = experiment.name
+        write_csv(folder / f"{name}.csv", test.header, test.rows)
+        notes = [f"from {raw}", *test.notes]
+        sentences = [f"{note[:1].upper()}{note[1:]}." for note in notes]
+        table = toml_of(experiment, sentences, test.unrecorded)
+        understood(experiment, folder / f"{name}.svg", test.recording)
+        content["experiments"][name] = _imported(raw, test)
+        write_text(folder / f"{name}.toml", table)
+        tables.append(table)
     if len(tests) > 1:
         write_text(folder / f"{TOGETHER}.toml", "\n".join(tables))
     content["warnings"] = notices_by_part(content["experiments"])
     write_json(folder / IMPORTED, content)
+
+
+def _imported(raw: str, test: Converted) -> ImportedExperiment:
+    """What ``import.json`` says of one test."""
+    experiment = test.experiment
+    resolution = experiment.resolution or None
+    steps = experiment.control == "displacement"
+    return {
+        "raw": raw,
+        "length_mm": experiment.length_mm,
+        "material": experiment.material,
+        "control": experiment.control,
+        "resolution_N": resolution if steps else None,
+        "resolution_mm": None if steps else resolution,
+        "holds": len(experiment.recorded_holds),
+        "readings": sum(hold.time_s.size for hold in experiment.holds),
+        "notes": test.notes,
+        "warnings": to_json([*test.warnings, *data_checks.of_experiment(experiment)]),
+    }

@@ -80,7 +80,8 @@ def import_robot(
     target = Path(output)
     if target.exists():
         raise InputError(f"{target}: found a file of this name, expected none; nothing is overwritten")
-    text = robot_file(found, (bounds[0], bounds[1]), np.asarray(where))
+    lowest, highest = bounds
+    text = robot_file(found, (lowest, highest), np.asarray(where))
     schema.parse(text, str(first))
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

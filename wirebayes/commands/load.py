@@ -66,21 +66,27 @@ def load(folder: PathLike, *, own_effects: PathLike | None = None) -> Any:
     Posterior(kite-1.5m, chain hooke saturating, converged)
     """
     place, own = ResultFolder(Path(folder)), path_of(own_effects)
-    if (place.path / POSTERIOR).is_file():
-        summary: SummaryJson = read_json(place.path / SUMMARY)
+    path = place.path
+    if (path / POSTERIOR).is_file():
+        summary: SummaryJson = read_json(path / SUMMARY)
         name = str(summary["experiment"])
         return Posterior(place, own, computed=False, name=name)
-    absent = f"{place.path}: found no {CONFIGURATION}, expected a folder of results"
-    configuration = read_json(place.path / CONFIGURATION, absent)
+    absent = f"{path}: found no {CONFIGURATION}, expected a folder of results"
+    configuration = read_json(path / CONFIGURATION, absent)
     command = configuration.get("command") if isinstance(configuration, dict) else None
     if command != "fit" and command not in _KINDS:
         known = ", ".join(["fit", *_KINDS])
-        raise InputError(f"{place.path / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
-    if not (place.path / COMPLETE).is_file():
-        raise InputError(f"{place.path}: found unfinished results, expected finished ones; run the same command again")
+        raise InputError(f"{path / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
+    if not (path / COMPLETE).is_file():
+        raise InputError(f"{path}: found unfinished results, expected finished ones; run the same command again")
     if command == "fit":
-        folders = [path.parent.name for path in sorted(place.path.glob(f"*/{POSTERIOR}"))]
-        order: list[str] = list(configuration.get("data_sha256", ()))
-        return fits_in(place, sorted(folders, key=lambda name: order.index(name) if name in order else 0), own)
+        order = list(configuration.get("data_sha256", ()))
+        return fits_in(place, _folders_of_fits(path, order), own)
     kind: Callable[..., Result[Any]] = _KINDS[str(command)]
     return kind(place, own, computed=False)
+
+
+def _folders_of_fits(path: Path, order: list[str]) -> list[str]:
+    """The folders with a posterior, in the order in which their experiments were given."""
+    folders = [file.parent.name for file in sorted(path.glob(f"*/{POSTERIOR}"))]
+    return sorted(folders, key=lambda name: order.index(name) if name in order else 0)

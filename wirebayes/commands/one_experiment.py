@@ -21,7 +21,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.next_hold import write_next_hold
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.batch import DiscoveryColumns, FitColumns, Row
-from wirebayes.json_files.summary import SummaryJson
+from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.spec import ModelSpec
 from wirebayes.processes.workers import one_thread_each
@@ -104,28 +104,26 @@ def do(work: bytes) -> Done:
         with TemporaryDirectory(prefix="wirebayes-", dir=task.scratch) as scratch:
             folder = Path(scratch)
             try:
-                if task.discover:
-                    row = {**row, **_discovered(experiment, task, folder)}
-                else:
-                    row = {**row, **_fitted(experiment, task, folder)}
+                found = _discovered(experiment, task, folder) if task.discover else _fitted(experiment, task, folder)
             except OSError:  # a full disk is not the specimen's fault
                 raise
             except Exception as error:  # no specimen may lose the others
                 message = f"{type(error).__name__}: {error}".replace(f"{folder}/", "")
                 return Done(row | {"error": message}, {})
-            return Done(row, _files(folder, experiment.name, task.posteriors))
+            return Done({**row, **found}, _files(folder, experiment.name, task.posteriors))
 
 
 def first_columns(experiment: Experiment, file: str) -> Row:
     """A row before anything is known of its posterior."""
     recorded = experiment.recorded_holds
+    readings = sum(hold.time_s.size for hold in recorded)
     return {
         "name": experiment.name,
         "material": experiment.material,
         "file": file,
         "length_mm": experiment.length_mm,
         "holds": len(recorded),
-        "readings": sum(hold.time_s.size for hold in recorded),
+        "readings": readings,
         "converged": None,
         "parameters": {},
         "verdict": None,
@@ -161,17 +159,20 @@ def _fit_and_store(job: Job, folder: Path, task: BatchTask, *, draws: bool) -> N
 def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> DiscoveryColumns:
     kinds = catalogue_without(task.without, catalogue(task.own_effects))
     found = investigate([experiment], Settings(task.spec, kinds, task.simulations), task.seed)
-    jobs = plain_jobs([experiment], task.spec, task.own_effects) + jobs_of(found, task.spec, task.own_effects)
+    jobs = plain_jobs([experiment], task.spec, task.own_effects)
+    jobs += jobs_of(found, task.spec, task.own_effects)
     for job in jobs:
         _fit_and_store(job, folder, task, draws=True)  # pictures show them
     write_findings(found, folder, task.own_effects)
+    own_folder = folder / experiment.name
     if task.posteriors:
-        write_next_hold(experiment, folder / experiment.name)
+        write_next_hold(experiment, own_folder)
     report = found.report["experiments"][experiment.name]
+    summary: SummaryJson = read_json(own_folder / "plain" / SUMMARY)
     # the check of a fit is this global test
     p = report["p_global"]
     return {
-        **_columns(read_json(folder / experiment.name / "plain" / SUMMARY), p, p > ALPHA),
+        **_columns(summary, p, p > ALPHA),
         "verdict": report["verdict"],
         "effects": report["effects"],
         "best_effect": report["best"],
@@ -180,11 +181,10 @@ def _discovered(experiment: Experiment, task: BatchTask, folder: Path) -> Discov
 
 
 def _columns(summary: SummaryJson, p: float | None, passed: bool | None) -> FitColumns:
-    parameters: dict[str, Statistics] = {
-        n: {"mean": v["mean"], "sd": v["sd"], "q05": v["q05"], "q50": v["q50"], "q95": v["q95"]}
-        for n, v in summary["parameters"].items()
-    }
-    check = None if passed is None else "passed" if passed else "failed"
+    parameters = {name: _statistics(parameter) for name, parameter in summary["parameters"].items()}
+    check = None
+    if passed is not None:
+        check = "passed" if passed else "failed"
     return {
         "converged": summary["converged"],
         "parameters": parameters,
@@ -194,18 +194,26 @@ def _columns(summary: SummaryJson, p: float | None, passed: bool | None) -> FitC
     }
 
 
+def _statistics(parameter: Parameter) -> Statistics:
+    return {
+        "mean": parameter["mean"],
+        "sd": parameter["sd"],
+        "q05": parameter["q05"],
+        "q50": parameter["q50"],
+        "q95": parameter["q95"],
+    }
+
+
 def _hash(experiment: Experiment) -> dict[str, str]:
     return {experiment.name: experiment.data_hash}
 
 
 def _files(folder: Path, name: str, posteriors: bool) -> dict[str, bytes]:
     """The files by their path below the experiment's own folder."""
-    paths = sorted(path for path in folder.rglob("*") if path.is_file())
-    kept = [path for path in paths if posteriors or path.name != POSTERIOR]
     inside = folder / name
-    return {
-        (
-            path.relative_to(inside) if path.is_relative_to(inside) else path.relative_to(folder)
-        ).as_posix(): path.read_bytes()
-        for path in kept
-    }
+    files = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and (posteriors or path.name != POSTERIOR):
+            place = inside if path.is_relative_to(inside) else folder
+            files[path.relative_to(place).as_posix()] = path.read_bytes()
+    return files

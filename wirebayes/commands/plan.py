@@ -164,7 +164,11 @@ def _check_tests(tests: object) -> None:
 def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, report: Progress) -> list[Judged]:
     """What each test would teach, and what it would show of missing effects."""
     planned = [(at_centre(test, request.guess.at(test.length_mm), spec), words) for test, words in request.tests]
-    tension = middle_tension(planned[0][0])  # all state their creep for the tension of the first
+    first, _ = planned[0]
+    stated = {  # all state their creep for the same wire
+        "tension_N": middle_tension(first),
+        "length_mm": request.guess.length_mm,
+    }
     kept = 0 if request.robot is None else _ROBOT_TESTS
     judged = []
     for done, (test, words) in enumerate(planned):
@@ -172,9 +176,7 @@ def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, repo
         guess = request.guess.at(test.length_mm)
         rng = np.random.default_rng(seed_of(seed, "plan", test.name))
         try:
-            expected = expected_widths(
-                test, guess, rng, spec, tension_N=tension, length_mm=request.guess.length_mm, kept_draws=kept
-            )
+            expected = expected_widths(test, guess, rng, spec, **stated, kept_draws=kept)
         except ValueError as error:
             raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
         seen = sensitivity(test, guess, kinds, rng, spec, simulations=SIMULATIONS)
@@ -200,17 +202,24 @@ def _request(
     rng: Generator,
 ) -> PlanRequest:
     """Tests and guess of whatever was given."""
-    if not isinstance(source, str | os.PathLike | Experiment):
+    if isinstance(source, Experiment):
+        return _of_experiment(source, n, spec, rng)
+    if not isinstance(source, str | os.PathLike):
         raise InputError(f"source: found {type(source).__name__}, expected a path or an Experiment")
-    if not isinstance(source, Experiment) and Path(source).is_dir():
-        return _of_folder(Path(source), name, n, effects, own)
-    if not isinstance(source, Experiment) and is_plan(Path(source)):
-        return _of_plan(read_plan(Path(source), effects), name, n, own, rng)
-    experiments = [source] if isinstance(source, Experiment) else select(read_experiments(Path(source)), name)
+    path = Path(source)
+    if path.is_dir():
+        return _of_folder(path, name, n, effects, own)
+    if is_plan(path):
+        return _of_plan(read_plan(path, effects), name, n, own, rng)
+    experiments = select(read_experiments(path), name)
     if len(experiments) > 1:
-        names = ", ".join(e.name for e in experiments)
+        names = ", ".join(experiment.name for experiment in experiments)
         raise InputError(f"{source}: found the experiments {names}, expected one of them as --experiment")
-    (measured,) = experiments
+    return _of_experiment(experiments[0], n, spec, rng)
+
+
+def _of_experiment(measured: Experiment, n: int, spec: ModelSpec, rng: Generator) -> PlanRequest:
+    """The same test again, and others like it."""
     build([measured], (), spec)  # checks priors
     guess = from_readings(measured, n, rng, spec)
     about = {"data_sha256": measured.data_hash, "priors": measured.priors}
@@ -218,13 +227,12 @@ def _request(
 
 
 def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: Generator) -> PlanRequest:
-    tests = [(_experiment(test, file), "") for test in file.tests]
-    for test, _ in tests:
+    planned = [_experiment(test, file) for test in file.tests]
+    for test in planned:
         build([test])  # checks priors
+    about: dict[str, Any] = {}
     if file.posterior is None:
-        planned = [test for test, _ in tests]
         guess = from_tables(file.guess, file.guess_lines, file.source, planned, n, rng)
-        about: dict[str, Any] = {}
     else:
         guess, about, _ = _posterior(file.posterior, name, n, own)
     about |= {
@@ -233,21 +241,27 @@ def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: Ge
         "material": file.material,
         "protocols": [vars(test) for test in file.tests],
     }
+    tests = [(test, "") for test in planned]
     return PlanRequest(tests, guess, file.aim, file.budget_min, file.robot, about)
 
 
 def _of_folder(folder: Path, name: str | None, n: int, effects: list[str], own: Path | None) -> PlanRequest:
     """The folder of a fit or discover: the same test again, and others like it."""
     guess, about, sample = _posterior(folder, name, n, own)
-    aim: tuple[str, ...] = ("parameters",)
-    findings = folder / "discovery.json"
-    if findings.is_file():
-        report: DiscoveryJson = read_json(findings)
-        if sample.name in report["experiments"]:
-            found = report["experiments"][sample.name]
-            rivals = list(dict.fromkeys(e for e in (*found["set"], *found["group"]) if e in effects))
-            aim = tuple(rivals[:2]) if len(rivals) > 1 else aim
+    rivals = [effect for effect in _rivals(folder / "discovery.json", sample.name) if effect in effects]
+    aim = tuple(rivals[:2]) if len(rivals) > 1 else ("parameters",)
     return PlanRequest(_like(_measured(sample, folder)), guess, aim, None, None, about)
+
+
+def _rivals(findings: Path, name: str) -> list[str]:
+    """The effects between which a discovery did not decide, each once."""
+    if not findings.is_file():
+        return []
+    report: DiscoveryJson = read_json(findings)
+    if name not in report["experiments"]:
+        return []
+    found = report["experiments"][name]
+    return list(dict.fromkeys([*found["set"], *found["group"]]))
 
 
 def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, dict[str, Any], Sample]:
@@ -265,54 +279,60 @@ def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tupl
 
 
 def _experiment(test: PlannedTest, file: PlanFile) -> Experiment:
-    bench = Bench(
-        test.name, file.material, test.length_mm, times_s=test.times_s, temperatures_C=test.temperatures_C
-    ).setting(test.control, test.settings, test.resolution)
+    bench = Bench(test.name, file.material, test.length_mm, times_s=test.times_s, temperatures_C=test.temperatures_C)
+    bench = bench.setting(test.control, test.settings, test.resolution)
     return replace(bench.experiment(), source=file.source, priors=file.priors, prior_lines=file.prior_lines)
 
 
 def _like(measured: Experiment) -> list[tuple[Experiment, str]]:
     """The same test again, and what else could be done with such a sample."""
     out = [(replace(measured, name=REPEAT), "repeat the test")]
-    short = ("unload", "dense", "unload-dense", "half-steps")
-    for name, other in zip(short, other_measurements(measured.protocol(), alone=True), strict=True):
-        bench = Bench(name, measured.material, measured.length_mm, times_s=tuple(other.times_s.tolist())).setting(
-            measured.control, tuple(other.setting.tolist()), measured.resolution
-        )
-        out.append((replace(bench.experiment(), source=measured.source, priors=measured.priors), other.words))
+    names = ("unload", "dense", "unload-dense", "half-steps")
+    for name, other in zip(names, other_measurements(measured.protocol(), alone=True), strict=True):
+        times = tuple(other.times_s.tolist())
+        settings = tuple(other.setting.tolist())
+        bench = Bench(name, measured.material, measured.length_mm, times_s=times)
+        bench = bench.setting(measured.control, settings, measured.resolution)
+        test = replace(bench.experiment(), source=measured.source, priors=measured.priors)
+        out.append((test, other.words))
     return out
 
 
 def _measured(sample: Sample, folder: Path) -> Experiment:
     """The experiment of a stored posterior, without its readings' temperatures."""
-    p = sample.protocol
-    holds = []
-    for i, mask in enumerate(p.mask):
-        number = int(p.number[i]) if mask.any() else None
-        times, read = p.time_s[i][mask].tolist(), sample.readings[i, :, 0][mask].tolist()
-        log = None
-        if p.warming_K is not None and p.reference_C is not None and mask.any():
-            log = frozen((p.warming_K[i][mask] + p.reference_C).tolist())
-        holds.append(
-            Hold(
-                number,
-                float(p.setting[i]),
-                float(p.duration_s[i]),
-                frozen(times),
-                frozen(read),
-                log,
-                float(p.start_s[i]),
-                p.control,
-            )
-        )
+    protocol = sample.protocol
+    holds = tuple(_hold(sample, row) for row in range(len(protocol.mask)))
     return Experiment(
-        sample.name, sample.material, p.length_mm, sample.resolution, tuple(holds), folder, control=p.control
+        sample.name, sample.material, protocol.length_mm, sample.resolution, holds, folder, control=protocol.control
+    )
+
+
+def _hold(sample: Sample, row: int) -> Hold:
+    """One hold of a stored posterior."""
+    protocol = sample.protocol
+    mask = protocol.mask[row]
+    recorded = bool(mask.any())
+    temperatures = None
+    if protocol.warming_K is not None and protocol.reference_C is not None and recorded:
+        temperatures = frozen((protocol.warming_K[row][mask] + protocol.reference_C).tolist())
+    return Hold(
+        int(protocol.number[row]) if recorded else None,
+        float(protocol.setting[row]),
+        float(protocol.duration_s[row]),
+        frozen(protocol.time_s[row][mask].tolist()),
+        frozen(sample.readings[row, :, 0][mask].tolist()),
+        temperatures,
+        float(protocol.start_s[row]),
+        protocol.control,
     )
 
 
 def _checked_aim(aim: Aim, effects: list[str]) -> tuple[str, ...]:
     words = (aim,) if isinstance(aim, str) else tuple(aim)
-    if words in (("parameters",), ("creep",)) or (len(set(words)) == len(words) == 2 and set(words) <= set(effects)):
+    if words in (("parameters",), ("creep",)):
+        return words
+    are_two = len(words) == 2 and words[0] != words[1]
+    if are_two and all(word in effects for word in words):
         return words
     expected = "parameters, creep, or two different effects of the catalogue"
     raise InputError(f"--aim: found {', '.join(map(str, words))}, expected {expected}")

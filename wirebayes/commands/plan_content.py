@@ -12,9 +12,11 @@ from wirebayes.json_files.values import Statistics
 from wirebayes.model.sample import MATERIAL, SAMPLE
 from wirebayes.model.spec import ModelSpec
 from wirebayes.notice import Notice, to_json
+from wirebayes.numeric.typing import Floats
 from wirebayes.planning.guess import GuessedWire
 from wirebayes.planning.ranking import Judged, too_long
 from wirebayes.planning.widths import HOUR_S
+from wirebayes.results.contraction import interval
 from wirebayes.robot.mechanics import draws as robot_draws
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -55,21 +57,25 @@ def protocol_content(
     """
     test, expected, seen = judged.test, judged.expected, judged.sensitivity
     widths = expected.widths
-    cosines = {f"{a} {b}": cos for (a, b), cos in seen.cosines.items() if a < b}
+    cosines = {f"{one} {other}": cosine for (one, other), cosine in seen.cosines.items() if one < other}
     recorded = test.recorded_holds
+    readings = sum(hold.time_s.size for hold in recorded)
+    robot = None
+    if machine is not None and not machine.is_on_given_wires:
+        robot = _drift(judged, request.guess, machine, spec)
     return {
         "rank": rank,
         "name": test.name,
         "words": judged.words,
         "length_mm": test.length_mm,
         "holds": len(recorded),
-        "readings": sum(hold.time_s.size for hold in recorded),
+        "readings": readings,
         "duration_min": judged.duration_min,
         "within_budget": not too_long(judged, request.budget_min),
         "score": judged.score(request.aim),
         "information_bits": expected.information_bits,
         "simulated_tests": expected.tests,
-        "parameters": {n: q for n, q in widths.items() if n in (*MATERIAL, *SAMPLE)},
+        "parameters": {name: width for name, width in widths.items() if name in (*MATERIAL, *SAMPLE)},
         "creep": {
             "tension_N": expected.tension_N,
             "length_mm": expected.length_mm,
@@ -80,7 +86,7 @@ def protocol_content(
         "effects": seen.effects,
         "cosines": cosines,
         "not_identifiable": list(seen.hidden),
-        "robot": None if machine is None or machine.is_on_given_wires else _drift(judged, request.guess, machine, spec),
+        "robot": robot,
     }
 
 
@@ -95,6 +101,7 @@ def plan_content(rows: list[JudgedProtocol], request: PlanRequest, machine: Robo
     machine : Robot, optional
     """
     guess = request.guess
+    notices = [*_over_budget(rows[0], request.budget_min), *_of_robot(machine), *guess.doubts]
     return {
         "version": 1,
         "aim": list(request.aim),
@@ -103,11 +110,11 @@ def plan_content(rows: list[JudgedProtocol], request: PlanRequest, machine: Robo
         "guess": {
             "source": guess.source,
             "length_mm": guess.length_mm,
-            "parameters": {n: _statistics(v) for n, v in guess.draws.items()},
+            "parameters": {name: _statistics(values) for name, values in guess.draws.items()},
         },
         "robot": None if machine is None else machine.name,
         "protocols": rows,
-        "warnings": to_json([*_over_budget(rows[0], request.budget_min), *_of_robot(machine), *guess.doubts]),
+        "warnings": to_json(notices),
     }
 
 
@@ -134,34 +141,33 @@ def _of_robot(machine: Robot | None) -> list[Notice]:
 
 def _drift(judged: Judged, guess: GuessedWire, machine: Robot, spec: ModelSpec) -> RobotDrift | None:
     """How well the drift of a robot within an hour would be known, and is at the guess; None where nothing holds it."""
-
-    def sd(parameters: dict[str, Any], length_mm: float) -> tuple[float, float]:
-        few = {n: parameters[n][:_ROBOT_DRAWS] for n in MATERIAL}
-        wires = robot_draws.for_robot(machine, WireDraws(few, length_mm, spec.law, spec.history))
-        course = drift.from_command(
-            machine, wires, machine.home_m, matrix(machine.home_rotation_rad), np.array([0.0, HOUR_S])
-        )
-        far = 1e3 * np.linalg.norm(course.position_m[:, -1] - machine.home_m, axis=1)[course.found]
-        return (float(np.median(far)), float(far.std())) if len(far) > 1 else (np.nan, np.nan)
-
-    after = np.array([sd(d, judged.test.length_mm) for d in judged.expected.draws])
-    if np.isnan(after).all():  # nothing holds the home pose
+    after = []
+    for draws in judged.expected.draws:
+        distances = _distances_mm(draws, judged.test.length_mm, machine, spec)
+        if len(distances) > 1:
+            after.append([float(np.median(distances)), float(distances.std())])
+    if not after:  # nothing holds the home pose
         return None
-    drift_mm, drift_sd_mm = np.nanmedian(after, axis=0)
+    at_guess = _distances_mm(guess.draws, guess.length_mm, machine, spec)
+    drift_mm, drift_sd_mm = np.median(after, axis=0)
     return {
         "time_s": HOUR_S,
         "drift_mm": float(drift_mm),
         "drift_sd_mm": float(drift_sd_mm),
-        "drift_sd_guess_mm": sd(guess.draws, guess.length_mm)[1],
+        "drift_sd_guess_mm": float(at_guess.std()) if len(at_guess) > 1 else np.nan,
     }
+
+
+def _distances_mm(parameters: dict[str, Any], length_mm: float, machine: Robot, spec: ModelSpec) -> Floats:
+    """How far the platform is from its home pose after an hour, for some draws of the line; without those that fail."""
+    few = {name: parameters[name][:_ROBOT_DRAWS] for name in MATERIAL}
+    wires = robot_draws.for_robot(machine, WireDraws(few, length_mm, spec.law, spec.history))
+    rotation = matrix(machine.home_rotation_rad)
+    course = drift.from_command(machine, wires, machine.home_m, rotation, np.array([0.0, HOUR_S]))
+    away_m = course.position_m[:, -1] - machine.home_m
+    return np.asarray(1e3 * np.linalg.norm(away_m, axis=1)[course.found])
 
 
 def _statistics(values: Any) -> Statistics:
-    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
-    return {
-        "mean": float(values.mean()),
-        "sd": float(values.std()),
-        "q05": float(low),
-        "q50": float(middle),
-        "q95": float(high),
-    }
+    low, middle, high = interval(values)
+    return {"mean": float(values.mean()), "sd": float(values.std()), "q05": low, "q50": middle, "q95": high}

@@ -164,7 +164,8 @@ def pose(
     9
     """
     over_time = joints is not None or trajectory is not None
-    draws = (OVER_TIME if over_time else DRAWS) if draws is None else draws
+    if draws is None:
+        draws = OVER_TIME if over_time else DRAWS
     given = _Given(robot, wires, draws, experiment, path_of(own_effects), check_seed(seed), output, progress)
     _refuse_calibration(calibration is not None and not over_time)
     bare = robot_of(robot)
@@ -183,9 +184,19 @@ def pose(
         return _along(asked, joints, trajectory, errors, given.begun({**carried, **at}))
     slices = _slices(machine, map_heights, map_rotations)
     other, of_other = given.other(other_fit, machine)
-    options = {**at, "--times": text_of(times), **allowed.options(), "--specimen-spread": specimen_spread}
-    options |= {"--other-fit": of_other, **carried, **_options_of(slices)}
-    return pose_at(asked, _request(asked, allowed, specimen_spread, slices), other, given.begun(options))
+    request = _request(asked, allowed, specimen_spread, slices)
+    begun = given.begun(
+        {
+            **at,
+            "--times": text_of(times),
+            **allowed.options(),
+            "--specimen-spread": specimen_spread,
+            "--other-fit": of_other,
+            **carried,
+            **_options_of(slices),
+        }
+    )
+    return pose_at(asked, request, other, begun)
 
 
 def _along(asked: AskedPose, joints: Any, trajectory: Any, errors: Uncertain, begun: Begun) -> Pose:
@@ -221,7 +232,8 @@ class _Given:
 
     def asked(self, machine: Robot, position: Numbers | None, rotation: Numbers | None) -> AskedPose:
         """The pose of the robot with its payload, and its wires."""
-        line, place = self.draws_of(self.wires, machine), asked_place(machine, position, rotation)
+        line = self.draws_of(self.wires, machine)
+        place = asked_place(machine, position, rotation)
         return AskedPose(machine, line, *place, self.seed, self.own_effects)
 
     def other(self, fit: Wires | None, machine: Robot) -> tuple[WireDraws | None, str | None]:
@@ -291,11 +303,11 @@ def pose_at(asked: AskedPose, request: PoseRequest, other: WireDraws | None, beg
 
 
 def _write(folder: Path, robot: Robot, request: PoseRequest, found: PoseAnswer) -> None:
+    from wirebayes.report.pictures import robot as pictures  # matplotlib only where it is needed
+
     write_json(folder / "pose.json", found.content)
     if found.maps:
         write_csv(folder / "workspace.csv", TABLE, rows(found.maps))
-    from wirebayes.report.pictures import robot as pictures  # matplotlib only where it is needed
-
     pictures.save_pose(folder, robot, request, found)
 
 
@@ -319,16 +331,21 @@ def _refuse_calibration(alone: bool) -> None:
 
 def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:
     """The requested slices; refused where the robot has only one height or one orientation."""
-    if (heights is not None or rotations is not None) and robot.freedom == "orientation":
-        raise InputError("--map-heights, --map-rotation: found for a platform on a ball joint, expected none")
-    if heights is not None and robot.plane is not None:
-        raise InputError("--map-heights: found heights for a robot in a plane, expected none")
-    if heights is not None and (robot.upper_m[:2] == robot.lower_m[:2]).any():
-        raise InputError("--map-heights: found heights for a workspace in a vertical plane, expected none")
-    if rotations is not None and robot.degrees == 3:
-        raise InputError("--map-rotation: found one for a robot whose lines keep the orientation, expected none")
     if heights is None and rotations is None:
         return LEVEL
+    _refuse_slices(robot, heights is not None, rotations is not None)
     levels = None if heights is None else np.unique(numbers("--map-heights", heights))
     turns = [numbers("--map-rotation", turn, 3) for turn in rotations or ()]
     return Slices(levels, np.array(turns) if turns else LEVEL.rotations_rad)
+
+
+def _refuse_slices(robot: Robot, heights: bool, rotations: bool) -> None:
+    """Refuse slices of what has only one height, or one orientation."""
+    if robot.freedom == "orientation":
+        raise InputError("--map-heights, --map-rotation: found for a platform on a ball joint, expected none")
+    if heights and robot.plane is not None:
+        raise InputError("--map-heights: found heights for a robot in a plane, expected none")
+    if heights and (robot.upper_m[:2] == robot.lower_m[:2]).any():
+        raise InputError("--map-heights: found heights for a workspace in a vertical plane, expected none")
+    if rotations and robot.degrees == 3:
+        raise InputError("--map-rotation: found one for a robot whose lines keep the orientation, expected none")

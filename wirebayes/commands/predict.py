@@ -25,8 +25,10 @@ from wirebayes.results.mixture import members_of
 from wirebayes.results.read_back import Stored
 from wirebayes.strict.columns import is_table
 from wirebayes.strict.files import PathLike
+from wirebayes.strict.table import CsvTable
 from wirebayes.views.findings import Findings
 from wirebayes.views.posterior import Posterior, Posteriors
+from wirebayes.wire.protocol import Control
 
 
 def predict(
@@ -91,19 +93,13 @@ def predict(
     if model is not None:
         check_choice("model", model, ("plain", "final"))
     members = stored_posteriors(posterior, experiment, model, own)
-    control = members[0][1].sample.protocol.control
-    if is_table(protocol):
-        cells = protocol_of_columns(protocol, control)
-    elif isinstance(protocol, str | os.PathLike):
-        cells = protocol_table(Path(protocol), control)
-    else:
-        raise InputError(f"protocol: found {type(protocol).__name__}, expected a file, a DataFrame or columns by name")
+    first = members[0][1]
+    control = first.sample.protocol.control
+    cells = _cells(protocol, control)
     requests = [(probability, request_of(cells, stored, fresh=fresh)) for probability, stored in members]
     seed = check_seed(seed)
     if output is not None:
-        check_file(Path(output))
-        if isinstance(protocol, str | os.PathLike) and Path(output).exists() and Path(output).samefile(protocol):
-            raise InputError(f"--output {output}: found the protocol itself, expected another file")
+        _check_output(Path(output), protocol)
     rows = mixture_table(requests, seed)
     if output is not None:
         write_csv(Path(output), header(control), rows)
@@ -113,12 +109,28 @@ def predict(
             f"; averaged over the {len(requests)} models that the readings leave undecided, weighted by probability"
         )
     doubts = [doubt for _, stored in members for doubt in stored.doubts]
-    notices = to_json([*doubts, *beyond_tested(rows, members[0][1]), *unlikely_readings(requests, seed)])
+    notices = to_json([*doubts, *beyond_tested(rows, first), *unlikely_readings(requests, seed)])
     attributes: dict[str, Any] = {"prediction": sentence, "seed": seed}
     if notices:  # in two attributes, for netCDF holds text but no mappings
         attributes["warnings"] = [notice["text"] for notice in notices]
         attributes["warning_kinds"] = [notice["kind"] for notice in notices]
     return dataset(rows, attributes, control)
+
+
+def _cells(protocol: Any, control: Control) -> CsvTable:
+    """The table of a protocol, from columns or a file."""
+    if is_table(protocol):
+        return protocol_of_columns(protocol, control)
+    if isinstance(protocol, str | os.PathLike):
+        return protocol_table(Path(protocol), control)
+    raise InputError(f"protocol: found {type(protocol).__name__}, expected a file, a DataFrame or columns by name")
+
+
+def _check_output(output: Path, protocol: Any) -> None:
+    """Refuse a file that cannot be written, or that is the protocol."""
+    check_file(output)
+    if isinstance(protocol, str | os.PathLike) and output.exists() and output.samefile(protocol):
+        raise InputError(f"--output {output}: found the protocol itself, expected another file")
 
 
 def stored_posteriors(
@@ -153,17 +165,25 @@ def stored_posteriors(
     """
     if isinstance(posterior, str | os.PathLike):
         name, folder = find_posterior(Path(posterior), experiment, model)
-        return [(p, read_back.load_posterior(place, name, own_effects)) for p, place in members_of(folder)]
+        return _members(folder, name, own_effects)
+    if isinstance(posterior, Posterior):
+        return _members(posterior.folder, experiment, posterior.own_effects)
     if isinstance(posterior, Findings):
-        posteriors: Mapping[str, Posterior] = posterior.plain if model == "plain" else posterior.final
-        one, experiment = one_of(posteriors, experiment), None
+        several: Mapping[str, Posterior] = posterior.plain if model == "plain" else posterior.final
     elif isinstance(posterior, Posteriors):
-        one, experiment = one_of(posterior, experiment), None
-    elif isinstance(posterior, Posterior):
-        one = posterior
+        several = posterior
     else:
         raise InputError(f"posterior: found {type(posterior).__name__}, expected a Posterior, Findings or a folder")
-    return [(p, read_back.load_posterior(place, experiment, one.own_effects)) for p, place in members_of(one.folder)]
+    one = one_of(several, experiment)
+    return _members(one.folder, None, one.own_effects)
+
+
+def _members(folder: Path, experiment: str | None, own_effects: Path | None) -> list[tuple[float, Stored]]:
+    """The posteriors of a folder with their probabilities."""
+    members = []
+    for probability, place in members_of(folder):
+        members.append((probability, read_back.load_posterior(place, experiment, own_effects)))
+    return members
 
 
 def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Posterior:
@@ -203,10 +223,10 @@ def find_posterior(folder: Path, experiment: str | None = None, model: str | Non
     if not folder.is_dir():
         raise InputError(f"{folder}: found no such folder, expected one written by fit or discover")
     found: dict[str, list[Path]] = {}
-    levels = ("posterior.nc", "*/posterior.nc", "*/*/posterior.nc")
-    for path in sorted(path for level in levels for path in folder.glob(level)):
-        for name in read_back.experiments_in(path):
-            found.setdefault(name, []).append(path.parent)
+    files = [file for level in _LEVELS for file in folder.glob(level)]
+    for file in sorted(files):
+        for name in read_back.experiments_in(file):
+            found.setdefault(name, []).append(file.parent)
     if not found:
         raise InputError(f"{folder}: found no posterior.nc in it, expected a folder written by fit or discover")
     if experiment is None and len(found) > 1:
@@ -215,10 +235,13 @@ def find_posterior(folder: Path, experiment: str | None = None, model: str | Non
     if name not in found:
         raise InputError(f"--experiment {name}: not in {folder}, expected one of {', '.join(sorted(found))}")
     places = {place.name: place for place in found[name]}
-    if model is None:
-        if len(places) == 1:
-            return name, next(iter(places.values()))
-        model = "final"
+    if model is None and len(places) == 1:
+        (only,) = places.values()
+        return name, only
+    model = model or "final"
     if model not in places:
         raise InputError(f"--model {model}: {folder} has no such posterior of {name}; discover writes plain and final")
     return name, places[model]
+
+
+_LEVELS = ("posterior.nc", "*/posterior.nc", "*/*/posterior.nc")

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 from wirebayes._version import __version__
@@ -107,13 +108,14 @@ def simulate_tests(
     alike = Bench(times_s=moments, unrecorded=gaps, temperatures_C=warmth).setting(control, path, float(resolution))
     benches = _benches(alike, tests, sizes)
     truth = Truth(chosen, tuple(found.values()), spec.law, spec.history)
+    set_as = "weights_N" if control == "force" else "displacements_mm"
     configuration = {
         "command": "simulate",
         "version": __version__,
         "seed": seed,
         "tests": tests,
         "lengths_mm": sizes,
-        ("weights_N" if control == "force" else "displacements_mm"): path,
+        set_as: path,
         "times_s": moments,
         "unrecorded": sorted(gaps),
         "temperatures_C": warmth,
@@ -142,13 +144,14 @@ def _effects(
     effects: str | Sequence[str] | Mapping[str, float], own: Path | None
 ) -> tuple[dict[str, Effect], dict[str, float]]:
     """The effects by key, and the amplitudes that were given."""
+    if isinstance(effects, Mapping):
+        texts: Sequence[str] = [f"{key}={value}" for key, value in effects.items()]
+    else:
+        texts = names_given(effects)
     found: dict[str, Effect] = {}
     given: dict[str, float] = {}
     known = catalogue(own)
-    listed = (
-        [f"{key}={value}" for key, value in effects.items()] if isinstance(effects, Mapping) else names_given(effects)
-    )
-    for text in listed:
+    for text in texts:
         effect, amplitudes = effect_option(text, known)
         found[effect.key] = effect
         given |= amplitudes
@@ -183,13 +186,14 @@ def _check_protocol(
     unrecorded: frozenset[int],
 ) -> None:
     """Refuse what no bench could do."""
-    if min(lengths) <= 0 or len(set(lengths)) < len(lengths):
+    shortest, least = min(lengths), min(path)
+    if shortest <= 0 or len(set(lengths)) < len(lengths):
         raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")
-    if control == "force" and min(path) <= 0:
-        raise InputError(f"--weights: found {min(path):g}, expected more than 0 N")
-    if control == "displacement" and min(path) <= -min(lengths):
-        raise InputError(f"--displacements: found {min(path):g}, expected more than -{min(lengths):g} mm, a length")
-    if times[0] < 0 or any(b <= a for a, b in zip(times, times[1:], strict=False)):
+    if control == "force" and least <= 0:
+        raise InputError(f"--weights: found {least:g}, expected more than 0 N")
+    if control == "displacement" and least <= -shortest:
+        raise InputError(f"--displacements: found {least:g}, expected more than -{shortest:g} mm, a length")
+    if times[0] < 0 or any(after <= before for before, after in pairwise(times)):
         raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
     if not unrecorded <= set(range(1, len(path))):
         raise InputError(f"--unrecorded: found {max(unrecorded)}, expected a hold from 1 to {len(path) - 1}")

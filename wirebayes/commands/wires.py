@@ -17,6 +17,7 @@ from wirebayes.errors import InputError
 from wirebayes.inference.between_specimens import between_specimens
 from wirebayes.json_files.plain import plain
 from wirebayes.numeric.evenly import evenly
+from wirebayes.numeric.typing import Floats
 from wirebayes.results import read_back
 from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics import schema
@@ -75,9 +76,12 @@ def posterior_of(wires: Wires, experiment: str | None = None) -> Path | str:
 
 def _content_of(line: Specimens, experiment: str | None) -> str:
     """What tells the posteriors of a line from others."""
-    if _is_sample(line):
-        return hash_of({str(i): content_hash(folder_of(one, experiment) / POSTERIOR) for i, one in enumerate(line)})
-    return content_hash(folder_of(line, experiment) / POSTERIOR)
+    if not _is_sample(line):
+        return content_hash(folder_of(line, experiment) / POSTERIOR)
+    each = {}
+    for i, one in enumerate(line):
+        each[str(i)] = content_hash(folder_of(one, experiment) / POSTERIOR)
+    return hash_of(each)
 
 
 def _is_sample(wires: Wires) -> TypeGuard[Sequence[Line]]:
@@ -135,11 +139,14 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
         If there is no posterior, or its model cannot be used on a robot.
     """
     if _several(wires):
-        return _together({name: draws_of(line, count, experiment, own_effects) for name, line in wires.items()})
+        lines = {name: draws_of(line, count, experiment, own_effects) for name, line in wires.items()}
+        return _together(lines)
     if _is_sample(wires):
         return _sample(wires, count, experiment, own_effects)
-    if isinstance(wires, Posteriors | Findings):
-        wires = one_of(wires.final if isinstance(wires, Findings) else wires, experiment)
+    if isinstance(wires, Findings):
+        wires = wires.final
+    if isinstance(wires, Posteriors):
+        wires = one_of(wires, experiment)
     if isinstance(wires, Posterior):
         return _usable(wires.stored(experiment), wires.name, count)
     return read_wires(folder_of(wires), count, experiment, own_effects)
@@ -175,9 +182,8 @@ def draws_for(
     lines_of(robot, line)
     idle = [name for name in line.each if name not in robot.wire]
     if line.others and idle:
-        raise InputError(
-            f"--wires: found {idle[0]}, expected one of the legs' wires: {', '.join(sorted({*robot.wire}))}"
-        )
+        expected = ", ".join(sorted({*robot.wire}))
+        raise InputError(f"--wires: found {idle[0]}, expected one of the legs' wires: {expected}")
     return line
 
 
@@ -188,16 +194,22 @@ def _together(lines: dict[str, WireDraws]) -> WireDraws:
     name, first = next(iter(lines.items()))
     count = min(line.count for line in lines.values())
     rng = np.random.default_rng(0)
+    others = {}
     for other, line in lines.items():
-        for what, a, b in (("elastic-law", first.law, line.law), ("history", first.history, line.history)):
-            if a != b:
-                raise InputError(
-                    f"--wires: found {name} fitted with --{what} {a} and {other} with {b}, expected one for all wires"
-                )
-        order = slice(0, count) if line is first else rng.permutation(line.count)[:count]
-        lines[other] = replace(line.part(order), name=other)
-    first = lines.pop(name)
-    return replace(first, others=lines)
+        _check_alike(name, first, other, line)
+        if other == name:
+            continue
+        order = rng.permutation(line.count)[:count]
+        others[other] = replace(line.part(order), name=other)
+    return replace(first.part(slice(0, count)), name=name, others=others)
+
+
+def _check_alike(name: str, first: WireDraws, other: str, line: WireDraws) -> None:
+    """Refuse lines that were fitted with different laws."""
+    for option, one, another in (("elastic-law", first.law, line.law), ("history", first.history, line.history)):
+        if one != another:
+            found = f"{name} fitted with --{option} {one} and {other} with {another}"
+            raise InputError(f"--wires: found {found}, expected one for all wires")
 
 
 def _check_plain_and_alike(folders: Sequence[Path], ones: Sequence[WireDraws]) -> None:
@@ -224,25 +236,33 @@ def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effec
     _check_plain_and_alike(folders, ones)
     logarithms = []
     for stored, one in zip(tests, ones, strict=True):
-        values = np.log(np.column_stack([stored.draws[name] for name in CORE]))
+        values = _log_core(stored.draws)
         values[:, CORE.index("B")] += np.log(first.length_mm / one.length_mm)  # creep is a strain
         logarithms.append(values)
-    before = read_back.prior_draws(folders[0], experiment)
-    log_prior = np.log(np.column_stack([before[name] for name in CORE]))
+    log_prior = _log_core(read_back.prior_draws(folders[0], experiment))
     prior = log_prior.mean(0), np.cov(log_prior.T)
     found = between_specimens(logarithms, prior, count, np.random.default_rng(0))
-    tension = np.array([one.tension_range_N or (0.0, 0.0) for one in ones])
-    time = np.array([one.time_range_s or (0.0, 0.0) for one in ones])
     return replace(
         first,
         parameters=dict(zip(CORE, np.exp(found.mean).T, strict=True)),
         effects=(),
-        tension_range_N=(float(tension.min()), float(tension.max())),
-        time_range_s=(float(time.min()), float(time.max())),
+        tension_range_N=_widest([one.tension_range_N for one in ones]),
+        time_range_s=_widest([one.time_range_s for one in ones]),
         spread=dict(zip(CORE, found.spread.T, strict=True)),
         specimens=len(ones),
         doubts=tuple(doubt for one in ones for doubt in one.doubts),
     )
+
+
+def _log_core(draws: Mapping[str, Floats]) -> Floats:
+    """Logarithms (n, p) of the material's parameters."""
+    return np.log(np.column_stack([draws[name] for name in CORE]))
+
+
+def _widest(ranges: Sequence[tuple[float, float] | None]) -> tuple[float, float]:
+    """The range that covers all; of one that is not known, zero."""
+    ends = np.array([known or (0.0, 0.0) for known in ranges])
+    return float(ends.min()), float(ends.max())
 
 
 def named_lines(texts: Sequence[str]) -> Wires:
@@ -309,21 +329,24 @@ def wire_draws(stored: Stored, count: int) -> WireDraws:
     """Material parameters of a stored posterior with what was tested; bench quantities stay behind."""
     sample = stored.sample
     effects = tuple(sample.model.effects)
-    names = [*CORE, *(c for e in material(effects) for c in e.columns())]
+    names = list(CORE)
+    for effect in material(effects):
+        names += effect.columns()
     pick = evenly(len(stored.draws["k1"]), count)
-    protocol, tensions = sample.protocol, sample.tensions_N
     parameters = {name: stored.draws[name][pick] for name in names}
     if stored.length_exponent is not None:
         parameters[LENGTH_EXPONENT] = stored.length_exponent[pick]
+    tensions = sample.tensions_N
+    longest_s = float(sample.protocol.duration_s.max())
     return WireDraws(
         parameters,
-        protocol.length_mm,
+        sample.protocol.length_mm,
         sample.model.law,
         sample.model.history,
         effects,
-        (float(tensions.min()), float(tensions.max())),
-        (0.0, float(protocol.duration_s.max())),
-        sample.model.tension_ref_N,
+        tension_range_N=(float(tensions.min()), float(tensions.max())),
+        time_range_s=(0.0, longest_s),
+        tension_ref_N=sample.model.tension_ref_N,
         doubts=stored.doubts,
     )
 

@@ -98,37 +98,28 @@ def _other_creep(base: ModelToCompare) -> list[ModelToCompare]:
 
 def _other_model(base: ModelToCompare) -> list[ModelToCompare]:
     """The other elastic law, history and likelihood."""
+    spec = base.spec
     out = []
-    if base.spec.law == "hooke":
+    if spec.law == "hooke":
         sentence = "Strain is taken over the stretched length, eq (3)."
-        out.append(_beside(base, "modified_hooke", LAW, sentence, spec=replace(base.spec, law="modified")))
+        out.append(_beside(base, "modified_hooke", LAW, sentence, spec=replace(spec, law="modified")))
     else:
-        out.append(
-            _beside(
-                base,
-                "hooke",
-                LAW,
-                "Strain is taken over the zero-tension length, eq (1).",
-                spec=replace(base.spec, law="hooke"),
-            )
-        )
-    if base.spec.history == "saturating":
+        sentence = "Strain is taken over the zero-tension length, eq (1)."
+        out.append(_beside(base, "hooke", LAW, sentence, spec=replace(spec, law="hooke")))
+    if spec.history == "saturating":
         sentence = "Every hold adds the creep of eq (4) again."
-        out.append(_beside(base, "additive", HISTORY, sentence, spec=replace(base.spec, history="additive")))
+        out.append(_beside(base, "additive", HISTORY, sentence, spec=replace(spec, history="additive")))
     else:
         sentence = "Creep saturates towards the amount of eq (4)."
-        out.append(_beside(base, "saturating", HISTORY, sentence, spec=replace(base.spec, history="saturating")))
-    if base.spec.likelihood == "chain":
+        out.append(_beside(base, "saturating", HISTORY, sentence, spec=replace(spec, history="saturating")))
+    if spec.likelihood == "chain":
         sentence = "Every hold is a separate experiment."
-        out.append(_beside(base, "hold_by_hold", LIKELIHOOD, sentence, spec=replace(base.spec, likelihood="hold")))
+        out.append(_beside(base, "hold_by_hold", LIKELIHOOD, sentence, spec=replace(spec, likelihood="hold")))
         sentence = "Positions are exact; each reading has an independent error."
         out.append(_beside(base, "independent_errors", SETTING, sentence, fixed={"setting_sd": 0.0}))
     else:
-        out.append(
-            _beside(
-                base, "chain", LIKELIHOOD, "The holds form one history.", spec=replace(base.spec, likelihood="chain")
-            )
-        )
+        sentence = "The holds form one history."
+        out.append(_beside(base, "chain", LIKELIHOOD, sentence, spec=replace(spec, likelihood="chain")))
     return out
 
 
@@ -195,8 +186,7 @@ def problem_of(candidate: ModelToCompare, training: Experiment, effects: Sequenc
     problem = build([training], effects, candidate.spec)
     prior = problem.prior
     here = {name: value for name, value in candidate.fixed.items() if name in prior.names}
-    free = {name: d for name, d in prior.distributions.items() if name not in here}
-    return replace(
-        problem,
-        prior=replace(prior, distributions=free, fixed=prior.fixed | here, logarithmic=prior.logarithmic & free.keys()),
-    )
+    free = {name: distribution for name, distribution in prior.distributions.items() if name not in here}
+    logarithmic = prior.logarithmic & free.keys()
+    prior = replace(prior, distributions=free, fixed=prior.fixed | here, logarithmic=logarithmic)
+    return replace(problem, prior=prior)

@@ -1,11 +1,10 @@
 """Models side by side: each hold left out in turn, and the last holds predicted from the first."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -31,14 +30,16 @@ from wirebayes.json_files.read_units import in_unit
 from wirebayes.notice import Notice, from_json, notices_by_part, to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.held_out import HeldOutPrediction, Scores, held_out, two_thirds
-from wirebayes.prediction.leave_one_hold_out import smoothed_leave_one_hold_out, standard_error
+from wirebayes.prediction.leave_one_hold_out import LeftOutHolds, smoothed_leave_one_hold_out, standard_error
 from wirebayes.processes.workers import workers
 from wirebayes.progress import Progress, silent
 from wirebayes.wire.control import READ_UNIT
+from wirebayes.wire.effect import Effect
 
 # half the draws of a fit: dozens of models are sampled, and elpd differences count from 4, known to a tenth here
 POLICY = Policy(walkers=64, round_draws=2048, ess=2000.0, most_steps=600)
 _WEIGHTED = 0.5  # of those draws where they are weighted: all are kept, and an integral is then known to .03
+_PerHold = LeaveOneHoldOut | PredictionScores
 MEANINGFUL_ELPD, MEANINGFUL_SE = 4.0, 2.0  # below either, the difference may be chance (Sivula et al. 2020)
 
 
@@ -82,14 +83,16 @@ def judge(task: Task, seed: int, policy: Policy = POLICY) -> ModelJson:
         Plain values; ``failed`` holds the reason, or None.
     """
     candidate = task.candidate
+    spec = candidate.spec
+    scored = "all readings" if spec.likelihood == "chain" else "later readings given each hold's first"
     content: ModelJson = {
         "name": candidate.name,
         "question": candidate.question,
         "sentence": candidate.sentence,
-        "elastic_law": candidate.spec.law,
-        "history": candidate.spec.history,
-        "likelihood": candidate.spec.likelihood,
-        "scored": "all readings" if candidate.spec.likelihood == "chain" else "later readings given each hold's first",
+        "elastic_law": spec.law,
+        "history": spec.history,
+        "likelihood": spec.likelihood,
+        "scored": scored,
         "failed": None,
         "warnings": [],
     }
@@ -107,45 +110,49 @@ def judge(task: Task, seed: int, policy: Policy = POLICY) -> ModelJson:
 
 
 def _scores(task: Task, seed: int, policy: Policy) -> JudgementJson:
-    candidate, known = task.candidate, catalogue(task.own_effects)
+    candidate, name = task.candidate, task.experiment.name
+    known = catalogue(task.own_effects)
     whole = task.experiment if candidate.unrecorded else task.experiment.without_unrecorded()
     recorded = len(whole.recorded_holds)
     first = task.train_holds or two_thirds(recorded)
 
     def sampled(holds: int) -> Posterior:
         training = whole.train(holds)
-        own = seed_of(seed, task.experiment.name, candidate.name, str(holds))
+        own = seed_of(seed, name, candidate.name, str(holds))
         problem = problem_of(candidate, training, effects_of(candidate, training, known, seed))
         found = weighted_posterior(problem, own, policy.ess * _WEIGHTED)
         return found if found.converged else fit_problem(problem, own, policy=policy)
 
     full = sampled(task.train_holds or recorded)
-    own = seed_of(seed, task.experiment.name, candidate.name, "without")
-    left = smoothed_leave_one_hold_out(full, own)
+    left = smoothed_leave_one_hold_out(full, seed_of(seed, name, candidate.name, "without"))
     early = full if task.train_holds else sampled(first)
-    content: JudgementJson = {
-        "effects": [e.key for e in full.problem.samples[0].model.effects if e.key in _keys(known, full)],
+    later = None
+    if first < recorded:
+        rng = np.random.default_rng(seed_of(seed, name, "held out"))
+        later = _held_out(held_out(early, whole, rng), early)
+    return {
+        "effects": [effect.key for effect in _effects(full) if effect.name in known],
         "parameters": len(full.problem.names),
         "converged": full.converged and early.converged and left.converged,
         "convergence": full.why,
-        "leave_one_hold_out": {
-            "holds": left.hold,
-            "elpd": left.total,
-            "se": left.se,
-            "per_hold": left.elpd,
-            "pareto_k": left.pareto_k,
-            "refitted": left.hold[left.refitted],
-        },
-        "held_out": None,
+        "leave_one_hold_out": _left_out(left),
+        "held_out": later,
     }
-    if first < recorded:
-        rng = np.random.default_rng(seed_of(seed, task.experiment.name, "held out"))
-        content["held_out"] = _held_out(held_out(early, whole, rng), early)
-    return content
 
 
-def _keys(known: Mapping[str, Any], fitted: Posterior) -> list[str]:
-    return [e.key for e in fitted.problem.samples[0].model.effects if e.name in known]
+def _effects(fitted: Posterior) -> tuple[Effect, ...]:
+    return tuple(fitted.problem.samples[0].model.effects)
+
+
+def _left_out(left: LeftOutHolds) -> LeaveOneHoldOut:
+    return {
+        "holds": left.hold,
+        "elpd": left.total,
+        "se": left.se,
+        "per_hold": left.elpd,
+        "pareto_k": left.pareto_k,
+        "refitted": left.hold[left.refitted],
+    }
 
 
 def _held_out(result: HeldOutPrediction, trained: Posterior) -> HeldOutHolds:
@@ -154,18 +161,19 @@ def _held_out(result: HeldOutPrediction, trained: Posterior) -> HeldOutHolds:
         "holds": np.unique(result.given.hold),
         "free": None if result.free is None else scores_dict(result.free),
         "given_first": scores_dict(result.given),
-        "effects": [e.key for e in trained.problem.samples[0].model.effects],
+        "effects": [effect.key for effect in _effects(trained)],
     }
 
 
 def scores_dict(scores: Scores) -> PredictionScores:
     """Scores as plain values, with what the pictures need."""
+    coverage = {f"{100 * level:g}": share for level, share in scores.coverage().items()}
     return {
         "rmse_N": scores.rmse_N,
         "elpd": float(scores.elpd.sum()),
         "per_hold": scores.elpd,
         "elpd_together": scores.elpd_together,
-        "coverage": {f"{100 * level:g}": share for level, share in scores.coverage().items()},
+        "coverage": coverage,
         "pit_p": scores.pit_p,
         "readings": {
             "hold": scores.hold,
@@ -228,27 +236,37 @@ def side_by_side(models: Sequence[ModelJson], base: str, about: Sequence[Notice]
     dict
         ``models``, best first among those scored alike, failures last.
     """
-    known = {m["name"]: m for m in models}
+    known = {model["name"]: model for model in models}
     reference = known[base]
-    alike = [m for m in models if m["failed"] is None and m["scored"] == reference["scored"]]
-    weights = {}
-    if reference["failed"] is None:
-        per_hold = np.array([m["leave_one_hold_out"]["per_hold"] for m in alike], float).T
-        weights = dict(zip((m["name"] for m in alike), stacking(per_hold), strict=True))
+    weights = _weights(models, reference)
     rows: list[ComparedModel] = []
-    for m in models:
-        row: ComparedModel = {**m, "weight": weights.get(m["name"]), **_differences(m, reference), "meaning": ""}
-        if m["failed"] is None:
-            row["held_out"] = _without_readings(m["held_out"])
+    for model in models:
+        weight = weights.get(model["name"])
+        row: ComparedModel = {**model, "weight": weight, **_differences(model, reference), "meaning": ""}
+        if model["failed"] is None:
+            row["held_out"] = _without_readings(model["held_out"])
         row["meaning"] = _meaning(row, base)
         rows.append(row)
-    rows.sort(key=lambda r: (r["failed"] is not None, r["weight"] is None, -(_elpd(r) if r["failed"] is None else 0.0)))
-    of_models = from_json(notices_by_part({m["name"]: m for m in models}))
+    rows.sort(key=_order)
+    of_models = from_json(notices_by_part(known))
     return {"base": base, "models": rows, "warnings": to_json([*about, *of_models])}
 
 
-def _elpd(row: ComparedModel) -> float:
-    return row["leave_one_hold_out"]["elpd"]
+def _weights(models: Sequence[ModelJson], reference: ModelJson) -> dict[str, float]:
+    """Weights in the mixture, of the models that are scored on the same readings as the reference."""
+    if reference["failed"] is not None:
+        return {}
+    alike = [model for model in models if model["failed"] is None and model["scored"] == reference["scored"]]
+    per_hold = np.array([model["leave_one_hold_out"]["per_hold"] for model in alike], float).T
+    names = [model["name"] for model in alike]
+    return dict(zip(names, stacking(per_hold), strict=True))
+
+
+def _order(row: ComparedModel) -> tuple[bool, bool, float]:
+    """The best first among those scored alike, failures last."""
+    failed = row["failed"] is not None
+    elpd = 0.0 if failed else row["leave_one_hold_out"]["elpd"]
+    return failed, row["weight"] is None, -elpd
 
 
 def _without_readings(held: HeldOutHolds | None) -> HeldOutHolds | None:
@@ -269,22 +287,23 @@ def _short(scores: PredictionScores | None) -> PredictionScores | None:
     return short
 
 
-def _differences(m: ModelJson, reference: ModelJson) -> Differences:
+def _differences(model: ModelJson, reference: ModelJson) -> Differences:
     out: Differences = {"difference": None, "held_out_difference": None, "given_first_difference": None}
-    if m["failed"] is not None or reference["failed"] is not None:
+    if model["failed"] is not None or reference["failed"] is not None:
         return out
-    if m["scored"] == reference["scored"]:
-        out["difference"] = _difference(m["leave_one_hold_out"], reference["leave_one_hold_out"])
-    one, other = m["held_out"], reference["held_out"]
+    if model["scored"] == reference["scored"]:
+        out["difference"] = _difference(model["leave_one_hold_out"], reference["leave_one_hold_out"])
+    one, other = model["held_out"], reference["held_out"]
     if one and other:
-        if one["free"] and other["free"]:
-            out["held_out_difference"] = _difference(one["free"], other["free"])
-        if one["given_first"] and other["given_first"]:
-            out["given_first_difference"] = _difference(one["given_first"], other["given_first"])
+        out["held_out_difference"] = _difference(one["free"], other["free"])
+        out["given_first_difference"] = _difference(one["given_first"], other["given_first"])
     return out
 
 
-def _difference(one: LeaveOneHoldOut | PredictionScores, other: LeaveOneHoldOut | PredictionScores) -> Difference:
+def _difference(one: _PerHold | None, other: _PerHold | None) -> Difference | None:
+    """By how much one is better than the other; None where either was not scored."""
+    if not one or not other:
+        return None
     gained = np.asarray(one["per_hold"], float) - np.asarray(other["per_hold"], float)
     return {"elpd": float(gained.sum()), "se": standard_error(gained)}
 
@@ -302,12 +321,13 @@ def _meaning(row: ComparedModel, base: str) -> str:
     gain = row["difference"]
     where = "leaving out each hold in turn"
     if gain is None:
-        gain, where = row["given_first_difference"], "on held-out holds given their first reading"
+        gain = row["given_first_difference"]
+        where = "on held-out holds given their first reading"
     if gain is None:
         return "scored on other readings, so not comparable here"
-    size = f"elpd {gain['elpd']:+.1f} ± {gain['se']:.1f} against {base}, {where}"
     if np.isnan(gain["se"]):
         return f"elpd {gain['elpd']:+.1f} against {base}, {where}: one hold alone, which says nothing of its error"
+    size = f"elpd {gain['elpd']:+.1f} ± {gain['se']:.1f} against {base}, {where}"
     if not row["converged"]:
         return f"{size}; its sampling did not converge, so this may be wrong"
     if not meaningful(gain["elpd"], gain["se"]):

@@ -24,7 +24,8 @@ def solve_symmetric(H: Floats, right: Floats) -> tuple[Floats, Bools]:
     d, n = right.shape
     # A row and what it has on the right; of the rows below, what is left once the rows above are taken out.
     left = np.concatenate([H, right[:, None]], 1)
-    floor = 1e-12 * np.abs(H[range(d), range(d)])  # a pivot lost to rounding counts as zero: free to move that way
+    diagonal = H[range(d), range(d)]
+    floor = 1e-12 * np.abs(diagonal)  # a pivot lost to rounding counts as zero: free to move that way
     positive = np.ones(n, bool)
     inverse = np.empty((d, n))
     for j in range(d):
@@ -34,7 +35,8 @@ def solve_symmetric(H: Floats, right: Floats) -> tuple[Floats, Bools]:
         inverse[j] = 1.0 / np.sqrt(np.where(good, pivot, 1.0))
         row = left[j, j + 1 :]
         row *= inverse[j]
-        left[j + 1 :, j + 1 :] -= row[:-1, None] * row
+        below = left[j + 1 :, j + 1 :]
+        below -= row[:-1, None] * row
     x = left[:, d]
     for j in reversed(range(d)):
         x[j] *= inverse[j]

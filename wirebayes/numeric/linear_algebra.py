@@ -59,17 +59,22 @@ def _computable(function: Callable[..., tuple[Array, ...]], matrices: Array, *ot
     """Which matrices of a stack a function takes, ``(...)``, by trying ever smaller parts of the stack."""
     stack = matrices.shape[:-2]
     flat = matrices.reshape(-1, *matrices.shape[-2:])
-    right = [np.broadcast_to(o, (*stack, *o.shape[-2:])).reshape(-1, *o.shape[-2:]) for o in others]
-    out = np.ones(len(flat), bool)
+    right = []
+    for other in others:
+        whole = np.broadcast_to(other, (*stack, *other.shape[-2:]))
+        right.append(whole.reshape(-1, *other.shape[-2:]))
+    computable = np.ones(len(flat), bool)
     parts = [(0, len(flat))]
     while parts:
         first, last = parts.pop()
+        part = slice(first, last)
         try:
-            function(flat[first:last], *(other[first:last] for other in right))
+            function(flat[part], *(other[part] for other in right))
         except np.linalg.LinAlgError:
             if last - first == 1:
-                out[first] = False
+                computable[first] = False
             else:
                 middle = (first + last) // 2
-                parts += [(first, middle), (middle, last)]
-    return out.reshape(stack)
+                parts.append((first, middle))
+                parts.append((middle, last))
+    return computable.reshape(stack)

@@ -36,26 +36,36 @@ def intervals(rows: Sequence[Mapping[str, Any]], title: str) -> Figure:
     names = column_values(rows, "parameter")
     for row in rows:
         y = len(names) - names.index(row["parameter"])
-        one = row["published"]
-        if row["likelihood"] == "hold":
-            before = [row["prior_q05"] / one, row["prior_q95"] / one]
-            axes.plot(before, [y, y], lw=13, color="#e0e3e6", solid_capstyle="butt", zorder=1)
-        shift = 0.14 if row["likelihood"] == "chain" else -0.14
-        colour = COLOURS[row["likelihood"]]
-        after = [row["q05"] / one, row["q95"] / one]
-        axes.plot(after, [y + shift] * 2, lw=3.2, color=colour, solid_capstyle="butt", zorder=3)
-        axes.plot([row["q50"] / one], [y + shift], "o", ms=5, color=colour, zorder=3)
+        _interval(axes, row, y)
     axes.axvline(1, color=INK, lw=1, zorder=2)
     axes.plot([], [], color=QUIET, lw=8, label="before the test (prior)")
     for likelihood in ("chain", "hold"):
         axes.plot([], [], color=COLOURS[likelihood], lw=3.2, label=WORDS[likelihood])
     axes.plot([], [], color=INK, lw=1, label="published")
     logarithmic(axes)
-    axes.set_yticks(range(len(names), 0, -1), [name.replace("*", "·") for name in names])
-    axes.tick_params(axis="y", length=0)
-    axes.set_ylim(0.4, len(names) + 0.6)
+    _name_rows(axes, [name.replace("*", "·") for name in names])
     legend_below(figure, axes)
     return figure
+
+
+def _interval(axes: Any, row: Mapping[str, Any], y: int) -> None:
+    """Median and interval of one parameter under one likelihood, and once for both the prior's."""
+    one = row["published"]
+    if row["likelihood"] == "hold":
+        before = [row["prior_q05"] / one, row["prior_q95"] / one]
+        axes.plot(before, [y, y], lw=13, color="#e0e3e6", solid_capstyle="butt", zorder=1)
+    shift = 0.14 if row["likelihood"] == "chain" else -0.14
+    colour = COLOURS[row["likelihood"]]
+    after = [row["q05"] / one, row["q95"] / one]
+    axes.plot(after, [y + shift] * 2, lw=3.2, color=colour, solid_capstyle="butt", zorder=3)
+    axes.plot([row["q50"] / one], [y + shift], "o", ms=5, color=colour, zorder=3)
+
+
+def _name_rows(axes: Any, names: Sequence[str]) -> None:
+    """Names beside the rows, from the top."""
+    axes.set_yticks(range(len(names), 0, -1), names)
+    axes.tick_params(axis="y", length=0)
+    axes.set_ylim(0.4, len(names) + 0.6)
 
 
 def last_hold(time_s: Array, drawn_N: Array, curve_N: Array, marks: tuple[Array, Array], title: str) -> Figure:
@@ -96,9 +106,10 @@ def drifts(rows: Sequence[Mapping[str, Any]], limit_mm: float, title: str) -> Fi
     shown = [row for row in rows if row["specimen_spread"] > 0]
     for row in shown:
         loaded = row["loaded_before_s"] > 0
-        y = len(names) - names.index(row["experiment"]) + (-0.14 if loaded else 0.14)
-        colour = CHAIN if loaded else HOLD
-        axes.plot([row["q05_drift_mm"], row["q95_drift_mm"]], [y, y], lw=3.2, color=colour, solid_capstyle="butt")
+        shift, colour = (-0.14, CHAIN) if loaded else (0.14, HOLD)
+        y = len(names) - names.index(row["experiment"]) + shift
+        ends = [row["q05_drift_mm"], row["q95_drift_mm"]]
+        axes.plot(ends, [y, y], lw=3.2, color=colour, solid_capstyle="butt")
         axes.plot([row["q50_drift_mm"]], [y], "o", ms=5, color=colour)
     axes.plot([], [], color=HOLD, lw=3.2, label="new wires")
     hours = sorted({row["loaded_before_s"] / 3600.0 for row in shown if row["loaded_before_s"] > 0})
@@ -106,9 +117,7 @@ def drifts(rows: Sequence[Mapping[str, Any]], limit_mm: float, title: str) -> Fi
         axes.plot([], [], color=CHAIN, lw=3.2, label=f"after {time_h:g} h under load")
     axes.axvline(limit_mm, color=INK, lw=1, ls="--", label=f"the paper: less than {limit_mm:g} mm")
     logarithmic(axes)
-    axes.set_yticks(range(len(names), 0, -1), names)
-    axes.tick_params(axis="y", length=0)
-    axes.set_ylim(0.4, len(names) + 0.6)
+    _name_rows(axes, names)
     legend_below(figure, axes)
     return figure
 
@@ -124,24 +133,36 @@ def prior_predictive(protocol: Protocol, drawn_N: Array, tension_N: Array, title
     figure = Figure(figsize=(4.7, 4.4), layout="constrained")
     above, below = figure.subplots(2, 1)
     figure.suptitle(title, fontsize=10.5, x=0.02, ha="left", color=INK)
-    seen = protocol.recorded
-    begin = np.maximum(drawn_N[seen, 0], 0.0)
-    _fan(above, protocol.setting[seen], begin)
-    above.plot(protocol.setting[seen], tension_N[seen, 0], "o", ms=4.5, color=CHAIN, label="measured")
-    above.set_yscale("symlog", linthresh=1.0)
-    above.set_ylim(bottom=0)
-    above.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    above.set(xlabel="displacement, mm", ylabel="first tension, N")
-    first = int(np.flatnonzero(seen)[0])
-    times, taut = protocol.time_s[first][protocol.mask[first]], drawn_N[first, 0] > _PULLS_N
-    _fan(below, times, 100 * drawn_N[first][protocol.mask[first]][:, taut] / drawn_N[first, 0, taut])
-    below.plot(times, 100 * tension_N[first][protocol.mask[first]] / tension_N[first, 0], "o", ms=4.5, color=CHAIN)
-    below.set(xlabel="time in the first hold, s", ylabel="tension left, %")
+    _first_tensions(above, protocol, drawn_N, tension_N)
+    first = int(np.flatnonzero(protocol.recorded)[0])
+    _tension_left(below, protocol, first, drawn_N[first], tension_N[first])
     for axes in (above, below):
         without_frame(axes)
         axes.tick_params(labelsize=9)
     legend_below(figure, above, 4)
     return figure
+
+
+def _first_tensions(axes: Any, protocol: Protocol, drawn_N: Array, tension_N: Array) -> None:
+    """Tension when each hold begins."""
+    seen = protocol.recorded
+    settings = protocol.setting[seen]
+    _fan(axes, settings, np.maximum(drawn_N[seen, 0], 0.0))
+    axes.plot(settings, tension_N[seen, 0], "o", ms=4.5, color=CHAIN, label="measured")
+    axes.set_yscale("symlog", linthresh=1.0)
+    axes.set_ylim(bottom=0)
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set(xlabel="displacement, mm", ylabel="first tension, N")
+
+
+def _tension_left(axes: Any, protocol: Protocol, hold: int, drawn_N: Array, tension_N: Array) -> None:
+    """How a hold goes on: draws (R, n) and readings (R,) as shares of the first."""
+    read = protocol.mask[hold]
+    times = protocol.time_s[hold][read]
+    taut = drawn_N[0] > _PULLS_N
+    _fan(axes, times, 100 * drawn_N[read][:, taut] / drawn_N[0, taut])
+    axes.plot(times, 100 * tension_N[read] / tension_N[0], "o", ms=4.5, color=CHAIN)
+    axes.set(xlabel="time in the first hold, s", ylabel="tension left, %")
 
 
 def _fan(axes: Any, x: Array, values: Array) -> None:

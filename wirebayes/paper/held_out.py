@@ -65,15 +65,19 @@ def forecast_held_out(stored: Stored, experiment: Experiment, rng: Generator) ->
     experiment : Experiment
         All holds.
     """
-    protocol, measured = experiment.protocol(), experiment.tension()
+    protocol = experiment.protocol()
+    measured = experiment.tension()
     trained = len(stored.sample.protocol.setting)
-    alone = stored.likelihood == "hold"
-    unused = protocol.recorded & (np.arange(len(protocol.setting)) >= trained)
-    request = PredictionRequest(protocol, 0 if alone else trained, unused, _first(measured, alone))
-    drawn = draw_predictive(stored.problem, some(stored.theta), stored.sample, request, rng)
+    unused = protocol.recorded.copy()
+    unused[:trained] = False
     wanted = protocol.mask & unused[:, None]
-    if alone:
+    if stored.likelihood == "hold":
+        request = PredictionRequest(protocol, 0, unused, measured[:, 0])
         wanted[:, 0] = False
+    else:
+        nothing = np.full(len(measured), np.nan)
+        request = PredictionRequest(protocol, trained, unused, nothing)
+    drawn = draw_predictive(stored.problem, some(stored.theta), stored.sample, request, rng)
     number = np.broadcast_to(protocol.number[:, None], wanted.shape)
     return Forecast(number[wanted], protocol.time_s[wanted], measured[wanted], drawn[wanted])
 
@@ -129,17 +133,12 @@ def some(theta: Array) -> Array:
     return rows
 
 
-def _first(measured: Array, given: bool) -> Array:
-    return measured[:, 0] if given else np.full(len(measured), np.nan)
-
-
 def _last_alone(experiment: Experiment, time_s: Array) -> tuple[Protocol, Array]:
     """The last hold as a test of its own, predicted at other times, and its first reading."""
     hold = experiment.recorded_holds[-1]
-    whole = experiment.protocol()
     times = np.concatenate([[0.0], time_s[time_s > 0]])[None]
     one = replace(
-        whole,
+        experiment.protocol(),
         setting=np.array([hold.setting]),
         time_s=times,
         mask=np.ones(times.shape, bool),

@@ -37,8 +37,11 @@ def identification_rows(
     list of dict
         Parameters, and the rms of what each predicts on the training holds, on the rest and on all, in N.
     """
-    wires = [(e, dict(published[e.name]), training_holds, seed) for e in experiments]
-    return [row for part in parallel_map(_wire, wires) for row in part]
+    wires = [(experiment, dict(published[experiment.name]), training_holds, seed) for experiment in experiments]
+    rows = []
+    for of_wire in parallel_map(_wire, wires):
+        rows += of_wire
+    return rows
 
 
 def _wire(task: tuple[Experiment, dict[str, float], int, int]) -> list[Row]:
@@ -55,13 +58,14 @@ def _wire(task: tuple[Experiment, dict[str, float], int, int]) -> list[Row]:
 
 def _row(experiment: Experiment, variant: ModelSpec, source: str, found: LeastSquaresFit, cut: int) -> Row:
     left = tension_residuals(experiment, at(found.parameters), variant)
+    parameters = {column: found.parameters.get(name) for name, column in _COLUMNS.items()}
     return {
         "experiment": experiment.name,
         "likelihood": variant.likelihood,
         "history": variant.history if variant.likelihood == "chain" else "",
         "elastic_law": variant.law,
         "parameters": source,
-        **{f"{name}_{_UNITS[name]}".rstrip("_"): found.parameters.get(name) for name in _UNITS},
+        **parameters,
         "rms_first_N": rms(left[:cut]),
         "rms_rest_N": rms(left[cut:]),
         "rms_all_N": rms(left),
@@ -69,4 +73,4 @@ def _row(experiment: Experiment, variant: ModelSpec, source: str, found: LeastSq
     }
 
 
-_UNITS = {"k1": "N", "B": "", "U": "", "k2": "", "N": "", "preload": "mm"}
+_COLUMNS = {"k1": "k1_N", "B": "B", "U": "U", "k2": "k2", "N": "N", "preload": "preload_mm"}

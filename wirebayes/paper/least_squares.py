@@ -77,8 +77,8 @@ def tension_residuals(experiment: Experiment, theta: Mapping[str, Array], varian
     """
     protocol, measured = experiment.protocol(), experiment.tension()[..., None]
     model = Model(variant.law, variant.history)
-    predicted = np.full((*measured.shape[:2], len(theta["k1"])), np.nan)
     if variant.likelihood == "hold":
+        predicted = np.full((*measured.shape[:2], len(theta["k1"])), np.nan)
         for j, course in enumerate(hold_courses(protocol, dict(theta), model, measured[:, 0])):
             if course is not None:
                 tension, _, valid = course
@@ -116,21 +116,24 @@ def identify(
     if not names:
         only = tension_residuals(experiment, at(known), variant)
         return LeastSquaresFit(known, rms(only))
-    prior = default_prior(experiment.length_mm, scales_of([experiment]), {})
     logarithmic = np.array([name != "preload" for name in names])
-    columns = [prior.names.index(name) for name in names]
-    wide = prior.rvs(_WIDE, rng)[:, columns]
-    low, high = (_logged(end, logarithmic) for end in (wide.min(axis=0), wide.max(axis=0)))
-    if "k1" in names:
-        low[names.index("k1")] = np.log(_LEAST_STIFFNESS * experiment.tension().max())
     search = _Search(experiment, variant, known, names, logarithmic)
-    draws = prior.rvs(_DRAWS, rng)[:, columns]
-    end, cost = _best_descent(search.misfit, _logged(draws, logarithmic), low, high)
-    found = {name: float(value[0]) for name, value in search.natural(end[None]).items()}
-    ordered = {name: found[name] for name in adjusted(variant)}
-    loose = np.maximum(0.01 * (high - low), cost * _per_unit_misfit(search.misfit, end))
-    edge = np.minimum(end - low, high - end) < loose
-    return LeastSquaresFit(ordered, cost, tuple(name for name, on in zip(names, edge, strict=True) if on))
+    prior = default_prior(experiment.length_mm, scales_of([experiment]), {})
+    columns = [prior.names.index(name) for name in names]
+    low, high = _bounds(search, prior.rvs(_WIDE, rng)[:, columns])
+    points = _logged(prior.rvs(_DRAWS, rng)[:, columns], logarithmic)
+    end, cost = _best_descent(search.misfit, points, low, high)
+    found = search.natural(end[None])
+    ordered = {name: float(found[name][0]) for name in adjusted(variant)}
+    error = cost * _per_unit_misfit(search.misfit, end)
+    return LeastSquaresFit(ordered, cost, _at_an_edge(names, end, low, high, error))
+
+
+def _at_an_edge(names: Sequence[str], end: Array, low: Array, high: Array, error: Array) -> tuple[str, ...]:
+    """The parameters with an edge of the search within their standard error, or next to them."""
+    loose = np.maximum(0.01 * (high - low), error)
+    distance = np.minimum(end - low, high - end)
+    return tuple(name for name, is_at_edge in zip(names, distance < loose, strict=True) if is_at_edge)
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,8 @@ class _Search:
 
     def natural(self, z: Array) -> dict[str, Array]:
         """(n, d) search coordinates as parameters, each (n,)."""
-        columns = np.where(self.logarithmic, np.exp(np.where(self.logarithmic, z, 0.0)), z).T
+        logarithms = np.where(self.logarithmic, z, 0.0)
+        columns = np.where(self.logarithmic, np.exp(logarithms), z).T
         rows = dict(zip(self.names, np.ascontiguousarray(columns), strict=True))
         return rows | {name: np.full(len(z), value) for name, value in self.known.items()}
 
@@ -153,7 +157,8 @@ class _Search:
         """(m, n) residuals of (n, d) points; a reading that cannot be predicted counts in full."""
         predicted = _predicted(self.experiment, self.variant)
         values = tension_residuals(self.experiment, self.natural(z), self.variant)[predicted]
-        return np.where(np.isfinite(values), values, self.experiment.tension()[predicted][:, None])
+        measured = self.experiment.tension()[predicted]
+        return np.where(np.isfinite(values), values, measured[:, None])
 
 
 def _predicted(experiment: Experiment, variant: ModelSpec) -> Bools:
@@ -168,9 +173,10 @@ def _best_descent(misfit: Function, points: Array, low: Array, high: Array) -> t
     """Where the best descent ends, of those from the best of many points, and its rms misfit."""
     with np.errstate(all="ignore"):
         starts = np.clip(points, low + 1e-9, high - 1e-9)
-        best = starts[np.argsort((misfit(starts) ** 2).sum(axis=0), kind="stable")[:_STARTS]]
+        squares = (misfit(starts) ** 2).sum(axis=0)
+        best = starts[np.argsort(squares, kind="stable")[:_STARTS]]
         ends = [_descend(misfit, start, low, high) for start in best]
-    costs = np.array([np.sqrt(np.mean(misfit(z[None]) ** 2)) for z in ends])
+    costs = np.array([np.sqrt(np.mean(misfit(end[None]) ** 2)) for end in ends])
     return ends[int(np.argmin(costs))], float(costs.min())
 
 
@@ -180,7 +186,18 @@ def leading(experiment: Experiment, holds: int) -> int:
 
 
 def _logged(values: Array, logarithmic: Bools) -> Array:
-    return np.where(logarithmic, np.log(np.where(logarithmic, values, 1.0)), values)
+    positive = np.where(logarithmic, values, 1.0)
+    return np.where(logarithmic, np.log(positive), values)
+
+
+def _bounds(search: _Search, wide: Array) -> tuple[Array, Array]:
+    """(d,) least and largest search coordinates: where many draws (n, d) of the prior end, and a thin line's k1."""
+    low = _logged(wide.min(axis=0), search.logarithmic)
+    high = _logged(wide.max(axis=0), search.logarithmic)
+    if "k1" in search.names:
+        largest_N = search.experiment.tension().max()
+        low[search.names.index("k1")] = np.log(_LEAST_STIFFNESS * largest_N)
+    return low, high
 
 
 def _jacobian(misfit: Function, z: Array) -> Array:
@@ -193,7 +210,8 @@ def _jacobian(misfit: Function, z: Array) -> Array:
 def _per_unit_misfit(misfit: Function, z: Array) -> Array:
     """(d,) standard errors at a point (d,) if residuals had a standard deviation of one."""
     _, singular, directions = np.linalg.svd(_jacobian(misfit, z), full_matrices=False)
-    return np.sqrt(((directions / np.maximum(singular, 1e-12)[:, None]) ** 2).sum(axis=0))
+    scaled = directions / np.maximum(singular, 1e-12)[:, None]
+    return np.sqrt((scaled**2).sum(axis=0))
 
 
 def _descend(misfit: Function, start: Array, low: Array, high: Array) -> Array:

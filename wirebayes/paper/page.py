@@ -28,19 +28,24 @@ _TERMS = ("hold", "90 % interval", "prior", "contraction", "held out", "rms", "d
 
 def paper_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """Assemble the page from the folder's tables and pictures; what is not there yet is left out."""
-    tables = {name: read_json(folder / f"{name}.json") for name in _TABLES if (folder / f"{name}.json").is_file()}
+    tables: Tables = {}
+    for name in _TABLES:
+        file = folder / f"{name}.json"
+        if file.is_file():
+            tables[name] = read_json(file)
     gallery = _gallery(folder / "figures")
     sections = [build(tables, gallery) for needed, build in _SECTIONS if all(name in tables for name in needed)]
     sections.append(Section("The robot in three dimensions", robot_view(folder / "figures")))
     sections.append(files_beside(folder, _FILES))
     sections.append(meaning(_TERMS))
-    return Page(
-        "Four wires that creep",
-        creep_of_each_wire(tables["creep"]) if tables.get("creep") else _ABOUT,
-        [section for section in sections if section.blocks],
-        f"Seed {configuration.get('seed')}. The tables beside this page (CSV and JSON) hold every number shown; each "
-        "fit has a folder with posterior.nc, which opens with ArviZ.",
+    lead = creep_of_each_wire(tables["creep"]) if tables.get("creep") else _ABOUT
+    filled = [section for section in sections if section.blocks]
+    seed = configuration.get("seed")
+    footer = (
+        f"Seed {seed}. The tables beside this page (CSV and JSON) hold every number shown; each "
+        "fit has a folder with posterior.nc, which opens with ArviZ."
     )
+    return Page("Four wires that creep", lead, filled, footer)
 
 
 def _gallery(folder: Path) -> Gallery:
@@ -48,8 +53,11 @@ def _gallery(folder: Path) -> Gallery:
     index = read_json(folder / "index.json") if (folder / "index.json").is_file() else []
 
     def pictures(section: str, small: bool = False) -> list[Block]:
-        entries = [entry for entry in index if entry["section"] == section and (folder / entry["file"]).is_file()]
-        found = [Picture(embedded(folder / entry["file"]), entry["alt"], entry["caption"]) for entry in entries]
+        found = []
+        for entry in index:
+            file = folder / entry["file"]
+            if entry["section"] == section and file.is_file():
+                found.append(Picture(embedded(file), entry["alt"], entry["caption"]))
         return [Pictures(found, small)] if found else []
 
     return pictures
@@ -76,46 +84,49 @@ def _measured(tables: Tables, gallery: Gallery) -> Section:
 
 def _table_4(tables: Tables, gallery: Gallery) -> Section:
     rows = tables["least_squares"]
-    blocks: list[Block] = [
-        Text(
-            "Least squares on the first five holds, the rest left for testing. Hold by hold, each hold's first "
-            "reading fixes the stretched length and the later ones are predicted. As one history (a chain), the "
-            "displacements and one unknown preload must explain everything; Table 4 lacks the preload, so it is "
-            "fitted for it."
-        ),
-        paper_tables.table_4(
-            rows,
-            "hold",
-            "",
-            "hooke",
-            "Hold by hold, law (1): the interpretation under which Table 4 reproduces the tables.",
-        ),
-    ]
-    loose = [unbroken(r) for r in of_table_4(rows, "refitted") if r["not_held_back"]]
-    if loose:
-        words = (
-            f"On {listed(loose)} the readings leave a ridge along which the refit may run to the edge of the search: "
-            "the values of the parameters in the last column mean nothing by themselves."
-        )
-        blocks.append(Text(words))
-    better = [
-        unbroken(p)
-        for p, r in zip(of_table_4(rows, "published"), of_table_4(rows, "refitted"), strict=True)
-        if p["rms_rest_N"] < r["rms_rest_N"] and p["rms_first_N"] > r["rms_first_N"]
-    ]
-    if better:
-        blocks.append(
-            Text(
-                f"On {listed(better)} Table 4 fits the first five holds worse and predicts the rest better than least "
-                "squares on the first five does. It is probably not the outcome of that fit alone."
-            )
-        )
-    caption = "One history, creep saturating towards B τᵁ, law (1)."
-    return Section(
-        "Table 4 reproduced",
-        [*blocks, paper_tables.table_4(rows, "chain", "saturating", "hooke", caption)],
-        folded=True,
+    words = Text(
+        "Least squares on the first five holds, the rest left for testing. Hold by hold, each hold's first "
+        "reading fixes the stretched length and the later ones are predicted. As one history (a chain), the "
+        "displacements and one unknown preload must explain everything; Table 4 lacks the preload, so it is "
+        "fitted for it."
     )
+    by_hold = "Hold by hold, law (1): the interpretation under which Table 4 reproduces the tables."
+    as_chain = "One history, creep saturating towards B τᵁ, law (1)."
+    blocks = [
+        words,
+        paper_tables.table_4(rows, "hold", "", "hooke", by_hold),
+        *_on_a_ridge(of_table_4(rows, "refitted")),
+        *_not_that_fit_alone(of_table_4(rows, "published"), of_table_4(rows, "refitted")),
+        paper_tables.table_4(rows, "chain", "saturating", "hooke", as_chain),
+    ]
+    return Section("Table 4 reproduced", blocks, folded=True)
+
+
+def _on_a_ridge(refitted: Rows) -> list[Block]:
+    """Which wires' refits may lie anywhere along a ridge."""
+    loose = [unbroken(row) for row in refitted if row["not_held_back"]]
+    if not loose:
+        return []
+    words = (
+        f"On {listed(loose)} the readings leave a ridge along which the refit may run to the edge of the search: "
+        "the values of the parameters in the last column mean nothing by themselves."
+    )
+    return [Text(words)]
+
+
+def _not_that_fit_alone(published: Rows, refitted: Rows) -> list[Block]:
+    """Where Table 4 predicts better what it was not fitted to, and worse what it was."""
+    better = []
+    for theirs, ours in zip(published, refitted, strict=True):
+        if theirs["rms_rest_N"] < ours["rms_rest_N"] and theirs["rms_first_N"] > ours["rms_first_N"]:
+            better.append(unbroken(theirs))
+    if not better:
+        return []
+    words = (
+        f"On {listed(better)} Table 4 fits the first five holds worse and predicts the rest better than least "
+        "squares on the first five does. It is probably not the outcome of that fit alone."
+    )
+    return [Text(words)]
 
 
 def _table_4_otherwise(tables: Tables, gallery: Gallery) -> Section:
@@ -171,10 +182,9 @@ def _cannot_know(tables: Tables, gallery: Gallery) -> Section:
 
 def _held_out(tables: Tables, gallery: Gallery) -> Section:
     rows = tables["held_out"]
-    chain, alone = (
-        [unbroken(r) for r in rows if r["likelihood"] == kind and r["coverage_90"] < LEAST_COVERAGE]
-        for kind in ("chain", "hold")
-    )
+    poor = [row for row in rows if row["coverage_90"] < LEAST_COVERAGE]
+    chain = [unbroken(row) for row in poor if row["likelihood"] == "chain"]
+    alone = [unbroken(row) for row in poor if row["likelihood"] == "hold"]
     blocks: list[Block] = []
     if chain:
         words = (
@@ -192,11 +202,8 @@ def _held_out(tables: Tables, gallery: Gallery) -> Section:
         "Predictions of the unused holds from the first five. A band counts as reliable when at least "
         f"{100 * LEAST_COVERAGE:.0f} % of the readings lie in it; 90 % should."
     )
-    return Section(
-        "Where the model fails",
-        [*blocks, *gallery("unused-chain"), paper_tables.forecast_table(rows, caption)],
-        folded=True,
-    )
+    table = paper_tables.forecast_table(rows, caption)
+    return Section("Where the model fails", [*blocks, *gallery("unused-chain"), table], folded=True)
 
 
 def _creep(tables: Tables, gallery: Gallery) -> Section:
@@ -219,22 +226,21 @@ def _robot(tables: Tables, gallery: Gallery) -> Section:
     )
     blocks: list[Block] = [words]
     if "robot_claim" in tables:
-        blocks += [Text(_claim(tables["robot_claim"])), paper_tables.robot_claim(tables["robot_claim"])]
+        claim = tables["robot_claim"]
+        blocks += [Text(_claim(claim)), paper_tables.robot_claim(claim)]
     blocks.append(paper_tables.drift_claim(tables["robot"]))
     if "robot_mass" in tables:
         blocks.append(paper_tables.robot_mass(tables["robot_mass"]))
-    return Section(
-        "What it means for a robot", [*blocks, *gallery("robot"), *gallery("robot-map", small=True)], folded=True
-    )
+    blocks += [*gallery("robot"), *gallery("robot-map", small=True)]
+    return Section("What it means for a robot", blocks, folded=True)
 
 
 def _claim(rows: Rows) -> str:
     """Where the paper's claim holds and what takes it away."""
     wires = column_values(rows, "experiment")
-    of = {(r["experiment"], r["step"]): r["q50_drift_mm"] for r in rows}
-    printed = [r for r in rows if r["step"] == "table_4_elongation"]
-    holds = sum(r["within_claim"] for r in printed)
-    factors = [of[w, "table_4_strain"] / of[w, "table_4_elongation"] for w in wires]
+    drift_mm = {(row["experiment"], row["step"]): row["q50_drift_mm"] for row in rows}
+    holds = sum(row["within_claim"] for row in rows if row["step"] == "table_4_elongation")
+    factors = [drift_mm[wire, "table_4_strain"] / drift_mm[wire, "table_4_elongation"] for wire in wires]
     return (
         f"With the paper's own parameters and its eq. (5) as printed, {holds} of {len(wires)} wires keep the platform "
         "within 0.3 mm at the home pose. Equation (5) gives every wire the elongation of the tested sample; if creep "

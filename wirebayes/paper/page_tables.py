@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from wirebayes.report.blocks import Table, number, span, unit_text
+from wirebayes.report.blocks import Table, number, span
+from wirebayes.report.cells import percent, with_unit
 
 Rows = list[dict[str, Any]]
 VERDICTS = {"inside": "good", "outside": "bad", "not determined": "open", "yes": "good", "no": "bad"}
@@ -58,12 +59,11 @@ def interval_table(rows: Rows, caption: str) -> Table:
     for likelihood in LIKELIHOOD.values():
         header += [f"{likelihood}: 90 % interval", "contraction", "verdict"]
     lines = []
-    for r, s in _pairs(rows, "parameter"):
-        unit = unit_text(r["unit"])
-        name = r["parameter"].replace("*", "·") + (f", {unit}" if unit else "")
-        line = [r["experiment"], name, number(r["published"], 4)]
-        for q in (r, s):
-            line += [span(q["q05"], q["q95"]), f"{100 * q['contraction']:.0f} %", q["verdict"]]
+    for chain, alone in _pairs(rows, "parameter"):
+        name = with_unit(chain["parameter"].replace("*", "·"), chain["unit"])
+        line = [chain["experiment"], name, number(chain["published"], 4)]
+        for row in (chain, alone):
+            line += [span(row["q05"], row["q95"]), percent(row["contraction"]), row["verdict"]]
         lines.append(line)
     return Table(header, lines, caption, VERDICTS)
 
@@ -119,20 +119,21 @@ CLAIM_STEPS = {
 def robot_claim(rows: Rows) -> Table:
     """The paper's claim taken apart, one thing changed a line."""
     wires = column_values(rows, "experiment")
-    found = {(r["experiment"], r["step"]): r for r in rows}
+    found = {(row["experiment"], row["step"]): row for row in rows}
     lines = []
     for step, words in CLAIM_STEPS.items():
-        cells = []
-        for wire in wires:
-            row = found[wire, step]
-            band = f" ({span(row['q05_drift_mm'], row['q95_drift_mm'], 2)})" if step.startswith("chain") else ""
-            cells.append(f"{row['q50_drift_mm']:.3g}{band}")
-        lines.append([words, *cells])
+        drifts = [_drift(found[wire, step], with_band=step.startswith("chain")) for wire in wires]
+        lines.append([words, *drifts])
     caption = (
         f"Drift within 60 s on new wires, mm: {rows[0]['robot']} at its home pose unless the workspace is named. Each "
         "line changes one thing and keeps it in the lines below. In brackets: 90 % of the draws (and poses)."
     )
     return Table(["what is assumed", *wires], lines, caption)
+
+
+def _drift(row: dict[str, Any], with_band: bool) -> str:
+    middle = f"{row['q50_drift_mm']:.3g}"
+    return f"{middle} ({span(row['q05_drift_mm'], row['q95_drift_mm'], 2)})" if with_band else middle
 
 
 def robot_mass(rows: Rows) -> Table:
@@ -154,17 +155,30 @@ def sampling(rows: Rows) -> Table:
     header += ["smallest ESS", "nested R-hat", "likelihood evaluations"]
     header += ["draws per evaluation", "per kept evaluation", "modes"]
     lines = []
-    for r in rows:
-        done = "yes" if r["converged"] else "no"
-        line = [r["experiment"], LIKELIHOOD[r["likelihood"]], r["trained_on"], done]
-        line += [f"{r['autocorrelation_steps']:.1f}", number(round(r["smallest_ess"]))]
-        line += [f"{r['largest_nested_r_hat']:.4f}", number(r["likelihood_evaluations"])]
-        line += [number(r[f"effective_draws_per_{kind}evaluation"], 2) for kind in ("", "kept_")]
-        lines.append([*line, str(r["modes_found"])])
+    for row in rows:
+        lines.append(
+            [
+                row["experiment"],
+                LIKELIHOOD[row["likelihood"]],
+                row["trained_on"],
+                "yes" if row["converged"] else "no",
+                f"{row['autocorrelation_steps']:.1f}",
+                number(round(row["smallest_ess"])),
+                f"{row['largest_nested_r_hat']:.4f}",
+                number(row["likelihood_evaluations"]),
+                number(row["effective_draws_per_evaluation"], 2),
+                number(row["effective_draws_per_kept_evaluation"], 2),
+                str(row["modes_found"]),
+            ]
+        )
     return Table(header, lines, words=VERDICTS)
 
 
 def _pairs(rows: Rows, key: str) -> list[tuple[dict[str, Any], dict[str, Any]]]:
     """Rows of the chain, each with its counterpart hold by hold."""
-    alone = {(r["experiment"], r[key]): r for r in rows if r["likelihood"] == "hold"}
-    return [(r, alone[r["experiment"], r[key]]) for r in rows if r["likelihood"] == "chain"]
+    alone = {(row["experiment"], row[key]): row for row in rows if row["likelihood"] == "hold"}
+    pairs = []
+    for row in rows:
+        if row["likelihood"] == "chain":
+            pairs.append((row, alone[row["experiment"], row[key]]))
+    return pairs

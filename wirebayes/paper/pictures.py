@@ -1,6 +1,7 @@
 """Draws the pictures of the paper reproduced, and keeps an index that says what each shows."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +115,9 @@ class Gallery:
         full : mapping of likelihood to Stored
             Posteriors of all holds, ``hold`` and ``chain``.
         """
-        draws = {kind: {k: some(v) for k, v in full[kind].draws.items()} for kind in ("hold", "chain")}
+        draws = {}
+        for kind in ("hold", "chain"):
+            draws[kind] = {name: some(values) for name, values in full[kind].draws.items()}
         self._stiffness_and_amount(e, published, draws, full["hold"].draws)
         self._amount_and_rate(e, published, draws, full["hold"].draws)
 
@@ -125,14 +128,18 @@ class Gallery:
         draws: Mapping[str, Mapping[str, Array]],
         by_hold: Mapping[str, Array],
     ) -> None:
-        mark = (published["k1"], published["B"])
-        k1, B = ({kind: d[name] for kind, d in draws.items()} for name in ("k1", "B"))
-        figure = figures.joint(k1, B, figures.axis_label("k1"), figures.axis_label("B"), e.name, mark)
+        stiffness = published["k1"]
+        mark = (stiffness, published["B"])
+        k1 = {kind: own["k1"] for kind, own in draws.items()}
+        amount = {kind: own["B"] for kind, own in draws.items()}
+        xlabel, ylabel = figures.axis_label("k1"), figures.axis_label("B")
+        figure = figures.joint(k1, amount, xlabel, ylabel, e.name, mark)
         low, high = np.quantile(by_hold["k1"], [0.05, 0.95])
         caption = f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B changes with it."
         jump = stiffest_step(e)
-        if abs(jump / published["k1"] - 1) < 0.02:
-            nearest = f"{number(published['k1'], 4)} N is within 2 % of the stiffest single step between two holds"
+        relative = jump / stiffness - 1
+        if abs(relative) < 0.02:
+            nearest = f"{number(stiffness, 4)} N is within 2 % of the stiffest single step between two holds"
             caption += f" The published {nearest}, {number(jump, 4)} N."
         alt = f"Posterior draws of k1 and B of {e.name}: a long ridge hold by hold, a small cloud as a chain."
         self.add("ridge", e.name, figure, alt, caption)
@@ -144,17 +151,22 @@ class Gallery:
         draws: Mapping[str, Mapping[str, Array]],
         by_hold: Mapping[str, Array],
     ) -> None:
-        k2 = {kind: d["k2"] for kind, d in draws.items()}
-        product = {kind: d["k1"] * d["B"] for kind, d in draws.items()}
+        rate = {kind: own["k2"] for kind, own in draws.items()}
+        amount = {kind: own["k1"] * own["B"] for kind, own in draws.items()}
         mark = (published["k2"], published["k1"] * published["B"])
-        figure = figures.joint(k2, product, figures.axis_label("k2"), "k1·B, N mm N⁻ᵁ", e.name, mark)
-        correlation = float(np.corrcoef(np.log(by_hold["k1"] * by_hold["B"]), np.log(by_hold["k2"]))[0, 1])
+        xlabel = figures.axis_label("k2")
+        figure = figures.joint(rate, amount, xlabel, "k1·B, N mm N⁻ᵁ", e.name, mark)
+        log_amount = np.log(by_hold["k1"] * by_hold["B"])
+        log_rate = np.log(by_hold["k2"])
+        correlations = np.corrcoef(log_amount, log_rate)
+        correlation = number(float(correlations[0, 1]), 3)
         time_s = e.recorded_holds[-1].duration_s
-        theirs = (np.asarray(published[name]) for name in ("k2", "N"))
-        share = 100 * float(creep_fraction(np.asarray(time_s), *theirs))
+        their_rate, their_shape = np.asarray(published["k2"]), np.asarray(published["N"])
+        fraction = creep_fraction(np.asarray(time_s), their_rate, their_shape)
+        share = f"{100 * float(fraction):.0f} %"
         caption = (
-            f"Correlation hold by hold {number(correlation, 3)} (of logarithms). By the paper's own numbers a hold of "
-            f"{time_s:g} s shows {share:.0f} % of the final creep."
+            f"Correlation hold by hold {correlation} (of logarithms). By the paper's own numbers a hold of "
+            f"{time_s:g} s shows {share} of the final creep."
         )
         alt = f"Posterior draws of k2 and k1 B of {e.name}: much slow creep looks like little fast creep."
         self.add("amount-and-rate", e.name, figure, alt, caption)
@@ -178,9 +190,10 @@ def _published_at(e: Experiment, published: Mapping[str, float], out: Forecast) 
 
 def stiffest_step(e: Experiment) -> float:
     """Largest tension gained in one step between two neighbouring holds, per unit strain, N."""
-    steps = [
-        (b.tension_N[0] - a.tension_N[-1]) * e.length_mm / (b.displacement_mm - a.displacement_mm)
-        for a, b in zip(e.holds, e.holds[1:], strict=False)
-        if a.recorded and b.recorded and b.displacement_mm != a.displacement_mm
-    ]
+    steps = []
+    for before, after in pairwise(e.holds):
+        moved_mm = after.displacement_mm - before.displacement_mm
+        if before.recorded and after.recorded and moved_mm != 0:
+            gained_N = after.tension_N[0] - before.tension_N[-1]
+            steps.append(gained_N * e.length_mm / moved_mm)
     return float(max(steps))

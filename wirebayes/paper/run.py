@@ -98,11 +98,12 @@ def fits(experiments: Sequence[Experiment], training: int) -> list[Job]:
     """Every wire under both likelihoods: trained on its first holds, and on all of them."""
     jobs = []
     for suffix, holds in ((f"-first-{training}", training), ("", None)):
-        for e in experiments:
-            shown = e if holds is None else e.train(holds)
+        for experiment in experiments:
+            shown = experiment if holds is None else experiment.train(holds)
+            hashes = {experiment.name: experiment.data_hash}
+            provenance = {"version": __version__, "data_sha256": hashes, "train_holds": holds}
             for likelihood in LIKELIHOODS:
-                provenance = {"version": __version__, "data_sha256": {e.name: e.data_hash}, "train_holds": holds}
-                folder = f"{e.name}/{likelihood}{suffix}"
+                folder = f"{experiment.name}/{likelihood}{suffix}"
                 jobs.append(Job(folder, (shown,), spec=ModelSpec(likelihood=likelihood), provenance=provenance))
     return jobs
 
@@ -117,41 +118,51 @@ def _tables_and_pictures(
 ) -> None:
     table_4 = published["table_4"]
     with workers(len(experiments)) as parallel_map:
-        write_table(
-            directory,
-            "least_squares",
-            identification.identification_rows(experiments, table_4, training, seed, parallel_map),
-        )
+        rows = identification.identification_rows(experiments, table_4, training, seed, parallel_map)
+    write_table(directory, "least_squares", rows)
     report("tables and pictures", 1, 3)
     drawn = pictures.Gallery(directory)
-    tables: dict[str, list[Row]] = {"posterior": [], "creep": [], "held_out": [], "sampling": []}
-    chains: dict[str, Stored] = {}
-    for e in experiments:
-        full, first = _stored(directory / e.name, training)
-        seen = {
-            likelihood: forecast_held_out(
-                stored, e, np.random.default_rng(seed_of(seed, "held out", e.name, likelihood))
-            )
-            for likelihood, stored in first.items()
-        }
-        own = _rows(directory, e, full, seen, table_4[e.name], training, seed)
-        for name, rows in own.items():
-            tables[name] += rows
-        chains[e.name] = full["chain"]
-        _draw(drawn, e, table_4[e.name], full, first, seen, own["posterior"], seed)
-    for name, rows in tables.items():
-        write_table(directory, name, rows)
-    write_table(directory, "measured", [_measured_row(e) for e in experiments])
+    chains = _of_wires(directory, experiments, table_4, training, seed, drawn)
+    write_table(directory, "measured", [_measured_row(experiment) for experiment in experiments])
     report("tables and pictures", 2, 3)
-    lengths = {e.name: e.length_mm for e in experiments}
+    lengths = {experiment.name: experiment.length_mm for experiment in experiments}
     lines = {name: section_4.as_line(chain) for name, chain in chains.items()}
     robot = section_4.drift_rows(chains, seed)
     write_table(directory, "robot", robot)
-    write_table(directory, "robot_claim", claim_steps.claim_step_rows(section_4.MAPPED, table_4, lengths, lines))
+    steps = claim_steps.claim_step_rows(section_4.MAPPED, table_4, lengths, lines)
+    write_table(directory, "robot_claim", steps)
     write_table(directory, "robot_mass", section_4.needed(chains))
     _draw_robot(drawn, robot, chains, published["pose_claim"]["centre_moves_less_than_mm"])
     drawn.finish()
     report("tables and pictures", 3, 3)
+
+
+def _of_wires(
+    directory: Path,
+    experiments: Sequence[Experiment],
+    table_4: Mapping[str, Any],
+    training: int,
+    seed: int,
+    drawn: pictures.Gallery,
+) -> dict[str, Stored]:
+    """Tables and pictures of the wires; the posterior of each as one history."""
+    tables: dict[str, list[Row]] = {"posterior": [], "creep": [], "held_out": [], "sampling": []}
+    chains: dict[str, Stored] = {}
+    for e in experiments:
+        full, first = _stored(directory / e.name, training)
+        seen = {}
+        for likelihood, stored in first.items():
+            rng = np.random.default_rng(seed_of(seed, "held out", e.name, likelihood))
+            seen[likelihood] = forecast_held_out(stored, e, rng)
+        published = table_4[e.name]
+        own = _rows(directory, e, full, seen, published, training, seed)
+        for name, rows in own.items():
+            tables[name] += rows
+        chains[e.name] = full["chain"]
+        _draw(drawn, e, published, full, first, seen, own["posterior"], seed)
+    for name, rows in tables.items():
+        write_table(directory, name, rows)
+    return chains
 
 
 def _draw_robot(drawn: pictures.Gallery, rows: list[Row], chains: Mapping[str, Stored], limit_mm: float) -> None:
@@ -162,8 +173,11 @@ def _draw_robot(drawn: pictures.Gallery, rows: list[Row], chains: Mapping[str, S
 
 def _stored(folder: Path, training: int) -> tuple[dict[str, Stored], dict[str, Stored]]:
     """An experiment's posteriors by likelihood: of all holds, and of the first ones."""
-    full: dict[str, Stored] = {likelihood: load_posterior(folder / likelihood) for likelihood in LIKELIHOODS}
-    return full, {likelihood: load_posterior(folder / f"{likelihood}-first-{training}") for likelihood in LIKELIHOODS}
+    full, first = dict[str, Stored](), dict[str, Stored]()
+    for likelihood in LIKELIHOODS:
+        full[likelihood] = load_posterior(folder / likelihood)
+        first[likelihood] = load_posterior(folder / f"{likelihood}-first-{training}")
+    return full, first
 
 
 def _rows(
@@ -210,22 +224,27 @@ def _draw(
 
 def _prior_draws(experiment: Experiment, likelihood: Likelihood, seed: int) -> dict[str, Array]:
     prior = build([experiment], (), ModelSpec(likelihood=likelihood)).prior
-    draws = prior.rvs(_PRIOR_DRAWS, np.random.default_rng(seed_of(seed, "prior", experiment.name, likelihood)))
-    return dict(zip(prior.names, draws.T, strict=True)) | {k: np.full(len(draws), v) for k, v in prior.fixed.items()}
+    rng = np.random.default_rng(seed_of(seed, "prior", experiment.name, likelihood))
+    draws = dict(zip(prior.names, prior.rvs(_PRIOR_DRAWS, rng).T, strict=True))
+    for name, value in prior.fixed.items():
+        draws[name] = np.full(_PRIOR_DRAWS, value)
+    return draws
 
 
 def _measured_row(e: Experiment) -> Row:
-    tension = np.concatenate([hold.tension_N for hold in e.recorded_holds])
+    recorded = e.recorded_holds
+    tension = np.concatenate([hold.tension_N for hold in recorded])
+    losses = [1 - hold.tension_N[-1] / hold.tension_N[0] for hold in recorded]
     return {
         "experiment": e.name,
         "material": e.material,
         "length_mm": e.length_mm,
-        "holds": len(e.recorded_holds),
-        "unrecorded_holds": len(e.holds) - len(e.recorded_holds),
+        "holds": len(recorded),
+        "unrecorded_holds": len(e.holds) - len(recorded),
         "readings": len(tension),
         "smallest_tension_N": tension.min(),
         "largest_tension_N": tension.max(),
-        "median_loss_percent": 100 * float(np.median([1 - h.tension_N[-1] / h.tension_N[0] for h in e.recorded_holds])),
+        "median_loss_percent": 100 * float(np.median(losses)),
     }
 
 
@@ -241,21 +260,29 @@ def _forecast_row(name: str, likelihood: str, seen: Forecast) -> Row:
 
 
 def _sampling_row(directory: Path, name: str, likelihood: str, suffix: str) -> Row:
-    summary = json.loads((directory / name / f"{likelihood}{suffix}" / "summary.json").read_text(encoding="utf-8"))
-    evaluations, ess = summary["likelihood_evaluations"], summary["smallest_ess"]
+    summary = _summary(directory / name / f"{likelihood}{suffix}")
+    evaluations, kept = summary["likelihood_evaluations"], summary["kept_evaluations"]
+    ess = summary["smallest_ess"]
+    trained_on = suffix.removeprefix("-").replace("-", " ")
     return {
         "experiment": name,
         "likelihood": likelihood,
-        "trained_on": suffix.removeprefix("-").replace("-", " ") or "all holds",
+        "trained_on": trained_on or "all holds",
         "converged": summary["converged"],
         "autocorrelation_steps": summary["autocorrelation_steps"],
         "smallest_ess": ess,
         "largest_nested_r_hat": summary["largest_nested_r_hat"],
         "likelihood_evaluations": evaluations,
         "effective_draws_per_evaluation": ess / evaluations,
-        "effective_draws_per_kept_evaluation": ess / summary["kept_evaluations"],
+        "effective_draws_per_kept_evaluation": ess / kept,
         "modes_found": summary["modes_found"],
     }
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    """The summary of a fit."""
+    content: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    return content
 
 
 def write_table(directory: Path, name: str, rows: Sequence[Row]) -> None:
@@ -276,7 +303,7 @@ def write_table(directory: Path, name: str, rows: Sequence[Row]) -> None:
 def _not_converged(directory: Path, jobs: Sequence[Job]) -> list[str]:
     lines = []
     for job in jobs:
-        summary = json.loads((directory / job.folder / "summary.json").read_text(encoding="utf-8"))
+        summary = _summary(directory / job.folder)
         if not summary["converged"]:
             lines.append(f"{job.folder}: {summary['convergence']}")
     return lines

@@ -11,6 +11,7 @@ import numpy as np
 
 from wirebayes.inference.fit import seed_of
 from wirebayes.io.run_folder import write_json
+from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
 from wirebayes.paper.figures import drifts
 from wirebayes.paper.pictures import Gallery
@@ -52,28 +53,38 @@ def drift_rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
                 rng = np.random.default_rng(seed_of(seed, "robot", wire, name, f"{spread} {loaded_s}"))
                 wires = draws.for_robot(robot, line, spread, rng)
                 found = claim.over_workspace(robot, wires, claim.grid(robot, _GRID), loaded_s=loaded_s)
-                row: Row = {"experiment": wire, "robot": name, "specimen_spread": spread, "loaded_before_s": loaded_s}
-                for key, values in (("drift_mm", 1e3 * found.distance_m), ("tilt_deg", np.degrees(found.tilt_rad))):
-                    quantiles = np.nanquantile(values, [0.05, 0.5, 0.95])
-                    row |= {f"{q}_{key}": v for q, v in zip(("q05", "q50", "q95"), quantiles, strict=True)}
-                out.append(row | {"probability": float(found.holds().mean()), "solved": found.found})
+                case: Row = {"experiment": wire, "robot": name, "specimen_spread": spread, "loaded_before_s": loaded_s}
+                out.append(case | _drift_row(found))
     return out
+
+
+def _drift_row(found: claim.WorkspaceDrift) -> Row:
+    """Quantiles of drift and tilt, and how probable it is that the claim holds."""
+    row: Row = {}
+    for key, values in (("drift_mm", 1e3 * found.distance_m), ("tilt_deg", np.degrees(found.tilt_rad))):
+        quantiles = np.nanquantile(values, [0.05, 0.5, 0.95])
+        for name, value in zip(("q05", "q50", "q95"), quantiles, strict=True):
+            row[f"{name}_{key}"] = value
+    return row | {"probability": float(found.holds().mean()), "solved": found.found}
 
 
 def needed(chains: Mapping[str, Stored]) -> list[Row]:
     """Largest platform mass for which the claim holds on new wires, for each wire and size of the robot."""
     robot = schema.read_robot_file(MAPPED)
-    return [
-        {
-            "experiment": wire,
-            "robot": MAPPED,
-            "size_factor": size,
-            "specimen_spread": 0.05,
-            "largest_mass_kg": claim.largest_mass(robot, as_line(stored, _FEW), size, steps=7),
-        }
-        for wire, stored in chains.items()
-        for size in _SIZES
-    ]
+    rows = []
+    for wire, stored in chains.items():
+        line = as_line(stored, _FEW)
+        for size in _SIZES:
+            rows.append(
+                {
+                    "experiment": wire,
+                    "robot": MAPPED,
+                    "size_factor": size,
+                    "specimen_spread": 0.05,
+                    "largest_mass_kg": claim.largest_mass(robot, line, size, steps=7),
+                }
+            )
+    return rows
 
 
 def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
@@ -82,13 +93,15 @@ def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
     for wire, stored in chains.items():
         wires = draws.for_robot(robot, as_line(stored, _FEW))
         found = claim.over_workspace(robot, wires, claim.grid(robot, _MAP))
-        maps = workspace_maps(found, wire)
-        low, high = (1e3 * f(np.nanmedian(found.distance_m, 1)) for f in (np.min, np.max))
-        caption = f"Median drift from {number(low, 2)} to {number(high, 2)} mm across the workspace."
-        for quantity, figure in maps.items():
+        median_m = np.nanmedian(found.distance_m, 1)
+        low, high = 1e3 * np.min(median_m), 1e3 * np.max(median_m)
+        captions = {
+            "drift": f"Median drift from {number(low, 2)} to {number(high, 2)} mm across the workspace.",
+            "tilt": f"The tilt of {MAPPED} on {wire}, same places.",
+        }
+        for quantity, figure in workspace_maps(found, wire).items():
             alt = f"Median {quantity} of {MAPPED} on new {wire} within a minute, over its workspace at three heights."
-            under = caption if quantity == "drift" else f"The tilt of {MAPPED} on {wire}, same places."
-            gallery.add("robot-map", f"{quantity}-{wire}", figure, alt, under)
+            gallery.add("robot-map", f"{quantity}-{wire}", figure, alt, captions[quantity])
 
 
 def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) -> None:
@@ -102,22 +115,24 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
         The paper's claim, drawn as a line.
     """
     robot = schema.read_robot_file(MAPPED)
-    x, R = robot.home_m, matrix(robot.home_rotation_rad)
+    home_m, rotation = robot.home_m, matrix(robot.home_rotation_rad)
     moved: dict[str, Floats] = {}
     budget: dict[str, dict[str, float]] = {}
     for wire, stored in chains.items():
         line = as_line(stored)
-        course = drift.from_command(robot, draws.for_robot(robot, line), x, R, _TIMES_S)
+        course = drift.from_command(robot, draws.for_robot(robot, line), home_m, rotation, _TIMES_S)
         if not moved:
-            write_json(gallery.folder / "scene.json", scene_points(robot, x, R, course))
-        distance = 1e3 * np.linalg.norm(course.position_m - x, axis=-1)
+            write_json(gallery.folder / "scene.json", scene_points(robot, home_m, rotation, course))
+        distance = 1e3 * np.linalg.norm(course.position_m - home_m, axis=-1)
         moved[wire] = np.where(course.found[:, None], distance, np.nan)
-        budget[wire] = variance_shares.shares({name: line.parameters[name] for name in draws.CORE}, distance[:, -1])
+        material = {name: line.parameters[name] for name in draws.CORE}
+        budget[wire] = variance_shares.shares(material, distance[:, -1])
+    figure = drifts_in_time(moved, _TIMES_S, limit_mm, f"Robot {MAPPED}: drift")
     alt = f"Distance of the platform of {MAPPED} from its pose while new wires of one line creep, for an hour."
     caption = "New wires, the actuators still. Band: 90 % of the posterior draws; beyond 120 s extrapolated."
-    gallery.add("robot", "drift", drifts_in_time(moved, _TIMES_S, limit_mm, f"Robot {MAPPED}: drift"), alt, caption)
-    alt = f"Shares of the parameters in the variance of the drift of {MAPPED} after an hour, for each wire."
+    gallery.add("robot", "drift", figure, alt, caption)
     figure = budgets(budget, f"Robot {MAPPED}: sources of uncertainty")
+    alt = f"Shares of the parameters in the variance of the drift of {MAPPED} after an hour, for each wire."
     gallery.add("robot", "budget", figure, alt, f"Of the drift after {_TIMES_S[-1]:g} s.")
 
 
@@ -141,7 +156,7 @@ def draw_gallery(gallery: Gallery, claims: Sequence[Row], limit_mm: float) -> No
 
 def as_line(stored: Stored, count: int = _DRAWS) -> WireDraws:
     """Posterior draws of a wire, some of them, as the robot takes them."""
-    pick = np.linspace(0, len(stored.theta) - 1, count).round().astype(int)
+    pick = evenly(len(stored.theta), count)
     model = stored.sample.model
     parameters = {name: stored.draws[name][pick] for name in draws.CORE}
     length = stored.sample.protocol.length_mm

@@ -58,9 +58,10 @@ def verdict_rows(
     """
     out = []
     for name in (*MATERIAL, PRODUCT):
-        after, before = (_quantity(name, values) for values in (draws, prior))
+        after, before = _quantity(name, draws), _quantity(name, prior)
         value = float(_quantity(name, published))
         low, middle, high = interval(after)
+        prior_low, _, prior_high = interval(before)
         shrunk = contraction(after, before)
         out.append(
             {
@@ -72,8 +73,8 @@ def verdict_rows(
                 "q05": low,
                 "q50": middle,
                 "q95": high,
-                "prior_q05": interval(before)[0],
-                "prior_q95": interval(before)[2],
+                "prior_q05": prior_low,
+                "prior_q95": prior_high,
                 "contraction": shrunk,
                 "verdict": verdict(value, low, high, shrunk),
             }
@@ -111,9 +112,10 @@ def creep_rows(
     """
     times = np.array(list(CREEP_TIMES_S.values()))
     table = {name: np.array([value]) for name, value in published.items()}
-    ours, theirs = (FreshSample(theta, Model(), length_mm).creep_mm(tension_N, times) for theta in (draws, table))
+    ours = FreshSample(draws, Model(), length_mm).creep_mm(tension_N, times)
+    (theirs,) = FreshSample(table, Model(), length_mm).creep_mm(tension_N, times).T
     out = []
-    for time_s, mine, published_mm in zip(times.tolist(), ours, theirs[:, 0], strict=True):
+    for time_s, mine, published_mm in zip(times.tolist(), ours, theirs, strict=True):
         low, middle, high = interval(mine)
         out.append(
             {

@@ -17,6 +17,7 @@ from wirebayes.model.sample import MATERIAL, SAMPLE
 from wirebayes.model.scales import NATURAL, TYPICAL_K1_N, planned_scales
 from wirebayes.model.spec import ModelSpec
 from wirebayes.notice import Notice
+from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
 
 
@@ -43,7 +44,8 @@ class GuessedWire:
 
     def at(self, length_mm: float) -> dict[str, Array]:
         """The draws for a sample of another length: creep is a strain of the whole wire."""
-        return self.draws | {"B": self.draws["B"] * (length_mm / self.length_mm)}
+        longer = length_mm / self.length_mm
+        return self.draws | {"B": self.draws["B"] * longer}
 
 
 def from_tables(
@@ -74,20 +76,31 @@ def from_tables(
     n : int
         Number of draws.
     """
+    stated = _stated(tables, lines, source)
+    length_mm = tests[0].length_mm
+    scales = planned_scales(tests, _middle(stated.get("k1", TYPICAL_K1_N)))
+    prior = default_prior(length_mm, scales, stated, tests[0].control)
+    values = dict(zip(prior.names, prior.rvs(n, rng).T, strict=True))
+    for name, value in prior.fixed.items():
+        values[name] = np.full(n, value)
+    draws = {name: values[name] for name in (*MATERIAL, *SAMPLE)}
+    given = ", ".join(tables) if tables else "nothing"
+    return GuessedWire(draws, length_mm, f"the plan's guess ({given} given, the rest as wide as the model's prior)")
+
+
+def _stated(tables: Mapping[str, Any], lines: Mapping[str, int], source: Path) -> dict[str, Any]:
+    """What a plan file says of parameters: numbers, or distributions."""
     stated = {}
     for name, value in tables.items():
-        table = value if isinstance(value, dict) else {"fixed": value}
         key = f"{source}, line {lines[name]}: guess.{name}"
+        table = value if isinstance(value, dict) else {"fixed": value}
         stated[name] = possible(key, name, from_table(key, table))
-    k1 = stated.get("k1", TYPICAL_K1_N)
-    scales = planned_scales(tests, k1 if isinstance(k1, float) else float(k1.median()))
-    length_mm = tests[0].length_mm
-    prior = default_prior(length_mm, scales, stated, tests[0].control)
-    drawn = dict(zip(prior.names, prior.rvs(n, rng).T, strict=True))
-    known = {name: np.full(n, value) for name, value in prior.fixed.items()}
-    out = {name: (drawn | known)[name] for name in (*MATERIAL, *SAMPLE)}
-    given = ", ".join(tables) if tables else "nothing"
-    return GuessedWire(out, length_mm, f"the plan's guess ({given} given, the rest as wide as the model's prior)")
+    return stated
+
+
+def _middle(value: Any) -> float:
+    """A number, or the median of a distribution."""
+    return value if isinstance(value, float) else float(value.median())
 
 
 def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n: int) -> GuessedWire:
@@ -104,9 +117,9 @@ def from_posterior(draws: Mapping[str, Array], length_mm: float, source: str, n:
     n : int
         How many draws; all of them where there are fewer.
     """
-    count = len(draws["k1"])
-    pick = np.linspace(0, count - 1, min(n, count)).round().astype(int)
-    return GuessedWire({name: draws[name][pick] for name in (*MATERIAL, *SAMPLE)}, length_mm, source)
+    pick = evenly(len(draws["k1"]), n)
+    kept = {name: draws[name][pick] for name in (*MATERIAL, *SAMPLE)}
+    return GuessedWire(kept, length_mm, source)
 
 
 def from_readings(experiment: Experiment, n: int, rng: Generator, spec: ModelSpec) -> GuessedWire:
@@ -118,7 +131,8 @@ def from_readings(experiment: Experiment, n: int, rng: Generator, spec: ModelSpe
         Number of draws.
     """
     block = fitted([experiment], (), spec, rng)
+    fitted_problem = block.target.problem
     theta = rough_draws(block.target, block.modes, rng, n)
-    problem = block.target.problem.in_units(NATURAL)
-    own = problem.parameters(block.target.problem.theta_in(NATURAL, theta), problem.samples[0])
-    return GuessedWire(dict(own), experiment.length_mm, f"a quick fit of {experiment.name}")
+    natural = fitted_problem.in_units(NATURAL)
+    parameters = natural.parameters(fitted_problem.theta_in(NATURAL, theta), natural.samples[0])
+    return GuessedWire(dict(parameters), experiment.length_mm, f"a quick fit of {experiment.name}")

@@ -19,7 +19,7 @@ from wirebayes.json_files.plan import EffectPower
 from wirebayes.model.build import build
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.planning.widths import Guess, central
-from wirebayes.wire.effect import Kinds
+from wirebayes.wire.effect import Effect, Kinds
 
 SIMULATIONS = 300  # an amplitude seen in 80 % of tests is then known to some 5 %
 
@@ -46,7 +46,8 @@ class Sensitivity:
         if one not in self.effects or other not in self.effects:
             return 0.0
         smaller = min(self.effects[one]["delta_prior"], self.effects[other]["delta_prior"])
-        return smaller * float(np.sqrt(max(0.0, 1.0 - self.cosines[one, other] ** 2)))
+        unexplained = 1.0 - self.cosines[one, other] ** 2
+        return smaller * float(np.sqrt(max(0.0, unexplained)))
 
 
 def sensitivity(
@@ -74,25 +75,34 @@ def sensitivity(
     """
     block = _fit_at(test, central(guess), spec)
     trials, candidates = screening.candidate_probes([block], kinds)
-    hidden = power.not_identifiable(block, list(kinds.values()), [c.name for c in candidates])
+    names = [candidate.name for candidate in candidates]
+    hidden = tuple(power.not_identifiable(block, list(kinds.values()), names))
     if not candidates:
-        return Sensitivity(hidden=tuple(hidden))
+        return Sensitivity(hidden=hidden)
     null = screening.replicated(block, trials, simulations, rng).scan
     level = screening.chance_level(candidates, [null])
     x = expand(block.target, block.z, trials)
     alike = power.similarity([x], trials, [float(x.ratio[0])])
     strength = np.median(null.norm, axis=0)
-    effects: dict[str, EffectPower] = {}
-    for name, (k, seen) in power.detectable(null, trials, candidates, level).items():
-        main = trials[k].effect.amplitudes[0]
-        effects[name] = {
-            "amplitude_80": None if seen is None else block.natural_amplitude(trials[k].effect, seen),
-            "unit": block.unit(trials[k].effect),
-            "delta_80": None if seen is None else seen * float(strength[k]),
-            "delta_prior": float(strength[k] * main.prior.std()),
-            "confused_with": [n for n in power.group_of([name], alike) if n != name],
-        }
-    return Sensitivity(effects, alike, tuple(hidden))
+    seen = power.detectable(null, trials, candidates, level)
+    effects = {}
+    for name, (trial, amplitude) in seen.items():
+        found = _power(block, trials[trial].effect, amplitude, float(strength[trial]))
+        found["confused_with"] = [other for other in power.group_of([name], alike) if other != name]
+        effects[name] = found
+    return Sensitivity(effects, alike, hidden)
+
+
+def _power(block: LaplaceFit, effect: Effect, seen: float | None, strength: float) -> EffectPower:
+    """What the smallest amplitude that is seen is worth, given standard deviations per unit of amplitude."""
+    prior = effect.amplitudes[0].prior
+    return {
+        "amplitude_80": None if seen is None else block.natural_amplitude(effect, seen),
+        "unit": block.unit(effect),
+        "delta_80": None if seen is None else seen * strength,
+        "delta_prior": float(strength * prior.std()),
+        "confused_with": [],
+    }
 
 
 def _fit_at(test: Experiment, centre: Mapping[str, float], spec: ModelSpec) -> LaplaceFit:
@@ -100,7 +110,8 @@ def _fit_at(test: Experiment, centre: Mapping[str, float], spec: ModelSpec) -> L
     natural = build([test], (), spec)
     target = LogPosterior(natural.in_units(natural.own_units))
     theta = np.array([[centre[name] for name in natural.names]])
-    z = target.coordinates.to_sampled(natural.theta_in(target.problem.units, theta))
-    d = z.shape[1]
-    there = Optimum(z, target(z), np.eye(d)[None], np.array([True]))
-    return LaplaceFit((test,), (), spec, target, there)
+    own_theta = natural.theta_in(target.problem.units, theta)
+    z = target.coordinates.to_sampled(own_theta)
+    covariance = np.eye(z.shape[1])[None]
+    best = Optimum(z, target(z), covariance, np.array([True]))
+    return LaplaceFit((test,), (), spec, target, best)

@@ -7,7 +7,6 @@ include the curvature of the posterior and the priors of a fit; a second mode fa
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.random import Generator
@@ -83,17 +82,20 @@ def at_centre(test: Experiment, guess: Guess, spec: ModelSpec) -> Experiment:
     """
     problem = build([test], (), spec)
     (sample,) = problem.samples
-    read = simulate(sample.protocol, {n: np.array([v]) for n, v in central(guess).items()}, sample.model)[..., 0]
-    holds = [
-        replace(hold, readings=frozen(row[mask].tolist())) if hold.recorded else hold
-        for hold, row, mask in zip(test.holds, read, sample.protocol.mask, strict=True)
-    ]
+    centre = {name: np.array([value]) for name, value in central(guess).items()}
+    read = simulate(sample.protocol, centre, sample.model)[..., 0]
+    holds = []
+    for hold, row, mask in zip(test.holds, read, sample.protocol.mask, strict=True):
+        if hold.recorded:
+            hold = replace(hold, readings=frozen(row[mask].tolist()))
+        holds.append(hold)
     return replace(test, holds=tuple(holds))
 
 
 def middle_tension(test: Experiment) -> float:
     """The middle one of the tensions with which the holds of a test begin, N."""
-    return float(np.median([np.ravel(hold.tension_N)[0] for hold in test.recorded_holds]))
+    first = [np.ravel(hold.tension_N)[0] for hold in test.recorded_holds]
+    return float(np.median(first))
 
 
 def expected_widths(
@@ -128,29 +130,45 @@ def expected_widths(
     """
     problem = build([test], (), spec)
     (sample,) = problem.samples
+    creep = _Creep(
+        tension_N=middle_tension(test) if tension_N is None else tension_N,
+        length_mm=test.length_mm if length_mm is None else length_mm,
+        longest_s=float(sample.protocol.duration_s.max()),
+    )
     target = LogPosterior(problem)
-    truth, y = _simulated(problem, np.column_stack([guess[name] for name in problem.names]), rng)
+    guessed = np.column_stack([guess[name] for name in problem.names])
+    truth, y = _simulated(problem, guessed, rng)
     found, good = _climbed(target, truth, y)
-    longest = float(sample.protocol.duration_s.max())
-    tension = middle_tension(test) if tension_N is None else tension_N
-    length = test.length_mm if length_mm is None else length_mm
-    quantities = partial(_quantities, problem, tension_N=tension, longest_s=longest, length_mm=length)
-    widths, volumes, draws = list[dict[str, Array]](), list[Array](), list[dict[str, Array]]()
+    widths = list[dict[str, Array]]()
+    volumes = list[Array]()
+    draws = list[dict[str, Array]]()
     for part in _posteriors(target, found, good, y, rng):
-        values = {name: v.reshape(part.weight.shape) for name, v in quantities(part.theta).items()}
-        widths.append({name: _row_widths(v, part.weight) for name, v in values.items()})
-        volumes.append(_log_volume(part.theta.reshape(*part.weight.shape, -1), part.weight, problem))
+        values = part.of_tests(_quantities(problem, part.theta, creep))
+        widths.append({name: _row_widths(rows, part.weight) for name, rows in values.items()})
+        volumes.append(_log_volume(part, problem))
         draws += _kept(part, values, kept_draws - len(draws), rng)
-    expected = _expected(widths, quantities(truth), test)
+    before = _quantities(problem, truth, creep)
+    expected = _expected(widths, before, test)
     bits = _bits(problem, np.concatenate(volumes))
-    return Expected(expected, tension, length, longest, bits, len(good), tuple(draws))
+    return Expected(expected, creep.tension_N, creep.length_mm, creep.longest_s, bits, len(good), tuple(draws))
+
+
+@dataclass(frozen=True)
+class _Creep:
+    """For which tension, length and longest hold creep is stated."""
+
+    tension_N: float
+    length_mm: float
+    longest_s: float
 
 
 def _simulated(problem: Problem, truth: Array, rng: Generator) -> tuple[Array, Array]:
     """Parameters with readings of a test that they give, without those that the prior or the model excludes."""
     (sample,) = problem.samples
     y = readings(problem, truth, sample, rng)
-    usable = np.isfinite(y[sample.protocol.mask]).all(axis=0) & np.isfinite(problem.prior.log_density()(truth))
+    computable = np.isfinite(y[sample.protocol.mask]).all(axis=0)
+    possible = np.isfinite(problem.prior.log_density()(truth))
+    usable = computable & possible
     return truth[usable], y[..., usable]
 
 
@@ -161,13 +179,17 @@ class _Posteriors:
     theta: Array
     weight: Array
 
+    def of_tests(self, quantities: Mapping[str, Array]) -> dict[str, Array]:
+        """Quantities of all draws, each (tests, draws)."""
+        return {name: values.reshape(self.weight.shape) for name, values in quantities.items()}
+
 
 def _kept(part: _Posteriors, values: dict[str, Array], count: int, rng: Generator) -> list[dict[str, Array]]:
     """Draws of the first so many tests, each as likely as its weight says."""
     out = []
-    for weight, row in list(zip(part.weight, _rows(values), strict=True))[:count]:
+    for test, weight in enumerate(part.weight[: max(count, 0)]):
         pick = rng.choice(len(weight), _KEPT, p=weight)
-        out.append({name: v[pick] for name, v in row.items()})
+        out.append({name: rows[test][pick] for name, rows in values.items()})
     return out
 
 
@@ -185,12 +207,8 @@ def _posteriors(target: LogPosterior, found: Optimum, good: Indices, y: Array, r
     covariance = found.covariance
     for begin in range(0, len(good), _ROWS):
         part = good[begin : begin + _ROWS]
-        yield _Posteriors(*_weighted(target, found.z[part], covariance[part], y[..., part], rng))
-
-
-def _rows(values: Mapping[str, Array]) -> list[dict[str, Array]]:
-    """The quantities (tests, draws) of each test."""
-    return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+        theta, weight = _weighted(target, found.z[part], covariance[part], y[..., part], rng)
+        yield _Posteriors(theta, weight)
 
 
 def _climbed(target: LogPosterior, truth: Array, y: Array) -> tuple[Optimum, Indices]:
@@ -199,7 +217,8 @@ def _climbed(target: LogPosterior, truth: Array, y: Array) -> tuple[Optimum, Ind
     start = target.coordinates.to_sampled(truth)
     found = climb(density, start, residuals, iterations=40, tolerance=1e-3)
     good = np.flatnonzero(np.isfinite(found.log_density))
-    good = good[np.isfinite(found.covariance[good]).all(axis=(1, 2))]
+    has_width = np.isfinite(found.covariance[good]).all(axis=(1, 2))
+    good = good[has_width]
     if not len(good):
         raise ValueError("no simulated test could be fitted")
     return found, good
@@ -209,7 +228,7 @@ def _bits(problem: Problem, log_volumes: Array) -> float:
     """Information in a test: how many times the volume of the parameters is halved (median over tests)."""
     prior = problem.prior.rvs(4000, np.random.default_rng(0))
     equal = np.full((1, len(prior)), 1.0 / len(prior))
-    known = _log_volume(prior[None], equal, problem)
+    known = _log_volume(_Posteriors(prior, equal), problem)
     return float((known[0] - np.median(log_volumes)) / np.log(2.0))
 
 
@@ -225,50 +244,70 @@ def _weighted(target: LogPosterior, z: Array, covariance: Array, y: Array, rng: 
         points, weight = _round(target, density, centre, _WIDER**2 * covariance, count, rng)
         centre = np.einsum("mk,mkd->md", weight, points)
         away = points - centre[:, None]
-        covariance = np.einsum("mk,mki,mkj->mij", weight, away, away) + _LEAST * covariance
+        spread = np.einsum("mk,mki,mkj->mij", weight, away, away)
+        covariance = spread + _LEAST * covariance
+    flat = points.reshape(-1, z.shape[1])
     with np.errstate(over="ignore"):
-        theta = target.coordinates.to_natural(points.reshape(-1, z.shape[1]))
+        theta = target.coordinates.to_natural(flat)
     # a draw without weight stands for the mode: infinity times nothing would be no number
     modes = np.repeat(target.coordinates.to_natural(z), _DRAWS[-1], axis=0)
-    return np.where(weight.reshape(-1, 1) > 0, theta, modes), weight
+    counts = weight.reshape(-1, 1) > 0
+    return np.where(counts, theta, modes), weight
 
 
 def _round(
     target: LogPosterior, density: Density, centre: Array, covariance: Array, k: int, rng: Generator
 ) -> tuple[Array, Array]:
     """(m, k, d) draws of Student t's, and their (m, k) weights in the posteriors."""
-    m, d = centre.shape
-    normal = rng.normal(size=(m, k, d))
-    stretch = np.sqrt(rng.chisquare(_DEGREES, size=(m, k)) / _DEGREES)
-    points = centre[:, None] + np.einsum("mij,mkj->mki", np.linalg.cholesky(covariance), normal) / stretch[..., None]
-    square = (normal**2).sum(axis=-1) / stretch**2
-    drawn = -0.5 * (_DEGREES + d) * np.log1p(square / _DEGREES)
-    flat, rows = points.reshape(-1, d), np.repeat(np.arange(m), k)
-    readings_in_all = sum(int(s.protocol.mask.size) for s in target.problem.samples)
-    pieces = max(1, len(flat) * readings_in_all // _NUMBERS)
+    points, log_drawn = _student_draws(centre, covariance, k, rng)
     with np.errstate(all="ignore"):
-        values = [
-            density(p, r) for p, r in zip(np.array_split(flat, pieces), np.array_split(rows, pieces), strict=True)
-        ]
-        log_weight = np.concatenate(values).reshape(m, k) - drawn
-        finite = np.isfinite(target.coordinates.to_natural(flat)).all(axis=1).reshape(m, k)
-    log_weight[~np.isfinite(log_weight) | ~finite] = -np.inf
+        log_density, possible = _at_draws(target, density, points)
+        log_weight = log_density - log_drawn
+    log_weight[~np.isfinite(log_weight) | ~possible] = -np.inf
     weight = np.exp(log_weight - log_weight.max(axis=1, keepdims=True))
     # truncated importance sampling: no draw may count for more than sqrt(k) average ones
-    weight = np.minimum(weight, weight.mean(axis=1, keepdims=True) * np.sqrt(k))
+    most = weight.mean(axis=1, keepdims=True) * np.sqrt(k)
+    weight = np.minimum(weight, most)
     return points, weight / weight.sum(axis=1, keepdims=True)
 
 
-def _quantities(
-    problem: Problem, theta: Array, tension_N: float, longest_s: float, length_mm: float
-) -> dict[str, Array]:
+def _student_draws(centre: Array, covariance: Array, k: int, rng: Generator) -> tuple[Array, Array]:
+    """(m, k, d) draws of Student t's, and their (m, k) log densities but for a constant."""
+    m, d = centre.shape
+    normal = rng.normal(size=(m, k, d))
+    stretch = np.sqrt(rng.chisquare(_DEGREES, size=(m, k)) / _DEGREES)
+    correlated = np.einsum("mij,mkj->mki", np.linalg.cholesky(covariance), normal)
+    points = centre[:, None] + correlated / stretch[..., None]
+    square = (normal**2).sum(axis=-1) / stretch**2
+    log_drawn = -0.5 * (_DEGREES + d) * np.log1p(square / _DEGREES)
+    return points, log_drawn
+
+
+def _at_draws(target: LogPosterior, density: Density, points: Array) -> tuple[Array, Array]:
+    """(m, k) log posterior densities of the draws of each test, and whether they are numbers in natural units."""
+    m, k, d = points.shape
+    flat = points.reshape(-1, d)
+    tests = np.repeat(np.arange(m), k)
+    numbers = len(flat) * sum(int(sample.protocol.mask.size) for sample in target.problem.samples)
+    pieces = max(1, numbers // _NUMBERS)
+    values = []
+    for some, their_tests in zip(np.array_split(flat, pieces), np.array_split(tests, pieces), strict=True):
+        values.append(density(some, their_tests))
+    finite = np.isfinite(target.coordinates.to_natural(flat)).all(axis=1)
+    return np.concatenate(values).reshape(m, k), finite.reshape(m, k)
+
+
+def _quantities(problem: Problem, theta: Array, creep: _Creep) -> dict[str, Array]:
     """Parameters and creep of (n, d) draws, each (n,)."""
     (sample,) = problem.samples
+    tested_mm = sample.protocol.length_mm
     own = problem.parameters(theta, sample)
-    wire = FreshSample({n: own[n] for n in MATERIAL}, sample.model, sample.protocol.length_mm)
-    creep = wire.creep_mm(tension_N, np.array([longest_s, HOUR_S])) * (length_mm / sample.protocol.length_mm)
+    material = {name: own[name] for name in MATERIAL}
+    wire = FreshSample(material, sample.model, tested_mm)
+    times = np.array([creep.longest_s, HOUR_S])
+    longest_hold, hour = wire.creep_mm(creep.tension_N, times) * (creep.length_mm / tested_mm)
     free = {name: theta[:, i] for i, name in enumerate(problem.names)}
-    return free | {"creep_longest_hold_mm": creep[0], "creep_1h_mm": creep[1]}
+    return free | {"creep_longest_hold_mm": longest_hold, "creep_1h_mm": hour}
 
 
 def _row_widths(values: Array, weight: Array) -> Array:
@@ -276,20 +315,29 @@ def _row_widths(values: Array, weight: Array) -> Array:
     mean = (values * weight).sum(axis=1, keepdims=True)
     sd = np.sqrt((weight * (values - mean) ** 2).sum(axis=1))
     order = np.argsort(values, axis=1)
-    ranked, share = np.take_along_axis(values, order, 1), np.cumsum(np.take_along_axis(weight, order, 1), axis=1)
-    low, high = (np.array([np.interp(q, s, v) for s, v in zip(share, ranked, strict=True)]) for q in (0.05, 0.95))
-    return np.column_stack([sd, high - low])
+    ranked = np.take_along_axis(values, order, axis=1)
+    share = np.cumsum(np.take_along_axis(weight, order, axis=1), axis=1)
+    lengths = []
+    for row_share, row in zip(share, ranked, strict=True):
+        low, high = np.interp([0.05, 0.95], row_share, row)
+        lengths.append(high - low)
+    return np.column_stack([sd, lengths])
 
 
-def _log_volume(theta: Array, weight: Array, problem: Problem) -> Array:
+def _log_volume(part: _Posteriors, problem: Problem) -> Array:
     """(m,) half the log determinant of the covariance of the material's parameters, positive ones as logarithms."""
     columns = [i for i, name in enumerate(problem.names) if name in MATERIAL]
-    x = theta[..., columns]
-    logs = [problem.names[i] in problem.prior.logarithmic for i in columns]
-    x = np.where(logs, np.log(np.where(logs, np.maximum(x, 1e-300), 1.0)), x)
-    away = x - np.einsum("mk,mkd->md", weight, x)[:, None]
+    positive = [problem.names[i] in problem.prior.logarithmic for i in columns]
+    weight = part.weight
+    x = part.theta.reshape(*weight.shape, -1)[..., columns]
+    logs = np.log(np.where(positive, np.maximum(x, 1e-300), 1.0))
+    x = np.where(positive, logs, x)
+    mean = np.einsum("mk,mkd->md", weight, x)
+    away = x - mean[:, None]
     covariance = np.einsum("mk,mki,mkj->mij", weight, away, away)
-    return np.asarray(0.5 * np.linalg.slogdet(covariance + 1e-24 * np.eye(len(columns)))[1])
+    regular = covariance + 1e-24 * np.eye(len(columns))
+    _, log_determinant = np.linalg.slogdet(regular)
+    return np.asarray(0.5 * log_determinant)
 
 
 def _unit(name: str, test: Experiment) -> str:

@@ -12,11 +12,13 @@ from scipy.special import logsumexp
 from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods, single_holds
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Array, Bools, Ints
 from wirebayes.prediction.leave_one_hold_out import evenly_thinned
 from wirebayes.prediction.predictive import PredictionRequest, draw_predictive, given_first
+from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import linearise
 
 LEVELS = (0.5, 0.9, 0.99)  # half, the usual nine in ten, and nearly all: intervals whose coverage is counted
@@ -64,10 +66,11 @@ class Scores:
 
     def coverage(self) -> dict[float, float]:
         """Share of readings inside each central interval."""
-        ends = dict(zip(QUANTILES, self.quantiles_N, strict=True))
+        end_at = dict(zip(QUANTILES, self.quantiles_N, strict=True))
         shares = {}
         for level in LEVELS:
-            low, high = (ends[round(0.5 + sign * level / 2, 4)] for sign in (-1, 1))
+            low = end_at[round(0.5 - level / 2, 4)]
+            high = end_at[round(0.5 + level / 2, 4)]
             inside = (low <= self.observed_N) & (self.observed_N <= high)
             shares[level] = float(inside.mean())
         return shares
@@ -107,46 +110,99 @@ def held_out(fitted: Posterior, experiment: Experiment, rng: np.random.Generator
     sample : int
         Which sample.
     """
-    problem, here = fitted.problem, fitted.problem.samples[sample]
-    whole, trained = experiment.protocol(), len(here.protocol.number)
-    theta = evenly_thinned(fitted.flat)
-    requested = whole.recorded.copy()
+    problem = fitted.problem
+    here = problem.samples[sample]
+    trained = len(here.protocol.number)
+    protocol = experiment.protocol()
+    requested = protocol.recorded.copy()
     requested[:trained] = False
     if not requested.any():
         raise ValueError(f"{experiment.name}: all {trained} holds were trained on")
-    tension = experiment.readings()
-    past = int(here.protocol.recorded.sum())
-    unseen = whole.mask & requested[:, None]
-    later = unseen.copy()
-    later[:, 0] = False
-
-    def predicted(given_N: Array) -> Array:
-        return draw_predictive(problem, theta, here, PredictionRequest(whole, trained, requested, given_N), rng)
-
-    def scored(drawn: Array, rows: Bools, elpd: Array, together: float = np.nan) -> Scores:
-        return _scores(drawn, rows, whole.number, whole.time_s, tension, elpd, together)
-
+    test = _HeldOutTest(fitted, sample, protocol, experiment.readings(), requested, trained)
     if problem.likelihood == "hold":
-        elpd = _hold_scores(fitted, experiment, sample, requested)
-        return HeldOutPrediction(experiment.name, past, None, scored(predicted(tension[:, 0]), later, elpd))
-    drawn = predicted(np.full(len(requested), np.nan))
-    elpd, elpd_given, together = _chain_scores(fitted, experiment, sample, requested)
-    free = scored(drawn, unseen, elpd, together)
+        free, given = None, _from_first_readings(test, rng)
+    else:
+        free, given = _along_the_chain(test, rng)
+    past = int(here.protocol.recorded.sum())
+    return HeldOutPrediction(experiment.name, past, free, given)
+
+
+@dataclass(frozen=True)
+class _HeldOutTest:
+    """A fit of the first holds of a test, and the whole of that test with the holds that are to be predicted."""
+
+    fitted: Posterior
+    sample: int
+    protocol: Protocol
+    tension: Array
+    requested: Bools
+    trained: int
+
+    @property
+    def here(self) -> Sample:
+        """What was trained on."""
+        return self.fitted.problem.samples[self.sample]
+
+    @property
+    def theta(self) -> Array:
+        """Draws of the fit, not too many."""
+        return evenly_thinned(self.fitted.flat)
+
+    @property
+    def unseen(self) -> Bools:
+        """All readings that are to be predicted."""
+        return self.protocol.mask & self.requested[:, None]
+
+    @property
+    def later(self) -> Bools:
+        """Those of them that are not the first of their hold."""
+        later = self.unseen
+        later[:, 0] = False
+        return later
+
+    def request(self, holds: Bools, first: Array) -> PredictionRequest:
+        """Some holds after what was trained on, with their first readings or NaN."""
+        return PredictionRequest(self.protocol, self.trained, holds, first)
+
+    def predicted(self, first: Array, rng: np.random.Generator) -> Array:
+        """Draws (H, R, n) of what is requested, given first readings or NaN."""
+        return draw_predictive(self.fitted.problem, self.theta, self.here, self.request(self.requested, first), rng)
+
+    def scores(self, drawn: Array, rows: Bools, elpd: Array, together: float = np.nan) -> Scores:
+        """How draws (H, R, n) meet what was read."""
+        return _scores(drawn, rows, self.protocol.number, self.protocol.time_s, self.tension, elpd, together)
+
+
+def _from_first_readings(test: _HeldOutTest, rng: np.random.Generator) -> Scores:
+    """Each hold by itself, given its first reading."""
+    drawn = test.predicted(test.tension[:, 0], rng)
+    return test.scores(drawn, test.later, _hold_scores(test))
+
+
+def _along_the_chain(test: _HeldOutTest, rng: np.random.Generator) -> tuple[Scores, Scores]:
+    """The holds predicted from the training alone, and each given its first reading."""
+    nothing = np.full(len(test.requested), np.nan)
+    drawn = test.predicted(nothing, rng)
+    elpd, elpd_given, together = _chain_scores(test)
+    free = test.scores(drawn, test.unseen, elpd, together)
     # Each hold given its own first reading alone, as the paper's figures were made.
-    for j in np.flatnonzero(requested):
-        only = np.arange(len(requested)) == j
-        request = PredictionRequest(whole, trained, only, np.where(only, tension[:, 0], np.nan))
-        drawn = given_first(drawn, request)
-    return HeldOutPrediction(experiment.name, past, free, scored(drawn, later, elpd_given))
+    positions = np.arange(len(test.requested))
+    for hold in np.flatnonzero(test.requested):
+        only = positions == hold
+        first = np.where(only, test.tension[:, 0], np.nan)
+        drawn = given_first(drawn, test.request(only, first))
+    return free, test.scores(drawn, test.later, elpd_given)
 
 
 def _scores(
     drawn: Array, rows: Bools, number: Array, time_s: Array, tension: Array, elpd: Array, together: float
 ) -> Scores:
-    draws, observed = drawn[rows], tension[rows]
+    draws = drawn[rows]
+    observed = tension[rows]
+    number_of_each = np.broadcast_to(number[:, None], rows.shape)
     band, p = pit_band(draws, observed)
     return Scores(
-        hold=np.broadcast_to(number[:, None], rows.shape)[rows],
+        hold=number_of_each[rows],
         time_s=time_s[rows],
         observed_N=observed,
         mean_N=draws.mean(axis=1),
@@ -177,57 +233,81 @@ def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[
     """
     rows, n = draws.shape
     levels = np.linspace(0.0, 1.0, 101)
-    pit = (np.argsort(np.argsort(draws, axis=1), axis=1) + 0.5) / n
-    own = ((draws < observed[:, None]).mean(axis=1)[:, None] <= levels).sum(axis=0)
-    # how many readings lie below each level; how many draws have so many, or fewer
+    ranks = np.argsort(np.argsort(draws, axis=1), axis=1)
+    pit = (ranks + 0.5) / n
+    observed_pit = (draws < observed[:, None]).mean(axis=1)
+    # how many readings lie below each level, in each draw and in what was observed
     counts = np.stack([(pit <= level).sum(axis=0) for level in levels])
-    draws_with = np.stack([np.bincount(c, minlength=rows + 1) for c in counts])
+    own = (observed_pit[:, None] <= levels).sum(axis=0)
+    extreme = _most_extreme(counts, own, rows)
+    of_draws, of_observed = extreme[:-1], extreme[-1]
+    pointwise = np.quantile(of_draws, 1.0 - probability)
+    half = pointwise / 2.0
+    shares = [min(half, 0.5), max(1.0 - half, 0.5)]
+    ends = np.quantile(counts / rows, shares, axis=1)
+    band = np.vstack([levels, ends])
+    p = np.mean(of_draws <= of_observed)
+    return band, float(p)
+
+
+def _most_extreme(counts: Array, own: Array, rows: int) -> Array:
+    """(n + 1,) the level at which each course is extreme, pointwise on two sides; its minimum over all levels.
+
+    Parameters
+    ----------
+    counts : (levels, n) array
+        Of the draws: how many of the `rows` readings lie below each level.
+    own : (levels,) array
+        Of the observed readings, which come last.
+    """
+    n = counts.shape[1]
+    draws_with = np.stack([np.bincount(count, minlength=rows + 1) for count in counts])
     with_at_most = np.cumsum(draws_with, axis=1)
-    # the level at which a course is extreme, in the pointwise two-sided sense; its minimum over all levels
     everything = np.column_stack([counts, own])
     below = np.take_along_axis(with_at_most, everything, axis=1)
-    above = n - below + np.take_along_axis(draws_with, everything, axis=1)
-    extreme = 2.0 * np.minimum(below, above).min(axis=0) / n
-    pointwise = np.quantile(extreme[:-1], 1.0 - probability)
-    ends = np.quantile(counts / rows, [min(pointwise / 2.0, 0.5), max(1.0 - pointwise / 2.0, 0.5)], axis=1)
-    return np.vstack([levels, ends]), float(np.mean(extreme[:-1] <= extreme[-1]))
+    as_many = np.take_along_axis(draws_with, everything, axis=1)
+    above = n - below + as_many
+    return np.asarray(2.0 * np.minimum(below, above).min(axis=0) / n)
 
 
-def _chain_scores(
-    fitted: Posterior, experiment: Experiment, sample: int, requested: Bools
-) -> tuple[Array, Array, float]:
+def _chain_scores(test: _HeldOutTest) -> tuple[Array, Array, float]:
     """log p(readings | training) and log p(later readings | first, training) of each held-out hold; all together."""
-    here = fitted.problem.samples[sample]
-    protocol, read = experiment.protocol(), experiment.readings()[..., None]
-    later = protocol.mask & requested[:, None]
-    firsts = later & (np.arange(protocol.mask.shape[1]) == 0)
-    whole: list[Array] = []
-    first: list[Array] = []
-    together: list[Array] = []
-    theta = evenly_thinned(fitted.flat)
-    for start in range(0, len(theta), _CHUNK):
-        own = fitted.problem.parameters(theta[start : start + _CHUNK], here)
-        line = linearise(protocol, own, here.model)
-        noise = here.variance(own), own["setting_sd"]
-        with np.errstate(all="ignore"):
-            before = likelihoods.chain(line, read, protocol.mask & ~requested[:, None], *noise)
-            whole.append(likelihoods.held_out_density(line, before, read, later, *noise))
-            first.append(likelihoods.held_out_density(line, before, read, firsts, *noise))
-            every = likelihoods.chain(line, read, protocol.mask, *noise)
-        together.append(every.log_likelihood[requested].sum(axis=0))
-    whole_hold, first_reading = _log_mean(np.concatenate(whole, axis=-1)), _log_mean(np.concatenate(first, axis=-1))
-    return whole_hold, whole_hold - first_reading, float(_log_mean(np.concatenate(together, axis=-1)))
+    theta = test.theta
+    parts = [_chain_densities(test, theta[start : start + _CHUNK]) for start in range(0, len(theta), _CHUNK)]
+    whole, first, together = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+    whole_hold = _log_mean(whole)
+    later_readings = whole_hold - _log_mean(first)
+    return whole_hold, later_readings, float(_log_mean(together))
 
 
-def _hold_scores(fitted: Posterior, experiment: Experiment, sample: int, requested: Bools) -> Array:
-    problem, here = fitted.problem, fitted.problem.samples[sample]
-    own = problem.parameters(evenly_thinned(fitted.flat), here)
+def _chain_densities(test: _HeldOutTest, theta: Array) -> tuple[Array, Array, Array]:
+    """Log densities (holds, n) of whole holds and of their first readings, and (n,) of all together, at draws."""
+    protocol = test.protocol
+    read = test.tension[..., None]
+    later = test.unseen
+    firsts = later.copy()
+    firsts[:, 1:] = False
+    trained_on = protocol.mask & ~test.requested[:, None]
+    own = test.fitted.problem.parameters(theta, test.here)
+    line = linearise(protocol, own, test.here.model)
+    noise = test.here.variance(own), own["setting_sd"]
+    with np.errstate(all="ignore"):
+        before = likelihoods.chain(line, read, trained_on, *noise)
+        whole = likelihoods.held_out_density(line, before, read, later, *noise)
+        first = likelihoods.held_out_density(line, before, read, firsts, *noise)
+        every = likelihoods.chain(line, read, protocol.mask, *noise)
+    together = every.log_likelihood[test.requested].sum(axis=0)
+    return whole, first, together
+
+
+def _hold_scores(test: _HeldOutTest) -> Array:
+    """log p(later readings | first) of each held-out hold."""
+    own = test.fitted.problem.parameters(test.theta, test.here)
     own = own | {"preload": 0.0 * own["B"]}
-    variance = here.variance(own)
-    log_p = single_holds.hold_by_hold(
-        experiment.protocol(), own, here.model, experiment.readings()[..., None], variance
-    )
-    return _log_mean(log_p[requested])
+    variance = test.here.variance(own)
+    read = test.tension[..., None]
+    log_p = single_holds.hold_by_hold(test.protocol, own, test.here.model, read, variance)
+    return _log_mean(log_p[test.requested])
 
 
 def _log_mean(log_p: Array) -> Array:

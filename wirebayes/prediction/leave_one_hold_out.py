@@ -20,6 +20,7 @@ from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.model.problem import Problem
+from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.prediction.left_out_density import log_densities, without_hold
 from wirebayes.progress import ShareDone
@@ -99,55 +100,90 @@ def smoothed_leave_one_hold_out(
     """
     problem = fitted.problem
     theta = evenly_thinned(fitted.flat)
-    conditional = problem.leave_one_hold_out(theta)
-    where = _recorded(problem)
-    elpd, k = _smoothed([conditional[s][j] for s, j in where])
+    holds = _recorded(problem)
+    conditional = _of_holds(problem, theta, holds)
+    elpd, k = _smoothed(conditional)
     # smoothing can fail where draws repeat, with a k that looks well
-    refitted, converged = np.full(len(where), exact) | ~(k <= LARGEST_K) | ~np.isfinite(elpd), True
+    untrusted = ~(k <= LARGEST_K) | ~np.isfinite(elpd)
+    refitted = np.full(len(holds), exact) | untrusted
     alone = refitted.copy()
     if refitted.any() and not exact:
-        found, settled = log_densities(problem, where, theta, seed_of(seed, "left out"), refitted)
+        own_seed = seed_of(seed, "left out")
+        found, settled = log_densities(problem, holds, theta, own_seed, refitted)
         elpd = np.where(settled | refitted, found, elpd)
-        alone, refitted = refitted & ~settled, refitted | settled
+        alone = refitted & ~settled
+        refitted = refitted | settled
+    converged = True
     for done, i in enumerate(np.flatnonzero(alone).tolist()):
         progress(done / alone.sum())
-        s, j = where[i]
-        own = seed_of(seed, "without", str(s), str(j))
-        without = fit_problem(without_hold(problem, s, j), own, policy=policy, rough=theta)
-        there = problem.leave_one_hold_out(evenly_thinned(without.flat))[s][j]
-        bridge, shared = log_mean(there, conditional[s][j])
+        refit = _refitted(problem, holds[i], theta, seed, policy)
+        bridge, shared = log_mean(refit.conditional, conditional[i])
         if exact or shared >= _SHARED:  # else what importance sampling says, settled or not, is nearer
             elpd[i] = bridge
-        converged &= without.converged and shared >= _SHARED
+        converged &= refit.converged and shared >= _SHARED
     progress(1.0)
-    return LeftOutHolds(*_holds_named(problem, where), elpd, k, refitted, converged)
+    samples, numbers = _holds_named(problem, holds)
+    return LeftOutHolds(samples, numbers, elpd, k, refitted, converged)
+
+
+@dataclass(frozen=True)
+class _Refit:
+    """A fit without a hold: log densities of the hold's readings at its draws, and whether it converged."""
+
+    conditional: Floats
+    converged: bool
+
+
+def _refitted(problem: Problem, hold: tuple[int, int], rough: Floats, seed: int, policy: Policy) -> _Refit:
+    """A fit of the problem without a hold, given as sample and position."""
+    sample, position = hold
+    own_seed = seed_of(seed, "without", str(sample), str(position))
+    fit = fit_problem(without_hold(problem, sample, position), own_seed, policy=policy, rough=rough)
+    (conditional,) = _of_holds(problem, evenly_thinned(fit.flat), [hold])
+    return _Refit(conditional, fit.converged)
+
+
+def _of_holds(problem: Problem, theta: Floats, holds: Sequence[tuple[int, int]]) -> list[Floats]:
+    """Log densities (n,) of the readings of holds, given as sample and position, given all others."""
+    conditional = problem.leave_one_hold_out(theta)
+    return [conditional[sample][position] for sample, position in holds]
 
 
 def _recorded(problem: Problem) -> list[tuple[int, int]]:
     """Sample and position of every recorded hold."""
-    return [(s, int(j)) for s, sample in enumerate(problem.samples) for j in np.flatnonzero(sample.protocol.recorded)]
+    holds = []
+    for s, sample in enumerate(problem.samples):
+        holds += [(s, int(position)) for position in np.flatnonzero(sample.protocol.recorded)]
+    return holds
 
 
 def _smoothed(conditional: Sequence[Floats]) -> tuple[Floats, Floats]:
     """Log density of each hold given the others, from densities at draws that saw it, and the tail index of weights."""
-    elpd, k = np.zeros(len(conditional)), np.zeros(len(conditional))
+    elpd = np.zeros(len(conditional))
+    k = np.zeros(len(conditional))
     for i, log_p in enumerate(conditional):
-        # A lone first reading is given hold by hold: nothing is left to predict, and no parameter matters.
-        log_weight, k[i] = (0.0 * log_p, 0.0) if np.ptp(log_p) == 0.0 else pareto_smoothed(-log_p)
+        if np.ptp(log_p) == 0.0:
+            # A lone first reading is given hold by hold: nothing is left to predict, and no parameter matters.
+            log_weight = 0.0 * log_p
+        else:
+            log_weight, k[i] = pareto_smoothed(-log_p)
         elpd[i] = logsumexp(log_weight + log_p) - logsumexp(log_weight)
     return elpd, k
 
 
 def _holds_named(problem: Problem, where: Sequence[tuple[int, int]]) -> tuple[tuple[str, ...], Ints]:
     """Sample and number of each hold."""
-    names = tuple(problem.samples[s].name for s, _ in where)
-    return names, np.array([problem.samples[s].protocol.number[j] for s, j in where])
+    names, numbers = [], []
+    for s, position in where:
+        sample = problem.samples[s]
+        names.append(sample.name)
+        numbers.append(sample.protocol.number[position])
+    return tuple(names), np.array(numbers)
 
 
 def evenly_thinned(theta: Floats, draws: int = _DRAWS) -> Floats:
     """At most so many rows, evenly spread."""
-    rows = np.linspace(0, len(theta) - 1, min(draws, len(theta))).round().astype(int)
-    kept: Floats = theta[rows]
+    kept: Floats = theta[evenly(len(theta), draws)]
     return kept
 
 
@@ -176,17 +212,23 @@ def log_mean(log_p: Floats, log_p_weighted: Floats) -> tuple[float, float]:
     C. H. Bennett, Efficient estimation of free energy differences from Monte Carlo data, J. Comput. Phys. 22 (1976);
     X.-L. Meng and W. H. Wong, Statistica Sinica 6 (1996).
     """
-    one, other = log_p[np.isfinite(log_p)], log_p_weighted
+    one = log_p[np.isfinite(log_p)]
+    other = log_p_weighted
 
     def unbalanced(middle: float) -> float:
         return float(expit(one - middle).sum() - expit(middle - other).sum())
 
-    low, high = min(one.min(), other.min()), max(one.max(), other.max())
+    low = min(one.min(), other.min())
+    high = max(one.max(), other.max())
     span = high - low + np.log(len(log_p) + len(other)) + 1.0
     middle = brentq(unbalanced, low - span, high + span, maxiter=1000)
-    return float(middle + np.log(len(other) / len(log_p))), float(expit(one - middle).sum())
+    bridge = float(middle + np.log(len(other) / len(log_p)))
+    shared = float(expit(one - middle).sum())
+    return bridge, shared
 
 
 def standard_error(values: Floats) -> float:
     """Of the sum of (holds,) values, from their spread; NaN of a single one."""
-    return float(np.sqrt(len(values) * values.var(ddof=1))) if len(values) > 1 else float("nan")
+    if len(values) < 2:
+        return float("nan")
+    return float(np.sqrt(len(values) * values.var(ddof=1)))

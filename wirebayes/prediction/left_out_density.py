@@ -42,24 +42,35 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int, doubt
         Which of them are settled.
     """
     rng = np.random.default_rng(seed)
-    asked = problem
-    draws = problem.theta_in(problem.own_units, draws)
-    problem = problem.in_units(problem.own_units)
-    target = LogPosterior(problem)
-    z = target.coordinates.to_sampled(draws)
-    pool = importance.from_draws(joined_densities(target, holds), z, target.coordinates.order, rng, _ESS)
-    elpd, settled = -pool.log_ratio[1:], pool.settled[0] & pool.settled[1:]
+    own = problem.in_units(problem.own_units)
+    target = LogPosterior(own)
+    own_draws = problem.theta_in(problem.own_units, draws)
+    z = target.coordinates.to_sampled(own_draws)
+    densities = joined_densities(target, holds)
+    pool = importance.from_draws(densities, z, target.coordinates.order, rng, _ESS)
+    whole_settled = bool(pool.settled[0])
+    elpd = -pool.log_ratio[1:]
+    settled = pool.settled[0] & pool.settled[1:]
     _bear_witness(target, holds, pool, settled, doubtful, rng)
-    log_whole, known = float(pool.log_integral[0]), bool(pool.settled[0])
-    missing = np.flatnonzero(~settled & (known | doubtful)).tolist()
-    if missing and not known:
-        whole = weighted_posterior(problem, seed_of(seed, "whole"), _ALONE)
-        log_whole, known = whole.log_evidence, whole.converged
-    for m in missing:
-        s, j = holds[m]
-        alone = weighted_posterior(without_hold(problem, s, j), seed_of(seed, str(s), str(j)), _ALONE)
-        elpd[m], settled[m] = log_whole - alone.log_evidence, known and alone.converged
-    return elpd - _log_units(asked, problem, holds), settled
+    missing = np.flatnonzero(~settled & (whole_settled | doubtful)).tolist()
+    if missing:
+        log_whole, known = float(pool.log_integral[0]), whole_settled
+        if not whole_settled:
+            log_whole, known = _evidence(own, seed_of(seed, "whole"))
+        for m in missing:
+            sample, row = holds[m]
+            without = without_hold(own, sample, row)
+            own_seed = seed_of(seed, str(sample), str(row))
+            log_without, converged = _evidence(without, own_seed)
+            elpd[m] = log_whole - log_without
+            settled[m] = known and converged
+    return elpd - _log_units(problem, own, holds), settled
+
+
+def _evidence(problem: Problem, seed: int) -> tuple[float, bool]:
+    """Log integral of a posterior that is sampled by itself, and whether the sampling converged."""
+    alone = weighted_posterior(problem, seed, _ALONE)
+    return alone.log_evidence, alone.converged
 
 
 def _bear_witness(
@@ -74,13 +85,18 @@ def _bear_witness(
     told = np.flatnonzero(settled & doubtful).tolist()
     if not told:
         return
-    without = without_holds(target.problem, [holds[m] for m in told])
-    for m, found in zip(told, searches(target, rng, len(told), without), strict=True):
+    problem = target.problem
+    told_holds = [holds[m] for m in told]
+    without = without_holds(problem, told_holds)
+    found_of_each = searches(target, rng, len(told), without)
+    for m, found in zip(told, found_of_each, strict=True):
+        column = 1 + m
         left = copy(target)  # in the same coordinates, under the same prior
-        left.problem = without_hold(target.problem, *holds[m])
-        log_integral = float(pool.log_integral[0] + pool.log_ratio[1 + m])
+        left.problem = without_hold(problem, *holds[m])
+        log_integral = pool.log_integral[0] + pool.log_ratio[column]
         others = importance.widened(found)
-        settled[m] = abs(overlooked_share(left, pool, 1 + m, log_integral, others, rng)) <= _MISSED
+        overlooked = overlooked_share(left, pool, column, float(log_integral), others, rng)
+        settled[m] = abs(overlooked) <= _MISSED
 
 
 def _log_units(asked: Problem, own: Problem, holds: Holds) -> Array:
@@ -89,7 +105,8 @@ def _log_units(asked: Problem, own: Problem, holds: Holds) -> Array:
     for s, j in holds:
         sample = own.samples[s]
         readings = sample.protocol.mask[j].sum()
-        out.append(readings * np.log(own.read_unit(sample) / asked.read_unit(sample)))
+        ratio = own.read_unit(sample) / asked.read_unit(sample)
+        out.append(readings * np.log(ratio))
     return np.array(out)
 
 
@@ -111,8 +128,9 @@ def without_hold(problem: Problem, sample: int, hold: int) -> Problem:
     here = problem.samples[sample]
     mask = here.protocol.mask.copy()
     mask[hold] = False
-    kept = replace(here, protocol=replace(here.protocol, mask=mask))
-    return replace(problem, samples=(*problem.samples[:sample], kept, *problem.samples[sample + 1 :]))
+    samples = list(problem.samples)
+    samples[sample] = replace(here, protocol=replace(here.protocol, mask=mask))
+    return replace(problem, samples=tuple(samples))
 
 
 def without_holds(problem: Problem, holds: Holds) -> list[Array]:
@@ -139,12 +157,16 @@ def joined_densities(target: LogPosterior, holds: Holds) -> Function:
     def densities(z: Array) -> Array:
         theta = target.coordinates.to_natural(z)
         whole, without = target.problem.without_each_hold(theta)
+        of_holds = [without[s][j] for s, j in holds]
         with np.errstate(all="ignore"):
             prior = target.sampled_prior(theta, z)
-            value = prior[:, None] + np.column_stack([whole, *(without[s][j] for s, j in holds)])
+            value = prior[:, None] + np.column_stack([whole, *of_holds])
         return or_impossible(value)
 
-    return lambda z: np.concatenate([densities(z[i : i + _ROWS]) for i in range(0, len(z), _ROWS)])
+    def in_chunks(z: Array) -> Array:
+        return np.concatenate([densities(z[start : start + _ROWS]) for start in range(0, len(z), _ROWS)])
+
+    return in_chunks
 
 
 _ESS = 400.0  # a ratio of two integrals is then known to .07 at worst

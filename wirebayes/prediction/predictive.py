@@ -76,9 +76,11 @@ def draw_predictive(
 
 
 def _readings(problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: Generator) -> Floats:
-    own, protocol = problem.parameters(theta, sample), request.protocol
-    shape = (*protocol.time_s.shape, len(theta))
-    error = rng.normal(size=shape) * own["sensor_sd"] + rng.uniform(-0.5, 0.5, shape) * sample.resolution
+    own = problem.parameters(theta, sample)
+    shape = (*request.protocol.time_s.shape, len(theta))
+    noise = rng.normal(size=shape) * own["sensor_sd"]
+    rounding = rng.uniform(-0.5, 0.5, shape) * sample.resolution
+    error = noise + rounding
     if problem.likelihood == "hold":
         return _hold_by_hold(own, sample.model, request, error)
     course = chain_course(own, sample, request, rng)
@@ -108,23 +110,26 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: Ge
     (H, R, n) array
         Readings of all holds of the protocol.
     """
-    protocol, trained = request.protocol, request.trained
+    protocol = request.protocol
+    trained = request.trained
     n = len(own["B"])
-    setting = rng.normal(size=(len(request.requested), n)) * own["setting_sd"]
-    again = setting.copy()
+    error = rng.normal(size=(len(request.requested), n)) * own["setting_sd"]
+    error_again = error.copy()
     if trained:
-        setting[:trained] = settings_given_readings(own, sample, rng)
+        error[:trained] = settings_given_readings(own, sample, rng)
+    setting = protocol.setting[:, None] + error
+    setting_again = protocol.setting[:, None] + error_again
     walk = Walk(protocol, own, sample.model)
     creep, beside = walk.begin(n)
     out = []
     for j, requested in enumerate(request.requested):
-        anew = None
+        replicate = None
         if j < trained and requested:
             past = list(walk.past)
-            anew, _, _ = walk.hold(j, protocol.setting[j] + again[j], creep, beside)
+            replicate, _, _ = walk.hold(j, setting_again[j], creep, beside)
             walk.past = past
-        readings, creep, beside = walk.hold(j, protocol.setting[j] + setting[j], creep, beside)
-        out.append(readings if anew is None else anew)
+        readings, creep, beside = walk.hold(j, setting[j], creep, beside)
+        out.append(readings if replicate is None else replicate)
     return np.array(out)
 
 
@@ -141,26 +146,39 @@ def settings_given_readings(own: Theta, sample: Sample, rng: Generator) -> Float
     (H, n) array
         One draw of all holds for each draw of the parameters.
     """
-    line = linearise(sample.protocol, own, sample.model)
-    variance = sample.variance(own)
+    square, right = _normal_equations(own, sample)
+    eigen, vectors = eigh(square)
+    precision = 1.0 + np.maximum(eigen, 0.0)
+    mean = np.einsum("nij,ni->nj", vectors, right) / precision
+    spread = rng.normal(size=right.shape) / np.sqrt(precision)
+    drawn: Floats = np.einsum("nij,nj->in", vectors, mean + spread) * own["setting_sd"]
+    return drawn
+
+
+def _normal_equations(own: Theta, sample: Sample) -> tuple[Floats, Floats]:
+    """Matrices (n, H, H) and right sides (n, H) for the setting errors of all holds, in units of their own sd.
+
+    Hold by hold, so that the whole Jacobian is never in memory.
+    """
+    protocol = sample.protocol
+    line = linearise(protocol, own, sample.model)
+    sensor_sd = np.sqrt(sample.variance(own))
+    unit = own["setting_sd"] / sensor_sd
     holds, _, n = line.reading.shape
     carried = np.zeros((holds, n))
-    # Normal equations of eta in units of its own sd; hold by hold, so that the whole Jacobian is never in memory.
-    square, right = np.zeros((n, holds, holds)), np.zeros((n, holds))
-    for j, keep in enumerate(sample.protocol.mask):
-        by_eta = line.by_creep[j][:, None, :] * carried[None]
-        by_eta[:, j] = line.by_setting[j]
-        scaled = np.moveaxis(by_eta[keep] * (own["setting_sd"] / np.sqrt(variance)), -1, 0)
-        residual = ((sample.readings[j] - line.reading[j])[keep] / np.sqrt(variance)).T
+    square = np.zeros((n, holds, holds))
+    right = np.zeros((n, holds))
+    for j, keep in enumerate(protocol.mask):
+        by_error = line.by_creep[j][:, None, :] * carried[None]
+        by_error[:, j] = line.by_setting[j]
+        scaled = np.moveaxis(by_error[keep] * unit, -1, 0)
+        left = (sample.readings[j] - line.reading[j])[keep]
+        residual = (left / sensor_sd).T
         square += np.swapaxes(scaled, 1, 2) @ scaled
         right += np.einsum("nrh,nr->nh", scaled, residual)
         carried = line.carry_by_creep[j] * carried
         carried[j] = line.carry_by_setting[j]
-    eigen, vectors = eigh(square)
-    precision = 1.0 + np.maximum(eigen, 0.0)
-    along = np.einsum("nij,ni->nj", vectors, right) / precision + rng.normal(size=(n, holds)) / np.sqrt(precision)
-    drawn: Floats = np.einsum("nij,nj->in", vectors, along) * own["setting_sd"]
-    return drawn
+    return square, right
 
 
 def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: Floats) -> Floats:
@@ -168,10 +186,11 @@ def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: F
     given = request.first[:, None] - error[:, 0]
     out = np.zeros_like(error)
     for j, course in enumerate(single_holds.hold_courses(request.protocol, own, model, given)):
-        if course is not None and request.requested[j]:
-            reading, _, valid = course
-            out[j] = np.where(valid, reading, 0.0) + error[j]
-            out[j, 0] = request.first[j]
+        if course is None or not request.requested[j]:
+            continue
+        reading, _, valid = course
+        out[j] = np.where(valid, reading, 0.0) + error[j]
+        out[j, 0] = request.first[j]
     return out
 
 
@@ -190,9 +209,8 @@ def given_first(drawn: Floats, request: PredictionRequest) -> Floats:
     """
     given = request.requested & np.isfinite(request.first)
     for j in np.flatnonzero(request.requested)[::-1]:
-        known = np.array([j] if given[j] else [], int)
-        if j >= request.trained:
-            known = np.flatnonzero(given[request.trained : j + 1]) + request.trained
+        first = request.trained if j >= request.trained else j
+        known = np.flatnonzero(given[first : j + 1]) + first
         if len(known):
             drawn[j] = _regressed(drawn[j], drawn[known, 0], request.first[known])
         if given[j]:
@@ -203,7 +221,9 @@ def given_first(drawn: Floats, request: PredictionRequest) -> Floats:
 def _regressed(drawn: Floats, first: Floats, observed: Floats) -> Floats:
     """Joint draws (R, n) moved to where `first` (m, n) takes its observed values (m,)."""
     centred = first - first.mean(axis=1, keepdims=True)
-    square, across = centred @ centred.T, centred @ (drawn - drawn.mean(axis=1, keepdims=True)).T
+    away = drawn - drawn.mean(axis=1, keepdims=True)
+    square = centred @ centred.T
+    across = centred @ away.T
     gain = solve(square, across).T
     if not np.isfinite(gain).all() and np.isfinite(square).all():  # given readings that do not vary, or vary as one
         gain = (np.linalg.pinv(square, hermitian=True) @ across).T

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from wirebayes.errors import InputError, shown
 from wirebayes.io.experiment import protocol_of
 from wirebayes.io.readings import READ, SET, Hold, protocol_holds
-from wirebayes.numeric.typing import Array, Floats
+from wirebayes.numeric.typing import Array, Bools, Floats, Ints
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.read_back import Stored
 from wirebayes.sentences import counted
@@ -75,7 +76,8 @@ def _of_fresh_sample(file: "_File", stored: Stored) -> ProtocolRequest:
     temperature_C = file.holds[0].temperature_C
     began_at = None if temperature_C is None else float(temperature_C[0])
     alone = protocol_of(file.holds, stored.sample.protocol.length_mm, began_at)
-    prediction = PredictionRequest(alone, 0, np.ones(len(file.holds), bool), file.first)
+    every = np.ones(len(file.holds), bool)
+    prediction = PredictionRequest(alone, 0, every, file.first)
     return ProtocolRequest(_without_events(stored), prediction, file.holds, _FRESH)
 
 
@@ -87,18 +89,37 @@ def _of_tested_sample(file: "_File", stored: Stored) -> ProtocolRequest:
     numbers = [int(hold.number or 0) for hold in file.holds]
     repeated = np.array([number in row_of for number in numbers])
     rows = np.array([row_of[number] for number in numbers if number in row_of], int)
-    requested = np.zeros(len(trained.number), bool)
-    requested[rows] = True
-    given = np.full(len(trained.number), np.nan)
-    given[rows] = file.first[repeated]
-    after = tuple(hold for hold, known in zip(file.holds, repeated, strict=True) if not known)
-    whole = _joined(trained, protocol_of(after, trained.length_mm, trained.reference_C)) if after else trained
-    everything = np.append(requested, np.ones(len(after), bool))
-    first = np.append(given, file.first[~repeated])
-    prediction = PredictionRequest(whole, len(trained.number), everything, first)
     later = [number for number in numbers if number not in row_of]
-    sentence = _tested(tuple(trained.number[rows]), later, max(row_of), stored.likelihood)
+    prediction = _continued(file, trained, rows, repeated)
+    replicates = tuple(trained.number[rows])
+    sentence = _tested(replicates, later, max(row_of), stored.likelihood)
     return ProtocolRequest(stored, prediction, file.holds, sentence)
+
+
+def _continued(file: "_File", trained: Protocol, rows: Ints, repeated: Bools) -> PredictionRequest:
+    """The holds of a test with those that a file adds.
+
+    Parameters
+    ----------
+    rows : (m,) int array
+        Trained holds that the file repeats.
+    repeated : (holds of the file,) bool array
+    """
+    holds = len(trained.number)
+    requested = np.zeros(holds, bool)
+    requested[rows] = True
+    first = np.full(holds, np.nan)
+    first[rows] = file.first[repeated]
+    each = zip(file.holds, repeated, strict=True)
+    after = tuple(hold for hold, known in each if not known)
+    whole = trained
+    if after:
+        later = protocol_of(after, trained.length_mm, trained.reference_C)
+        whole = _joined(trained, later)
+    all_later = np.ones(len(after), bool)
+    requested = np.append(requested, all_later)
+    first = np.append(first, file.first[~repeated])
+    return PredictionRequest(whole, holds, requested, first)
 
 
 _FRESH = "predicted as a fresh sample with no history: the protocol is all that happens to it"
@@ -115,22 +136,38 @@ def _tested(replicates: Sequence[int], later: Sequence[int], last: int, likeliho
             f"{_listed(_ranges(later))} predicted as a continuation of the test from the end of hold {last} on, given "
             f"{given} (--fresh predicts a fresh sample instead)"
         )
-        skipped = [(a + 1, b - 1) for a, b in zip([last, *later], later, strict=False) if b > a + 1]
-        if skipped:
-            parts.append(f"nothing is assumed to have happened in between: {_listed(skipped)} not in its history")
+    skipped = _skipped([last, *later])
+    if skipped:
+        parts.append(f"nothing is assumed to have happened in between: {_listed(skipped)} not in its history")
     return "; ".join(parts)
+
+
+def _skipped(numbers: Sequence[int]) -> list[tuple[int, int]]:
+    """First and last of each run of numbers that is missing among rising ones."""
+    gaps = []
+    for before, after in pairwise(numbers):
+        if after > before + 1:
+            gaps.append((before + 1, after - 1))
+    return gaps
 
 
 def _ranges(numbers: Sequence[int]) -> list[tuple[int, int]]:
     """First and last of each run of neighbours among rising numbers."""
-    ends = [i for i, n in enumerate(numbers) if i + 1 == len(numbers) or numbers[i + 1] != n + 1]
-    starts = [0, *(i + 1 for i in ends[:-1])]
-    return [(int(numbers[i]), int(numbers[j])) for i, j in zip(starts, ends, strict=True)]
+    ranges: list[tuple[int, int]] = []
+    for number in map(int, numbers):
+        if ranges and number == ranges[-1][1] + 1:
+            ranges[-1] = (ranges[-1][0], number)
+        else:
+            ranges.append((number, number))
+    return ranges
 
 
 def _listed(ranges: Sequence[tuple[int, int]]) -> str:
-    several = len(ranges) > 1 or ranges[0][0] != ranges[0][1]
-    return f"hold{'s' * several} " + ", ".join(str(a) if a == b else f"{a} to {b}" for a, b in ranges)
+    first, last = ranges[0]
+    several = len(ranges) > 1 or first != last
+    word = "holds" if several else "hold"
+    each = [str(first) if first == last else f"{first} to {last}" for first, last in ranges]
+    return f"{word} {', '.join(each)}"
 
 
 @dataclass(frozen=True)
@@ -161,16 +198,16 @@ class _File:
     def check_temperature(self, logged: bool) -> None:
         given = self.holds[0].temperature_C
         if logged and given is None:
-            raise self.complain(
-                0, 0, "temperature_C", "no column temperature_C", "one, because the training data had temperatures"
-            )
+            expected = "one, because the training data had temperatures"
+            raise self.complain(0, 0, "temperature_C", "no column temperature_C", expected)
         if given is not None and not logged:
             expected = "no column temperature_C, because the training data had no temperatures"
             raise self.complain(0, 0, "temperature_C", f"{given[0]:g}", expected)
 
     def check_first_readings(self) -> None:
         for i, hold in enumerate(self.holds):
-            first, column = hold.readings[0], READ[hold.control]
+            first = hold.readings[0]
+            column = READ[hold.control]
             if not np.isfinite(first):
                 expected = "the hold's first reading, because the posterior is hold by hold"
                 raise self.complain(i, 0, column, f"no {column}", expected)
@@ -209,15 +246,23 @@ class _File:
 
     def _check_repeat(self, i: int, trained: Protocol, row: int) -> None:
         hold = self.holds[i]
-        if hold.setting != trained.setting[row]:
-            expected = f"{trained.setting[row]:g}, as hold {hold.number} was trained on"
-            raise self.complain(i, 0, SET[hold.control], f"{hold.setting:g}", expected)
-        times = read = trained.time_s[row][trained.mask[row]]
-        if len(hold.time_s) == len(times) + 1 and trained.duration_s[row] > times[-1]:
-            times = np.append(times, trained.duration_s[row])  # the row that says when the hold ended
+        setting = trained.setting[row]
+        if hold.setting != setting:
+            found = f"{hold.setting:g}"
+            expected = f"{setting:g}, as hold {hold.number} was trained on"
+            raise self.complain(i, 0, SET[hold.control], found, expected)
+        mask = trained.mask[row]
+        times = read = trained.time_s[row][mask]
+        ends = trained.duration_s[row]
+        count = len(read)
+        one_more = len(hold.time_s) == count + 1
+        if one_more and ends > read[-1]:
+            times = np.append(read, ends)  # the row that says when the hold ended
         self._check_times(i, times)
         if trained.warming_K is not None and trained.reference_C is not None:
-            self._check_temperatures(i, trained.reference_C + trained.warming_K[row][: len(read)])
+            warming = trained.warming_K[row][:count]
+            logged = trained.reference_C + warming
+            self._check_temperatures(i, logged)
 
     def _check_times(self, i: int, times: Floats) -> None:
         hold = self.holds[i]
@@ -254,14 +299,16 @@ def _joined(before: Protocol, after: Protocol) -> Protocol:
     def padded(array: Array) -> Floats:
         return np.pad(array.astype(float), [(0, 0), (0, width - array.shape[1])])
 
+    time_s = np.concatenate([padded(before.time_s), padded(after.time_s)])
+    mask = np.concatenate([padded(before.mask), padded(after.mask)]) > 0
     warming = None
     if before.warming_K is not None and after.warming_K is not None:
         warming = np.concatenate([padded(before.warming_K), padded(after.warming_K)])
     return Protocol(
         length_mm=before.length_mm,
         setting=np.concatenate([before.setting, after.setting]),
-        time_s=np.concatenate([padded(before.time_s), padded(after.time_s)]),
-        mask=np.concatenate([padded(before.mask), padded(after.mask)]) > 0,
+        time_s=time_s,
+        mask=mask,
         duration_s=np.concatenate([before.duration_s, after.duration_s]),
         number=np.concatenate([before.number, after.number]),
         warming_K=warming,
@@ -271,6 +318,10 @@ def _joined(before: Protocol, after: Protocol) -> Protocol:
 
 
 def _without_events(stored: Stored) -> Stored:
-    model = stored.sample.model
-    lasting = tuple(e for e in model.effects if not isinstance(e, EventEffect) and e.place != "before")
-    return replace(stored, sample=replace(stored.sample, model=replace(model, effects=lasting)))
+    sample = stored.sample
+    lasting = []
+    for effect in sample.model.effects:
+        if not isinstance(effect, EventEffect) and effect.place != "before":
+            lasting.append(effect)
+    model = replace(sample.model, effects=tuple(lasting))
+    return replace(stored, sample=replace(sample, model=model))

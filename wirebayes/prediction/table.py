@@ -10,7 +10,7 @@ import xarray as xr
 
 from wirebayes.errors import InputError
 from wirebayes.inference.fit import seed_of
-from wirebayes.io.readings import READ, SET
+from wirebayes.io.readings import READ, SET, Hold
 from wirebayes.io.run_folder import read_json, writable, write_csv, write_json
 from wirebayes.json_files.prediction import PredictionJson
 from wirebayes.notice import Notice
@@ -31,7 +31,8 @@ DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 
 def header(control: Control) -> tuple[str, ...]:
     """Columns: what is set, and figures of what is read in its unit."""
-    figures = (f"{name}_{READ_UNIT[control]}" for name in ("mean", "sd", "q05", "q50", "q95"))
+    unit = READ_UNIT[control]
+    figures = [f"{name}_{unit}" for name in ("mean", "sd", "q05", "q50", "q95")]
     return ("experiment", "hold", SET[control], "time_s", *figures)
 
 
@@ -49,16 +50,22 @@ def mixture_table(
     """
     drawn = _drawn(members, seed, draws)
     request = members[0][1]
-    stored, prediction = request.stored, request.prediction
+    experiment = request.stored.sample.name
+    positions = np.flatnonzero(request.prediction.requested)
     rows: list[list[Any]] = []
-    for hold, at in zip(request.holds, np.flatnonzero(prediction.requested), strict=True):
-        here = drawn[at, : len(hold.time_s)]
-        quantiles = np.quantile(here, [0.05, 0.5, 0.95], axis=1)
-        for k, time in enumerate(hold.time_s):
-            about = here[k] - here[k, 0]  # so that a given reading comes back to the last digit
-            figures = [here[k, 0] + about.mean(), about.std(ddof=1), *quantiles[:, k]]
-            rows.append([stored.sample.name, hold.number, hold.setting, float(time), *map(float, figures)])
+    for hold, position in zip(request.holds, positions, strict=True):
+        here = drawn[position, : len(hold.time_s)]
+        for time, readings, figures in zip(hold.time_s, here, _figures(here), strict=True):
+            about = readings - readings[0]  # so that a given reading comes back to the last digit
+            moments = [float(readings[0] + about.mean()), float(about.std(ddof=1))]
+            rows.append([experiment, hold.number, hold.setting, float(time), *moments, *figures])
     return rows
+
+
+def _figures(readings: Floats) -> list[list[float]]:
+    """Quantiles of each of several readings (R, n)."""
+    quantiles: Floats = np.quantile(readings, [0.05, 0.5, 0.95], axis=1)
+    return quantiles.T.tolist()
 
 
 def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: int = 0) -> list[Notice]:
@@ -70,23 +77,42 @@ def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: in
         As for `mixture_table`.
     """
     request = members[0][1]
-    given = np.isfinite(request.prediction.first) & request.prediction.requested
+    prediction = request.prediction
+    given = np.isfinite(prediction.first) & prediction.requested
     if request.stored.likelihood == "hold" or not given.any():  # each hold starts from its own reading
         return []
-    blind = [(p, replace(r, prediction=replace(r.prediction, first=np.full(len(given), np.nan)))) for p, r in members]
+    blind = [(probability, _blind(member)) for probability, member in members]
     first = _drawn(blind, seed, _FEW)[:, 0]
     out = []
-    for hold, at in zip(request.holds, np.flatnonzero(request.prediction.requested), strict=True):
-        read, mean, sd = request.prediction.first[at], first[at].mean(), first[at].std(ddof=1)
-        if given[at] and abs(read - mean) > FAR_OFF * sd:
-            unit = READ_UNIT[hold.control]
-            text = (
-                f"hold {hold.number}: its first reading, {read:.4g} {unit}, is {abs(read - mean) / sd:.0f} standard "
-                f"deviations from the {mean:.4g} {unit} expected there: check {READ[hold.control]} (in {unit}?) and "
-                f"{SET[hold.control]}; what follows from it is not to be relied on"
-            )
-            out.append(Notice("data", text))
+    for hold, position in zip(request.holds, np.flatnonzero(prediction.requested), strict=True):
+        if not given[position]:
+            continue
+        doubt = _far_off(hold, prediction.first[position], first[position])
+        if doubt is not None:
+            out.append(Notice("data", doubt))
     return out
+
+
+def _blind(request: ProtocolRequest) -> ProtocolRequest:
+    """The same request, given no first reading."""
+    prediction = request.prediction
+    unknown = np.full(len(prediction.first), np.nan)
+    return replace(request, prediction=replace(prediction, first=unknown))
+
+
+def _far_off(hold: Hold, read: float, drawn: Floats) -> str | None:
+    """What speaks against a first reading that is far from its predicted draws (n,)."""
+    mean = drawn.mean()
+    sd = drawn.std(ddof=1)
+    distance = abs(read - mean)
+    if not distance > FAR_OFF * sd:
+        return None
+    unit = READ_UNIT[hold.control]
+    return (
+        f"hold {hold.number}: its first reading, {read:.4g} {unit}, is {distance / sd:.0f} standard "
+        f"deviations from the {mean:.4g} {unit} expected there: check {READ[hold.control]} (in {unit}?) and "
+        f"{SET[hold.control]}; what follows from it is not to be relied on"
+    )
 
 
 def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]:
@@ -99,12 +125,19 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
     stored : Stored
         A posterior behind it.
     """
-    protocol, readings = stored.sample.protocol, stored.sample.readings[..., 0]
-    names, longest = header(protocol.control), float(protocol.duration_s[protocol.recorded].max())
-    weights = protocol.control == "force"
-    highest = float((protocol.setting[protocol.recorded] if weights else readings[protocol.mask]).max())
-    tension = max(row[names.index("tension_N" if weights else "q50_N")] for row in rows)
-    time = max(row[names.index("time_s")] for row in rows)
+    protocol = stored.sample.protocol
+    recorded = protocol.recorded
+    if protocol.control == "force":
+        tested = protocol.setting[recorded]
+        tension_column = "tension_N"
+    else:
+        tested = stored.sample.readings[..., 0][protocol.mask]
+        tension_column = "q50_N"
+    highest = float(tested.max())
+    longest = float(protocol.duration_s[recorded].max())
+    columns = header(protocol.control)
+    tension = max(row[columns.index(tension_column)] for row in rows)
+    time = max(row[columns.index("time_s")] for row in rows)
     out = []
     if tension > FAR_UP * highest:
         out.append(f"tensions of up to {tension:.4g} N are predicted; none above {highest:.4g} N was tested")
@@ -115,12 +148,14 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
 
 def _drawn(members: Sequence[tuple[float, ProtocolRequest]], seed: int, draws: int) -> Floats:
     """Readings (H, R, n) of all models, each with as many draws as it is probable."""
-    rng = np.random.default_rng(seed_of(seed, "predict", members[0][1].stored.sample.name))
+    experiment = members[0][1].stored.sample.name
+    rng = np.random.default_rng(seed_of(seed, "predict", experiment))
     parts = []
     for probability, request in members:
-        stored, n = request.stored, max(round(probability * draws), 2)
+        stored = request.stored
         theta = stored.theta
-        theta = theta[evenly(len(theta), n)]
+        own_draws = max(round(probability * draws), 2)
+        theta = theta[evenly(len(theta), own_draws)]
         parts.append(draw_predictive(stored.problem, theta, stored.sample, request.prediction, rng))
     return np.concatenate(parts, axis=-1)
 
@@ -141,13 +176,14 @@ class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __ini
         """The prediction as plain values: what was predicted, a row for each reading, and the warnings."""
         columns = {str(name): values.values.tolist() for name, values in self.reset_coords().data_vars.items()}
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        warned = zip(self.attrs.get("warning_kinds", ()), self.attrs.get("warnings", ()), strict=True)
+        kinds = self.attrs.get("warning_kinds", ())
+        texts = self.attrs.get("warnings", ())
         return {
             "experiment": self.attrs["experiment"],
             "prediction": self.attrs["prediction"],
             "seed": int(self.attrs["seed"]),
             "readings": rows,
-            "warnings": [{"kind": kind, "text": text} for kind, text in warned],
+            "warnings": [{"kind": kind, "text": text} for kind, text in zip(kinds, texts, strict=True)],
         }
 
     def save(self, folder: PathLike) -> Path:
@@ -168,18 +204,25 @@ class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __ini
         InputError
             The folder holds something else, or cannot be written.
         """
-        target, found = Path(folder), self.summary()
+        target = Path(folder)
+        found = self.summary()
         summary = target / "predicted.json"
-        kept = summary.is_file() and read_json(summary) == found
-        if target.exists() and not (kept or (target.is_dir() and not any(target.iterdir()))):
+        if target.exists() and not _may_receive(target, summary, found):
             raise InputError(f"{target}: found something else, expected a new or empty folder")
-        columns = header("displacement" if "mean_N" in self else "force")
-        rows = [[found["experiment"], *(row[name] for name in columns[1:])] for row in found["readings"]]
+        columns = header(self._control)
+        rows = []
+        for reading in found["readings"]:
+            figures = [reading[name] for name in columns[1:]]
+            rows.append([found["experiment"], *figures])
         with writable(target):
             target.mkdir(parents=True, exist_ok=True)
             write_csv(target / "predicted.csv", columns, rows)
             write_json(summary, found)
         return target
+
+    @property
+    def _control(self) -> Control:
+        return "displacement" if "mean_N" in self else "force"
 
     def plot(self, axes: Any = None) -> Any:  # type: ignore[override]  # xarray's own draws no bands
         """Draw the median and the 90 % band against the time in the hold, a colour for each hold.
@@ -197,24 +240,40 @@ class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __ini
             import matplotlib.pyplot as plt  # only where it is needed
 
             axes = plt.subplots()[1]
-        control: Control = "displacement" if "mean_N" in self else "force"
-        unit, setting = READ_UNIT[control], SET[control]
+        control = self._control
+        unit = READ_UNIT[control]
         holds = np.unique(self["hold"].values)
         named = holds[evenly(len(holds), _MOST_NAMED)]
         for hold in holds:
             rows = self.isel(reading=np.flatnonzero(self["hold"].values == hold))
-            time = rows["time_s"].values
-            label = f"hold {hold}, {rows[setting].values[0]:g} {SET_UNIT[control]}" if hold in named else None
-            (line,) = axes.plot(time, rows[f"q50_{unit}"].values, "o-", ms=3, label=label)
-            low, high = rows[f"q05_{unit}"].values, rows[f"q95_{unit}"].values
-            axes.fill_between(time, low, high, color=line.get_color(), alpha=0.25, lw=0)
+            setting = rows[SET[control]].values[0]
+            label = f"hold {hold}, {setting:g} {SET_UNIT[control]}" if hold in named else None
+            _draw_hold(axes, rows, unit, label)
         axes.set_xlabel("time in the hold, s")
         axes.set_ylabel(f"{_READ_WORD[control]}, {unit}")
         axes.set_title(f"{self.attrs['experiment']}: predicted, 90 % band", loc="left")
         axes.spines[["top", "right"]].set_visible(False)
         # the best place is looked for among all points of all lines
-        axes.legend(frameon=False, loc="best" if len(holds) <= _MOST_NAMED else "upper right")
+        place = "best" if len(holds) <= _MOST_NAMED else "upper right"
+        axes.legend(frameon=False, loc=place)
         return axes
+
+
+def _may_receive(target: Path, summary: Path, found: PredictionJson) -> bool:
+    """Whether a folder is empty, or holds this prediction already."""
+    if summary.is_file() and read_json(summary) == found:
+        return True
+    return target.is_dir() and not any(target.iterdir())
+
+
+def _draw_hold(axes: Any, rows: xr.Dataset, unit: str, label: str | None) -> None:
+    """Median and band of one hold."""
+    time = rows["time_s"].values
+    median = rows[f"q50_{unit}"].values
+    low = rows[f"q05_{unit}"].values
+    high = rows[f"q95_{unit}"].values
+    (line,) = axes.plot(time, median, "o-", ms=3, label=label)
+    axes.fill_between(time, low, high, color=line.get_color(), alpha=0.25, lw=0)
 
 
 _MOST_NAMED = 12  # holds that a legend has room for; of more, some evenly spaced ones are named
@@ -233,11 +292,12 @@ def dataset(
         Of the dataset; the experiment's name joins them.
     control : {"displacement", "force"}
     """
-    columns = {name: [row[i] for row in rows] for i, name in enumerate(header(control))}
-    experiment = str(columns.pop("experiment")[0])
-    units = {"hold": "1", SET[control]: SET_UNIT[control], "time_s": "s"}
-    variables = {
-        name: ("reading", np.array(c), {"units": units.get(name, READ_UNIT[control])}) for name, c in columns.items()
-    }
-    coords = {name: variables.pop(name) for name in units}
+    table = {name: [row[i] for row in rows] for i, name in enumerate(header(control))}
+    experiment = str(table.pop("experiment")[0])
+    coordinate_units = {"hold": "1", SET[control]: SET_UNIT[control], "time_s": "s"}
+    variables = {}
+    for name, values in table.items():
+        unit = coordinate_units.get(name, READ_UNIT[control])
+        variables[name] = ("reading", np.array(values), {"units": unit})
+    coords = {name: variables.pop(name) for name in coordinate_units}
     return Prediction(variables, coords, {"experiment": experiment, **attributes})

@@ -49,13 +49,19 @@ class Table:
     @property
     def names(self) -> frozenset[int]:
         """Columns of words, none of them a number: they begin at the left as well."""
-        columns = enumerate(zip(*self.rows, strict=True))
-        return frozenset(i for i, cells in columns if i and not any(_A_NUMBER.match(cell) for cell in cells))
+        columns = set()
+        for i, cells in enumerate(zip(*self.rows, strict=True)):
+            if i and not any(_A_NUMBER.match(cell) for cell in cells):
+                columns.add(i)
+        return frozenset(columns)
 
     @property
     def prose(self) -> frozenset[int]:
         """Columns of sentences rather than numbers: they may break, and begin at the left."""
-        return frozenset(i for row in self.rows for i, cell in enumerate(row) if i and len(cell) > _SENTENCE)
+        columns = set()
+        for row in self.rows:
+            columns |= {i for i, cell in enumerate(row) if i and len(cell) > _SENTENCE}
+        return frozenset(columns)
 
 
 @dataclass(frozen=True)
@@ -196,7 +202,9 @@ class Page:
     @property
     def grave(self) -> Notices | None:
         """The warnings that stand before the answer: those that the first section begins with."""
-        first = next((block for section in self.sections[:1] for block in section.blocks[:1]), None)
+        if not self.sections or not self.sections[0].blocks:
+            return None
+        first = self.sections[0].blocks[0]
         return first if isinstance(first, Notices) and first.notices[0].first else None
 
 
@@ -226,9 +234,11 @@ def drawn_together(figures: Sequence[Callable[[], Figure]]) -> list[str]:
 
 
 def _address(content: bytes, suffix: str) -> str:
+    kind = _KINDS[suffix]
     if suffix == ".svg":  # text in a data address is smaller than base64 of it
-        return f"data:{_KINDS[suffix]},{quote(content, safe=_READ_AS_THEY_ARE)}"
-    return f"data:{_KINDS[suffix]};base64,{base64.b64encode(content).decode('ascii')}"
+        return f"data:{kind},{quote(content, safe=_READ_AS_THEY_ARE)}"
+    encoded = base64.b64encode(content).decode("ascii")
+    return f"data:{kind};base64,{encoded}"
 
 
 _READ_AS_THEY_ARE = " !$'()*+,-./:;=?@[]^_`{|}~"
@@ -236,6 +246,23 @@ _READ_AS_THEY_ARE = " !$'()*+,-./:;=?@[]^_`{|}~"
 
 def svg(figure: Figure) -> bytes:
     """A figure as SVG, the same bytes every time: letters as text, dense layers as images, no more digits than show."""
+    _rasterize_dense(figure)
+    stream = io.BytesIO()
+    style: Any = {"svg.hashsalt": "wirebayes", "svg.fonttype": "none"}
+    no_metadata = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    with matplotlib.rc_context(style):
+        _lay_out(figure)
+        figure.savefig(stream, format="svg", dpi=_DPI, metadata=no_metadata)
+    text = stream.getvalue().decode("utf-8")
+    text = text[text.index("<svg") :]
+    text = text.replace("<svg", f'<svg font-family="{_FONTS}"', 1)
+    for pattern, instead in _SHORTER:
+        text = pattern.sub(instead, text)
+    return _COORDINATES.sub(_shorter_path, text).encode("utf-8")
+
+
+def _rasterize_dense(figure: Figure) -> None:
+    """Draw lines and clouds of very many points as images."""
     for axes in figure.axes:
         for line in axes.lines:
             if np.size(line.get_xdata(orig=False)) > _DENSE:
@@ -243,16 +270,11 @@ def svg(figure: Figure) -> bytes:
         for cloud in axes.collections:
             if isinstance(cloud, PathCollection) and len(np.asarray(cloud.get_offsets())) > _DENSE:
                 cloud.set_rasterized(True)
-    stream = io.BytesIO()
-    style: Any = {"svg.hashsalt": "wirebayes", "svg.fonttype": "none"}
-    with matplotlib.rc_context(style):
-        _lay_out(figure)
-        figure.savefig(stream, format="svg", dpi=_DPI, metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-    text = stream.getvalue().decode("utf-8")
-    text = text[text.index("<svg") :].replace("<svg", f'<svg font-family="{_FONTS}"', 1)
-    for pattern, instead in _SHORTER:
-        text = pattern.sub(instead, text)
-    return _COORDINATES.sub(lambda path: _LONG.sub(_tenth, path[0]).replace(" L ", " "), text).encode("utf-8")
+
+
+def _shorter_path(path: re.Match[str]) -> str:
+    rounded = _LONG.sub(_tenth, path[0])
+    return rounded.replace(" L ", " ")
 
 
 def _lay_out(figure: Figure) -> None:
@@ -316,15 +338,29 @@ def pictures_in(folder: Path, captions: Mapping[str, str]) -> list[Picture]:
     captions : mapping of file name without ending to caption
     """
     files = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix in _KINDS}
-    shown = {name: captions[name] for name in captions if name in files} | {
-        n: words(n) for n in files if n not in captions
-    }
-    return [Picture(embedded(files[name]), caption, caption) for name, caption in shown.items()]
+    pictures = [captioned(files[name], captions[name]) for name in captions if name in files]
+    others = [captioned(file, words(name)) for name, file in files.items() if name not in captions]
+    return pictures + others
+
+
+def captioned(file: Path, caption: str, wide: bool = False) -> Picture:
+    """A picture file whose caption says what is to be seen.
+
+    Parameters
+    ----------
+    wide : bool
+        Whether it scrolls sideways on a phone.
+    """
+    return Picture(embedded(file), caption, caption, wide)
 
 
 def picture_file(folder: Path, name: str) -> Path | None:
     """The file of a picture, or nothing where there is none."""
-    return next((path for path in (folder / f"{name}{kind}" for kind in _KINDS) if path.is_file()), None)
+    for kind in _KINDS:
+        path = folder / f"{name}{kind}"
+        if path.is_file():
+            return path
+    return None
 
 
 def files_beside(folder: Path, contents: Sequence[tuple[str, str]], title: str = "Raw results") -> Section:
@@ -336,12 +372,12 @@ def files_beside(folder: Path, contents: Sequence[tuple[str, str]], title: str =
     title : str
         Of the section.
     """
-    found = [
-        (path.relative_to(folder).as_posix(), holds)
-        for name, holds in contents
-        for path in sorted(folder.glob(name))[:_MOST_LINKS]
-    ]
-    return Section(title, [Links([(quote(name), holds) for name, holds in found])])
+    found = []
+    for name, holds in contents:
+        for path in sorted(folder.glob(name))[:_MOST_LINKS]:
+            file = path.relative_to(folder).as_posix()
+            found.append((quote(file), holds))
+    return Section(title, [Links(found)])
 
 
 def seed_of_page(configuration: Mapping[str, Any]) -> str:

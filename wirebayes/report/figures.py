@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, get_font
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from wirebayes.json_files.summary import ExtrapolatedCreep
+from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep
 from wirebayes.numeric.typing import Array
-from wirebayes.report.blocks import unit_text
+from wirebayes.report.cells import with_unit
 from wirebayes.results.parameters import unit_of
 from wirebayes.wire.protocol import Control, Protocol
 
@@ -24,7 +24,8 @@ _SIZE = (4.7, 3.4)  # inches: two panels stand side by side on a page
 def verbatim(text: str) -> str:
     """A user's words for a picture as they stand: no formulas between dollars, a mark for what the font lacks."""
     has = get_font(findfont(FontProperties())).get_char_index
-    return "".join(c if has(ord(c)) else "\ufffd" for c in text).replace("$", r"\$")
+    letters = [letter if has(ord(letter)) else "\ufffd" for letter in text]
+    return "".join(letters).replace("$", r"\$")
 
 
 def panel(xlabel: str, ylabel: str, title: str = "", size: tuple[float, float] = _SIZE) -> tuple[Figure, Any]:
@@ -72,14 +73,27 @@ def legend_below(figure: Figure, axes: Any, columns: int = 2) -> None:
         Whose labelled lines the legend names.
     """
     place: Any = "outside lower center"
-    figure.legend(
-        *axes.get_legend_handles_labels(), loc=place, ncols=columns, frameon=False, fontsize=8.5, handlelength=1.6
-    )
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc=place, ncols=columns, frameon=False, fontsize=8.5, handlelength=1.6)
 
 
 def apart(rows: Array) -> Array:
     """Rows (n, m) one after the other with a gap behind each: a line for all of them takes a tenth of the time of n."""
-    return np.column_stack([rows, np.full(len(rows), np.nan)]).ravel()
+    gaps = np.full(len(rows), np.nan)
+    return np.column_stack([rows, gaps]).ravel()
+
+
+def places_in_holds(hold: Array, time_s: Array) -> tuple[list[int], Array]:
+    """Numbers of holds in their order, and where each reading stands: holds at 0, 1, 2, time within each.
+
+    Parameters
+    ----------
+    hold, time_s : (m,) arrays
+    """
+    numbers = [int(number) for number in dict.fromkeys(hold.tolist())]
+    position = np.array([numbers.index(int(number)) for number in hold])
+    longest = max(float(time_s.max()), 1e-9)
+    return numbers, position - 0.35 + 0.7 * time_s / longest
 
 
 def measured(protocol: Protocol, readings: Array, title: str) -> Figure:
@@ -92,22 +106,31 @@ def measured(protocol: Protocol, readings: Array, title: str) -> Figure:
     weights = protocol.control == "force"
     across, upward = ("weight, N", "displacement, mm") if weights else ("displacement, mm", "tension, N")
     figure, axes = panel(across, upward, title)
+    _join_readings(axes, protocol, readings)
+    hold, reading = np.nonzero(protocol.mask)
+    first = np.diff(hold, prepend=-1) != 0
+    later = ~first
+    x = protocol.setting[hold]
+    y = readings[hold, reading]
+    axes.scatter(x[first], y[first], s=22, color=CHAIN, zorder=3, label="when the hold begins")
+    if later.any():
+        axes.scatter(x[later], y[later], s=11, color=HOLD, zorder=2, label="later readings")
+    legend(axes, loc="lower right")
+    is_slack_noise = y.min() < 0.0  # noise of a slack wire reaches below
+    if not weights and not is_slack_noise:
+        axes.set_ylim(bottom=0)
+    return figure
+
+
+def _join_readings(axes: Any, protocol: Protocol, readings: Array) -> None:
+    """A line through the readings of each hold, a dotted one where a hold was not recorded."""
     seen = protocol.mask.any(axis=1)
     for x in protocol.setting[~seen]:
         axes.axvline(x, color=QUIET, ls=":", lw=1.2, label="held, not recorded")
     read = np.where(protocol.mask, readings, np.nan)[seen]
     ends = np.stack([np.nanmin(read, axis=1), np.nanmax(read, axis=1)], axis=1)
-    axes.plot(apart(protocol.setting[seen].repeat(2).reshape(-1, 2)), apart(ends), color=QUIET, lw=1.5, zorder=1)
-    hold, reading = np.nonzero(protocol.mask)
-    first = np.diff(hold, prepend=-1) != 0
-    x, y = protocol.setting[hold], readings[hold, reading]
-    axes.scatter(x[first], y[first], s=22, color=CHAIN, zorder=3, label="when the hold begins")
-    if not first.all():
-        axes.scatter(x[~first], y[~first], s=11, color=HOLD, zorder=2, label="later readings")
-    legend(axes, loc="lower right")
-    if not weights and readings[protocol.mask].min() >= 0.0:  # noise of a slack wire reaches below
-        axes.set_ylim(bottom=0)
-    return figure
+    settings = protocol.setting[seen].repeat(2).reshape(-1, 2)
+    axes.plot(apart(settings), apart(ends), color=QUIET, lw=1.5, zorder=1)
 
 
 def joint(
@@ -128,8 +151,9 @@ def joint(
     """
     figure, axes = panel(xlabel, ylabel, title)
     for kind, across in x.items():
-        axes.scatter(across, y[kind], s=3, alpha=0.35, lw=0, color=COLOURS.get(kind, QUIET), rasterized=True)
-        axes.scatter([], [], s=18, color=COLOURS.get(kind, QUIET), label=WORDS.get(kind, kind))
+        colour = COLOURS.get(kind, QUIET)
+        axes.scatter(across, y[kind], s=3, alpha=0.35, lw=0, color=colour, rasterized=True)
+        axes.scatter([], [], s=18, color=colour, label=WORDS.get(kind, kind))
     if mark is not None:
         axes.scatter(*mark, marker="X", s=90, color=INK, edgecolor="white", lw=1.2, zorder=5, label="published")
     logarithmic(axes, "both")
@@ -145,8 +169,7 @@ def axis_label(name: str, effects: tuple[Any, ...] = (), control: Control = "dis
     effects : tuple of Effect
     control : {"displacement", "force"}
     """
-    unit = unit_text(unit_of(name, effects, (control,)))
-    return f"{name}, {unit}" if unit else name
+    return with_unit(name, unit_of(name, effects, (control,)))
 
 
 def logarithmic(axes: Any, which: str = "x") -> None:
@@ -157,11 +180,19 @@ def logarithmic(axes: Any, which: str = "x") -> None:
         getattr(axes, f"set_{name}scale")("log")
         axis = getattr(axes, f"{name}axis")
         low, high = sorted(getattr(axes, f"get_{name}lim")())
-        decades = np.log10(high / low)
-        subs = (1.0, 2.0, 5.0) if decades < 1.6 else (1.0, 3.0) if decades < 2.6 else (1.0,)
-        axis.set_major_locator(LogLocator(subs=subs))
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}".replace(",", "\u2009")))
+        axis.set_major_locator(LogLocator(subs=_ticks_within_a_decade(np.log10(high / low))))
+        axis.set_major_formatter(FuncFormatter(_with_thin_spaces))
         axis.set_minor_locator(NullLocator())  # there are dozens of minor ticks, and each is placed several times
+
+
+def _ticks_within_a_decade(decades: float) -> tuple[float, ...]:
+    if decades < 1.6:
+        return (1.0, 2.0, 5.0)
+    return (1.0, 3.0) if decades < 2.6 else (1.0,)
+
+
+def _with_thin_spaces(value: float, _: int | None) -> str:
+    return f"{value:,.10g}".replace(",", "\u2009")
 
 
 def residual_figure(
@@ -184,21 +215,25 @@ def residual_figure(
         The paper's prediction.
     """
     figure, axes = panel("hold (readings in order of time within each)", "measured − predicted, N", title)
-    numbers = list(dict.fromkeys(hold.tolist()))
-    longest = max(float(time_s.max()), 1e-9)
-    place = np.array([numbers.index(h) for h in hold]) - 0.35 + 0.7 * time_s / longest
-    last = np.flatnonzero(np.diff(hold) != 0) + 1
-    low, middle, high = np.insert(band_N, last, np.nan, axis=1)  # a gap between holds
-    axes.fill_between(
-        np.insert(place, last, np.nan), low - middle, high - middle, color=colour, alpha=0.22, lw=0, label="90 % band"
-    )
+    numbers, place = places_in_holds(hold, time_s)
+    is_last = np.diff(hold) != 0
+    ends = np.flatnonzero(is_last) + 1
+    low, middle, high = np.insert(band_N, ends, np.nan, axis=1)  # a gap between holds
+    band_place = np.insert(place, ends, np.nan)
+    lower, upper = low - middle, high - middle
+    axes.fill_between(band_place, lower, upper, color=colour, alpha=0.22, lw=0, label="90 % band")
     axes.axhline(0, color=colour, lw=1)
-    axes.scatter(place, measured_N - band_N[1], s=14, color=colour, zorder=3, label="measured − posterior median")
+    median = band_N[1]
+    left = measured_N - median
+    axes.scatter(place, left, s=14, color=colour, zorder=3, label="measured − posterior median")
+    columns = 3
     if paper_N is not None:
-        left = measured_N - paper_N
-        axes.scatter(place, left, s=18, marker="x", lw=1, color=INK, zorder=2, label="measured − paper's curve")
-    axes.set_xticks(range(len(numbers)), [str(n) for n in numbers])
-    legend_below(figure, axes, 3 if paper_N is None else 2)
+        columns = 2
+        theirs = measured_N - paper_N
+        axes.scatter(place, theirs, s=18, marker="x", lw=1, color=INK, zorder=2, label="measured − paper's curve")
+    names = [str(number) for number in numbers]
+    axes.set_xticks(range(len(names)), names)
+    legend_below(figure, axes, columns)
     return figure
 
 
@@ -210,28 +245,38 @@ def creep_ahead(ahead: ExtrapolatedCreep, title: str) -> Figure:
     ahead : mapping
         ``extrapolation`` of a ``summary.json``.
     """
-    figure, axes = panel("time under constant tension, s", "creep, mm", f"{title}, {ahead['tension_N']:g} N")
+    title = f"{title}, {ahead['tension_N']:g} N"
+    figure, axes = panel("time under constant tension, s", "creep, mm", title)
+    times = ahead["time_s"]
     prior, weaker, posterior = ahead["prior_mm"], ahead["weaker_prior_mm"], ahead["posterior_mm"]
-    axes.fill_between(ahead["time_s"], prior["q05"], prior["q95"], color=QUIET, alpha=0.45, lw=0, label="prior alone")
-    axes.fill_between(
-        ahead["time_s"], posterior["q05"], posterior["q95"], color=CHAIN, alpha=0.45, lw=0, label="posterior, 90 %"
-    )
-    axes.plot(ahead["time_s"], posterior["q50"], color=CHAIN, lw=1.2)
-    for end, label in ((weaker["q05"], "prior at half weight"), (weaker["q95"], None)):
-        axes.plot(ahead["time_s"], end, color=HOLD, lw=1, ls="--", label=label)
-    for t, word in ((3600.0, "1 h"), (86400.0, "1 day")):
-        axes.axvline(t, color=INK, lw=0.5, alpha=0.4)
-        axes.annotate(
-            word,
-            (t, 1.0),
-            xycoords=("data", "axes fraction"),
-            ha="right",
-            va="top",
-            fontsize=8,
-            color=INK,
-            xytext=(-2, -2),
-            textcoords="offset points",
-        )
+    _fill(axes, times, prior, QUIET, "prior alone")
+    _fill(axes, times, posterior, CHAIN, "posterior, 90 %")
+    axes.plot(times, posterior["q50"], color=CHAIN, lw=1.2)
+    low, high = weaker["q05"], weaker["q95"]
+    axes.plot(times, low, color=HOLD, lw=1, ls="--", label="prior at half weight")
+    axes.plot(times, high, color=HOLD, lw=1, ls="--")
+    _mark_time(axes, 3600.0, "1 h")
+    _mark_time(axes, 86400.0, "1 day")
     logarithmic(axes, "both")
     legend_below(figure, axes, 3)
     return figure
+
+
+def _fill(axes: Any, times: Any, band: CreepBand, colour: str, label: str) -> None:
+    axes.fill_between(times, band["q05"], band["q95"], color=colour, alpha=0.45, lw=0, label=label)
+
+
+def _mark_time(axes: Any, time: float, word: str) -> None:
+    """A thin upright line with a word at its top."""
+    axes.axvline(time, color=INK, lw=0.5, alpha=0.4)
+    axes.annotate(
+        word,
+        (time, 1.0),
+        xycoords=("data", "axes fraction"),
+        ha="right",
+        va="top",
+        fontsize=8,
+        color=INK,
+        xytext=(-2, -2),
+        textcoords="offset points",
+    )

@@ -89,8 +89,7 @@ def meaning(
     """
     blocks: list[Block] = []
     if model:
-        named_symbols = [(f"{n}{_unit(unit_of(n))}", f"{sentence}.") for n, sentence in SYMBOLS.items()]
-        blocks += [Text(_IN_WORDS), Definitions("Symbols", named_symbols if symbols else [], _LAWS)]
+        blocks += [Text(_IN_WORDS), Definitions("Symbols", _symbols() if symbols else [], _LAWS)]
     named = _effects_named(effects, own or {})
     if named:
         blocks.append(Definitions("Effects named here", named))
@@ -100,19 +99,34 @@ def meaning(
     return Section("What the words and symbols mean", blocks, folded=True)
 
 
+def _symbols() -> list[tuple[str, str]]:
+    """The model's symbols with their units, and what each is."""
+    return [(f"{name}{_unit(unit_of(name))}", f"{sentence}.") for name, sentence in SYMBOLS.items()]
+
+
 def _effects_named(effects: Iterable[str], own: Mapping[str, Effect]) -> list[tuple[str, str]]:
     """The effects by their spoken names, each once, and what each is."""
     users = {name: type(effect) for name, effect in own.items()}
     known = {**CATALOGUE, Discrepancy.name: Discrepancy, **users}
-    names = dict.fromkeys(effect.split("@")[0].split(".")[0] for effect in effects)
-    return [(spoken(name), _effect(known[name])) for name in names if name in known]
+    named = []
+    for name in dict.fromkeys(_kind_of(effect) for effect in effects):
+        if name in known:
+            named.append((spoken(name), _effect(known[name])))
+    return named
+
+
+def _kind_of(effect: str) -> str:
+    """The name of an effect without its hold or amplitude."""
+    return effect.split("@")[0].split(".")[0]
 
 
 def _effect(kind: type[Effect]) -> str:
     """One line: what it says of the wire, and its amplitudes with their units."""
-    sizes = ", ".join(f"{a.name}{_unit(a.unit)}" for a in kind.amplitudes)
-    formula = inspect.cleandoc(kind.__doc__ or "").split("\n\n")[0].replace("\n", " ").replace("->", "→").rstrip(".")
-    return f"{kind.sentence} {formula}." + (f" Size: {sizes}." if sizes else "")
+    formula = inspect.cleandoc(kind.__doc__ or "").split("\n\n")[0]
+    formula = formula.replace("\n", " ").replace("->", "→").rstrip(".")
+    text = f"{kind.sentence} {formula}."
+    sizes = ", ".join(f"{amplitude.name}{_unit(amplitude.unit)}" for amplitude in kind.amplitudes)
+    return f"{text} Size: {sizes}." if sizes else text
 
 
 def _unit(unit: str) -> str:

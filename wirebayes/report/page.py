@@ -75,9 +75,5 @@ def render(page: Page, files_in: str = "") -> str:
     environment.autoescape = environment.trim_blocks = environment.lstrip_blocks = True
     environment.filters["sentence"] = as_sentence
     views = any(isinstance(block, View) for section in page.sections for block in section.blocks)
-    return (
-        environment.get_template("page.html.jinja").render(
-            page=page, views=views, version=__version__, files_in=files_in
-        )
-        + "\n"
-    )
+    template = environment.get_template("page.html.jinja")
+    return template.render(page=page, views=views, version=__version__, files_in=files_in) + "\n"

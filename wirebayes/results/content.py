@@ -1,7 +1,7 @@
 """What ``posterior.nc`` holds of a fit: draws, readings, protocols, and what is needed to use them alone."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array, Ints
 from wirebayes.results.netcdf import Group, Variable
 from wirebayes.results.parameters import unit_of, variables
-from wirebayes.wire.protocol import Control
+from wirebayes.wire.protocol import Control, Protocol
 
 _UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
 _PREDICTIVE_DRAWS = 500  # a chain: predicted readings are many more numbers than parameters
@@ -37,40 +37,55 @@ def groups_of(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rn
     rng : numpy Generator
         Draws from the prior and of the predictive distribution.
     """
-    problem, (m, draws, _) = fit.problem, fit.theta.shape
+    problem = fit.problem
+    chains, draws, d = fit.theta.shape
     members = list(problem.samples) if sample is None else [sample]
     few = np.unique(np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS)).astype(int))
-    chosen = fit.theta[:, few].reshape(-1, fit.theta.shape[-1])
+    chosen = fit.theta[:, few].reshape(-1, d)
     groups = _of_parameters(fit, sample, members, rng)
-    replicated = {s.name: np.moveaxis(replicate(problem, chosen, s, rng), -1, 0) for s in members}
+    replicated, measured = {}, {}
+    for member in members:
+        predicted = replicate(problem, chosen, member, rng)
+        replicated[member.name] = np.moveaxis(predicted, -1, 0)
+        measured[member.name] = np.moveaxis(member.readings, -1, 0)
     labels = _hold_coordinates(members, apart=sample is not None)
-    measured = {s.name: np.moveaxis(s.readings, -1, 0) for s in members}
-    groups |= {
-        "posterior_predictive": Group(_readings(members, replicated, (m, len(few))), labels | _steps(m, few)),
-        "log_likelihood": Group(_log_likelihood(fit, members), labels | _steps(m, np.arange(draws))),
-        "observed_data": Group(_readings(members, measured, ()), labels),
-        "constant_data": Group(_protocols(members), labels),
-    }
-    _label(groups, fit, members, provenance)
+    steps = _steps(chains, np.arange(draws))
+    predictive = _readings(members, replicated, (chains, len(few)))
+    groups["posterior_predictive"] = Group(predictive, labels | _steps(chains, few))
+    groups["log_likelihood"] = Group(_log_likelihood(fit, members), labels | steps)
+    groups["observed_data"] = Group(_readings(members, measured, ()), labels)
+    groups["constant_data"] = Group(_protocols(members), labels)
+    _label(groups, members)
+    groups["constant_data"].attributes["reference_C"] = _listed(s.protocol.reference_C for s in members)
+    groups["posterior"].attributes.update(_about(fit, members, provenance))
     return groups
 
 
 def _of_parameters(fit: Fit, sample: Sample | None, members: Sequence[Sample], rng: Generator) -> dict[str, Group]:
     """Posterior and prior draws of the parameters, and the log density."""
-    problem, (m, draws, _) = fit.problem, fit.theta.shape
+    problem = fit.problem
+    chains, draws, _ = fit.theta.shape
     prior = problem.prior.rvs(_PRIOR_DRAWS, rng)
-    experiments = Variable(("experiment",), np.array([s.name for s in members]))
-
-    def group(variables: Mapping[str, Array], steps: dict[str, Variable]) -> Group:
-        axes = ("chain", "draw", "experiment")
-        named = {name: Variable(axes[: values.ndim], values) for name, values in variables.items()}
-        return Group(named, steps | ({} if sample else {"experiment": experiments}))
-
+    several = {}
+    if sample is None:
+        names = np.array([s.name for s in members])
+        several["experiment"] = Variable(("experiment",), names)
+    steps = _steps(chains, np.arange(draws))
+    prior_steps = _steps(1, np.arange(_PRIOR_DRAWS))
+    posterior_draws = _named(variables(problem, fit.theta, sample))
+    prior_draws = _named(variables(problem, prior[None], sample))
+    log_density = Variable(("chain", "draw"), fit.log_density)
     return {
-        "posterior": group(variables(problem, fit.theta, sample), _steps(m, np.arange(draws))),
-        "sample_stats": Group({"lp": Variable(("chain", "draw"), fit.log_density)}, _steps(m, np.arange(draws))),
-        "prior": group(variables(problem, prior[None], sample), _steps(1, np.arange(_PRIOR_DRAWS))),
+        "posterior": Group(posterior_draws, steps | several),
+        "sample_stats": Group({"lp": log_density}, dict(steps)),
+        "prior": Group(prior_draws, prior_steps | several),
     }
+
+
+def _named(values: Mapping[str, Array]) -> dict[str, Variable]:
+    """Draws (chains, draws) of each parameter, or (chains, draws, experiments)."""
+    axes = ("chain", "draw", "experiment")
+    return {name: Variable(axes[: draws.ndim], draws) for name, draws in values.items()}
 
 
 def _steps(chains: int, draws: Ints) -> dict[str, Variable]:
@@ -80,14 +95,18 @@ def _steps(chains: int, draws: Ints) -> dict[str, Variable]:
 
 def _log_likelihood(fit: Fit, members: Sequence[Sample]) -> dict[str, Variable]:
     """Log density of each recorded hold given all others, at every draw."""
-    m, draws, _ = fit.theta.shape
-    samples = zip(_left_out(fit.problem, fit.flat), fit.problem.samples, strict=True)
-    holds = np.concatenate([values[s.protocol.recorded] for values, s in samples if s in members])
-    return {_name(members, READ, READING): Variable(("chain", "draw", "hold"), holds.T.reshape(m, draws, -1))}
+    chains, draws, _ = fit.theta.shape
+    recorded = []
+    for values, s in zip(_left_out(fit.problem, fit.flat), fit.problem.samples, strict=True):
+        if s in members:
+            recorded.append(values[s.protocol.recorded])
+    holds = np.concatenate(recorded)
+    densities = holds.T.reshape(chains, draws, -1)
+    return {_name(members, READ, READING): Variable(("chain", "draw", "hold"), densities)}
 
 
-def _label(groups: Mapping[str, Group], fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> None:
-    """Units of all variables, and what is needed to use the posterior without its experiment file."""
+def _label(groups: Mapping[str, Group], members: Sequence[Sample]) -> None:
+    """Units of all variables."""
     effects, controls = members[0].model.effects, _controls(members)
     for kind, group in groups.items():
         for name in group.variables:
@@ -100,31 +119,39 @@ def _label(groups: Mapping[str, Group], fit: Fit, members: Sequence[Sample], pro
             else:
                 unit = _UNIT_IN_NAME.get(name.rsplit("_", 1)[-1], "1")
             group.units[name] = unit
-    groups["constant_data"].attributes["reference_C"] = json.dumps([s.protocol.reference_C for s in members])
-    groups["posterior"].attributes.update(_about(fit, members, provenance))
+
+
+def _listed(values: Iterable[Any]) -> str:
+    """A value of each experiment, as an attribute holds them."""
+    return json.dumps(list(values))
 
 
 def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes of the posterior: experiments, model, range of the readings, sampler."""
     first = members[0]
-    loads = [s.tensions_N for s in members]
+    model = first.model
+    protocols = [s.protocol for s in members]
+    tensions = [s.tensions_N for s in members]
+    lowest = min(own.min() for own in tensions)
+    highest = max(own.max() for own in tensions)
+    longest = max(protocol.duration_s.max() for protocol in protocols)
     return {
         "wirebayes_version": __version__,
         "inference_library": "emcee",
         "experiment": first.name,
-        "experiments": json.dumps([s.name for s in members]),
+        "experiments": _listed(s.name for s in members),
         "material": first.material,
         "length_mm": first.protocol.length_mm,
-        "lengths_mm": json.dumps([s.protocol.length_mm for s in members]),
-        "controls": json.dumps([s.protocol.control for s in members]),
-        "resolutions": json.dumps([s.resolution for s in members]),
-        "elastic_law": first.model.law,
-        "history": first.model.history,
+        "lengths_mm": _listed(protocol.length_mm for protocol in protocols),
+        "controls": _listed(protocol.control for protocol in protocols),
+        "resolutions": _listed(s.resolution for s in members),
+        "elastic_law": model.law,
+        "history": model.history,
         "likelihood": fit.problem.likelihood,
-        "effects": json.dumps([e.key for e in first.model.effects]),
-        "tension_ref_N": first.model.tension_ref_N,
-        "tension_range_N": [float(min(t.min() for t in loads)), float(max(t.max() for t in loads))],
-        "time_range_s": [0.0, float(max(s.protocol.duration_s.max() for s in members))],
+        "effects": _listed(effect.key for effect in model.effects),
+        "tension_ref_N": model.tension_ref_N,
+        "tension_range_N": [float(lowest), float(highest)],
+        "time_range_s": [0.0, float(longest)],
         "walkers": fit.chains.z.shape[2],
         "thin": fit.thin,
         "converged": int(fit.chains.converged),
@@ -141,10 +168,14 @@ def _hold_coordinates(members: Sequence[Sample], *, apart: bool) -> dict[str, Va
     number = np.concatenate([s.protocol.number[s.protocol.recorded] for s in members])
     if apart or len(members) == 1:
         return {"hold": Variable(("hold",), number)}
-    names = np.repeat([s.name for s in members], [s.protocol.recorded.sum() for s in members])
+    holds = [s.protocol.recorded.sum() for s in members]
+    names = np.repeat([s.name for s in members], holds)
     labels = np.array([f"{name}:{n}" for name, n in zip(names, number, strict=True)])
-    each = {"hold": labels, "experiment": names, "number": number}
-    return {name: Variable(("hold",), values) for name, values in each.items()}
+    return {
+        "hold": Variable(("hold",), labels),
+        "experiment": Variable(("hold",), names),
+        "number": Variable(("hold",), number),
+    }
 
 
 def _stacked(members: Sequence[Sample], values: Mapping[str, Array]) -> Array:
@@ -159,12 +190,15 @@ def _stacked(members: Sequence[Sample], values: Mapping[str, Array]) -> Array:
 
 def _readings(members: Sequence[Sample], values: Mapping[str, Array], shape: tuple[int, ...]) -> dict[str, Variable]:
     """Readings of each hold, and their mean, which has the dimensions of the log-likelihood."""
-    read, first = _stacked(members, values), ("chain", "draw") if shape else ()
+    read = _stacked(members, values)
+    means = np.nanmean(read, axis=2)
+    steps = ("chain", "draw") if shape else ()
     name = _name(members, READ, READING)
-    mean = "hold_mean" if name == READING else f"hold_mean_{UNIT[name]}"
+    mean_name = "hold_mean" if name == READING else f"hold_mean_{UNIT[name]}"
+    _, holds, times = read.shape
     return {
-        name: Variable((*first, "hold", "time"), read.reshape(*shape, *read.shape[1:])),
-        mean: Variable((*first, "hold"), np.nanmean(read, axis=2).reshape(*shape, read.shape[1])),
+        name: Variable((*steps, "hold", "time"), read.reshape(*shape, holds, times)),
+        mean_name: Variable((*steps, "hold"), means.reshape(*shape, holds)),
     }
 
 
@@ -181,38 +215,55 @@ def _name(members: Sequence[Sample], names: Mapping[Control, str], of_both: str)
 def _protocols(members: Sequence[Sample]) -> dict[str, Variable]:
     """What was done: the recorded holds, and beside them the unrecorded ones, as an experiment file states them."""
     protocols = [s.protocol for s in members]
-    recorded = np.concatenate([p.recorded for p in protocols])
-
-    def each(field: str) -> Array:
-        return np.concatenate([getattr(p, field) for p in protocols])
-
+    recorded = _of_all(protocols, "recorded")
     set_as = _name(members, SET, SETTING)
+    setting = _of_all(protocols, "setting")[recorded]
+    duration = _of_all(protocols, "duration_s")[recorded]
     times = {s.name: s.protocol.time_s[None] for s in members}
     out = {
-        set_as: Variable(("hold",), each("setting")[recorded]),
-        "duration_s": Variable(("hold",), each("duration_s")[recorded]),
+        set_as: Variable(("hold",), setting),
+        "duration_s": Variable(("hold",), duration),
         "time_s": Variable(("hold", "time"), _stacked(members, times)[0]),
     }
-    if any(p.warming_K is not None for p in protocols):
-        warming = {
-            s.name: (np.nan if p.warming_K is None else p.warming_K) + 0.0 * times[s.name]
-            for s, p in zip(members, protocols, strict=True)
-        }
-        out["warming_K"] = Variable(("hold", "time"), _stacked(members, warming)[0])
+    if any(protocol.warming_K is not None for protocol in protocols):
+        out["warming_K"] = Variable(("hold", "time"), _stacked(members, _warming(members))[0])
     if set_as == SETTING:
-        controls = np.concatenate([np.full(len(p.number), p.control) for p in protocols])
+        controls = np.repeat([protocol.control for protocol in protocols], _holds(protocols))
         out["control"] = Variable(("hold",), controls[recorded])
     if not recorded.all():
-        following = np.concatenate([_following(p.number) for p in protocols])
-        names = np.repeat([s.name for s in members], [len(p.number) for p in protocols])
-        unrecorded = {
-            "unrecorded_experiment": names,
-            "unrecorded_before_hold": following,
-            f"unrecorded_{set_as}": each("setting"),
-            "unrecorded_duration_s": each("duration_s"),
-        }
-        out |= {name: Variable(("unrecorded_hold",), values[~recorded]) for name, values in unrecorded.items()}
+        for name, values in _unrecorded(members, set_as).items():
+            out[name] = Variable(("unrecorded_hold",), values[~recorded])
     return out
+
+
+def _warming(members: Sequence[Sample]) -> dict[str, Array]:
+    """Warming of each test, (1, H, R); NaN where it was not logged."""
+    warming = {}
+    for s in members:
+        values = np.full(s.protocol.time_s.shape, np.nan) if s.protocol.warming_K is None else s.protocol.warming_K
+        warming[s.name] = values[None]
+    return warming
+
+
+def _of_all(protocols: Sequence[Protocol], field: str) -> Array:
+    """Values of each hold, one test after the other."""
+    return np.concatenate([getattr(protocol, field) for protocol in protocols])
+
+
+def _holds(protocols: Sequence[Protocol]) -> list[int]:
+    return [len(protocol.number) for protocol in protocols]
+
+
+def _unrecorded(members: Sequence[Sample], set_as: str) -> dict[str, Array]:
+    """What is stored of unrecorded holds, of every hold."""
+    protocols = [s.protocol for s in members]
+    following = [_following(protocol.number) for protocol in protocols]
+    return {
+        "unrecorded_experiment": np.repeat([s.name for s in members], _holds(protocols)),
+        "unrecorded_before_hold": np.concatenate(following),
+        f"unrecorded_{set_as}": _of_all(protocols, "setting"),
+        "unrecorded_duration_s": _of_all(protocols, "duration_s"),
+    }
 
 
 def _following(number: Array) -> Array:

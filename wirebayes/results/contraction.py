@@ -7,10 +7,8 @@ import numpy as np
 from wirebayes.numeric.typing import Array
 
 Source = Literal["prior", "data and prior", "data"]
-LEAST, MOST = (
-    0.3,
-    0.9,
-)  # below the one the prior determines a quantity; from the other on, a 90 % range of a third, data
+LEAST = 0.3  # below it the prior determines a quantity
+MOST = 0.9  # from here on, a 90 % range of a third, the data do
 
 
 def interval(values: Array) -> tuple[float, float, float]:
@@ -44,4 +42,6 @@ def contraction(posterior: Array, prior: Array) -> float:
 
 def source(value: float) -> Source:
     """What determines a quantity that has contracted so much."""
-    return "prior" if value < LEAST else "data and prior" if value < MOST else "data"
+    if value < LEAST:
+        return "prior"
+    return "data and prior" if value < MOST else "data"

@@ -59,29 +59,39 @@ def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
     if problem.likelihood != "chain":
         return None
     protocols = [sample.protocol for sample in problem.samples]
-    if not all(map(are_recorded, protocols)):
-        samples = [sample if are_recorded(sample.protocol) else _longer(sample) for sample in problem.samples]
+    recorded = [are_recorded(protocol) for protocol in protocols]
+    if not all(recorded):
+        each = zip(problem.samples, recorded, strict=True)
+        samples = [sample if is_recorded else _longer(sample) for sample, is_recorded in each]
         covered, supposed, advice = COVERED, _LONGER, _RECORD
     elif any(unread_after_s(protocol).any() for protocol in protocols):
         samples = [_shorter(sample) for sample in problem.samples]
         covered, supposed, advice = 1.0, _rests(problem.samples), _LET_GO
     else:
         return None
-    before, after = _modes(problem, replace(problem, samples=tuple(samples)), best)
+    otherwise = replace(problem, samples=tuple(samples))
+    before, after = _modes(problem, otherwise, best)
+    shifts = after - before
+    moved = _moved(problem, shifts, spread)
+    sentence = hold_ends_sentence(moved, supposed, advice)
+    return {"covered": covered, "moved": moved, "sentence": sentence}
+
+
+def _moved(problem: Problem, shifts: Array, spread: Array) -> dict[str, MovedByHoldEnds]:
+    """By how much each parameter moves of which is told, also in its standard deviations."""
     moved: dict[str, MovedByHoldEnds] = {}
-    for i, name in enumerate(problem.names):
-        if not _is_told(name):
-            continue
-        shift = float(after[i] - before[i])
-        share = abs(shift) / max(float(spread[i]), np.finfo(float).tiny)
-        moved[name] = {"shift": shift, "sd_share": share, "unit": _unit(name, problem)}
-    return {"covered": covered, "moved": moved, "sentence": hold_ends_sentence(moved, supposed, advice)}
+    for name, shift, sd in zip(problem.names, shifts.tolist(), spread.tolist(), strict=True):
+        if _is_told(name):
+            share = abs(shift) / max(sd, np.finfo(float).tiny)
+            moved[name] = {"shift": shift, "sd_share": share, "unit": _unit(name, problem)}
+    return moved
 
 
 def hold_ends_notice(ends: HoldEnds | None) -> list[Notice]:
     """A warning where something would move far."""
-    matters = ends is not None and any(move["sd_share"] >= MATTERS for move in ends["moved"].values())
-    return [Notice("hold-ends", ends["sentence"])] if ends is not None and matters else []
+    if ends is None or not any(move["sd_share"] >= MATTERS for move in ends["moved"].values()):
+        return []
+    return [Notice("hold-ends", ends["sentence"])]
 
 
 def unread_after_s(protocol: Protocol) -> Array:
@@ -91,9 +101,12 @@ def unread_after_s(protocol: Protocol) -> Array:
     ----------
     protocol : Protocol
     """
-    rows = zip(protocol.time_s, protocol.mask, protocol.duration_s, strict=True)
-    each = [unread_s(time[mask], float(end)) if mask.any() else 0.0 for time, mask, end in rows]
-    return np.array([*each[:-1], 0.0])
+    unread = np.zeros(len(protocol.duration_s))
+    for hold, mask in enumerate(protocol.mask[:-1]):
+        if mask.any():
+            times = protocol.time_s[hold][mask]
+            unread[hold] = unread_s(times, float(protocol.duration_s[hold]))
+    return unread
 
 
 def _rests(samples: Sequence[Sample]) -> str:
@@ -101,11 +114,13 @@ def _rests(samples: Sequence[Sample]) -> str:
     each = []
     for sample in samples:
         unread = unread_after_s(sample.protocol)
-        which = [str(number) for number in sample.protocol.number[unread > 0.0]]
+        numbers = sample.protocol.number[unread > 0.0]
+        which = [str(number) for number in numbers]
         if which:
-            plural = "s" * (len(which) > 1)
+            holds = f"hold{'s' * (len(which) > 1)} {listed(which)}"
             of = f" of {sample.name}" if len(samples) > 1 else ""
-            each.append(f"hold{plural} {listed(which)}{of} (up to {lasting(float(unread.max()))})")
+            longest = lasting(float(unread.max()))
+            each.append(f"{holds}{of} (up to {longest})")
     return (
         f"{listed(each)} went on long after the last reading, and what was set is taken to have stayed until the next "
         "move: had nothing followed that reading,"
@@ -114,7 +129,9 @@ def _rests(samples: Sequence[Sample]) -> str:
 
 def _is_told(column: str) -> bool:
     """The creep rate, which unseen creep distorts most, and amplitudes of effects that have a meaning."""
-    return column.split("[")[0] == "k2" or ("." in column and not column.startswith("discrepancy."))
+    if column.split("[")[0] == "k2":
+        return True
+    return "." in column and not column.startswith("discrepancy.")
 
 
 def _unit(column: str, problem: Problem) -> str:
@@ -147,29 +164,41 @@ def _longer(sample: Sample) -> Sample:
     times = np.where(sample.protocol.recorded, 1.0 / COVERED, 1.0)
     protocol = replace(sample.protocol, duration_s=sample.protocol.duration_s * times)
     more = protocol.mask.shape[1] - sample.protocol.mask.shape[1]  # a column for the ends, where there was none
-    return replace(sample, protocol=protocol, readings=np.pad(sample.readings, [(0, 0), (0, more), (0, 0)]))
+    readings = np.pad(sample.readings, [(0, 0), (0, more), (0, 0)])
+    return replace(sample, protocol=protocol, readings=readings)
 
 
 def _shorter(sample: Sample) -> Sample:
     """The same readings in holds that end with their last readings where they went on unread."""
-    p = sample.protocol
-    last_s = p.time_s[np.arange(len(p.duration_s)), p.last_reading]
-    ended = np.where(unread_after_s(p) > 0.0, last_s, p.duration_s)
-    return replace(sample, protocol=replace(p, duration_s=ended))
+    protocol = sample.protocol
+    holds = np.arange(len(protocol.duration_s))
+    last_s = protocol.time_s[holds, protocol.last_reading]
+    went_on = unread_after_s(protocol) > 0.0
+    ended = np.where(went_on, last_s, protocol.duration_s)
+    return replace(sample, protocol=replace(protocol, duration_s=ended))
 
 
 def _modes(problem: Problem, longer: Problem, best: Array) -> tuple[Array, Array]:
     """(d,) parameters at the mode that is reached from these, of both problems; what is integrated out stays."""
     own = problem.in_units(problem.own_units)
-    target, other = (LogPosterior(integrated(p.in_units(own.units)), for_draws=False) for p in (problem, longer))
+    target = _density(problem, own)
+    other = _density(longer, own)
     other.coordinates.steps = target.coordinates.steps  # so that both modes are of one density
     columns = [problem.names.index(name) for name in target.problem.names]
-    start = target.coordinates.to_sampled(problem.theta_in(own.units, best[None])[:, columns])
+    theta = problem.theta_in(own.units, best[None])
+    near = theta[:, columns]
+    start = target.coordinates.to_sampled(near)
     ends = []
     for each in (target, other):
         density, residuals = each.rowwise()
-        found = climb(density, start, residuals, curvature_at_end=False).z
-        theta = problem.theta_in(own.units, best[None])
-        theta[:, columns] = each.coordinates.to_natural(found)
-        ends.append(own.theta_in(problem.units, theta)[0])
+        found = climb(density, start, residuals, curvature_at_end=False)
+        there = theta.copy()
+        there[:, columns] = each.coordinates.to_natural(found.z)
+        (in_given_units,) = own.theta_in(problem.units, there)
+        ends.append(in_given_units)
     return ends[0], ends[1]
+
+
+def _density(problem: Problem, own: Problem) -> LogPosterior:
+    """The density of a problem in the units of another, without what can be integrated out."""
+    return LogPosterior(integrated(problem.in_units(own.units)), for_draws=False)

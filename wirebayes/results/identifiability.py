@@ -14,7 +14,9 @@ import numpy as np
 from wirebayes.inference.chain_statistics import pareto_smoothed, power_scaled, power_sensitivity
 from wirebayes.inference.fit import Fit
 from wirebayes.json_files.summary import CreepBand, ExtrapolatedCreep, Identifiability, IdentifiabilityFigures
+from wirebayes.model.prior import Prior
 from wirebayes.numeric.distributions import log_density_of
+from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import contraction, source
 from wirebayes.sentences import number, short
@@ -24,6 +26,7 @@ SENSITIVE = 0.05  # the threshold that the authors of the method propose
 RIDGE = 0.9  # correlation above which two parameters are known in combination only
 _POWERS = (1.0 / 1.1, 1.1)  # so small that weights stay even, so large that the change exceeds the chance of 4000 draws
 _NOTHING = 1e-6  # nats by which a component varies: it moves nothing, and its weights differ by rounding alone
+_ENDS = (0.05, 0.95)  # of the interval that is reported
 _DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 
 
@@ -43,53 +46,73 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
     prior, names = problem.prior, problem.names
     theta = _thinned(fitted.flat)
     positive = np.array([name in prior.logarithmic for name in names])
-    z = np.where(positive, np.log(np.where(positive, theta, 1.0)), theta)
+    logs = np.log(np.where(positive, theta, 1.0))
+    z = np.where(positive, logs, theta)
     own_prior = log_priors(fitted, theta)
     likelihood = problem.log_likelihood(theta)
     correlation = np.atleast_2d(np.corrcoef(z.T))
-    out: dict[str, Identifiability] = {}
     drawn = prior.rvs(20000, np.random.default_rng(0))
     by_likelihood = distances_per_doubling(z, likelihood)
+    out: dict[str, Identifiability] = {}
     for i, name in enumerate(names):
-        sample = drawn[:, i]
-        before = np.quantile(sample, [0.05, 0.95])
-        if name not in prior.powers:
-            before = prior.distributions[name].ppf([0.05, 0.95])
-        after = np.quantile(theta[:, i], [0.05, 0.95])
-        along = [j for j in range(len(names)) if j != i and abs(correlation[i, j]) > RIDGE]
+        is_factor = bool(positive[i])
         figures: IdentifiabilityFigures = {
-            "contraction": contraction(theta[:, i], sample),
-            "prior_range_90": float(before[1] / before[0] if positive[i] else before[1] - before[0]),
-            "posterior_range_90": float(after[1] / after[0] if positive[i] else after[1] - after[0]),
-            "range_is_factor": bool(positive[i]),
+            "contraction": contraction(theta[:, i], drawn[:, i]),
+            "prior_range_90": _range(_prior_ends(prior, name, drawn[:, i]), is_factor),
+            "posterior_range_90": _range(np.quantile(theta[:, i], _ENDS), is_factor),
+            "range_is_factor": is_factor,
             "prior_sensitivity": distances_per_doubling(z[:, [i]], own_prior[:, i])[0],
             "likelihood_sensitivity": by_likelihood[i],
-            "ridges": {names[j]: float(correlation[i, j]) for j in along},
+            "ridges": _ridges(names, correlation, i),
         }
         out[name] = {**figures, "sentence": parameter_in_words(name, figures)}
     return out
 
 
+def _prior_ends(prior: Prior, name: str, drawn: Array) -> Array:
+    """Ends of the prior's 90 % interval of a parameter."""
+    if name in prior.powers:
+        return np.quantile(drawn, _ENDS)
+    return np.asarray(prior.distributions[name].ppf(_ENDS))
+
+
+def _range(ends: Array, is_factor: bool) -> float:
+    """How far the ends of an interval are apart."""
+    low, high = ends
+    return float(high / low if is_factor else high - low)
+
+
+def _ridges(names: Sequence[str], correlation: Array, i: int) -> dict[str, float]:
+    """The parameters that are known only together with one of them, and their correlation."""
+    ridges = {}
+    for j, name in enumerate(names):
+        if j != i and abs(correlation[i, j]) > RIDGE:
+            ridges[name] = float(correlation[i, j])
+    return ridges
+
+
 def _thinned(flat: Array) -> Array:
     """At most `_DRAWS` rows, evenly spread."""
-    return np.asarray(flat[np.linspace(0, len(flat) - 1, min(_DRAWS, len(flat))).round().astype(int)])
+    return np.asarray(flat[evenly(len(flat), _DRAWS)])
 
 
 def parameter_in_words(name: str, figures: IdentifiabilityFigures) -> str:
     """A sentence about one parameter."""
-    sign = "×" if figures["range_is_factor"] else ""
-    after, before = figures["posterior_range_90"], figures["prior_range_90"]
-    ranges = f"its 90 % range is {sign}{number(after)}, the prior's {sign}{number(before)}"
     determined_by = source(figures["contraction"])
+    sensitivity = figures["prior_sensitivity"]
     if determined_by == "prior":
         verdict = "the data say next to nothing about it, the interval is the prior's"
-    elif figures["prior_sensitivity"] > SENSITIVE or determined_by != "data":
-        verdict = f"data and prior both determine it (sensitivity to the prior {figures['prior_sensitivity']:.2f})"
+    elif sensitivity > SENSITIVE or determined_by != "data":
+        verdict = f"data and prior both determine it (sensitivity to the prior {sensitivity:.2f})"
     else:
         verdict = "the data determine it"
-    with_whom = " and ".join(f"{other} (r = {number(r, 2)})" for other, r in figures["ridges"].items())
-    along = f"; it is correlated with {with_whom}, and their combination is known better" if with_whom else ""
-    return f"{name}: {verdict}; {ranges}{along}."
+    sign = "×" if figures["range_is_factor"] else ""
+    after, before = number(figures["posterior_range_90"]), number(figures["prior_range_90"])
+    text = f"{name}: {verdict}; its 90 % range is {sign}{after}, the prior's {sign}{before}"
+    with_whom = [f"{other} (r = {number(r, 2)})" for other, r in figures["ridges"].items()]
+    if with_whom:
+        text += f"; it is correlated with {' and '.join(with_whom)}, and their combination is known better"
+    return f"{text}."
 
 
 def distances_per_doubling(values: Array, log_component: Array) -> list[float]:
@@ -105,9 +128,11 @@ def log_priors(fitted: Fit, theta: Array) -> Array:
     prior = fitted.problem.prior
     known = prior.known(theta)
     columns = []
-    for i, (name, distribution) in enumerate(prior.distributions.items()):
-        value = log_density_of(distribution)(known[:, i])
-        columns.append(value + np.log(known[:, i]) if name in prior.logarithmic else value)
+    for (name, distribution), values in zip(prior.distributions.items(), known.T, strict=True):
+        log_density = log_density_of(distribution)(values)
+        if name in prior.logarithmic:
+            log_density = log_density + np.log(values)
+        columns.append(log_density)
     return np.stack(columns, axis=1)
 
 
@@ -159,18 +184,7 @@ class Extrapolation:
 
     def to_dict(self) -> ExtrapolatedCreep:
         """The same as plain values, for JSON, with a sentence for the longest time."""
-        share, hours = float(self.prior_share[-1]), self.time_s[-1] / 3600.0
-        if not np.isfinite(share):
-            verdict = "more than a twentieth of the draws do not creep at this tension"
-        elif self.pareto_k > TRUSTED_K:
-            verdict = "these draws cannot show how much it depends on the prior"
-        elif share > 0.1:
-            verdict = f"it depends on the prior: with half the prior's weight the band is {100 * share:.0f} % wider"
-        else:
-            verdict = (
-                f"it hardly depends on the prior: with half the prior's weight the band is {100 * share:.0f} % wider"
-            )
-        sentence = f"Creep after {hours:g} h at {self.tension_N:g} N: {verdict}."
+        hours = self.time_s[-1] / 3600.0
         return {
             "tension_N": self.tension_N,
             "time_s": self.time_s,
@@ -179,9 +193,20 @@ class Extrapolation:
             "prior_mm": _quantiles(self.prior_mm),
             "prior_share": self.prior_share,
             "pareto_k": self.pareto_k,
-            "sentence": sentence,
+            "sentence": f"Creep after {hours:g} h at {self.tension_N:g} N: {self._verdict()}.",
             "warning": self.warning,
         }
+
+    def _verdict(self) -> str:
+        """How much the creep at the longest time depends on the prior."""
+        share = float(self.prior_share[-1])
+        if not np.isfinite(share):
+            return "more than a twentieth of the draws do not creep at this tension"
+        if self.pareto_k > TRUSTED_K:
+            return "these draws cannot show how much it depends on the prior"
+        wider = f"with half the prior's weight the band is {100 * share:.0f} % wider"
+        depends = "it depends on the prior" if share > 0.1 else "it hardly depends on the prior"
+        return f"{depends}: {wider}"
 
 
 def _quantiles(values: Array) -> CreepBand:
@@ -216,20 +241,24 @@ def extrapolation(fitted: Fit, tension_N: float, times_s: Array = TIMES_S, sampl
         wire = FreshSample(problem.parameters(rows, here), here.model, here.protocol.length_mm)
         return wire.creep_mm(tension_N, times_s)
 
-    courses, before = creep(theta), creep(problem.prior.rvs(_DRAWS, np.random.default_rng(0)))
+    courses = creep(theta)
+    before = creep(problem.prior.rvs(_DRAWS, np.random.default_rng(0)))
     levels = [0.05, 0.5, 0.95]
+    weaker = [_weighted_quantiles(course, weight, levels) for course in courses]
+    longest = max(s.protocol.duration_s.max() for s in problem.samples)
     return Extrapolation(
         times_s,
         tension_N,
-        np.quantile(courses, levels, axis=1),
-        np.stack([_weighted_quantiles(course, weight, levels) for course in courses], axis=1),
-        np.quantile(before, levels, axis=1),
-        float(k),
-        float(max(s.protocol.duration_s.max() for s in problem.samples)),
+        posterior_mm=np.quantile(courses, levels, axis=1),
+        weaker_prior_mm=np.stack(weaker, axis=1),
+        prior_mm=np.quantile(before, levels, axis=1),
+        pareto_k=float(k),
+        longest_hold_s=float(longest),
     )
 
 
 def _weighted_quantiles(values: Array, weight: Array, levels: Sequence[float]) -> Array:
     order = np.argsort(values)
-    share = (np.cumsum(weight[order]) - 0.5 * weight[order]) / weight.sum()
+    ranked = weight[order]
+    share = (np.cumsum(ranked) - 0.5 * ranked) / weight.sum()
     return np.interp(levels, share, values[order])

@@ -8,7 +8,7 @@ the coordinate that labels it, or else an empty one whose name says that it is n
 """
 
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -98,13 +98,10 @@ def _write(node: Any, group: Group, numbers: Iterator[int]) -> None:
     """Fill a group of HDF5; each dimension takes the next of the file's numbers."""
     _describe(node, group.attributes)
     both = group.coordinates | group.variables
-    sizes = {dim: size for v in both.values() for dim, size in zip(v.dims, v.values.shape, strict=True)}
     written = {name: _dataset(node, name, variable.values) for name, variable in both.items()}
-    for dim, size in sizes.items():
-        scale = written[dim] if dim in written else node.create_dataset(dim, (size,), ">f4", track_order=True)
-        scale.make_scale(dim if dim in written else f"{_NO_VARIABLE}{size:10}")
-        scale.attrs["_Netcdf4Dimid"] = np.int32(next(numbers))
-    auxiliary = [name for name in group.coordinates if name not in sizes]
+    sizes = _sizes(both.values())
+    _make_scales(node, written, sizes, numbers)
+    auxiliary = {name: set(variable.dims) for name, variable in group.coordinates.items() if name not in sizes}
     for name, variable in both.items():
         dataset = written[name]
         if name not in sizes:
@@ -112,9 +109,30 @@ def _write(node: Any, group: Group, numbers: Iterator[int]) -> None:
                 axis.attach_scale(node[dim])
         if name in group.units:
             dataset.attrs["units"] = group.units[name]
-        labelling = [other for other in auxiliary if set(both[other].dims) <= set(variable.dims)]
+        labelling = [other for other, dims in auxiliary.items() if dims <= set(variable.dims)]
         if labelling and name in group.variables:  # as the conventions for climate and forecast (CF) have it
             dataset.attrs["coordinates"] = " ".join(labelling)
+
+
+def _sizes(variables: Iterable[Variable]) -> dict[str, int]:
+    """The size of every dimension."""
+    sizes = {}
+    for variable in variables:
+        for dim, size in zip(variable.dims, variable.values.shape, strict=True):
+            sizes[dim] = size
+    return sizes
+
+
+def _make_scales(node: Any, written: Mapping[str, Any], sizes: Mapping[str, int], numbers: Iterator[int]) -> None:
+    """Make a scale of the coordinate that labels a dimension, or an empty one."""
+    for dim, size in sizes.items():
+        if dim in written:
+            scale, name = written[dim], dim
+        else:
+            scale = node.create_dataset(dim, (size,), ">f4", track_order=True)
+            name = f"{_NO_VARIABLE}{size:10}"
+        scale.make_scale(name)
+        scale.attrs["_Netcdf4Dimid"] = np.int32(next(numbers))
 
 
 def _dataset(node: Any, name: str, values: Array) -> Any:
@@ -134,12 +152,15 @@ def _describe(node: Any, attributes: Mapping[str, Any]) -> None:
 
 
 def _read(node: Any) -> Group:
-    found = Group({}, {}, {}, {name: _entry(value) for name, value in node.attrs.items()})
+    found = Group({})
+    for name, value in node.attrs.items():
+        found.attributes[name] = _entry(value)
     stored = {name: dataset for name, dataset in node.items() if not _is_bare(dataset)}
     labels: set[str] = set()
     for dataset in stored.values():
+        named = _entry(dataset.attrs.get("coordinates", ""))
         labels.update(_dims(dataset))
-        labels.update(_entry(dataset.attrs.get("coordinates", "")).split())
+        labels.update(named.split())
     for name, dataset in stored.items():
         place = found.coordinates if name in labels else found.variables
         place[name] = Variable(_dims(dataset), _values(dataset))
@@ -161,13 +182,15 @@ def _dims(dataset: Any) -> tuple[str, ...]:
 
 def _entry(value: Any) -> Any:
     """An attribute as it was given to `content`: a list of one entry is that entry."""
-    entry = value[0] if np.size(value) == 1 and np.ndim(value) else value
+    is_one = np.size(value) == 1 and np.ndim(value) > 0
+    entry = value[0] if is_one else value
     return entry.decode() if isinstance(entry, bytes) else entry
 
 
 def _values(dataset: Any) -> Array:
     """The values in this machine's order of bytes; text as Python's own."""
     values = np.asarray(dataset[...])
-    if values.dtype.kind in "OSU":
-        return np.array([t.decode() if isinstance(t, bytes) else t for t in values.ravel()]).reshape(values.shape)
-    return values
+    if values.dtype.kind not in "OSU":
+        return values
+    text = [entry.decode() if isinstance(entry, bytes) else entry for entry in values.ravel()]
+    return np.array(text).reshape(values.shape)

@@ -39,23 +39,41 @@ def outliers(rows: Iterable[Row]) -> list[OutlierRow]:
             materials.setdefault(row["material"], []).append(row)
     found: list[OutlierRow] = []
     for material, members in materials.items():
-        for name in dict.fromkeys(p for row in members for p in row["parameters"]):
-            have = [row for row in members if name in row["parameters"]]
-            if len(have) < LEAST_SPECIMENS:
-                continue
-            low, value, high = (np.array([row["parameters"][name][q] for row in have]) for q in INTERVAL)
-            if name == "B":  # an elongation: specimens may differ in length
-                metres = np.array([row["length_mm"] for row in have], float) / 1e3
-                low, value, high = low / metres, value / metres, high / metres
-            positive = bool((low > 0).all())
-            x, sd = (np.log(value), np.log(high / low)) if positive else (value, high - low)
-            z = robust_z(x, sd / _NINETY)
-            far = np.flatnonzero(np.abs(z) > threshold(len(have), len(members[0]["parameters"])))
-            found += [
-                _row(have[i]["name"], material, name, float(value[i]), float(np.median(value)), float(z[i]), len(z))
-                for i in far
-            ]
-    return sorted(found, key=lambda outlier: (-abs(outlier["z"]), outlier["experiment"]))
+        parameters = len(members[0]["parameters"])
+        names = dict.fromkeys(parameter for row in members for parameter in row["parameters"])
+        for name in names:
+            specimens = [row for row in members if name in row["parameters"]]
+            if len(specimens) >= LEAST_SPECIMENS:
+                limit = threshold(len(specimens), parameters)
+                found += _far_off(material, name, specimens, limit)
+    found.sort(key=lambda outlier: (-abs(outlier["z"]), outlier["experiment"]))
+    return found
+
+
+def _far_off(material: str, name: str, specimens: list[Row], limit: float) -> list[OutlierRow]:
+    """The specimens of a material whose parameter has a z beyond a limit."""
+    low, value, high = _intervals(name, specimens)
+    if (low > 0).all():
+        z = robust_z(np.log(value), np.log(high / low) / _NINETY)
+    else:
+        z = robust_z(value, (high - low) / _NINETY)
+    median = float(np.median(value))
+    found = []
+    for i in np.flatnonzero(np.abs(z) > limit):
+        found.append(_row(specimens[i]["name"], material, name, float(value[i]), median, float(z[i]), len(z)))
+    return found
+
+
+def _intervals(name: str, specimens: list[Row]) -> tuple[Array, Array, Array]:
+    """Ends of the interval of a parameter and the median between them, of each specimen."""
+    intervals = []
+    for row in specimens:
+        # an elongation: specimens may differ in length
+        metres = float(row["length_mm"] or np.nan) / 1e3 if name == "B" else 1.0
+        figures = row["parameters"][name]
+        intervals.append([figures[quantile] / metres for quantile in INTERVAL])
+    low, value, high = np.array(intervals).T
+    return low, value, high
 
 
 def _row(
@@ -88,9 +106,11 @@ def robust_z(values: Array, sd: Array) -> Array:
     The spread between specimens is what their scatter has beyond the typical width of a posterior.
     """
     centre = np.median(values)
-    scatter = MAD_TO_SD * np.median(np.abs(values - centre))
+    away = values - centre
+    scatter = MAD_TO_SD * np.median(np.abs(away))
     spread = max(float(scatter**2 - np.median(sd) ** 2), 0.0)
-    return np.asarray((values - centre) / np.sqrt(np.maximum(spread + sd**2, _LEAST**2)))
+    expected = np.sqrt(np.maximum(spread + sd**2, _LEAST**2))
+    return np.asarray(away / expected)
 
 
 def threshold(specimens: int, parameters: int) -> float:

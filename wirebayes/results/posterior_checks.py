@@ -13,6 +13,7 @@ from wirebayes.io import data_checks
 from wirebayes.io.checked_test import CheckedTest
 from wirebayes.io.zero_shifts import slack_below
 from wirebayes.model.build import FINEST
+from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
@@ -48,21 +49,28 @@ def posterior_warnings(fit: Fit, sample: Sample) -> list[Notice]:
     list of Notice
         What, where, what to change.
     """
-    theta = fit.flat
-    own = fit.problem.parameters(theta, sample)
-    prior = fit.problem.parameters(fit.problem.prior.rvs(4000, np.random.default_rng(0)), sample)
-    readings = sample.readings[..., 0]
-    of_readings = data_checks.warnings(sample.protocol, readings, sample.resolution)
-    if fit.problem.likelihood == "chain":
-        stated = {name for name in ("k1", "preload") if fit.problem.column(name, sample) in fit.problem.stated}
+    problem = fit.problem
+    own = problem.parameters(fit.flat, sample)
+    prior = problem.parameters(problem.prior.rvs(4000, np.random.default_rng(0)), sample)
+    of_readings = data_checks.warnings(sample.protocol, sample.readings[..., 0], sample.resolution)
+    if problem.likelihood == "chain":
+        stated = {name for name in ("k1", "preload") if problem.column(name, sample) in problem.stated}
         of_readings += data_checks.one_setting(sample.protocol, stated)
-    samples, control = fit.problem.samples, sample.protocol.control
-    first = sample is samples[0]
-    first_read_so = sample is next(s for s in samples if s.protocol.control == control)
-    latent = f"{Discrepancy.name}."  # values of a smooth curve, of which nobody knows anything to state
-    of_sample = [n for n in fit.problem.names if _belongs(n, sample, shared=first, of_instrument=first_read_so)]
-    columns = [n for n in of_sample if not n.startswith(latent)]
-    return [*of_readings, *of_posterior(own, prior, sample), *leaning(fit.problem.prior, theta, columns)]
+    of_prior = leaning(problem.prior, fit.flat, _columns_of(problem, sample))
+    return [*of_readings, *of_posterior(own, prior, sample), *of_prior]
+
+
+def _columns_of(problem: Problem, sample: Sample) -> list[str]:
+    """The columns of a sample of which somebody may know something to state."""
+    control = sample.protocol.control
+    is_first = sample is problem.samples[0]
+    first_read_so = next(other for other in problem.samples if other.protocol.control == control)
+    columns = []
+    for name in problem.names:
+        is_latent = name.startswith(f"{Discrepancy.name}.")  # values of a smooth curve
+        if not is_latent and _belongs(name, sample, shared=is_first, of_instrument=sample is first_read_so):
+            columns.append(name)
+    return columns
 
 
 def _belongs(name: str, sample: Sample, *, shared: bool, of_instrument: bool) -> bool:
@@ -97,7 +105,8 @@ def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:
     steps = np.abs(np.diff(sample.protocol.setting))
     if "setting_sd" not in own or not steps.any():
         return ""
-    step, low = float(np.median(steps[steps > 0])), float(np.quantile(own["setting_sd"], 0.05))
+    step = float(np.median(steps[steps > 0]))
+    low = float(np.quantile(own["setting_sd"], 0.05))
     if low <= LOOSE_STEPS * step:
         return ""
     unit = SET_UNIT[sample.protocol.control]
@@ -191,12 +200,17 @@ def _time(log_s: float) -> str:
 
 def unchanged_prior(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -> str:
     """Readings that leave every interval as the prior has it."""
-
-    def width(values: Floats) -> float:
-        return float(np.subtract(*np.quantile(values, [0.95, 0.05])))
-
-    wire = [name for name in own if name != "sensor_sd" and width(prior[name]) > 0]
-    moved = [1.0 - width(own[name]) / width(prior[name]) for name in wire]
+    moved = []
+    for name, values in own.items():
+        before = _width(prior[name])
+        if name != "sensor_sd" and before > 0:
+            moved.append(1.0 - _width(values) / before)
     if not moved or max(moved) > LEAST_SHRINKAGE:
         return ""
     return "the posterior is the prior: these readings say nothing of the wire; was it slack, or held at one place?"
+
+
+def _width(values: Floats) -> float:
+    """Length of the 90 % interval."""
+    high, low = np.quantile(values, [0.95, 0.05])
+    return float(high - low)

@@ -1,7 +1,7 @@
 """Where a posterior leans on a prior: intervals that would move if the prior were twice as wide."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,27 +33,48 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
         Which priors are looked at.
     """
     known = prior.known(theta)
-    before = np.quantile(known, _ENDS, axis=0)
-    spread = np.maximum(known.std(axis=0, ddof=1), np.finfo(float).tiny)
-    order = np.argsort(known.T, axis=1)
-    ordered = np.take_along_axis(known.T, order, axis=1)
     deciding: list[str] = []
     open_ones: set[int] = set()
+    intervals = _Intervals.of(known)
     for name in columns:
         i = prior.names.index(name)
-        wide = _wider(prior.distributions[name])
+        distribution = prior.distributions[name]
+        wide = _wider(distribution)
         if wide is None:
             continue
-        log_weight = log_density_of(wide)(known[:, i]) - log_density_of(prior.distributions[name])(known[:, i])
-        weight = np.exp(log_weight - log_weight.max())
-        pairs = zip(ordered, order, strict=True)
-        after = np.stack([_weighted_ends(values, weight[ranked]) for values, ranked in pairs], 1)
-        moved = np.flatnonzero(np.abs(after - before).max(axis=0) > MOVED * spread)
+        log_weight = log_density_of(wide)(known[:, i]) - log_density_of(distribution)(known[:, i])
+        moved = intervals.moved(np.exp(log_weight - log_weight.max()))
         of_sample = all(_parameter(prior.names[j]) in SAMPLE for j in moved)
-        if len(moved) and not (_parameter(name) in NOISES and of_sample):
+        if moved and not (_parameter(name) in NOISES and of_sample):
             deciding.append(name)
-            open_ones.update(map(int, moved))
-    return [_notice(deciding, [prior.names[j] for j in sorted(open_ones)])] if deciding else []
+            open_ones.update(moved)
+    if not deciding:
+        return []
+    return [_notice(deciding, [prior.names[j] for j in sorted(open_ones)])]
+
+
+@dataclass(frozen=True)
+class _Intervals:
+    """Of columns (n, d): the draws in rising order and how to get there, (d, n), the intervals' ends and widths."""
+
+    ordered: Array
+    order: Array
+    ends: Array
+    spread: Array
+
+    @classmethod
+    def of(cls, known: Array) -> "_Intervals":
+        order = np.argsort(known.T, axis=1)
+        ordered = np.take_along_axis(known.T, order, axis=1)
+        spread = np.maximum(known.std(axis=0, ddof=1), np.finfo(float).tiny)
+        return cls(ordered, order, np.quantile(known, _ENDS, axis=0), spread)
+
+    def moved(self, weight: Array) -> list[int]:
+        """The columns of which an end moves far when draws are weighted."""
+        columns = zip(self.ordered, self.order, strict=True)
+        after = np.stack([_weighted_ends(values, weight[order]) for values, order in columns], 1)
+        shift = np.abs(after - self.ends).max(axis=0)
+        return [int(column) for column in np.flatnonzero(shift > MOVED * self.spread)]
 
 
 def _parameter(column: str) -> str:
@@ -81,10 +102,11 @@ def _wider(distribution: Any) -> Any:
 
 
 def _notice(deciding: Sequence[str], moved: Sequence[str]) -> Notice:
-    what = f"the interval of {moved[0]}" if len(moved) == 1 else f"the intervals of {listed(moved)}"
-    keys = ", ".join(dict.fromkeys(f"[prior.{_parameter(name)}]" for name in deciding))
     named = listed(deciding)
     whose, decides = ("prior", "its prior does") if len(deciding) == 1 else ("priors", "their priors do")
+    what = f"the interval of {moved[0]}" if len(moved) == 1 else f"the intervals of {listed(moved)}"
+    tables = [f"[prior.{_parameter(name)}]" for name in deciding]
+    keys = ", ".join(dict.fromkeys(tables))
     return Notice(
         "prior",
         f"with the {whose} of {named} twice as wide, {what} would move by more than a standard deviation: the readings "

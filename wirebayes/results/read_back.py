@@ -134,8 +134,11 @@ def _doubts(groups: Mapping[str, Group], name: str, summary: Path) -> tuple[Noti
 def load_with_priors(folder: Path) -> list[tuple[Stored, dict[str, Array]]]:
     """The posterior of each experiment in a folder by `save_posterior`, beside draws of its prior, each (n,)."""
     path = folder / "posterior.nc"
+    loaded = []
     with _opened(path, *_MODEL, "prior") as groups:
-        return [(_stored(groups, path, at), _prior(groups, at)) for at in range(len(_names_in(groups, path)))]
+        for place in range(len(_names_in(groups, path))):
+            loaded.append((_stored(groups, path, place), _prior(groups, place)))
+    return loaded
 
 
 def _names_in(groups: Mapping[str, Group], path: Path) -> list[str]:
@@ -150,32 +153,47 @@ def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path 
     """The posterior of the experiment at this place among those of the file."""
     posterior, observed, constant = (groups[name] for name in _MODEL)
     about = posterior.attributes
-    names = json.loads(about["experiments"])
+    if "reference_C" not in constant.attributes or "controls" not in about:
+        raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
+    model = _model(about, own_effects)
     draws = _one_of(posterior, at)
-    lengths = json.loads(about["lengths_mm"])
-    keys, known = json.loads(about["effects"]), catalogue(own_effects)
-    model = Model(
-        about["elastic_law"],
-        about["history"],
-        tuple(effect_named(k, known) for k in keys),
-        float(about["tension_ref_N"]),
-    )
     exponent = draws.pop(LENGTH_EXPONENT, None)
-    if len(names) > 1:
+    lengths = json.loads(about["lengths_mm"])
+    length = lengths[at]
+    if len(lengths) > 1:
         reference = float(np.exp(np.mean(np.log(lengths))))
-        draws = at_length(draws, model.effects, lengths[at] / reference, 1.0 if exponent is None else exponent)
-        draws = by_length(draws, model.effects, lengths[at], reference)
-    if "reference_C" not in constant.attributes:
-        raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
-    reference_C = json.loads(constant.attributes["reference_C"])[at]
-    if "controls" not in about:
-        raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
-    control = json.loads(about["controls"])[at]
-    protocol, readings = _measured(constant, observed, names[at], float(lengths[at]), reference_C, control)
-    resolutions = json.loads(about["resolutions"])
-    sample = Sample(names[at], about["material"], protocol, readings[..., None], float(resolutions[at]), model)
-    check_stored(draws, sample, about["likelihood"])
-    return Stored(draws, sample, about["likelihood"], exponent)
+        power = 1.0 if exponent is None else exponent
+        draws = at_length(draws, model.effects, length / reference, power)
+        draws = by_length(draws, model.effects, length, reference)
+    test = _Test(
+        name=json.loads(about["experiments"])[at],
+        length_mm=float(length),
+        reference_C=json.loads(constant.attributes["reference_C"])[at],
+        control=json.loads(about["controls"])[at],
+    )
+    protocol, readings = _measured(constant, observed, test)
+    resolution = float(json.loads(about["resolutions"])[at])
+    sample = Sample(test.name, about["material"], protocol, readings[..., None], resolution, model)
+    likelihood = about["likelihood"]
+    check_stored(draws, sample, likelihood)
+    return Stored(draws, sample, likelihood, exponent)
+
+
+def _model(about: Mapping[str, Any], own_effects: Path | None) -> Model:
+    """Law, history and effects of the fit."""
+    known = catalogue(own_effects)
+    effects = tuple(effect_named(key, known) for key in json.loads(about["effects"]))
+    return Model(about["elastic_law"], about["history"], effects, float(about["tension_ref_N"]))
+
+
+@dataclass(frozen=True)
+class _Test:
+    """One of the experiments of a file."""
+
+    name: str
+    length_mm: float
+    reference_C: float | None
+    control: Control
 
 
 def _one_of(group: Group, at: int) -> dict[str, Array]:
@@ -187,17 +205,13 @@ def _one_of(group: Group, at: int) -> dict[str, Array]:
     return draws
 
 
-def _measured(
-    constant: Group, observed: Group, name: str, length_mm: float, reference_C: float | None, control: Control
-) -> tuple[Protocol, Array]:
+def _measured(constant: Group, observed: Group, test: _Test) -> tuple[Protocol, Array]:
     """One experiment's holds, unrecorded ones at their place, and its (H, R) readings, padded with zeros."""
-    read_as = READ[control] if READ[control] in observed else READING
-    set_as = SET[control] if SET[control] in constant else SETTING
-    own = _of_experiment(constant, observed, name)
-    measured = observed[read_as][own]
-    width = int(np.isfinite(measured).sum(axis=1).max())
-    before, unrecorded = _unrecorded(constant, name, set_as)
+    read_as = READ[test.control] if READ[test.control] in observed else READING
+    set_as = SET[test.control] if SET[test.control] in constant else SETTING
+    own = _of_experiment(constant, observed, test.name)
     number = constant["number" if "number" in constant else "hold"][own]
+    before, unrecorded = _unrecorded(constant, test.name, set_as)
     # An unrecorded hold stands before the recorded one it names; several keep their order.
     place = np.argsort(np.concatenate([before - 0.5, number]), kind="stable")
 
@@ -205,24 +219,32 @@ def _measured(
         none = np.full((len(before), *recorded.shape[1:]), np.nan) if others is None else others
         return np.concatenate([none, recorded])[place]
 
-    readings, times = (whole(values)[:, :width] for values in (measured, constant["time_s"][own]))
+    measured = observed[read_as][own]
+    width = int(np.isfinite(measured).sum(axis=1).max())
+    readings = whole(measured)[:, :width]
+    times = whole(constant["time_s"][own])[:, :width]
     mask = np.isfinite(readings)
     if not np.array_equal(mask, np.isfinite(times)):
         raise ValueError("readings and times that do not belong together")
-    setting, duration = (whole(constant[key][own], unrecorded.get(key)) for key in (set_as, "duration_s"))
     protocol = Protocol(
-        length_mm,
-        setting,
-        np.nan_to_num(times),
-        mask,
-        duration,
-        whole(number, np.full(len(before), -1)).astype(np.int64),
-        None if reference_C is None else np.nan_to_num(whole(constant["warming_K"][own])[:, :width]),
-        reference_C,
-        control,
+        test.length_mm,
+        setting=whole(constant[set_as][own], unrecorded.get(set_as)),
+        time_s=np.nan_to_num(times),
+        mask=mask,
+        duration_s=whole(constant["duration_s"][own], unrecorded.get("duration_s")),
+        number=whole(number, np.full(len(before), -1)).astype(np.int64),
+        warming_K=_padded(whole(constant["warming_K"][own]), width) if test.reference_C is not None else None,
+        reference_C=test.reference_C,
+        control=test.control,
     )
-    padding = protocol.mask.shape[1] - readings.shape[1]  # a column where a hold went on after its last reading
-    return protocol, np.pad(np.nan_to_num(readings), [(0, 0), (0, padding)])
+    # a column where a hold went on after its last reading
+    return protocol, _padded(readings, protocol.mask.shape[1])
+
+
+def _padded(values: Array, width: int) -> Array:
+    """(H, width) values, cut or padded, zero where there is none."""
+    kept = np.nan_to_num(values[:, :width])
+    return np.pad(kept, [(0, 0), (0, width - kept.shape[1])])
 
 
 def _of_experiment(constant: Group, observed: Group, name: str) -> Array:
@@ -238,9 +260,8 @@ def _unrecorded(constant: Group, name: str, set_as: str) -> tuple[Array, dict[st
     if "unrecorded_before_hold" not in constant:
         return np.zeros(0, int), {}
     mine = constant["unrecorded_experiment"] == name
-    return constant["unrecorded_before_hold"][mine], {
-        key: constant[f"unrecorded_{key}"][mine] for key in (set_as, "duration_s")
-    }
+    before = constant["unrecorded_before_hold"][mine]
+    return before, {key: constant[f"unrecorded_{key}"][mine] for key in (set_as, "duration_s")}
 
 
 def datatree(folder: Path) -> "xr.DataTree":
@@ -257,11 +278,10 @@ def datatrees(folders: Mapping[str, Path]) -> "xr.DataTree":
     """The content of several ``posterior.nc`` in memory, each a branch under its name."""
     import xarray as xr  # as above
 
-    groups = {
-        f"{name}{path}".rstrip("/"): group
-        for name, folder in folders.items()
-        for path, group in datatree(folder).to_dict().items()
-    }
+    groups = {}
+    for name, folder in folders.items():
+        for path, group in datatree(folder).to_dict().items():
+            groups[f"{name}{path}".rstrip("/")] = group
     return xr.DataTree.from_dict(groups)
 
 

@@ -11,6 +11,7 @@ from wirebayes.model.sample import Sample
 from wirebayes.notice import Notice, NoticeJson, to_json
 from wirebayes.numeric.typing import Array
 from wirebayes.results import hold_ends, posterior_checks
+from wirebayes.results.contraction import interval
 from wirebayes.results.identifiability import extrapolation, identifiability
 from wirebayes.results.parameters import unit_of, variables
 from wirebayes.wire.fresh import FreshSample
@@ -34,20 +35,20 @@ def band(values: Array) -> Statistics | None:
     """Mean, sd and quantiles of draws; None where a draw has no finite value (creep that never ends)."""
     if not np.isfinite(values).all():
         return None
-    low, middle, high = (float(q) for q in np.quantile(values, [0.05, 0.5, 0.95]))
+    low, middle, high = interval(values)
     return {"mean": float(values.mean()), "sd": float(values.std(ddof=1)), "q05": low, "q50": middle, "q95": high}
 
 
 def statistics(values: Array) -> Mixed:
     """Mean, sd, quantiles, effective sample sizes and R-hat of (chains, draws)."""
-    q05, q50, q95 = np.quantile(values, [0.05, 0.5, 0.95])
+    low, middle, high = interval(values)
     with np.errstate(invalid="ignore"):
         return {
             "mean": float(values.mean()),
             "sd": float(values.std(ddof=1)),
-            "q05": float(q05),
-            "q50": float(q50),
-            "q95": float(q95),
+            "q05": low,
+            "q50": middle,
+            "q95": high,
             "ess_bulk": bulk_ess(values),
             "ess_tail": tail_ess(values),
             "r_hat": r_hat(values),
@@ -60,9 +61,8 @@ def _warnings(fit: Fit, sample: Sample | None, ends: HoldEnds | None) -> list[No
     if sample is not None:
         found += posterior_checks.posterior_warnings(fit, sample)
     else:
-        found += [
-            notice.of(s.name) for s in fit.problem.samples for notice in posterior_checks.posterior_warnings(fit, s)
-        ]
+        for one in fit.problem.samples:
+            found += [notice.of(one.name) for notice in posterior_checks.posterior_warnings(fit, one)]
     return to_json([*found, *hold_ends.hold_ends_notice(ends)])
 
 
@@ -73,35 +73,27 @@ def _hold_ends(fit: Fit) -> HoldEnds | None:
 
 def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
     """What ``summary.json`` says of a fit: of one of its samples, or, where None, of all together."""
-    first = sample or fit.problem.samples[0]
-    controls = [s.protocol.control for s in ([sample] if sample else fit.problem.samples)]
-    parameters: dict[str, Parameter] = {}
-    for name, values in variables(fit.problem, fit.theta, sample).items():
-        unit = unit_of(name, first.model.effects, controls)
-        if values.ndim == 2:
-            parameters[name] = {"unit": unit, **statistics(values)}
-        else:
-            for i, s in enumerate(fit.problem.samples):
-                own = unit_of(name, first.model.effects, [s.protocol.control])
-                parameters[f"{name}[{s.name}]"] = {"unit": own, **statistics(values[..., i])}
+    problem, chains = fit.problem, fit.chains
+    first = sample or problem.samples[0]
+    model = first.model
     tension = first.tested_tension_N
-    wire = FreshSample(fit.problem.parameters(fit.flat, first), first.model, first.protocol.length_mm)
-    chains = fit.chains
+    wire = FreshSample(problem.parameters(fit.flat, first), model, first.protocol.length_mm)
     ends = _hold_ends(fit)
+    ahead = extrapolation(fit, tension, sample=problem.samples.index(first))
     return {
         "experiment": sample.name if sample else first.material.replace(" ", "-"),
-        "likelihood": fit.problem.likelihood,
-        "elastic_law": first.model.law,
-        "history": first.model.history,
-        "effects": [e.key for e in first.model.effects],
+        "likelihood": problem.likelihood,
+        "elastic_law": model.law,
+        "history": model.history,
+        "effects": [effect.key for effect in model.effects],
         "converged": chains.converged,
         "convergence": chains.why,
         "warnings": _warnings(fit, sample, ends),
-        "parameters": parameters,
+        "parameters": _parameters(fit, sample),
         "derived": derived(wire, tension),
         "longest_hold_s": float(first.protocol.duration_s.max()),
         "identifiability": identifiability(fit),
-        "extrapolation": extrapolation(fit, tension, sample=fit.problem.samples.index(first)).to_dict(),
+        "extrapolation": ahead.to_dict(),
         "hold_ends": ends,
         "likelihood_evaluations": chains.evaluations,
         "kept_evaluations": chains.kept_evaluations,
@@ -112,3 +104,21 @@ def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
         "learned_move": chains.learned,
         "modes_found": chains.modes,
     }
+
+
+def _parameters(fit: Fit, sample: Sample | None) -> dict[str, Parameter]:
+    """Every parameter with its unit; those that each sample has for itself, with the name of the sample."""
+    samples = [sample] if sample else list(fit.problem.samples)
+    effects = samples[0].model.effects
+    controls = [one.protocol.control for one in samples]
+    parameters: dict[str, Parameter] = {}
+    for name, values in variables(fit.problem, fit.theta, sample).items():
+        if values.ndim == 2:
+            parameters[name] = {"unit": unit_of(name, effects, controls), **statistics(values)}
+            continue
+        for i, one in enumerate(samples):
+            own_unit = unit_of(name, effects, [one.protocol.control])
+            own_values = values[..., i]
+            own_name = f"{name}[{one.name}]"
+            parameters[own_name] = {"unit": own_unit, **statistics(own_values)}
+    return parameters

@@ -25,7 +25,7 @@ from wirebayes.model.scales import TYPICAL_K1_N, planned_scales
 from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.means import geometric_mean
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Floats
 from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, Kinds
@@ -105,27 +105,23 @@ class Bench:
 
     def experiment(self) -> Experiment:
         """The test with readings still at zero."""
-        count = len(self.settings)
-        several = np.ndim(self.times_s[0]) > 0
-        each = [np.array(t) for t in self.times_s] if several else [np.array(self.times_s)] * count
-        starts = np.concatenate([[0.0], np.cumsum([t[-1] for t in each])])
+        is_ragged = np.ndim(self.times_s[0]) > 0
+        each = (
+            [np.array(times) for times in self.times_s] if is_ragged else [np.array(self.times_s)] * len(self.settings)
+        )
+        starts = np.concatenate([[0.0], np.cumsum([times[-1] for times in each])])
         holds = []
         for i, (setting, times) in enumerate(zip(self.settings, each, strict=True)):
-            kept = times if i + 1 not in self.unrecorded else times[:0]
-            log = None
-            if len(self.temperatures_C):
-                moments = np.linspace(0.0, starts[-1], len(self.temperatures_C))
-                # logged to a hundredth of a degree, and the wire follows the log
-                log = frozen(np.round(np.interp(starts[i] + kept, moments, self.temperatures_C), 2).tolist())
-            number = i + 1 if len(kept) else None
+            recorded = i + 1 not in self.unrecorded
+            kept = times if recorded else times[:0]
             holds.append(
                 Hold(
-                    number,
+                    i + 1 if len(kept) else None,
                     float(setting),
                     float(times[-1]),
                     frozen(kept.tolist()),
                     frozen([0.0] * len(kept)),
-                    log,
+                    self._log(starts[i] + kept, starts[-1]),
                     float(starts[i]),
                     self.control,
                 )
@@ -133,6 +129,15 @@ class Bench:
         return Experiment(
             self.name, self.material, self.length_mm, self.resolution, tuple(holds), Path(FILE), control=self.control
         )
+
+    def _log(self, time_s: Array, whole_s: float) -> Floats | None:
+        """Temperatures at times of a test that lasts so long."""
+        if not len(self.temperatures_C):
+            return None
+        moments = np.linspace(0.0, whole_s, len(self.temperatures_C))
+        # logged to a hundredth of a degree, and the wire follows the log
+        logged = np.round(np.interp(time_s, moments, self.temperatures_C), 2)
+        return frozen(logged.tolist())
 
 
 @dataclass(frozen=True)
@@ -193,35 +198,45 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     seed : int or numpy.random.SeedSequence
     """
     rng = np.random.default_rng(seed)
-    stated = [value for name, value in truth.parameters.items() if name.split("[")[0] == "k1" and value > 0]
     tests = [bench.experiment() for bench in benches]
-    scales = planned_scales(tests, geometric_mean(stated) if stated else TYPICAL_K1_N)
-    problem = build(tests, truth.effects, ModelSpec(truth.law, truth.history), scales=scales)
+    scales = planned_scales(tests, _middle_stiffness(truth))
+    spec = ModelSpec(truth.law, truth.history)
+    problem = build(tests, truth.effects, spec, scales=scales)
     theta = problem.prior.rvs(1, rng)
     for name, value in truth.parameters.items():
         theta[0, _columns(problem, name, value)] = value
-    problem = replace(problem, samples=tuple(_referred(problem, theta, sample) for sample in problem.samples))
+    samples = tuple(_referred(problem, theta, sample) for sample in problem.samples)
+    problem = replace(problem, samples=samples)
     settings, clean, readings = [], [], []
-    for sample in problem.samples:
+    for sample in samples:
         own = problem.parameters(theta, sample)
         setting = rng.normal(size=(len(sample.protocol.setting), 1)) * own["setting_sd"]
         exact = simulate(sample.protocol, own, sample.model, setting)
-        noisy = exact + rng.normal(size=exact.shape) * own["sensor_sd"]
-        readings.append(np.where(sample.protocol.mask[..., None], rounded(noisy, sample.resolution), 0.0))
+        noise = rng.normal(size=exact.shape) * own["sensor_sd"]
+        read = rounded(exact + noise, sample.resolution)
         settings.append(setting[:, 0])
         clean.append(exact[..., 0])
+        readings.append(np.where(sample.protocol.mask[..., None], read, 0.0))
     return Simulated(with_readings(problem, readings), theta, settings, clean)
+
+
+def _middle_stiffness(truth: Truth) -> float:
+    """The stiffness that a truth states, or a typical one, N."""
+    stated = [value for name, value in truth.parameters.items() if name.split("[")[0] == "k1" and value > 0]
+    return geometric_mean(stated) if stated else TYPICAL_K1_N
 
 
 def _columns(problem: Problem, name: str, value: float) -> list[int]:
     """Columns of a parameter, one or one a sample, which may have the value."""
+    bare = name.split("[")[0]
     columns = [i for i, column in enumerate(problem.names) if name in (column, column.split("[")[0])]
     if not columns:
         meant = hint(name, problem.names)
         raise InputError(f"parameter {name}: no such parameter{meant}; there are {', '.join(problem.names)}")
     for i in columns:
         low, high = problem.prior.distributions[problem.names[i]].support()
-        high = np.inf if name.split("[")[0] == "setting_sd" else high  # a bench may be worse than its prior
+        if bare == "setting_sd":
+            high = np.inf  # a bench may be worse than its prior
         if not low <= value <= high:
             raise InputError(f"parameter {name}: found {value:g}, expected a number from {low:g} to {high:g}")
     return columns
@@ -295,11 +310,18 @@ def _write_readings(path: Path, experiment: Experiment, sample: Sample) -> None:
     rows = []
     for hold, readings in zip(experiment.holds, sample.readings[..., 0], strict=True):
         for i, time in enumerate(hold.time_s):
-            read = float(readings[i]) if digits is None else round(float(readings[i]), digits)
-            row = [hold.number, hold.setting, time, read + 0.0]  # no minus before a zero
-            rows.append(row if hold.temperature_C is None else [*row, hold.temperature_C[i]])
-    header = ["hold", SET[experiment.control], "time_s", READ[experiment.control]]
-    write_csv(path, header if len(rows[0]) == 4 else [*header, "temperature_C"], rows)
+            read = float(readings[i])
+            if digits is not None:
+                read = round(read, digits)
+            read += 0.0  # no minus before a zero
+            row = [hold.number, hold.setting, time, read]
+            if hold.temperature_C is not None:
+                row.append(hold.temperature_C[i])
+            rows.append(row)
+    control = experiment.control
+    header = ["hold", SET[control], "time_s", READ[control], "temperature_C"]
+    columns = len(rows[0])
+    write_csv(path, header[:columns], rows)
 
 
 def _table(bench: Bench) -> str:
@@ -310,30 +332,38 @@ def _table(bench: Bench) -> str:
     if bench.resolution:
         lines.append(f"resolution_{READ_UNIT[bench.control]} = {float(bench.resolution)!r}")
     lines.append(f'readings = "{bench.name}.csv"')
-    holds = bench.experiment().holds
-    gaps = [
-        f"{{ before_hold = {next(h.number for h in holds[i:] if h.recorded)}, "
-        f"{SET[bench.control]} = {hold.setting!r}, duration_s = {hold.duration_s!r} }}"
-        for i, hold in enumerate(holds)
-        if not hold.recorded
-    ]
+    gaps = _gaps(bench.experiment())
     if gaps:
         lines.append(f"unrecorded_holds = [{', '.join(gaps)}]")
     return "\n".join(lines) + "\n"
 
 
+def _gaps(experiment: Experiment) -> list[str]:
+    """Unrecorded holds as an experiment file states them, each by the recorded one that follows it."""
+    gaps = []
+    following = None
+    for hold in reversed(experiment.holds):
+        if hold.recorded:
+            following = hold.number
+        else:
+            setting = f"{SET[experiment.control]} = {hold.setting!r}"
+            gaps.append(f"{{ before_hold = {following}, {setting}, duration_s = {hold.duration_s!r} }}")
+    return gaps[::-1]
+
+
 def _truth(made: Simulated, i: int) -> TrueWire:
     sample = made.problem.samples[i]
-    mask = sample.protocol.mask
+    model, protocol = sample.model, sample.protocol
+    parameters = made.problem.parameters(made.theta, sample)
     out: TrueWire = {
         "material": sample.material,
-        "elastic_law": sample.model.law,
-        "history": sample.model.history,
-        "effects": [effect.key for effect in sample.model.effects],
-        "parameters": {name: float(v[0]) for name, v in made.problem.parameters(made.theta, sample).items()},
-        "tension_ref_N": sample.model.tension_ref_N,
+        "elastic_law": model.law,
+        "history": model.history,
+        "effects": [effect.key for effect in model.effects],
+        "parameters": {name: float(value[0]) for name, value in parameters.items()},
+        "tension_ref_N": model.tension_ref_N,
     }
-    noise_free = [row[kept] for row, kept in zip(made.noise_free[i], mask, strict=True)]
-    if sample.protocol.control == "force":
+    noise_free = [row[kept] for row, kept in zip(made.noise_free[i], protocol.mask, strict=True)]
+    if protocol.control == "force":
         return {**out, "setting_N": made.setting_error[i], "noise_free_mm": noise_free}
     return {**out, "setting_mm": made.setting_error[i], "noise_free_N": noise_free}

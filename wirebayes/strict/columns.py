@@ -40,16 +40,20 @@ def columns_table(columns: Any, source: Path, may_be_empty: Callable[[str], bool
     """
     if not is_table(columns):
         raise InputError(f"{source}: found {type(columns).__name__}, expected a file, a DataFrame or columns by name")
-    header = [str(name) for name in names_of(columns)]
+    keys = names_of(columns)
+    header = [str(key) for key in keys]
     texts: list[list[str]] = []
-    for name, key in zip(header, names_of(columns), strict=True):
+    for name, key in zip(header, keys, strict=True):
         values = _objects(columns[key])
-        if values.ndim != 1 or (texts and len(values) != len(texts[0])):
+        fits = values.ndim == 1 and (not texts or len(values) == len(texts[0]))
+        if not fits:
             found = f"an array of shape {values.shape}" if values.ndim != 1 else f"{len(values)} values"
             expected = f"{len(texts[0])} as in {header[0]}" if texts else "one value for each row"
             raise InputError(f"{source}, column {name}: found {found}, expected {expected}")
-        texts.append([_text(value, empty=may_be_empty(name)) for value in values])
-    return _Columns(source, header, [list(row) for row in zip(*texts, strict=True)])
+        empty = may_be_empty(name)
+        texts.append([_text(value, empty=empty) for value in values])
+    rows = [list(row) for row in zip(*texts, strict=True)]
+    return _Columns(source, header, rows)
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,9 @@ def _objects(values: Any) -> NDArray[np.object_]:
     """Values of a column, those that a mask hides as NaN."""
     if np.ma.isMaskedArray(values):
         values = np.ma.filled(values.astype(object), np.nan)
-    return np.asarray(list(values) if isinstance(values, Iterator) else values, dtype=object)
+    if isinstance(values, Iterator):
+        values = list(values)
+    return np.asarray(values, dtype=object)
 
 
 def _text(value: Any, *, empty: bool) -> str:

@@ -39,22 +39,41 @@ def hint(word: str, known: Sequence[str]) -> str:
     """
     if len(word) > _LONGEST:
         return ""
-    unit = _unit(word)
-    for name in known:  # a unit written without anything between
-        quantity = name.rpartition("_")[0]
-        if not unit and quantity and word.lower().startswith(quantity.lower()):
-            unit = word[len(quantity) :]
+    unit = _unit(word) or _unit_without_a_gap(word, known)
     if unit:
-        quantity = word.rstrip("])")[: -len(unit)].strip("_ -/([°")
-        same = [name for name in known if _unit(name) and _conversion(unit, _unit(name))]
-        match = get_close_matches(quantity.lower(), [name.rpartition("_")[0] for name in same], 1)
-        if match:
-            name = next(name for name in same if name.rpartition("_")[0] == match[0])
-            return f" (another unit: {_conversion(unit, _unit(name))}; convert it to {name})"
-    units = (*_FACTORS, "C")
-    candidates = [name for name in known if not unit or _unit(name) not in units or _unit(name).lower() == unit.lower()]
+        converted = _converted(word, unit, known)
+        if converted:
+            return converted
+    candidates = [name for name in known if not unit or _in_the_same_unit(unit, _unit(name))]
     close = get_close_matches(word, candidates, 1)
     return f" (did you mean {close[0]}?)" if close else ""
+
+
+def _unit_without_a_gap(word: str, known: Sequence[str]) -> str:
+    """What stands behind the quantity of a known name, as in ``lengthmm``."""
+    for name in known:
+        quantity = name.rpartition("_")[0]
+        rest = word[len(quantity) :]
+        if quantity and rest and word.lower().startswith(quantity.lower()):
+            return rest
+    return ""
+
+
+def _converted(word: str, unit: str, known: Sequence[str]) -> str:
+    """The hint that a word names a known quantity in another unit, or nothing."""
+    quantity = word.rstrip("])")[: -len(unit)].strip("_ -/([°")
+    convertible: dict[str, str] = {}
+    for name in known:
+        conversion = _conversion(unit, _unit(name)) if _unit(name) else ""
+        if conversion:
+            convertible.setdefault(name.rpartition("_")[0], f" (another unit: {conversion}; convert it to {name})")
+    match = get_close_matches(quantity.lower(), list(convertible), 1)
+    return convertible[match[0]] if match else ""
+
+
+def _in_the_same_unit(unit: str, other: str) -> bool:
+    """Whether a name's last part is no other unit."""
+    return other not in (*_FACTORS, "C") or other.lower() == unit.lower()
 
 
 def _unit(name: str) -> str:

@@ -118,18 +118,24 @@ class CsvTable:
 
     def check_header(self, header: Header) -> None:
         """Refuse columns that are not known, twice there or missing."""
-        for at, name in enumerate(self.header):
-            where = f"{self.path}, {self.header_place(at)}"
+        for position, name in enumerate(self.header):
+            where = f"{self.path}, {self.header_place(position)}"
             if name not in header.known:
                 meant = hint(name, header.known)
                 raise InputError(f"{where}: found {shown(name)}{meant}, expected a header of {header}")
-            if name in self.header[:at]:
+            if name in self.header[:position]:
                 raise InputError(f"{where}: found {name} a second time, expected it once")
-        for group in (header.required, *header.groups):
-            missing = [name for name in group if name not in self.header]
-            if missing and (group is header.required or len(missing) < len(group)):
+        self._check_complete(header.required, header)
+        for group in header.groups:
+            if any(name in self.header for name in group):
+                self._check_complete(group, header)
+
+    def _check_complete(self, names: Sequence[str], header: Header) -> None:
+        """Refuse a header that lacks one of some names."""
+        for name in names:
+            if name not in self.header:
                 where = f"{self.path}, {self.header_place()}"
-                raise InputError(f"{where}: found no column {missing[0]}, expected a header of {header}")
+                raise InputError(f"{where}: found no column {name}, expected a header of {header}")
 
     def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
         """The error for one cell.
@@ -184,7 +190,9 @@ class CsvTable:
             NaN where a cell may be empty and is.
         """
         columns = [(name, allowed(name)) for name in self.header]
-        values = [[self._value(row, name, kind) for name, kind in columns] for row in range(len(self.rows))]
+        values = []
+        for row in range(len(self.rows)):
+            values.append([self._value(row, name, kind) for name, kind in columns])
         return np.array(values, float).reshape(len(self.rows), len(columns))
 
     def _value(self, row: int, column: str, allowed: Numbers) -> float:

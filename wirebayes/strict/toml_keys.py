@@ -91,14 +91,17 @@ class Keys:
         InputError
             There are fewer than `least`.
         """
-        given = self.value(kind, f"at least {_COUNT[least]} [[{kind}]]")
-        if not isinstance(given, list) or len(given) < least or not all(isinstance(table, dict) for table in given):
+        expected = f"at least {_COUNT[least]} [[{kind}]]"
+        given = self.value(kind, expected)
+        are_tables = isinstance(given, list) and all(isinstance(table, dict) for table in given)
+        if not are_tables or len(given) < least:
             found = "a single table" if isinstance(given, dict) else shown(given)
-            raise self.complain(kind, found, f"at least {_COUNT[least]} [[{kind}]]")
-        return [
-            replace(self, index=index, table=table, name=_called(table, index), kind=kind, asked=set())
-            for index, table in enumerate(given)
-        ]
+            raise self.complain(kind, found, expected)
+        tables = []
+        for index, table in enumerate(given):
+            name = _called(table, index)
+            tables.append(replace(self, index=index, table=table, name=name, kind=kind, asked=set()))
+        return tables
 
     def inside(self, key: str, default: dict[str, Any] | None = None, expected: str = "a table") -> Self:
         """The table under a key.
@@ -120,13 +123,13 @@ class Keys:
         entries = self.value(key, expected, [])
         if not isinstance(entries, list):
             raise self.complain(key, shown(entries), expected)
+        elements = []
         for index, entry in enumerate(entries):
             if not isinstance(entry, dict):
                 raise self.complain(f"{key}[{index}]", shown(entry), expected)
-        return [
-            replace(self, table=entry, prefix=f"{self.prefix}{key}[{index}].", asked=set())
-            for index, entry in enumerate(entries)
-        ]
+            prefix = f"{self.prefix}{key}[{index}]."
+            elements.append(replace(self, table=entry, prefix=prefix, asked=set()))
+        return elements
 
     def value(self, key: str, expected: str, default: Any = None) -> Any:
         """What stands under a key, which counts as known from then on.
@@ -295,21 +298,34 @@ def read_toml(source: Path, text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        depth = [line.count("[") + line.count("{") for line in text.split("\n")]
-        place, found = f"line {int(np.argmax(depth)) + 1}", "values nested too deeply"
+        place, found = _deepest(text)
     except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
-        at = re.fullmatch(r"(.*?) \((?:at line (\d+), column (\d+)|at end of document)\)", str(error), re.DOTALL)
-        if at and at[2]:
-            place, found = f"line {at[2]}, column {at[3]}", f"a TOML error ({_lower(at[1])})"
-        elif at:
-            lines = text.rstrip().split("\n")
-            place, found = f"line {len(lines)}, column {len(lines[-1]) + 1}", f"the end of the file ({_lower(at[1])})"
-        else:
-            longest = max(re.finditer(r"\d+", text), key=lambda run: len(run[0]))
-            before = text[: longest.start()].split("\n")
-            place = f"line {len(before)}, column {len(before[-1]) + 1}"
-            found = "a TOML error (a number of thousands of digits)"
+        place, found = _where(str(error), text)
     raise InputError(f"{source}, {place}: found {found}, expected valid TOML")
+
+
+def _deepest(text: str) -> tuple[str, str]:
+    """The line with most brackets, and what is wrong with it."""
+    depth = [line.count("[") + line.count("{") for line in text.split("\n")]
+    return f"line {int(np.argmax(depth)) + 1}", "values nested too deeply"
+
+
+def _where(error: str, text: str) -> tuple[str, str]:
+    """Where the parser found an error, and which."""
+    told = re.fullmatch(r"(.*?) \((?:at line (\d+), column (\d+)|at end of document)\)", error, re.DOTALL)
+    if told is None:
+        longest = max(re.finditer(r"\d+", text), key=lambda run: len(run[0]))
+        return _end_of(text[: longest.start()]), "a TOML error (a number of thousands of digits)"
+    what, line, column = told.groups()
+    if line:
+        return f"line {line}, column {column}", f"a TOML error ({_lower(what)})"
+    return _end_of(text.rstrip()), f"the end of the file ({_lower(what)})"
+
+
+def _end_of(text: str) -> str:
+    """The place behind a text."""
+    lines = text.split("\n")
+    return f"line {len(lines)}, column {len(lines[-1]) + 1}"
 
 
 _COUNT = {1: "one", 2: "two"}  # in words, as messages have it

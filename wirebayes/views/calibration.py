@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from wirebayes.answers import terminal
+from wirebayes.answers.robot import of_calibration
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.views.result import NOTHING, Given, Result, html_table
 
@@ -21,7 +21,7 @@ class Calibration(Result[CalibrateJson]):
     _content: ClassVar[str] = "calibration.json"
 
     def lines(self) -> list[str]:
-        return terminal.of_calibration(self.summary())
+        return of_calibration(self.summary())
 
     def next_step(self, given: Given = NOTHING) -> str:
         robot, lengths = self.place.path / "robot.toml", self.place.path / "calibration.json"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, cast
 
-from wirebayes.answers import terminal
+from wirebayes.answers.robot import of_pose
 from wirebayes.json_files.pose import PoseJson
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.robot.mechanics.wires_used import specimens_in_words
@@ -36,7 +36,7 @@ class Pose(Result[PoseJson | PoseHistoryJson]):
         return (*specimens_in_words(self.summary()["wires"]), *super().messages)
 
     def lines(self) -> list[str]:
-        return terminal.of_pose(self.summary())
+        return of_pose(self.summary())
 
     def next_step(self, given: Given = NOTHING) -> str:
         return _after_pose(self.summary(), self.place.path, given)

@@ -24,8 +24,8 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     seed_of_page,
-    unit_text,
 )
+from wirebayes.report.cells import NONE, with_unit
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.batch import specimens_of_materials
 from wirebayes.results.outliers import FALSE_ALARMS, LEAST_SPECIMENS
@@ -43,21 +43,33 @@ def batch_page(folder: Path, configuration: dict[str, Any]) -> Page:
     rows, far = found["experiments"], found["outliers"]
     fitted = [row for row in rows if row["parameters"]]
     lead, *others = batch_in_sentences(found)
-    first: list[Block] = [Text(sentence) for sentence in others]
-    if fitted:
-        alt = "Parameters of all specimens by material."
-        picture = Picture(drawn(specimens_of_materials(fitted, far)), alt, _PICTURE, wide=True)
-        first.append(Pictures([picture]))
-    first.append(Columns([_reliability(rows)]))
+    sections = [Section("Summary", _summary(others, rows, fitted, far))]
     warned: list[Block] = [*before_the_answer(found), *beside_the_answer(found)]
-    sections = [Section("Summary", first)]
-    sections += [Section("Warnings", warned, folded=len(found["warnings"]) > _MOST_WARNINGS)] if warned else []
-    sections += [Section("Outlying specimens", _outliers(fitted, far))]
-    sections.append(Section("Experiments", _table(rows), folded=len(rows) > 50))
+    if warned:
+        many = len(found["warnings"]) > _MOST_WARNINGS
+        sections.append(Section("Warnings", warned, folded=many))
+    sections.append(Section("Outlying specimens", _outliers(fitted, far)))
+    is_long = len(rows) > 50
+    sections.append(Section("Experiments", _table(rows), folded=is_long))
     sections.append(files_beside(folder, _FILES))
-    effects = [effect for row in fitted for effect in (*row["effects"], row["best_effect"] or "")]
+    effects = []
+    for row in fitted:
+        effects += row["effects"]
+        effects.append(row["best_effect"] or "")
     sections.append(meaning(("90 % interval", "p", "robust z"), effects))
-    return Page("Many experiments", lead, sections, seed_of_page(configuration))
+    footer = seed_of_page(configuration)
+    return Page("Many experiments", lead, sections, footer)
+
+
+def _summary(sentences: list[str], rows: list[Row], fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
+    """What was found, the parameters of all specimens, and how far to trust them."""
+    blocks: list[Block] = [Text(sentence) for sentence in sentences]
+    if fitted:
+        source = drawn(specimens_of_materials(fitted, far))
+        picture = Picture(source, "Parameters of all specimens by material.", _PICTURE, wide=True)
+        blocks.append(Pictures([picture]))
+    blocks.append(Columns([_reliability(rows)]))
+    return blocks
 
 
 _PICTURE = "Each dot is a specimen: its median and 90 % interval. Red ones are outliers of their material."
@@ -72,66 +84,75 @@ _FILES = (
 
 
 def _reliability(rows: list[Row]) -> Points:
+    points = []
     stopped = [row["name"] for row in rows if row["converged"] is False]
-    points = [f"Not converged: {_some(stopped)}."] if stopped else []
+    if stopped:
+        points.append(f"Not converged: {_some(stopped)}.")
     checked = sum(row["p_global"] is not None for row in rows)
     if checked:
+        by_chance = number(ALPHA * checked, 2)
         points.append(
-            f"If nothing were missing anywhere, about {number(ALPHA * checked, 2)} of {checked} checks would fail by "
+            f"If nothing were missing anywhere, about {by_chance} of {checked} checks would fail by "
             f"chance, each at its level of {ALPHA:g}."
         )
     odd = [row["name"] for row in rows if row["warnings"]]
-    points += [f"Suspicious readings or fits: {_some(odd)}; see the warnings."] if odd else []
+    if odd:
+        points.append(f"Suspicious readings or fits: {_some(odd)}; see the warnings.")
     return Points("How far it can be trusted", points or ["All fits converged."])
 
 
 def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
     specimens = Counter(row["material"] for row in fitted if row["material"])
     small = sorted(material for material, count in specimens.items() if count < LEAST_SPECIMENS)
+    if set(small) == set(specimens):
+        none = f"None is looked for: that takes {LEAST_SPECIMENS} specimens or more of one material."
+        return [Text(none)]
     rule = (
         "A specimen is an outlier when a parameter's median is farther from the median of its material than the "
         f"scatter of the others and its own uncertainty explain. If all specimens are "
         f"alike, {100 * FALSE_ALARMS:g} % of materials have an outlier by chance."
     )
-    rest = f" Not compared, with fewer than {LEAST_SPECIMENS} specimens: {_some(small)}." if small else ""
-    if set(small) == set(specimens):
-        none = f"None is looked for: that takes {LEAST_SPECIMENS} specimens or more of one material."
-        return [Text(none)]
+    if small:
+        rule += f" Not compared, with fewer than {LEAST_SPECIMENS} specimens: {_some(small)}."
     if not far:
-        return [Text("No specimen is an outlier of its material.", strong=True), Text(rule + rest)]
-    lines = [
-        [o["experiment"], o["material"], o["parameter"], number(o["value"]), number(o["median"]), number(o["z"], 2)]
-        for o in far[:_MOST_ROWS]
-    ]
+        return [Text("No specimen is an outlier of its material.", strong=True), Text(rule)]
+    lines = []
+    for row in far[:_MOST_ROWS]:
+        figures = [number(row["value"]), number(row["median"]), number(row["z"], 2)]
+        lines.append([row["experiment"], row["material"], row["parameter"], *figures])
     header = ["experiment", "material", "parameter", "its median", "median of the material", "robust z"]
-    return [Table(header, lines, "B is per metre of length."), Text(rule + rest)]
+    return [Table(header, lines, "B is per metre of length."), Text(rule)]
 
 
 def _table(rows: list[Row]) -> list[Block]:
-    lines = [
-        [
-            row["name"],
-            row["material"] or "–",
-            {True: "yes", False: "no", None: "–"}[row["converged"]],
-            *(_value(row, name) for name in _SHOWN),
-            row["error"] or (row["verdict"] or row["check"] or "–").replace("-", " "),
-            spoken(row["best_effect"]) if row["best_effect"] else "–",
-        ]
-        for row in rows[:_MOST_ROWS]
+    shown = rows[:_MOST_ROWS]
+    parameters = [with_unit(name, unit_of(name)) for name in _SHOWN]
+    header = ["experiment", "material", "converged", *parameters, "verdict", "most probable"]
+    caption = "Posterior medians; intervals stand in summary.csv."
+    if len(rows) > len(shown):
+        caption = f"The first {len(shown)} of {len(rows)}. {caption}"
+    return [Table(header, [_line(row) for row in shown], caption)]
+
+
+def _line(row: Row) -> list[str]:
+    """One experiment's row of the table."""
+    medians = [_value(row, name) for name in _SHOWN]
+    verdict = row["verdict"] or row["check"] or NONE
+    return [
+        row["name"],
+        row["material"] or NONE,
+        {True: "yes", False: "no", None: NONE}[row["converged"]],
+        *medians,
+        row["error"] or verdict.replace("-", " "),
+        spoken(row["best_effect"]) if row["best_effect"] else NONE,
     ]
-    header = ["experiment", "material", "converged", *map(_with_unit, _SHOWN), "verdict", "most probable"]
-    more = f"The first {_MOST_ROWS} of {len(rows)}. " if len(rows) > _MOST_ROWS else ""
-    return [Table(header, lines, more + "Posterior medians; intervals stand in summary.csv.")]
-
-
-def _with_unit(name: str) -> str:
-    unit = unit_text(unit_of(name))
-    return f"{name}, {unit}" if unit else name
 
 
 def _value(row: Row, name: str) -> str:
-    return number(row["parameters"][name]["q50"]) if name in row["parameters"] else "–"
+    parameter = row["parameters"].get(name)
+    return NONE if parameter is None else number(parameter["q50"])
 
 
 def _some(names: list[str], most: int = 10) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+    shown = ", ".join(names[:most])
+    return f"{shown} and {len(names) - most} more" if len(names) > most else shown

@@ -7,7 +7,7 @@ import numpy as np
 
 from wirebayes.answers.headline import calibration_in_a_sentence
 from wirebayes.io.run_folder import read_json
-from wirebayes.json_files.calibrate import CalibrateJson, EstimatedLengths
+from wirebayes.json_files.calibrate import CalibrateJson, EstimatedLengths, Interval
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -25,6 +25,7 @@ from wirebayes.report.blocks import (
     number,
     seed_of_page,
 )
+from wirebayes.report.cells import NONE
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pictures.calibrate import reference_errors
@@ -38,13 +39,15 @@ def calibrate_page(folder: Path, configuration: dict[str, Any]) -> Page:
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
     columns = Columns([_done(found), _known(found), _unknown(creep, hooke)])
     first = [*before_the_answer(found), *_errors(found), *beside_the_answer(found), columns]
+    view = robot_view(folder)
     sections = [
         Section("Summary", first),
         *_geometry(found),
         Section("Lengths", [_lengths(creep, hooke), *_biases(creep)]),
         Section("What to do", _next(found)),
     ]
-    sections += [Section("Where the platform is", view)] if (view := robot_view(folder)) else []
+    if view:
+        sections.append(Section("Where the platform is", view))
     sections.append(files_beside(folder, _FILES))
     sections.append(meaning(("90 % interval", "zero-tension length", "specimen spread"), model=False))
     lead = calibration_in_a_sentence(found)
@@ -81,66 +84,81 @@ _AXES = ("x, mm", "90 %", "y, mm", "90 %", "z, mm", "90 %")
 
 def _geometry(found: CalibrateJson) -> list[Section]:
     """Points that were estimated, what the readings leave open, and where the robot was at each hold."""
-    blocks: list[Block] = []
-    for points, of in ((found["exit_points_m"], "exit point"), (found["platform_points_m"], "platform point")):
-        if not np.any(np.array(points["sd"], float) > 0):
-            continue
-        columns = zip(points["mean"], points["q05"], points["q95"], strict=True)
-        lines = [[str(i + 1), *_intervals(mean, low, high)] for i, (mean, low, high) in enumerate(columns)]
-        blocks.append(Table(["wire", *_AXES], lines, f"The {of} of every wire."))
-    if not blocks:
+    tables = [
+        *_points(found["exit_points_m"], "exit point"),
+        *_points(found["platform_points_m"], "platform point"),
+    ]
+    if not tables:
         return []
     seen = found["identified"]
     words = [f"The readings determine {seen['determined']} of {seen['of']} combinations of geometry and references."]
     words += [f"Not determined: {text}." for text in seen["not_determined"]]
+    known = Columns([Points("What the readings determine", words)])
     poses = found["poses"]
-    places = zip(poses["hold"], poses["mean"], poses["q05"], poses["q95"], strict=True)
-    rows = [[f"{hold:g}", *_intervals(mean[:3], low[:3], high[:3])] for hold, mean, low, high in places]
+    rows = []
+    for hold, mean, low, high in zip(poses["hold"], poses["mean"], poses["q05"], poses["q95"], strict=True):
+        rows.append([f"{hold:g}", *_intervals(mean[:3], low[:3], high[:3])])
     return [
-        Section("Geometry", [*blocks, Columns([Points("What the readings determine", words)])]),
+        Section("Geometry", [*tables, known]),
         Section("Poses", [Table(["hold", *_AXES], rows, "Where the platform was when each hold ended.")]),
     ]
 
 
+def _points(points: Any, of: str) -> list[Table]:
+    """The table of points that were estimated."""
+    if not np.any(np.array(points["sd"], float) > 0):
+        return []
+    lines = []
+    columns = zip(points["mean"], points["q05"], points["q95"], strict=True)
+    for wire, (mean, low, high) in enumerate(columns, start=1):
+        lines.append([str(wire), *_intervals(mean, low, high)])
+    return [Table(["wire", *_AXES], lines, f"The {of} of every wire.")]
+
+
 def _intervals(mean: Any, low: Any, high: Any) -> list[str]:
     """Thousandths with their intervals."""
-    rows = zip(mean, low, high, strict=True)
-    return [cell for m, a, b in rows for cell in (_milli(m), f"{_milli(a)} … {_milli(b)}")]
+    cells = []
+    for middle, lower, upper in zip(mean, low, high, strict=True):
+        cells += _with_interval(middle, lower, upper)
+    return cells
+
+
+def _with_interval(middle: float | None, low: float | None, high: float | None) -> list[str]:
+    """One figure in thousandths and its interval, two cells."""
+    return [_milli(middle), f"{_milli(low)} … {_milli(high)}"]
 
 
 def _done(found: CalibrateJson) -> Points:
     prior = found["prior"]
-    biases = []
+    points = [f"{counted(found['holds'], 'hold')}, tensions read in {found['read']} of them."]
+    stated = {
+        "exit points": prior.get("anchor_sd_mm", 0.0),
+        "platform points": prior.get("platform_sd_mm", 0.0),
+        "poses": prior.get("pose_sd_mm", 0.0),
+    }
+    known = [f"{name} were known to {sd:g} mm" for name, sd in stated.items() if sd]
+    if known:
+        points.append(f"Before, {' and '.join(known)}.")
+    points.append(
+        f"Before, every reference length was known to {prior['reference_sd_mm']:g} mm, and specimens of one line "
+        f"were assumed to differ by {100 * prior['specimen_spread']:g} %."
+    )
     if "tension_bias_sd_N" in prior:
         kind = "a constant each" if prior["tension_bias_sign"] == "constant" else "against the last motion of the wire"
-        biases = [
+        points.append(
             f"Biases of the tension sensors were estimated too, {kind}; before, {prior['tension_bias_sd_N']:g} N."
-        ]
-    stated = (
-        ("exit points", prior.get("anchor_sd_mm", 0.0)),
-        ("platform points", prior.get("platform_sd_mm", 0.0)),
-        ("poses", prior.get("pose_sd_mm", 0.0)),
-    )
-    known = [f"{name} were known to {sd:g} mm" for name, sd in stated if sd]
-    return Points(
-        "What was done",
-        [
-            f"{counted(found['holds'], 'hold')}, tensions read in {found['read']} of them.",
-            *([f"Before, {' and '.join(known)}."] if known else []),
-            f"Before, every reference length was known to {prior['reference_sd_mm']:g} mm, and specimens of one line "
-            f"were assumed to differ by {100 * prior['specimen_spread']:g} %.",
-            *biases,
-        ],
-    )
+        )
+    return Points("What was done", points)
 
 
 def _known(found: CalibrateJson) -> Points:
+    observability = found["observability"]["sentence"]
     if found["pose_now"] is None:
-        return Points("What is known", ["Neither the lengths nor the pose.", found["observability"]["sentence"]])
-    sd = [1e3 * v for v in found["with_creep_model"]["length_m"]["sd"]]
+        return Points("What is known", ["Neither the lengths nor the pose.", observability])
+    sd_mm = [1e3 * sd_m for sd_m in found["with_creep_model"]["length_m"]["sd"]]
+    lengths = f"Every length is known to {from_to(min(sd_mm), max(sd_mm))} mm (standard error)."
     place = coordinates(found["pose_now"]["position_m"])
-    text = f"Every length is known to {from_to(min(sd), max(sd))} mm (standard error)."
-    return Points("What is known", [text, f"The platform is at ({place}) m.", found["observability"]["sentence"]])
+    return Points("What is known", [lengths, f"The platform is at ({place}) m.", observability])
 
 
 def _unknown(creep: EstimatedLengths, hooke: EstimatedLengths) -> Points:
@@ -166,36 +184,35 @@ def _p(p: float | None) -> str:
 
 
 def _lengths(creep: EstimatedLengths, hooke: EstimatedLengths) -> Table:
-    a, b = creep["length_m"], hooke["length_m"]
-    lines = [
-        [
-            str(i + 1),
-            _milli(mean),
-            f"{_milli(low)} … {_milli(high)}",
-            _milli(strain),
-            _milli(plain),
-            f"{_milli(plain_low)} … {_milli(plain_high)}",
-        ]
-        for i, (mean, low, high, strain, plain, plain_low, plain_high) in enumerate(
-            zip(a["mean"], a["q05"], a["q95"], creep["creep_strain"], b["mean"], b["q05"], b["q95"], strict=True)
-        )
-    ]
+    strains = creep["creep_strain"]
+    by_creep = _rows(creep["length_m"])
+    by_hooke = _rows(hooke["length_m"])
+    lines = []
+    for wire, (own, strain, plain) in enumerate(zip(by_creep, strains, by_hooke, strict=True), start=1):
+        lines.append([str(wire), *own, _milli(strain), *plain])
     header = ["wire", "length now, mm", "90 %", "creep strain, mm per m", "Hooke's law alone, mm", "90 %"]
     return Table(header, lines, "Zero-tension length of every wire when the last hold ended, creep included.")
+
+
+def _rows(lengths: Interval) -> list[list[str]]:
+    """Mean and interval of each wire's length."""
+    columns = zip(lengths["mean"], lengths["q05"], lengths["q95"], strict=True)
+    return [_with_interval(mean, low, high) for mean, low, high in columns]
 
 
 def _biases(creep: EstimatedLengths) -> list[Block]:
     if "tension_bias_N" not in creep:
         return []
-    pairs = zip(creep["tension_bias_N"]["mean"], creep["tension_bias_N"]["sd"], strict=True)
-    rows = [[str(i + 1), *("–" if v is None else f"{v:.3f}" for v in (mean, sd))] for i, (mean, sd) in enumerate(pairs)]
-    return [
-        Table(
-            ["wire", "bias of its sensor, N", "standard error, N"],
-            rows,
-            "By how much each tension sensor reads too high.",
-        )
-    ]
+    bias = creep["tension_bias_N"]
+    rows = []
+    for wire, (mean, sd) in enumerate(zip(bias["mean"], bias["sd"], strict=True), start=1):
+        rows.append([str(wire), _thousandths(mean), _thousandths(sd)])
+    header = ["wire", "bias of its sensor, N", "standard error, N"]
+    return [Table(header, rows, "By how much each tension sensor reads too high.")]
+
+
+def _thousandths(value: float | None) -> str:
+    return NONE if value is None else f"{value:.3f}"
 
 
 def _milli(value: float | None) -> str:
@@ -204,21 +221,22 @@ def _milli(value: float | None) -> str:
 
 
 def _next(found: CalibrateJson) -> list[Block]:
-    joints = "No joint values are given: read more poses, or check the readings and their stated errors."
-    if found["with_creep_model"]["converged"]:
-        joints = "No tensions within the bounds hold the platform at its home pose: no joint values lead there."
+    rows = [[f"{coordinate:.3f}" for coordinate in place] for place in found["next_positions_m"]]
+    caption = f"Positions whose readings would sharpen what is known most, the most useful first.{_gain(found)}"
+    return [Text(_joints(found)), Table(["x, m", "y, m", "z, m"], rows, caption)]
+
+
+def _joints(found: CalibrateJson) -> str:
+    """What to set in the controller."""
+    converged = found["with_creep_model"]["converged"]
+    if converged and not found["usable"]:
+        return "Set nothing in the controller: the warnings say why."
     if found["joint_values_for_home_m"] is not None:
-        values = ", ".join(f"{v:.5f}" for v in found["joint_values_for_home_m"])
-        joints = f"Joint values that bring the platform to its home pose now, m: {values}."
-    rows = [[f"{v:.3f}" for v in place] for place in found["next_positions_m"]]
-    caption = "Positions whose readings would sharpen what is known most, the most useful first."
-    if found["with_creep_model"]["converged"] and not found["usable"]:
-        joints = "Set nothing in the controller: the warnings say why."
-    caption += _gain(found)
-    return [
-        Text(joints),
-        Table(["x, m", "y, m", "z, m"], rows, caption),
-    ]
+        values = ", ".join(f"{value:.5f}" for value in found["joint_values_for_home_m"])
+        return f"Joint values that bring the platform to its home pose now, m: {values}."
+    if converged:
+        return "No tensions within the bounds hold the platform at its home pose: no joint values lead there."
+    return "No joint values are given: read more poses, or check the readings and their stated errors."
 
 
 def _gain(found: CalibrateJson) -> str:

@@ -9,6 +9,7 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson
 from wirebayes.json_files.imported import ImportedExperiment, ImportJson
 from wirebayes.json_files.read_units import read_value
+from wirebayes.notice import warns_of
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -27,8 +28,8 @@ from wirebayes.report.blocks import (
     picture_file,
     seed_of_page,
     span,
-    unit_text,
 )
+from wirebayes.report.cells import NONE, unit_or_dash
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.sentences import counted, spoken
 
@@ -47,20 +48,31 @@ def check_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``check.json`` or ``import.json``, a section for each experiment."""
     files = files_beside(folder, _FILES)
     if configuration["command"] == "import":
-        imported: ImportJson = read_json(folder / "import.json")
-        sections = [
-            Section(name, _imported(e, _picture(folder, name, " Is this the test that was done?")))
-            for name, e in imported["experiments"].items()
-        ]
-        understood = "; ".join(of_import(name, e)[0] for name, e in imported["experiments"].items())
-        return Page("What was imported", f"{understood}.", [*sections, files])
-    checked: CheckJson = read_json(folder / "check.json")
-    found = checked["experiments"]
-    sections = [Section(name, _checked(e, _picture(folder, name))) for name, e in found.items()]
-    effects = [effect for e in found.values() for effect in e["effects"]]
+        return _import_page(folder, files)
+    content: CheckJson = read_json(folder / "check.json")
+    checked = content["experiments"]
+    sections, effects, sentences = [], list[str](), list[str]()
+    for name, experiment in checked.items():
+        picture = _picture(folder, name)
+        sections.append(Section(name, _checked(experiment, picture)))
+        sentence = check_in_a_sentence(name, experiment)
+        sentences.append(sentence)
+        effects += experiment["effects"]
     sections += [files, meaning(("hold", "90 % interval", "prior"), effects, symbols=False)]
-    lead = " ".join(check_in_a_sentence(name, e) for name, e in list(found.items())[:_MOST_SENTENCES])
+    lead = " ".join(sentences[:_MOST_SENTENCES])
     return Page("What this test can determine", lead, sections, seed_of_page(configuration))
+
+
+def _import_page(folder: Path, files: Section) -> Page:
+    """The content of ``import.json``."""
+    content: ImportJson = read_json(folder / "import.json")
+    sections, understood = [], []
+    for name, experiment in content["experiments"].items():
+        picture = _picture(folder, name, " Is this the test that was done?")
+        sections.append(Section(name, _imported(experiment, picture)))
+        understood.append(of_import(name, experiment)[0])
+    lead = "; ".join(understood)
+    return Page("What was imported", f"{lead}.", [*sections, files])
 
 
 def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:
@@ -69,13 +81,14 @@ def _imported(e: ImportedExperiment, picture: list[Block]) -> list[Block]:
         f"{counted(e['holds'], 'hold')}, {counted(e['readings'], 'reading')}.",
         f"Length {number(e['length_mm'])} mm.",
     ]
-    notes = [f"{note[:1].upper()}{note[1:]}." for note in e["notes"]] or ["Nothing had to be decided."]
-    columns = [Points("What it is", about), Points("What was done", notes)]
+    done = [f"{note[:1].upper()}{note[1:]}." for note in e["notes"]]
+    columns = [Points("What it is", about), Points("What was done", done or ["Nothing had to be decided."])]
     return [*before_the_answer(e), *picture, *beside_the_answer(e), Columns(columns)]
 
 
 def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
-    known, blind = Points("What it is", _about(e)), Points("What it cannot determine", _blind(e))
+    known = Points("What it is", _about(e))
+    blind = Points("What it cannot determine", _blind(e))
     return [
         *before_the_answer(e),
         *picture,
@@ -89,15 +102,16 @@ def _checked(e: CheckedExperiment, picture: list[Block]) -> list[Block]:
 
 def _about(e: CheckedExperiment) -> list[str]:
     """The sample and the test in sentences."""
-    holds, readings = counted(e["recorded_holds"], "recorded hold"), counted(e["readings"], "reading")
-    unrecorded = f", {e['unrecorded_holds']} unrecorded" if e["unrecorded_holds"] else ""
+    holds = counted(e["recorded_holds"], "recorded hold")
+    if e["unrecorded_holds"]:
+        holds += f", {e['unrecorded_holds']} unrecorded"
     about = [
         f"{e['material']}, {number(e['length_mm'])} mm.",
-        f"{holds}{unrecorded}, {readings}.",
+        f"{holds}, {counted(e['readings'], 'reading')}.",
         f"{number(e['duration_s'] / 60.0)} min in all.",
     ]
     ends = e.get("hold_ends")
-    if ends and "hold-ends" not in [notice["kind"] for notice in e["warnings"]]:
+    if ends and not warns_of(e, "hold-ends"):
         about.append(as_sentence(ends["sentence"]))
     return about
 
@@ -117,21 +131,29 @@ def _blind(e: CheckedExperiment) -> list[str]:
 def _parameters(e: CheckedExperiment) -> Table:
     """What is known of each parameter before and after the test."""
     rows = []
-    for name, p in e["parameters"].items():
-        after, before = span(p["q05"], p["q95"]), span(p["prior_q05"], p["prior_q95"])
-        by, meaning = _DETERMINED_BY[p["determined_by"]], SYMBOLS.get(name, "–")
-        rows.append([name, unit_text(p["unit"]) or "–", number(p["q50"]), after, before, by, meaning])
+    for name, parameter in e["parameters"].items():
+        rows.append(
+            [
+                name,
+                unit_or_dash(parameter["unit"]),
+                number(parameter["q50"]),
+                span(parameter["q05"], parameter["q95"]),
+                span(parameter["prior_q05"], parameter["prior_q95"]),
+                _DETERMINED_BY[parameter["determined_by"]],
+                SYMBOLS.get(name, NONE),
+            ]
+        )
     header = ["parameter", "unit", "median", "90 % interval", "prior's 90 %", "determined by", "what it is"]
     return Table(header, rows, "A first estimate by a short run of the sampler; fit gives the posterior.")
 
 
 def _effects(e: CheckedExperiment) -> Table:
     """How small an effect the test would show."""
-    rows = [
-        [spoken(name), number(effect["amplitude_80"]), unit_text(effect["unit"]) or "–", effect["shows"]]
-        for name, effect in e["effects"].items()
-        if effect["shows"] != "no"
-    ]
+    rows = []
+    for name, effect in e["effects"].items():
+        if effect["shows"] != "no":
+            amplitude = number(effect["amplitude_80"])
+            rows.append([spoken(name), amplitude, unit_or_dash(effect["unit"]), effect["shows"]])
     caption = "The smallest amplitude of each effect that discover would detect in four tests of five like this one."
     return Table(["effect", "amplitude", "unit", "shows"], rows, caption)
 
@@ -142,10 +164,17 @@ def _holds(e: CheckedExperiment) -> Table:
     what, unit = ("weight (N)", "mm") if weights else ("displacement (mm)", "N")
     rows = []
     for hold in e["holds"]:
-        setting = number(hold["tension_N" if weights else "displacement_mm"])
-        begins, lasts = number(hold["start_s"]), number(hold["duration_s"])
-        first, last = number(read_value(hold, "first")), number(read_value(hold, "last"))
-        rows.append([str(hold["number"] or "–"), setting, begins, lasts, str(hold["readings"]), first, last])
+        rows.append(
+            [
+                str(hold["number"] or NONE),
+                number(hold["tension_N" if weights else "displacement_mm"]),
+                number(hold["start_s"]),
+                number(hold["duration_s"]),
+                str(hold["readings"]),
+                number(read_value(hold, "first")),
+                number(read_value(hold, "last")),
+            ]
+        )
     header = ["hold", what, "begins (s)", "lasts (s)", "readings", f"first ({unit})", f"last ({unit})"]
     return Table(header, rows, "The holds as they were read; one without a number was not recorded.")
 

@@ -1,13 +1,14 @@
 """The page of ``wirebayes compare``: models side by side on readings they have not seen."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from wirebayes.answers.headline import comparison_in_words
 from wirebayes.answers.terminal import options_of_best
 from wirebayes.io.run_folder import read_json
-from wirebayes.json_files.comparison import ComparedModels, ComparisonJson
+from wirebayes.json_files.comparison import ComparedModel, ComparedModels, ComparisonJson
 from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.report.blocks import (
     Block,
@@ -50,48 +51,81 @@ def compare_page(folder: Path, configuration: dict[str, Any]) -> Page:
     content: ComparisonJson = read_json(folder / "comparison.json")
     found = content["experiments"]
     sections = [_section(folder, name, table) for name, table in found.items()]
-    lead = " ".join(comparison_in_words(name, table) for name, table in list(found.items())[:_MOST_SENTENCES])
+    sentences = [comparison_in_words(name, table) for name, table in list(found.items())[:_MOST_SENTENCES]]
     sections.append(files_beside(folder, _FILES))
-    effects = [effect for table in found.values() for row in table["models"] for effect in row["name"].split(" + ")]
+    effects = []
+    for table in found.values():
+        for row in table["models"]:
+            effects += row["name"].split(" + ")
     sections.append(meaning(("hold", "held out", "rms", "elpd", "weight"), effects))
-    return Page("Models side by side", lead, sections, seed_of_page(configuration))
+    return Page("Models side by side", " ".join(sentences), sections, seed_of_page(configuration))
 
 
 def _section(folder: Path, name: str, table: ComparedModels) -> Section:
-    rows = table["models"]
-    good = [r for r in rows if r.get("failed") is None]
+    own = folder / name
+    pictures = pictures_in(own, _CAPTIONS) if own.is_dir() else []
+    first, others = pictures[:_FIRST], pictures[_FIRST:]
+    scored = [row for row in table["models"] if row.get("failed") is None]
     blocks: list[Block] = before_the_answer(table)
-    pictures = pictures_in(folder / name, _CAPTIONS) if (folder / name).is_dir() else []
-    blocks += [Pictures(pictures[:_FIRST])] if pictures else []
-    if good:
-        options = options_of_best(table)
-        again = "" if options is None else f"{f'wirebayes fit FILE.toml {options}'.rstrip()}, or "
-        blocks.append(Text(f"Next: {again}wirebayes discover FILE.toml, which names what is missing."))
+    if first:
+        blocks.append(Pictures(first))
+    if scored:
+        blocks.append(Text(_next(table)))
     blocks += beside_the_answer(table)
-    scored = [r["held_out"]["given_first"] for r in good if r["held_out"]]
-    unit = unit_read(scored[0] or {}) if scored else "N"
-    header = ["model", "weight", f"elpd − {table['base']}", "standard error", f"held out: rms, {unit}"]
-    header += [f"given first reading, {unit}", "meaning"]
-    lines = []
-    for r in good:
-        difference, held = r["difference"], r["held_out"]
-        both = (held["free"], held["given_first"]) if held else (None, None)
-        errors = (number(s and read_value(s, "rmse"), 2) for s in both)
-        scores = (number(v, 2) for v in ((difference["elpd"], difference["se"]) if difference else (None, None)))
-        lines.append([spoken(r["name"]), _share(r.get("weight")), *scores, *errors, _plain(r.get("meaning") or "")])
-    blocks.append(
-        Table(header, lines, "Best first. The weight is the model's share in the mixture with the best predictions.")
-    )
-    blocks += [Pictures(pictures[_FIRST:])] if pictures[_FIRST:] else []
-    failed = [[spoken(r["name"]), str(r["failed"])] for r in rows if r.get("failed") is not None]
+    blocks.append(_scores(scored, table["base"]))
+    if others:
+        blocks.append(Pictures(others))
+    failed = [[spoken(row["name"]), str(row["failed"])] for row in table["models"] if row.get("failed") is not None]
     if failed:
         blocks.append(Table(["model", "why it was not scored"], failed))
     return Section(name, blocks)
 
 
+def _next(table: ComparedModels) -> str:
+    """What to do with the best model."""
+    options = options_of_best(table)
+    again = ""
+    if options is not None:
+        again = f"wirebayes fit FILE.toml {options}".rstrip() + ", or "
+    return f"Next: {again}wirebayes discover FILE.toml, which names what is missing."
+
+
+def _scores(scored: Sequence[ComparedModel], base: str) -> Table:
+    """How well each model predicts, in words and figures."""
+    held_out = [row["held_out"]["given_first"] for row in scored if row["held_out"]]
+    unit = unit_read(held_out[0] or {}) if held_out else "N"
+    header = ["model", "weight", f"elpd − {base}", "standard error"]
+    header += [f"held out: rms, {unit}", f"given first reading, {unit}", "meaning"]
+    lines = [_line(row) for row in scored]
+    caption = "Best first. The weight is the model's share in the mixture with the best predictions."
+    return Table(header, lines, caption)
+
+
+def _line(row: ComparedModel) -> list[str]:
+    """One model's row of the table."""
+    difference = row["difference"]
+    elpd, error = (difference["elpd"], difference["se"]) if difference else (None, None)
+    held = row["held_out"]
+    free, given = (held["free"], held["given_first"]) if held else (None, None)
+    return [
+        spoken(row["name"]),
+        _share(row.get("weight")),
+        number(elpd, 2),
+        number(error, 2),
+        _rms(free),
+        _rms(given),
+        _plain(row.get("meaning") or ""),
+    ]
+
+
+def _rms(scores: Any) -> str:
+    return number(read_value(scores, "rmse") if scores else None, 2)
+
+
 def _share(weight: float | None) -> str:
     """A share of the mixture; what rounds to nothing is nothing."""
-    return number(weight if weight is None else round(weight, 3), 2)
+    rounded = None if weight is None else round(weight, 3)
+    return number(rounded, 2)
 
 
 def _plain(meaning: str) -> str:

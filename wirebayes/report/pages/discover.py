@@ -30,34 +30,40 @@ from wirebayes.report.blocks import (
     picture_file,
     pictures_in,
     seed_of_page,
-    unit_text,
 )
+from wirebayes.report.cells import NONE, median_and_interval, percent, unit_or_dash
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.discover import waterfall
-from wirebayes.sentences import listed, middle_and_span, p_in_words, quantity, said_beside, spoken
+from wirebayes.sentences import listed, p_in_words, quantity, said_beside, spoken
 
 
 def discover_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section an experiment, from ``discovery.json`` and the pictures beside it."""
     content: DiscoveryJson = read_json(folder / "discovery.json")
     found = content["experiments"]
-    overview = Table(
-        ["experiment", "verdict", "effects", "p of the plain model", "gap closed"],
-        [
-            [name, _spoken(v), listed([spoken(e) for e in v["effects"]]), _p(v), _gap_closed(v)]
-            for name, v in found.items()
-        ],
-    )
-    sections = [_section(folder, name, v) for name, v in found.items()]
+    sections, sentences, named = [], list[str](), list[str]()
+    for name, v in found.items():
+        sections.append(_section(folder, name, v))
+        sentences.append(findings_in_a_sentence(name, v))
+        named += [*v["effects"], *v["probabilities"], *v["power"], *v.get("group", [])]
     if len(found) > 1:
-        sections.insert(0, Section("Summary", [overview]))
-    sentences = [findings_in_a_sentence(name, v) for name, v in found.items()]
+        sections.insert(0, Section("Summary", [_overview(found)]))
     lead = " ".join(sentences[:_MOST_SENTENCES])
-    named = [e for v in found.values() for e in (*v["effects"], *v["probabilities"], *v["power"], *v.get("group", []))]
     sections.append(files_beside(folder, _FILES))
     explained = all(_has_parameters(folder / name) for name in found)
     sections.append(meaning(_TERMS, named, symbols=not explained))
-    return Page("What the model is missing", lead, sections, seed_of_page(configuration))
+    footer = seed_of_page(configuration)
+    return Page("What the model is missing", lead, sections, footer)
+
+
+def _overview(found: Mapping[str, ExperimentFindings]) -> Table:
+    """The verdict on each experiment."""
+    lines = []
+    for name, v in found.items():
+        effects = listed([spoken(effect) for effect in v["effects"]])
+        closed = percent((v.get("held_out") or {}).get("gap_closed"))
+        lines.append([name, v["verdict"].replace("-", " "), effects, _p(v), closed])
+    return Table(["experiment", "verdict", "effects", "p of the plain model", "gap closed"], lines)
 
 
 _FILES = (
@@ -77,7 +83,10 @@ _TERMS = ("hold", "90 % interval", "p", "held out", "rms", "elpd", "in the 90 % 
 
 
 def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
-    hidden = [sentence.partition(": ")[::2] for sentence in v.get("not_identifiable", [])]
+    hidden = []
+    for sentence in v.get("not_identifiable", []):
+        what, _, why = sentence.partition(": ")
+        hidden.append([spoken(what), why])
     blocks: list[Block] = [*before_the_answer(v), *_alone(v), *beside_the_answer(v)]
     blocks += _curves(folder, name)
     if v["verdict"] in ("named", "nothing-missing"):
@@ -86,20 +95,26 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
         blocks.append(Text(f"Measure next: {v['next_measurement']}"))
     blocks += _parameters(folder / name, v)
     blocks.append(_within_a_minute(v, [what for what, _ in hidden]))
-    if (folder / name).is_dir() and (others := pictures_in(folder / name, _patterns(v))):
-        blocks.append(Pictures(others))
+    blocks += _patterns(folder / name, v)
     if len(v.get("steps", [])) > 1 and read_value(v["steps"][0], "rmse") is not None:
         blocks += _steps(v)
     if v.get("probabilities"):
         blocks.append(_candidates(v))
     if v.get("power"):
-        lines = [[spoken(e), number(p["amplitude_80"]), unit_text(p["unit"]) or "–"] for e, p in v["power"].items()]
-        caption = "The smallest size of each effect that four of five such tests would show; a dash: none, or no unit."
-        blocks.append(Table(["effect", "size", "unit"], lines, caption))
+        blocks.append(_power(v))
     if hidden:
         caption = "What this test cannot show: the readings would be nearly the same with or without it."
-        blocks.append(Table(["what", "why"], [[spoken(what), why] for what, why in hidden], caption))
+        blocks.append(Table(["what", "why"], hidden, caption))
     return Section(name, blocks)
+
+
+def _power(v: ExperimentFindings) -> Table:
+    """How small an effect such a test would show."""
+    lines = []
+    for effect, power in v["power"].items():
+        lines.append([spoken(effect), number(power["amplitude_80"]), unit_or_dash(power["unit"])])
+    caption = "The smallest size of each effect that four of five such tests would show; a dash: none, or no unit."
+    return Table(["effect", "size", "unit"], lines, caption)
 
 
 def _curves(folder: Path, name: str) -> list[Block]:
@@ -112,10 +127,11 @@ def _curves(folder: Path, name: str) -> list[Block]:
 
 def _within_a_minute(v: ExperimentFindings, hidden: list[str]) -> Columns:
     """Where model and measurement disagree, what is known, and what is not."""
-    beside = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
-    known = [point for point in (*beside, _held_out(v), *_sizes(v)) if point]
+    known = [f"{line[0].upper()}{line[1:]}." for line in said_beside(v)]
+    known += [*_held_out(v), *_sizes(v)]
     unknown = [_NEAREST] if v.get("effects") else []
-    unknown += [f"This test cannot show {listed([spoken(what) for what in hidden])}."] if hidden else []
+    if hidden:
+        unknown.append(f"This test cannot show {listed(hidden)}.")
     return Columns(
         [
             Points("Where model and measurement disagree", _disagreements(v)),
@@ -127,7 +143,7 @@ def _within_a_minute(v: ExperimentFindings, hidden: list[str]) -> Columns:
 
 def _disagreements(v: ExperimentFindings) -> list[str]:
     """The residual patterns that chance alone would rarely make, and what they amount to where nothing is missing."""
-    patterns = [w["sentence"] for w in v.get("where", []) if w["p"] <= _SPEAKS]
+    patterns = [pattern["sentence"] for pattern in v.get("where", []) if pattern["p"] <= _SPEAKS]
     if not patterns:
         return ["No pattern stands out."]
     if v["verdict"] == "nothing-missing":
@@ -142,39 +158,36 @@ def _steps(v: ExperimentFindings) -> list[Block]:
         "Rms error on held-out holds: of the plain model, by how much each named effect reduces it in turn, and "
         "what is left above the noise."
     )
-    names = [spoken(steps[0]["model"]), *(f"+ {spoken(step['model'])}" for step in steps[1:])]
-    scores = [[number(read_value(s, "rmse")), number(s["elpd"]), _percent(s["coverage_90"])] for s in steps]
+    lines = []
+    for i, step in enumerate(steps):
+        name = spoken(step["model"])
+        if i:
+            name = f"+ {name}"
+        error = number(read_value(step, "rmse"))
+        lines.append([name, error, number(step["elpd"]), percent(step["coverage_90"])])
     header = ["model", f"rms error ({unit_read(steps[0])})", "elpd", "readings in 90 % bands"]
-    lines = [[name, *score] for name, score in zip(names, scores, strict=True)]
     caption = "Prediction of the held-out holds from the others, by the plain model and with each effect in turn."
-    return [Pictures([Picture(drawn(waterfall(v)), falling, falling)]), Table(header, lines, caption)]
+    picture = Picture(drawn(waterfall(v)), falling, falling)
+    return [Pictures([picture]), Table(header, lines, caption)]
 
 
 def _candidates(v: ExperimentFindings) -> Table:
     """The probability of each effect to be missing, the most probable first."""
     inclusion = v.get("inclusion", {})
-    ranked = sorted(v["probabilities"].items(), key=lambda item: -item[1])
+    probabilities = v["probabilities"].items()
+    ranked = sorted(probabilities, key=lambda item: -item[1])
     lines = []
     for effect, p in ranked:
         if max(p, inclusion.get(effect, 0.0)) >= _LEAST:
-            included = _probability(inclusion[effect]) if effect in inclusion else "–"
-            lines.append([spoken(effect), _probability(p), included])
+            lines.append([spoken(effect), percent(p), percent(inclusion.get(effect))])
     caption = (
         "First column: probability of having the largest share of the misfit, given that something is missing. "
         "Second: probability of being missing at all, alone or beside others."
     )
     rest = v.get("remainder", {}).get("probability")
     if rest is not None:
-        caption += f" Something that none of them explains remains with a probability of {_probability(rest)}."
+        caption += f" Something that none of them explains remains with a probability of {percent(rest)}."
     return Table(["candidate", "largest share", "missing at all"], lines, caption)
-
-
-def _probability(p: float) -> str:
-    return f"{100 * p:.0f} %"
-
-
-def _percent(share: float | None) -> str:
-    return "–" if share is None else f"{100 * share:.0f} %"
 
 
 def _p(v: ExperimentFindings) -> str:
@@ -183,14 +196,21 @@ def _p(v: ExperimentFindings) -> str:
 
 def _alone(v: ExperimentFindings) -> list[Block]:
     """That other effects look alike here, if so: a headline that hides them would promise too much."""
-    like = _alike(v) if v["verdict"] in ("named", "ambiguous") else ""
-    return [Text(f"{like[2:3].upper()}{like[3:]}.", strong=True)] if like else []
+    if v["verdict"] not in ("named", "ambiguous"):
+        return []
+    named = {*v["effects"], *v["set"], "unknown"}
+    alike = [spoken(effect) for effect in v.get("group", []) if effect not in named]
+    if not alike:
+        return []
+    return [Text(f"On this protocol hard to distinguish from {listed(alike)}.", strong=True)]
 
 
 def _means(name: str) -> str:
     """A parameter's meaning in a line; of one of an effect, which it is."""
-    effect, _, _ = name.partition(".")
-    return SYMBOLS.get(name) or (f"of the effect {spoken(effect)}" if effect != name else "–")
+    if name in SYMBOLS:
+        return SYMBOLS[name]
+    effect, dot, _ = name.partition(".")
+    return f"of the effect {spoken(effect)}" if dot else NONE
 
 
 def _has_parameters(folder: Path) -> bool:
@@ -202,41 +222,36 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
     """Every parameter before and after what was found joined the model."""
     if not _has_parameters(folder):
         return []
-    summaries: list[SummaryJson] = [read_json(folder / model / "summary.json") for model in ("plain", "final")]
-    plain, final = (summary["parameters"] for summary in summaries)
+    plain = _parameters_of(folder / "plain")
+    final = _parameters_of(folder / "final")
     if v["verdict"] == "nothing-missing":
         return [_plain_parameters(plain)]
     rows = []
     for name, after in final.items():
         if name.startswith(f"{Discrepancy.name}."):
             continue  # heights of a curve, a dozen of them
-        before = plain.get(name)
-        rows.append(
-            [
-                name,
-                unit_text(after["unit"]) or "–",
-                *(middle_and_span(before["q50"], before["q05"], before["q95"]) if before else ["–", "–"]),
-                *middle_and_span(after["q50"], after["q05"], after["q95"]),
-                _means(name),
-            ]
-        )
+        figures = [*median_and_interval(plain.get(name)), *median_and_interval(after)]
+        rows.append([name, unit_or_dash(after["unit"]), *figures, _means(name)])
     header = ["parameter", "unit", "plain", "90 %", "with what was found", "90 %", "what it is"]
-    curve = " The smooth curve that stands for what has no name is left out." if len(rows) < len(final) else ""
-    return [Table(header, rows, f"Each parameter before and after, both on all holds.{curve}")]
+    caption = "Each parameter before and after, both on all holds."
+    if len(rows) < len(final):
+        caption += " The smooth curve that stands for what has no name is left out."
+    return [Table(header, rows, caption)]
+
+
+def _parameters_of(folder: Path) -> dict[str, Parameter]:
+    """Parameters of one model of an experiment."""
+    summary: SummaryJson = read_json(folder / "summary.json")
+    return summary["parameters"]
 
 
 def _plain_parameters(parameters: Mapping[str, Parameter]) -> Table:
     """Those of the plain model, to which nothing had to be added."""
-    rows = [
-        [name, unit_text(p["unit"]) or "–", *middle_and_span(p["q50"], p["q05"], p["q95"]), _means(name)]
-        for name, p in parameters.items()
-    ]
+    rows = []
+    for name, parameter in parameters.items():
+        rows.append([name, unit_or_dash(parameter["unit"]), *median_and_interval(parameter), _means(name)])
     header = ["parameter", "unit", "median", "90 % interval", "what it is"]
     return Table(header, rows, "Of the plain model: nothing had to be added.")
-
-
-def _spoken(v: ExperimentFindings) -> str:
-    return str(v["verdict"]).replace("-", " ")
 
 
 _BEFORE_AND_AFTER = (
@@ -245,48 +260,47 @@ _BEFORE_AND_AFTER = (
 )
 
 
-def _patterns(v: ExperimentFindings) -> dict[str, str]:
-    """What the picture of each pattern shows; what is to be seen in it stands under where the two disagree."""
-    return {
-        f"where-{w['covariate'].replace(' ', '-')}": f"Residuals of the plain model by {w['covariate']}."
-        for w in v.get("where", [])
-    }
+def _patterns(folder: Path, v: ExperimentFindings) -> list[Block]:
+    """The picture of each pattern; what is to be seen in it stands under where the two disagree."""
+    if not folder.is_dir():
+        return []
+    captions = {}
+    for pattern in v.get("where", []):
+        covariate = pattern["covariate"]
+        captions[f"where-{covariate.replace(' ', '-')}"] = f"Residuals of the plain model by {covariate}."
+    pictures = pictures_in(folder, captions)
+    return [Pictures(pictures)] if pictures else []
 
 
-def _alike(v: ExperimentFindings) -> str:
-    """The near-equivalents of what is named: a headline that hides them would promise too much."""
-    like = [spoken(e) for e in v.get("group", []) if e not in (*v["effects"], *v["set"], "unknown")]
-    return f"; on this protocol hard to distinguish from {listed(like)}" if like else ""
-
-
-def _gap_closed(v: ExperimentFindings) -> str:
-    closed = (v.get("held_out") or {}).get("gap_closed")
-    return "–" if closed is None else f"{100 * closed:.0f} %"
-
-
-def _held_out(v: ExperimentFindings) -> str:
+def _held_out(v: ExperimentFindings) -> list[str]:
+    """How much the error on held-out holds changes; nothing where it says nothing."""
     held = v.get("held_out") or {}
     if not held.get("plain") or not held.get("final") or v["verdict"] == "nothing-missing":
-        return ""
+        return []
     if not held["holds"]:
-        return "No hold was held out: that needs three recorded holds of every test."
-    plain, final = (read_value(held[model], "rmse") for model in ("plain", "final"))
+        return ["No hold was held out: that needs three recorded holds of every test."]
+    plain = number(read_value(held["plain"], "rmse"), 2)
+    final = number(read_value(held["final"], "rmse"), 2)
     goes = "grows" if error_grows(held) else "falls"
-    holds, unit = listed([str(h) for h in held["holds"]]), unit_read(held["plain"])
-    text = f"On the held-out holds {holds} the rms error {goes} from {number(plain, 2)} to {number(final, 2)} {unit}"
+    holds = listed([str(hold) for hold in held["holds"]])
+    unit = unit_read(held["plain"])
+    text = f"On the held-out holds {holds} the rms error {goes} from {plain} to {final} {unit}"
     if v["verdict"] == "partial":
         text += " with a smooth discrepancy beside the named effects"
-    if v.get("accepted") and (flexible := held.get("flexible")):
+    flexible = held.get("flexible")
+    if v.get("accepted") and flexible:
         text += f"; a smooth curve instead of a named effect reaches {number(read_value(flexible, 'rmse'), 2)}"
-    return text + "."
+    return [f"{text}."]
 
 
 def _sizes(v: ExperimentFindings) -> list[str]:
     """How large each effect is here, and which are those of other tests."""
-    here = [_amplitude(effect, a) for effect, a in v.get("amplitudes", {}).items()]
-    return here + [f"{sentence}." for sentence in in_other_tests(v)]
+    here = [_amplitude(effect, amplitude) for effect, amplitude in v.get("amplitudes", {}).items()]
+    elsewhere = [f"{sentence}." for sentence in in_other_tests(v)]
+    return here + elsewhere
 
 
-def _amplitude(effect: str, a: AmplitudeEstimate) -> str:
-    at = "" if a.get("hold") is None else f", from hold {a['hold']} on"
-    return f"{spoken(effect)}: {quantity(a['mean'], a['q05'], a['q95'], a['unit'])}{at}."
+def _amplitude(effect: str, amplitude: AmplitudeEstimate) -> str:
+    size = quantity(amplitude["mean"], amplitude["q05"], amplitude["q95"], amplitude["unit"])
+    since = "" if amplitude.get("hold") is None else f", from hold {amplitude['hold']} on"
+    return f"{spoken(effect)}: {size}{since}."

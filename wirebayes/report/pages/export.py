@@ -43,38 +43,42 @@ def export_page(folder: Path, configuration: dict[str, Any]) -> Page:
         rows = list(csv.DictReader(file))
     summary: ExportSummary = read_json(folder / "export.json")
     wires = list(dict.fromkeys(row.get("wire") for row in rows))  # None, once, where all legs hang on one line
-    lines = [
-        [
-            *([] if row.get("wire") is None else [row["wire"]]),
-            number(float(row["tension_N"])),
-            f"{float(row['time_s']):g}",
-            number(float(row["q50_mm_per_m"])),
-            span(float(row["q05_mm_per_m"]), float(row["q95_mm_per_m"])),
-        ]
-        for row in rows
-    ]
-    caption = "Growth of a new line under a tension held constant, in mm per metre of line."
     words = Text(
         "Firmware and simulators know springs but no creep. The files give them the line's spring constant; the table "
         "says how much longer each metre of line will be after a time, which has to be corrected for by other means."
     )
     pictures = [_growth(wire, [row for row in rows if row.get("wire") == wire]) for wire in wires]
-    header = _HEADER if wires == [None] else ("wire", *_HEADER)
     creep = [*before_the_answer(summary), Pictures(pictures), *beside_the_answer(summary), words]
+    header = _HEADER if wires == [None] else ("wire", *_HEADER)
+    caption = "Growth of a new line under a tension held constant, in mm per metre of line."
     sections = [
         Section("Creep of the line", creep),
         files_beside(folder, _FILES, "Files"),
-        Section("Table of the creep", [Table(header, lines, caption)]),
+        Section("Table of the creep", [Table(header, [_line(row) for row in rows], caption)]),
         meaning(("90 % interval",), model=False),
     ]
-    last = rows[-1]
-    grown = f"{number(float(last['q50_mm_per_m']))} mm"
-    interval = span(float(last["q05_mm_per_m"]), float(last["q95_mm_per_m"]))
-    lead = (
-        f"A metre of the line grows by {grown} ({interval}) under {float(last['tension_N']):g} N within "
-        f"{lasting(float(last['time_s']))}; the interval holds 90 %."
+    return Page("Settings for a robot", _in_a_sentence(rows[-1]), sections, seed_of_page(configuration))
+
+
+def _line(row: dict[str, str]) -> list[str]:
+    """A row of the table as a page shows it."""
+    wire = [row["wire"]] if "wire" in row else []
+    return [*wire, number(float(row["tension_N"])), f"{float(row['time_s']):g}", *_grown(row)]
+
+
+def _grown(row: dict[str, str]) -> list[str]:
+    """Median and interval of the growth."""
+    interval = span(float(row["q05_mm_per_m"]), float(row["q95_mm_per_m"]))
+    return [number(float(row["q50_mm_per_m"])), interval]
+
+
+def _in_a_sentence(row: dict[str, str]) -> str:
+    grown, interval = _grown(row)
+    tension = f"{float(row['tension_N']):g} N"
+    time = lasting(float(row["time_s"]))
+    return (
+        f"A metre of the line grows by {grown} mm ({interval}) under {tension} within {time}; the interval holds 90 %."
     )
-    return Page("Settings for a robot", lead, sections, seed_of_page(configuration))
 
 
 _HEADER = ("tension, N", "after, s", "growth, mm per m", "90 % interval")
@@ -82,8 +86,10 @@ _HEADER = ("tension, N", "after, s", "growth, mm per m", "90 % interval")
 
 def _growth(wire: str | None, rows: list[dict[str, str]]) -> Picture:
     """The picture of one line's growth."""
-    of = "a new line" if wire is None else f"new wire {wire}"
     numbers = [{key: float(value) for key, value in row.items() if key != "wire"} for row in rows]
+    of = "a new line"
     caption = "Median and 90 % interval of the growth, a colour a tension."
-    caption = caption if wire is None else f"Wire {wire}: {caption[0].lower()}{caption[1:]}"
+    if wire is not None:
+        of = f"new wire {wire}"
+        caption = f"Wire {wire}: {caption[0].lower()}{caption[1:]}"
     return Picture(drawn(growth(numbers)), f"Growth of {of} against time at each tension.", caption)

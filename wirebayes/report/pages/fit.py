@@ -1,6 +1,6 @@
 """The page of ``wirebayes fit``: each fit's readings, what they determine and what they do not."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from wirebayes.answers.headline import USE, fit_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.model.sample import Sample
+from wirebayes.notice import warns_of
 from wirebayes.numeric.typing import Array
 from wirebayes.prediction.predictive import PredictionRequest, draw_predictive
 from wirebayes.report import figures
@@ -31,8 +32,8 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     seed_of_page,
-    unit_text,
 )
+from wirebayes.report.cells import NONE, median_and_interval, percent, unit_or_dash
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.corner import corner
 from wirebayes.report.pictures.curve import through_the_readings
@@ -54,25 +55,26 @@ _FILES = (
 def fit_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """One section for each experiment of each fit in the folder."""
     sections, effects, sentences = [], dict[str, Effect](), list[str]()
+    from_summaries = bool(configuration.get("own_effects"))  # without the table that explains each parameter
     for file in sorted(folder.glob("*/summary.json")):
         summary: SummaryJson = read_json(file)
         sentences.append(fit_in_a_sentence(summary))
-        if configuration.get("own_effects"):
+        if from_summaries:
             sections.append(_of_summary(summary))
             continue
-        for stored, prior in load_with_priors(file.parent):
+        loaded = load_with_priors(file.parent)
+        for stored, prior in loaded:
             effects |= {effect.name: effect for effect in stored.sample.model.effects}
             sections.append(section(stored, prior, summary))
     lead = " ".join(sentences[:_MOST_SENTENCES])
     sections.append(files_beside(folder, _FILES))
-    from_summaries = bool(configuration.get("own_effects"))  # without the table that explains each parameter
     sections.append(meaning(("hold", "90 % interval", "prior"), effects, effects, symbols=from_summaries))
     return Page("What the readings determine", lead, sections, seed_of_page(configuration))
 
 
 def _of_summary(summary: SummaryJson) -> Section:
     """A fit with effects of the user's own, from its summary alone: a page never executes a user's code."""
-    lines = [[name, *middle_and_span(s["q50"], s["q05"], s["q95"])] for name, s in summary["parameters"].items()]
+    lines = [[name, *median_and_interval(parameter)] for name, parameter in summary["parameters"].items()]
     words = Text("Fitted with effects from a file of the user's own, so this section shows summary.json alone.")
     table = Table(["parameter", "median", "90 % interval"], lines)
     blocks = [*_cautions(summary), words, table, _derived(summary), Text(_sampled(summary))]
@@ -91,24 +93,31 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     summary : dict
         The fit's ``summary.json``.
     """
-    sample, draws = stored.sample, stored.draws
-    sampled = [name for name in draws if name in prior and np.ptp(draws[name]) > 0]
-    shrunk = {name: contraction(draws[name], prior[name]) for name in sampled}
+    draws = stored.draws
+    sampled = {name: values for name, values in draws.items() if name in prior and np.ptp(values) > 0}
+    shrunk = {name: contraction(values, prior[name]) for name, values in sampled.items()}
     trusted = summary["converged"] and _passed(summary) is not False
-    pictures = _pictures(stored, {name: draws[name] for name in sampled}, summary, trusted)
-    blocks: list[Block] = _cautions(summary)
-    if "curve" in pictures:
-        blocks.append(Pictures([pictures["curve"]]))
-    blocks.append(Text(_next(summary)))
-    blocks.append(_parameters(draws, shrunk, sample))
-    blocks.append(Columns([_measured(stored, summary), *_known(summary, shrunk, trusted)]))
-    blocks.append(Pictures([pictures["measured"], pictures["residuals"]]))
-    if "pairs" in pictures:
-        blocks.append(Pictures([pictures["pairs"]]))
-    blocks.append(_derived(summary))
-    blocks.append(Pictures([pictures["ahead"]]))
-    blocks.append(Text(_sampled(summary)))
-    return Section(sample.name, blocks)
+    pictures = _pictures(stored, sampled, summary, trusted)
+    known = Columns([_measured(stored, summary), *_known(summary, shrunk, trusted)])
+    blocks: list[Block] = [
+        *_cautions(summary),
+        *_shown(pictures, "curve"),
+        Text(_next(summary)),
+        _parameters(draws, shrunk, stored.sample),
+        known,
+        *_shown(pictures, "measured", "residuals"),
+        *_shown(pictures, "pairs"),
+        _derived(summary),
+        *_shown(pictures, "ahead"),
+        Text(_sampled(summary)),
+    ]
+    return Section(stored.sample.name, blocks)
+
+
+def _shown(pictures: Mapping[str, Picture], *names: str) -> list[Block]:
+    """Some of the pictures side by side, those that there are."""
+    there = [pictures[name] for name in names if name in pictures]
+    return [Pictures(there)] if there else []
 
 
 def _pictures(stored: Stored, sampled: dict[str, Array], summary: SummaryJson, trusted: bool) -> dict[str, Picture]:
@@ -124,30 +133,49 @@ def _pictures(stored: Stored, sampled: dict[str, Array], summary: SummaryJson, t
     trusted : bool
         Whether nothing speaks against the fit.
     """
-    sample, name = stored.sample, stored.sample.name
-    weights = sample.protocol.control == "force"
-    against = f"Displacement of {name} against weight." if weights else f"Tension of {name} against displacement."
-    left = f"Measured minus predicted readings of {name}, hold after hold, inside the 90 % band."
-    later = f"Creep of {name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
-    ahead = summary["extrapolation"]
-    # those that take longest come first, so that no core waits for one that began last
+    figure_of = _figures(stored, sampled, summary)
+    sources = drawn_together(list(figure_of.values()))
+    texts = _texts(stored.sample, summary, trusted)
+    pictures = {}
+    for each, source in zip(figure_of, sources, strict=True):
+        alt, caption = texts[each]
+        pictures[each] = Picture(source, alt, caption, wide=each in _WIDE)
+    return pictures
+
+
+def _figures(stored: Stored, sampled: dict[str, Array], summary: SummaryJson) -> dict[str, Callable[[], Figure]]:
+    """What makes each picture; those that take longest come first, so that no core waits for one that began last."""
+    sample = stored.sample
     figure_of: dict[str, Callable[[], Figure]] = {}
     if stored.likelihood == "chain":
-        figure_of["curve"] = lambda: through_the_readings(stored, name)
+        figure_of["curve"] = lambda: through_the_readings(stored, sample.name)
     if len(sampled) > 1:
         figure_of["pairs"] = lambda: corner(sampled, sample.model.effects, sample.protocol.control)
     figure_of["residuals"] = lambda: _residuals(stored)
-    figure_of["ahead"] = lambda: figures.creep_ahead(ahead, name)
-    figure_of["measured"] = lambda: figures.measured(sample.protocol, sample.readings[..., 0], name)
-    source = dict(zip(figure_of, drawn_together(list(figure_of.values())), strict=True))
-    said = {
-        "curve": (f"Readings of {name} with the fitted curve through them, hold after hold.", _CURVE, True),
-        "measured": (against, _GREW if weights else _READ, False),
-        "residuals": (left, _LEFT, False),
-        "pairs": (f"Posterior of {name}, every pair of parameters.", _PAIRS, True),
-        "ahead": (later, _continued(summary, trusted), False),
+    figure_of["ahead"] = lambda: figures.creep_ahead(summary["extrapolation"], sample.name)
+    figure_of["measured"] = lambda: figures.measured(sample.protocol, sample.readings[..., 0], sample.name)
+    return figure_of
+
+
+def _texts(sample: Sample, summary: SummaryJson, trusted: bool) -> dict[str, tuple[str, str]]:
+    """Each picture in words, and its caption."""
+    name = sample.name
+    if sample.protocol.control == "force":
+        measured = f"Displacement of {name} against weight.", _GREW
+    else:
+        measured = f"Tension of {name} against displacement.", _READ
+    left = f"Measured minus predicted readings of {name}, hold after hold, inside the 90 % band."
+    later = f"Creep of {name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
+    return {
+        "curve": (f"Readings of {name} with the fitted curve through them, hold after hold.", _CURVE),
+        "measured": measured,
+        "residuals": (left, _LEFT),
+        "pairs": (f"Posterior of {name}, every pair of parameters.", _PAIRS),
+        "ahead": (later, _continued(summary, trusted)),
     }
-    return {each: Picture(source[each], *said[each]) for each in source}
+
+
+_WIDE = ("curve", "pairs")
 
 
 def _continued(summary: SummaryJson, trusted: bool) -> str:
@@ -159,10 +187,9 @@ def _continued(summary: SummaryJson, trusted: bool) -> str:
 
 def _next(summary: SummaryJson) -> str:
     """What to do with this fit."""
-    kinds = {notice["kind"] for notice in summary["warnings"]}
-    if "model-check" in kinds:
+    if warns_of(summary, "model-check"):
         return "Next: wirebayes discover with the same file looks for what the model is missing."
-    if "not-converged" in kinds:
+    if warns_of(summary, "not-converged"):
         return "Next: settle the warnings above, then fit again; these numbers are not to be used."
     return USE
 
@@ -191,14 +218,18 @@ def _passed(summary: SummaryJson) -> bool | None:
 
 def _cautions(summary: SummaryJson) -> list[Block]:
     """What a reader must know before anything else."""
+    blocks = before_the_answer(summary)
+    if not warns_of(summary, "model-check"):
+        blocks.append(_check(summary))
+    return blocks + beside_the_answer(summary)
+
+
+def _check(summary: SummaryJson) -> Text:
+    """What the model check says; what was not checked stands out."""
     if "model_check" not in summary:
-        check = Text("The model was not checked against the readings: the check was left out.", strong=True)
-    elif summary["model_check"]["passed"] is None:
-        check = Text(summary["model_check"]["sentence"], strong=True)
-    else:
-        check = Text(summary["model_check"]["sentence"])
-    said = "model-check" in [notice["kind"] for notice in summary["warnings"]]
-    return [*before_the_answer(summary), *([] if said else [check]), *beside_the_answer(summary)]
+        return Text("The model was not checked against the readings: the check was left out.", strong=True)
+    check = summary["model_check"]
+    return Text(check["sentence"], strong=check["passed"] is None)
 
 
 def _sampled(summary: SummaryJson) -> str:
@@ -212,21 +243,23 @@ def _sampled(summary: SummaryJson) -> str:
 
 
 def _measured(stored: Stored, summary: SummaryJson) -> Points:
-    ends = summary.get("hold_ends")
-    warned = "hold-ends" in [notice["kind"] for notice in summary["warnings"]]
-    protocol, read = stored.sample.protocol, stored.sample.readings[..., 0][stored.sample.protocol.mask]
+    protocol = stored.sample.protocol
+    read = stored.sample.readings[..., 0][protocol.mask]
     weights = protocol.control == "force"
     tension = protocol.setting[protocol.recorded] if weights else read
-    holds = int(protocol.recorded.sum())
-    unrecorded = len(protocol.recorded) - holds
+    recorded = int(protocol.recorded.sum())
+    holds = counted(recorded, "hold")
+    if recorded < len(protocol.recorded):
+        holds += f" and {len(protocol.recorded) - recorded} not recorded"
     points = [
         f"{stored.sample.material}, {protocol.length_mm:g} mm.",
-        f"{counted(holds, 'hold')}{f' and {unrecorded} not recorded' if unrecorded else ''}, "
-        f"{counted(len(read), 'reading')}.",
+        f"{holds}, {counted(len(read), 'reading')}.",
         f"{'Weights' if weights else 'Tensions'} from {number(tension.min())} to {number(tension.max())} N.",
         f"The longest hold lasted {protocol.duration_s.max():g} s.",
-        *([as_sentence(ends["sentence"])] if ends and not warned else []),
     ]
+    ends = summary.get("hold_ends")
+    if ends and not warns_of(summary, "hold-ends"):
+        points.append(as_sentence(ends["sentence"]))
     return Points("What was measured", points)
 
 
@@ -235,7 +268,8 @@ def _known(summary: SummaryJson, shrunk: dict[str, float], trusted: bool) -> lis
     known: list[str] = []
     undetermined: list[str] = []
     for name, each in summary["identifiability"].items():
-        (known if shrunk.get(name, 0.0) >= MOST else undetermined).append(each["sentence"])
+        determined = shrunk.get(name, 0.0) >= MOST
+        (known if determined else undetermined).append(each["sentence"])
     if not trusted:
         return [Points("What the readings would determine if the model were right", known + undetermined)]
     nothing = ["No parameter."]
@@ -245,17 +279,14 @@ def _known(summary: SummaryJson, shrunk: dict[str, float], trusted: bool) -> lis
     ]
 
 
-def _unit(name: str, sample: Sample) -> str:
-    return unit_text(unit_of(name, sample.model.effects, (sample.protocol.control,)))
-
-
 def _parameters(draws: dict[str, Array], shrunk: dict[str, float], sample: Sample) -> Table:
+    effects, control = sample.model.effects, sample.protocol.control
     lines = []
     for name, values in draws.items():
         low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
-        share = f"{100 * shrunk[name]:.0f} %" if name in shrunk else "–"
-        unit = _unit(name, sample) or "–"
-        lines.append([name, unit, *middle_and_span(middle, low, high), share, _means(name, sample.model.effects)])
+        unit = unit_or_dash(unit_of(name, effects, (control,)))
+        share = percent(shrunk.get(name))
+        lines.append([name, unit, *middle_and_span(middle, low, high), share, _means(name, effects)])
     caption = (
         "The interval contains the parameter with a probability of 90 %, if the model is right. "
         "Contraction is the share of the prior's variance that the readings took away, of the logarithm where a "
@@ -266,23 +297,22 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], sample: Sampl
 
 def _means(name: str, effects: tuple[Effect, ...]) -> str:
     """A parameter's meaning in a line."""
-    sentences = {c: e.sentence.rstrip(".") for e in effects for c in e.columns()}
-    return SYMBOLS.get(name) or sentences.get(name, "–")
+    for effect in reversed(effects):
+        if name in effect.columns():
+            return SYMBOLS.get(name) or effect.sentence.rstrip(".")
+    return SYMBOLS.get(name, NONE)
 
 
 def _derived(summary: SummaryJson) -> Table:
     derived = summary["derived"]
-    rows = [
-        ("creep after 2 min, mm", derived["creep_2min_mm"], "–"),
-        ("creep after 1 h, mm", derived["creep_1h_mm"], "–"),
-        ("creep after 1 day, mm", derived["creep_1day_mm"], "–"),
-        ("final creep, mm", derived["final_creep_mm"], "grows without end"),
-        ("half of it after, s", derived["median_creep_time_s"], "–"),
-        ("stiffness there, N per unit strain", derived["stiffness_N"], "–"),
-    ]
+    final_creep = derived["final_creep_mm"]
     lines = [
-        [name, *middle_and_span(band["q50"], band["q05"], band["q95"])] if band else [name, otherwise, "–"]
-        for name, band, otherwise in rows
+        ["creep after 2 min, mm", *median_and_interval(derived["creep_2min_mm"])],
+        ["creep after 1 h, mm", *median_and_interval(derived["creep_1h_mm"])],
+        ["creep after 1 day, mm", *median_and_interval(derived["creep_1day_mm"])],
+        ["final creep, mm", *(median_and_interval(final_creep) if final_creep else ["grows without end", NONE])],
+        ["half of it after, s", *median_and_interval(derived["median_creep_time_s"])],
+        ["stiffness there, N per unit strain", *median_and_interval(derived["stiffness_N"])],
     ]
     caption = (
         f"A fresh sample held at {derived['tension_N']:g} N, the tension at which one of the holds began. All fitted "
@@ -292,20 +322,30 @@ def _derived(summary: SummaryJson) -> Table:
     return Table(["quantity", "median", "90 % interval"], lines, caption)
 
 
-def _residuals(stored: Stored) -> Any:
-    protocol, readings = stored.sample.protocol, stored.sample.readings[..., 0]
-    alone = stored.likelihood == "hold"
-    first = readings[:, 0] if alone else np.full(len(readings), np.nan)
-    request = PredictionRequest(protocol, 0 if alone else len(readings), protocol.recorded, first)
-    rows = np.linspace(0, len(stored.theta) - 1, min(len(stored.theta), _DRAWS)).astype(int)
-    replicates = draw_predictive(stored.problem, stored.theta[rows], stored.sample, request, np.random.default_rng(0))
+def _residuals(stored: Stored) -> Figure:
+    sample, kind = stored.sample, stored.likelihood
+    protocol = sample.protocol
+    readings = sample.readings[..., 0]
     wanted = protocol.mask.copy()
-    if alone:
+    if kind == "hold":
         wanted[:, 0] = False
+    replicates = _replicates(stored)
     band = np.quantile(replicates[wanted], [0.05, 0.5, 0.95], axis=1)
-    number_of = np.broadcast_to(protocol.number[:, None], wanted.shape)[wanted]
-    kind = stored.likelihood
-    title = f"{stored.sample.name}, {figures.WORDS[kind]}"
-    return figures.residual_figure(
-        number_of, protocol.time_s[wanted], readings[wanted], band, title, figures.COLOURS[kind]
-    )
+    hold = np.broadcast_to(protocol.number[:, None], wanted.shape)
+    title = f"{sample.name}, {figures.WORDS[kind]}"
+    colour = figures.COLOURS[kind]
+    return figures.residual_figure(hold[wanted], protocol.time_s[wanted], readings[wanted], band, title, colour)
+
+
+def _replicates(stored: Stored) -> Array:
+    """Readings (H, R, n) of the same holds once more, each given its first reading where holds stand by themselves."""
+    protocol = stored.sample.protocol
+    first = stored.sample.readings[:, 0, 0]
+    if stored.likelihood == "hold":
+        request = PredictionRequest(protocol, 0, protocol.recorded, first)
+    else:
+        request = PredictionRequest(protocol, len(first), protocol.recorded, np.full(len(first), np.nan))
+    draws = len(stored.theta)
+    rows = np.linspace(0, draws - 1, min(draws, _DRAWS)).astype(int)
+    rng = np.random.default_rng(0)
+    return draw_predictive(stored.problem, stored.theta[rows], stored.sample, request, rng)

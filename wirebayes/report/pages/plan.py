@@ -25,8 +25,8 @@ from wirebayes.report.blocks import (
     picture_file,
     seed_of_page,
     span,
-    unit_text,
 )
+from wirebayes.report.cells import NONE, unit_or_dash, with_unit
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.plan import is_given
 from wirebayes.sentences import counted, short, spoken
@@ -42,20 +42,26 @@ def plan_page(folder: Path, configuration: dict[str, Any]) -> Page:
     """The content of ``plan.json``."""
     found: PlanJson = read_json(folder / "plan.json")
     rows = found["protocols"]
-    columns = Columns([_requested(found), _reliability(rows)])
-    first = before_the_answer(found)
-    picture = picture_file(folder, "plan")
-    if picture is not None:
-        alt = "Expected widths and detectable effects of each test."
-        first.append(Pictures([Picture(embedded(picture), alt, _PICTURE, wide=True)]))
-    first += [*beside_the_answer(found), columns, _ranking(found)]
-    sections = [Section("Summary", first)]
-    sections += [Section(f"{row['rank']}. {row['name']}", _protocol(row), folded=row["rank"] > 1) for row in rows]
+    sections = [Section("Summary", _summary(folder, found))]
+    effects = list[str]()
+    for row in rows:
+        sections.append(Section(f"{row['rank']}. {row['name']}", _protocol(row), folded=row["rank"] > 1))
+        effects += row["effects"]
     sections.append(files_beside(folder, _FILES))
-    effects = [effect for row in rows for effect in row["effects"]]
     sections.append(meaning(("hold", "90 % interval", "information", "δ"), effects))
     lead = plan_in_a_sentence(found)
     return Page("What a test would teach", lead, sections, seed_of_page(configuration))
+
+
+def _summary(folder: Path, found: PlanJson) -> list[Block]:
+    """What was asked, the picture and the ranking."""
+    blocks = before_the_answer(found)
+    picture = picture_file(folder, "plan")
+    if picture is not None:
+        alt = "Expected widths and detectable effects of each test."
+        blocks.append(Pictures([Picture(embedded(picture), alt, _PICTURE, wide=True)]))
+    columns = Columns([_requested(found), _reliability(found["protocols"])])
+    return [*blocks, *beside_the_answer(found), columns, _ranking(found)]
 
 
 _PICTURE = (
@@ -70,7 +76,9 @@ _FILES = (
 
 def _requested(found: PlanJson) -> Points:
     aim = found["aim"]
-    by = _AIMS[aim[0]] if len(aim) == 1 else f"how well {_words(aim[0])} and {_words(aim[1])} would be distinguished"
+    by = _AIMS.get(aim[0], "")
+    if len(aim) == 2:
+        by = f"how well {_words(aim[0])} and {_words(aim[1])} would be distinguished"
     points = [f"The guess: {found['guess']['source']}.", f"The tests are ranked by {by}."]
     if found["budget_min"] is not None:
         points.append(f"Available time: {short(found['budget_min'])} min.")
@@ -93,9 +101,8 @@ def _ranking(found: PlanJson) -> Table:
     rows = found["protocols"]
     first = rows[0]["parameters"]
     names = [name for name in ("k1", "B", "U", "k2", "N") if name in first]
-    units = {name: unit_text(first[name]["unit"]) for name in names}
     header = ["rank", "test", "minutes", "bits"]
-    header += [f"sd of {name}, {unit}" if unit else f"sd of {name}" for name, unit in units.items()]
+    header += [with_unit(f"sd of {name}", first[name]["unit"]) for name in names]
     header.append("sd of creep in 1 h, mm")
     if rows[0]["robot"] is not None:
         header.append("sd of the robot's drift in 1 h, mm")
@@ -106,7 +113,8 @@ def _ranking(found: PlanJson) -> Table:
 
 def _ranked(row: JudgedProtocol, names: Sequence[str]) -> list[str]:
     """A row of the ranking."""
-    widths = [row["parameters"][name]["sd"] for name in names] + [row["creep"]["creep_1h_mm"]["sd"]]
+    widths = [row["parameters"][name]["sd"] for name in names]
+    widths.append(row["creep"]["creep_1h_mm"]["sd"])
     if row["robot"] is not None:
         widths.append(row["robot"]["drift_sd_mm"])
     return [
@@ -122,12 +130,16 @@ def _ranked(row: JudgedProtocol, names: Sequence[str]) -> list[str]:
 def _protocol(row: JudgedProtocol) -> list[Block]:
     size = f"{counted(row['holds'], 'hold')} with {counted(row['readings'], 'reading')}"
     words = f": {row['words']}" if row["words"] else ""
-    blocks: list[Block] = [Text(f"{size}, {short(row['duration_min'])} min{words}."), _widths(row)]
+    minutes = short(row["duration_min"])
+    blocks: list[Block] = [Text(f"{size}, {minutes} min{words}."), _widths(row)]
     if row["effects"]:
         blocks.append(_effects(row))
     if row["not_identifiable"]:
-        parts = [sentence.partition(": ")[::2] for sentence in row["not_identifiable"]]
-        blocks.append(Table(["what", "why not"], [[_words(a), b] for a, b in parts], "What it would not show."))
+        lines = []
+        for sentence in row["not_identifiable"]:
+            what, _, reason = sentence.partition(": ")
+            lines.append([_words(what), reason])
+        blocks.append(Table(["what", "why not"], lines, "What it would not show."))
     return blocks
 
 
@@ -137,10 +149,9 @@ def _widths(row: JudgedProtocol) -> Table:
     quantities = row["parameters"] | {name: creep[name] for name in _CREEP}
     lines = []
     for name, width in quantities.items():
-        unit = unit_text(width["unit"])
         lines.append(
             [
-                f"{_words(name)}, {unit}" if unit else _words(name),
+                with_unit(_words(name), width["unit"]),
                 number(width["sd"], 2),
                 number(width["width_90"], 2),
                 span(width["width_90_low"], width["width_90_high"], 2),
@@ -154,16 +165,11 @@ def _widths(row: JudgedProtocol) -> Table:
 
 def _effects(row: JudgedProtocol) -> Table:
     """What sizes of effects would be seen."""
-    lines = [
-        [
-            _words(name),
-            number(seen["amplitude_80"], 2),
-            unit_text(seen["unit"]) or "–",
-            number(seen["delta_80"], 2),
-            ", ".join(map(_words, seen["confused_with"])) or "–",
-        ]
-        for name, seen in row["effects"].items()
-    ]
+    lines = []
+    for name, seen in row["effects"].items():
+        amplitude, delta = number(seen["amplitude_80"], 2), number(seen["delta_80"], 2)
+        confused = ", ".join(map(_words, seen["confused_with"])) or NONE
+        lines.append([_words(name), amplitude, unit_or_dash(seen["unit"]), delta, confused])
     header = ["effect", "amplitude", "unit", "δ", "hard to distinguish from"]
     caption = "Smallest amplitude seen in 80 % of tests, its size δ in standard deviations, and what it looks like."
     return Table(header, lines, caption)

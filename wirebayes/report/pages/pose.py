@@ -6,8 +6,7 @@ from typing import Any
 
 from wirebayes.answers.headline import pose_in_a_sentence
 from wirebayes.io.run_folder import read_json
-from wirebayes.json_files.pose import PoseJson, TimeWithin, Tolerances
-from wirebayes.json_files.values import INTERVAL
+from wirebayes.json_files.pose import Drift, EquilibriaJson, PoseJson, SliceOfWorkspace, TimeWithin, Tolerances
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -20,13 +19,14 @@ from wirebayes.report.blocks import (
     Text,
     before_the_answer,
     beside_the_answer,
-    embedded,
+    captioned,
     files_beside,
     number,
     picture_file,
     seed_of_page,
     span,
 )
+from wirebayes.report.cells import NONE, at_row, percent
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages import pose_history
 from wirebayes.report.pages.robot_view import robot_view
@@ -55,29 +55,42 @@ def pose_page(folder: Path, configuration: dict[str, Any]) -> Page:
     if "history" in content:
         return pose_history.pose_history_page(folder, configuration, content)
     pose: PoseJson = content
-    blocks: list[Block] = before_the_answer(pose)
     view = robot_view(folder)
-    turned = sorted({file.stem for file in folder.glob("workspace-[0-9]*") if file.suffix in (".svg", ".png")})
-    captions = _CAPTIONS | dict.fromkeys(turned, _TURNED)
-    files = {name: picture_file(folder, name) for name in captions if not (view and name == "robot")}
-    pictures = [Picture(embedded(p), captions[n], captions[n]) for n, p in files.items() if p is not None]
+    pictures = _pictures(folder, without_robot=bool(view))
     first, rest = pictures[:_FIRST], pictures[_FIRST:]
-    blocks += [Pictures(first)] if first else []
+    blocks: list[Block] = before_the_answer(pose)
+    if first:
+        blocks.append(Pictures(first))
     blocks += [*beside_the_answer(pose), Text(_next(pose)), Columns([_requested(pose), *_answers(pose)])]
-    sections = [Section("Summary", blocks), Section("The robot", view)]
-    sections += [Section("More pictures", [Pictures(rest)] if rest else [])]
-    sections += [Section("Slices of the workspace", _slices(pose))]
-    sections += [Section("Drift", _drift(pose)), Section("Pose error", _errors(pose))]
-    sections += [
+    sections = [
+        Section("Summary", blocks),
+        Section("The robot", view),
+        Section("More pictures", [Pictures(rest)] if rest else []),
+        Section("Slices of the workspace", _slices(pose)),
+        Section("Drift", _drift(pose)),
+        Section("Pose error", _errors(pose)),
         Section("Between calibrations", _between(pose)),
         Section("Sources of uncertainty", _variance_shares(pose)),
+        Section("How many equilibria", _equilibria(pose)),
+        files_beside(folder, _FILES),
+        meaning(_TERMS, pose.get("wires", {}).get("effects", [])),
     ]
-    sections += [Section("How many equilibria", _equilibria(pose))]
-    sections.append(files_beside(folder, _FILES))
-    effects = pose.get("wires", {}).get("effects", [])
-    sections.append(meaning(_TERMS, effects))
-    lead = pose_in_a_sentence(pose)
-    return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], seed_of_page(configuration))
+    filled = [section for section in sections if section.blocks]
+    return Page(f"Robot {pose['robot']}", pose_in_a_sentence(pose), filled, seed_of_page(configuration))
+
+
+def _pictures(folder: Path, without_robot: bool) -> list[Picture]:
+    """The pictures of a pose that are there; the robot may be seen otherwise."""
+    turned = sorted({file.stem for file in folder.glob("workspace-[0-9]*") if file.suffix in (".svg", ".png")})
+    captions = _CAPTIONS | dict.fromkeys(turned, _TURNED)
+    if without_robot:
+        del captions["robot"]
+    pictures = []
+    for name, caption in captions.items():
+        file = picture_file(folder, name)
+        if file is not None:
+            pictures.append(captioned(file, caption))
+    return pictures
 
 
 _FILES = (
@@ -99,72 +112,80 @@ def _next(pose: PoseJson) -> str:
 
 
 def _requested(pose: PoseJson) -> Points:
-    place = ", ".join(number(float(x)) if x else "0" for x in pose["pose"]["position_m"])
-    wires = pose.get("wires", {})
+    position_m = pose["pose"]["position_m"]
+    place = ", ".join(number(float(x)) if x else "0" for x in position_m)
     points = [f"Platform of {pose['mass_kg']:g} kg at ({place}) m."]
     if "orientation" in pose:
-        turned = ", ".join(f"{v:.4g}" for v in pose["pose"]["rotation_vector_rad"])
+        turned = ", ".join(f"{value:.4g}" for value in pose["pose"]["rotation_vector_rad"])
         points.append(f"Rotation vector ({turned}) rad. {pose['orientation']['sentence']}")
     if "plane" in pose:
         points.append(pose["plane"]["sentence"])
+    wires = pose.get("wires")
     if wires:
         points.append(wires_known(wires))
         points += specimens_in_words(wires)
-        if pose.get("inverse"):
-            low, high = (f(pose["inverse"]["tension_N"]) for f in (min, max))
-            rule = pose["tension_distribution"]["choice"].replace("_", " ")
-            points.append(f"Tensions by the rule “{rule}”: {number(low)} to {number(high)} N.")
-        if angles := pose.get("inverse", {}).get("motor_angle_rad"):
-            turned = ", ".join("no drum" if a is None else f"{a:.5g}" for a in angles["mean"])
-            points.append(f"Motor angles, rad, counted from nothing paid out: {turned}.")
+        points += _commanded(pose)
     return Points("What was computed", points)
 
 
+def _commanded(pose: PoseJson) -> list[str]:
+    """Tensions and motor angles; nothing where no tensions hold the pose."""
+    inverse = pose.get("inverse")
+    if not inverse:
+        return []
+    low, high = min(inverse["tension_N"]), max(inverse["tension_N"])
+    rule = pose["tension_distribution"]["choice"].replace("_", " ")
+    points = [f"Tensions by the rule “{rule}”: {number(low)} to {number(high)} N."]
+    angles = inverse.get("motor_angle_rad")
+    if angles:
+        turned = ", ".join("no drum" if angle is None else f"{angle:.5g}" for angle in angles["mean"])
+        points.append(f"Motor angles, rad, counted from nothing paid out: {turned}.")
+    return points
+
+
 def _answers(pose: PoseJson) -> list[Points]:
-    known = []
-    for entry in pose.get("drift", []):
-        last = entry["times_s"][-1]
-        if entry["distance_mm"]["q50"]:
-            low, middle, high = (entry["distance_mm"][q][-1] for q in INTERVAL)
-            alike = specimens_are(entry["specimen_spread"])
-            moved = quantity(middle, low, high, "mm")
-            known.append(f"After {lasting(last)} the platform has moved by {moved}, if {alike}.")
-    claim = pose.get("claim")
-    if claim:
-        limits = f"less than {claim['distance_mm']:g} mm and tilts less than {claim['tilt_deg']:g}°"
-        for held in claim["holds"]:
-            chance, alike = _percent(held["probability"]), specimens_are(held["specimen_spread"])
-            known.append(
-                f"It moves {limits} within {lasting(claim['time_s'])} with a probability of {chance}, if {alike}."
-            )
-    space = pose.get("workspace")
-    if space and claim:
-        moved = quantity(space["q50_drift_mm"], space["q05_drift_mm"], space["q95_drift_mm"], "mm")
-        known.append(
-            f"Anywhere in the workspace it moves by {moved} within {lasting(claim['time_s'])}, and stays within both "
-            f"limits with a probability of {_percent(space['probability'])}."
-        )
+    known = [*_moved(pose), *_within_limits(pose)]
     unknown = ["How much specimens of one line differ is assumed, not measured, unless three or more were tested."]
     known = known or ["Nothing: the pose cannot be held."]
     return [Points("What is known", known), Points("What is not known", unknown)]
 
 
-def _percent(share: float | None) -> str:
-    return "–" if share is None else f"{100 * share:.0f} %"
+def _moved(pose: PoseJson) -> list[str]:
+    """How far the platform has moved in the end."""
+    known = []
+    for entry in pose.get("drift", []):
+        if entry["distance_mm"]["q50"]:
+            low, middle, high = at_row(entry["distance_mm"], -1)
+            moved = quantity(middle, low, high, "mm")
+            time, alike = lasting(entry["times_s"][-1]), specimens_are(entry["specimen_spread"])
+            known.append(f"After {time} the platform has moved by {moved}, if {alike}.")
+    return known
+
+
+def _within_limits(pose: PoseJson) -> list[str]:
+    """With what probability it moves little within a minute, here and anywhere in the workspace."""
+    claim = pose.get("claim")
+    if not claim:
+        return []
+    known = []
+    time = lasting(claim["time_s"])
+    limits = f"less than {claim['distance_mm']:g} mm and tilts less than {claim['tilt_deg']:g}°"
+    for held in claim["holds"]:
+        chance, alike = percent(held["probability"]), specimens_are(held["specimen_spread"])
+        known.append(f"It moves {limits} within {time} with a probability of {chance}, if {alike}.")
+    space = pose.get("workspace")
+    if space:
+        moved = quantity(space["q50_drift_mm"], space["q05_drift_mm"], space["q95_drift_mm"], "mm")
+        known.append(
+            f"Anywhere in the workspace it moves by {moved} within {time}, and stays within both "
+            f"limits with a probability of {percent(space['probability'])}."
+        )
+    return known
 
 
 def _slices(pose: PoseJson) -> list[Block]:
-    lines = []
     space = pose.get("workspace")
-    for entry in space["slices"] if space else []:
-        turn = entry["rotation_vector_rad"]
-        named = f"({', '.join(f'{v:.3g}' for v in turn)}) rad" if any(turn) else "level"
-        cells = [named, f"{entry['axis']} = {entry['at_m']:.3g} m", f"{100 * entry['feasible']:.0f} %"]
-        if entry["feasible"]:
-            drift = [number(entry["q50_drift_mm"]), span(entry["q05_drift_mm"], entry["q95_drift_mm"])]
-            tension = span(entry["lowest_tension_N"], entry["highest_tension_N"])
-            cells += [*drift, number(entry["q50_tilt_deg"]), number(entry["probability"], 2), tension]
-        lines.append([*cells, *["–"] * (8 - len(cells))])
+    lines = [_slice(entry) for entry in space["slices"]] if space else []
     header = ["orientation", "slice", "held", "moved, mm", "90 %", "tilt, degrees", "probability", "tensions, N"]
     caption = (
         "A minute on new wires, over poses and draws. Held: share of the positions that tensions within the bounds "
@@ -174,58 +195,95 @@ def _slices(pose: PoseJson) -> list[Block]:
     return [Table(header, lines, caption)] if lines else []
 
 
+def _slice(entry: SliceOfWorkspace) -> list[str]:
+    """One slice's row of the table."""
+    turn = entry["rotation_vector_rad"]
+    orientation = "level"
+    if any(turn):
+        components = ", ".join(f"{value:.3g}" for value in turn)
+        orientation = f"({components}) rad"
+    where = [orientation, f"{entry['axis']} = {entry['at_m']:.3g} m", percent(entry["feasible"])]
+    if not entry["feasible"]:
+        return [*where, *[NONE] * 5]
+    return [
+        *where,
+        number(entry["q50_drift_mm"]),
+        span(entry["q05_drift_mm"], entry["q95_drift_mm"]),
+        number(entry["q50_tilt_deg"]),
+        number(entry["probability"], 2),
+        span(entry["lowest_tension_N"], entry["highest_tension_N"]),
+    ]
+
+
 def _drift(pose: PoseJson) -> list[Block]:
-    lines = []
     entries = pose.get("drift", [])
     angles = [entry[name] for entry in entries for name in ("tilt_deg", "from_vertical_deg")]
     turns = any(any(band["q95"] or ()) for band in angles)  # there are no bands where no draw could be solved
-    for entry in entries:
-        bands = [entry["distance_mm"], *([entry["tilt_deg"], entry["from_vertical_deg"]] if turns else [])]
-        for i, time in enumerate(entry["times_s"]):
-            if entry["distance_mm"]["q50"] and time > 0:
-                cells = []
-                for band in bands:
-                    low, middle, high = (band[q][i] for q in INTERVAL)
-                    cells += [number(middle), span(low, high)]
-                lines.append([f"{100 * entry['specimen_spread']:g} %", f"{time:g}", *cells])
     header = ["specimen spread", "after, s", "moved, mm", "90 %"]
-    header += ["tilt, degrees", "90 %", "from vertical, degrees", "90 %"] if turns else []
-    caption = "Tilt: angle of the platform's normal to the commanded one; beside it, to the vertical. " if turns else ""
-    return [Table(header, lines, caption + "Draws whose platform falls are left out.")] if lines else []
+    caption = "Draws whose platform falls are left out."
+    if turns:
+        header += ["tilt, degrees", "90 %", "from vertical, degrees", "90 %"]
+        caption = f"Tilt: angle of the platform's normal to the commanded one; beside it, to the vertical. {caption}"
+    lines = []
+    for entry in entries:
+        if entry["distance_mm"]["q50"]:
+            lines += _drifted(entry, turns)
+    return [Table(header, lines, caption)] if lines else []
+
+
+def _drifted(entry: Drift, turns: bool) -> list[list[str]]:
+    """A row for each time after the first."""
+    bands = [entry["distance_mm"]]
+    if turns:
+        bands += [entry["tilt_deg"], entry["from_vertical_deg"]]
+    spread = _spread(entry["specimen_spread"])
+    lines = []
+    for i, time in enumerate(entry["times_s"]):
+        if time > 0:
+            cells = []
+            for band in bands:
+                low, middle, high = at_row(band, i)
+                cells += [number(middle), span(low, high)]
+            lines.append([spread, f"{time:g}", *cells])
+    return lines
+
+
+def _spread(share: float) -> str:
+    return f"{100 * share:g} %"
 
 
 def _errors(pose: PoseJson) -> list[Block]:
+    entries = pose.get("pose_error", [])
     lines = []
-    for entry in pose.get("pose_error", []):
+    for entry in entries:
+        who = [CONTROLLERS[entry["controller"]], _spread(entry["specimen_spread"])]
         for i, time in enumerate(entry["times_s"]):
-            if not entry["distance_mm"]["q50"] or time not in (60, 600, entry["times_s"][-1]):
-                continue
-            low, middle, high = (entry["distance_mm"][q][i] for q in INTERVAL)
-            who = [CONTROLLERS[entry["controller"]], f"{100 * entry['specimen_spread']:g} %"]
-            lines.append([*who, f"{time:g}", number(middle), span(low, high), _longest_time(entry)])
-    header = ["controller", "specimen spread", "after, s", "pose error, mm", "90 %"]
-    header.append("last requested time within tolerance, s")
+            if entry["distance_mm"]["q50"] and time in (60, 600, entry["times_s"][-1]):
+                low, middle, high = at_row(entry["distance_mm"], i)
+                lines.append([*who, f"{time:g}", number(middle), span(low, high), _longest_time(entry)])
     if not lines:
         return []
-    evaluated = ", ".join(f"{time:g}" for time in pose["pose_error"][0]["times_s"])
+    header = ["controller", "specimen spread", "after, s", "pose error, mm", "90 %"]
+    header.append("last requested time within tolerance, s")
+    evaluated = ", ".join(f"{time:g}" for time in entries[0]["times_s"])
     grid = (
-        f" The last column is the last of the requested times that is ({evaluated} s); the next section has finer ones."
+        f"The last column is the last of the requested times that is ({evaluated} s); the next section has finer ones."
     )
-    return [Table(header, lines, _limits(pose["pose_error"][0]) + grid)]
+    return [Table(header, lines, f"{_limits(entries[0])} {grid}")]
 
 
 def _between(pose: PoseJson) -> list[Block]:
+    entries = pose.get("between_calibrations", [])
+    if not entries:
+        return []
     lines = []
-    for entry in pose.get("between_calibrations", []):
+    for entry in entries:
         loaded = f"{entry['loaded_before_s'] / 3600:g} h" if entry["loaded_before_s"] else "never"
-        spread = f"{100 * entry['specimen_spread']:g} %"
+        spread = _spread(entry["specimen_spread"])
         lines.append([CONTROLLERS[entry["controller"]], spread, loaded, _longest_time(entry)])
     header = ["controller", "specimen spread", "loaded before", "longest time between calibrations, s"]
-    if not lines:
-        return []
-    grid = " The last column is the last of eight times a decade, from 1 s on: it is at most a quarter too short."
-    limits = _limits(pose["between_calibrations"][0])
-    return [Table(header, lines, f"The pose is exact when a calibration ends. {limits}{grid}")]
+    grid = "The last column is the last of eight times a decade, from 1 s on: it is at most a quarter too short."
+    return [Table(header, lines, f"The pose is exact when a calibration ends. {_limits(entries[0])} {grid}")]
 
 
 def _limits(entry: Tolerances) -> str:
@@ -242,7 +300,7 @@ def _variance_shares(pose: PoseJson) -> list[Block]:
     shares = pose.get("variance_shares", {}).get("shared_draw")
     if not shares:
         return []
-    lines = [[name, f"{100 * share:.0f} %"] for name, share in shares.items()]
+    lines = [[name, percent(share)] for name, share in shares.items()]
     caption = f"Each parameter's share of the variance of the drift after {pose['variance_shares']['time_s']:g} s."
     return [Table(["parameter", "share"], lines, caption)]
 
@@ -251,12 +309,7 @@ def _equilibria(pose: PoseJson) -> list[Block]:
     found = pose.get("equilibria")
     if not found:
         return []
-    count = found["stable_found"]
-    many = "one stable equilibrium" if count == 1 else f"{count} stable equilibria"
-    own = "the commanded pose is one of them" if count > 1 else "the commanded pose"
-    unstable = "the commanded pose is balanced but not stable, so none of them"
-    own = own if found["commanded_stable"] else unstable
-    text = f"From {found['starts']} starts the mean wire's lengths lead to {many}: {own}."
+    text = f"From {found['starts']} starts the mean wire's lengths lead to {_how_many(found)}."
     proof = pose["certificate"]
     if proof.get("sentence"):
         return [Text(f"{text} {proof['sentence']}")]
@@ -279,8 +332,23 @@ def _equilibria(pose: PoseJson) -> list[Block]:
     return [Text(proved), Text(sure)]
 
 
+def _how_many(found: EquilibriaJson) -> str:
+    """How many stable equilibria there are, and whether the pose is among them."""
+    count = found["stable_found"]
+    many = "one stable equilibrium" if count == 1 else f"{count} stable equilibria"
+    if not found["commanded_stable"]:
+        own = "the commanded pose is balanced but not stable, so none of them"
+    elif count > 1:
+        own = "the commanded pose is one of them"
+    else:
+        own = "the commanded pose"
+    return f"{many}: {own}"
+
+
 def _outward(low: float, high: float) -> str:
     """A proved interval, rounded outward to a hundredth of its width (and no finer than it can be read)."""
     digits = max(0, 2 - math.floor(math.log10(max(high - low, 1e-9))))
     scale = 10.0**digits
-    return f"{math.floor(low * scale) / scale:.{digits}f} to {math.ceil(high * scale) / scale:.{digits}f}"
+    below = math.floor(low * scale) / scale
+    above = math.ceil(high * scale) / scale
+    return f"{below:.{digits}f} to {above:.{digits}f}"

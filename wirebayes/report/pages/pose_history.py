@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from wirebayes.answers.terminal import of_pose
-from wirebayes.json_files.pose_history import HistoryOfRobot, PoseHistoryJson
-from wirebayes.json_files.values import INTERVAL, Band, Numbers
+from wirebayes.answers.robot import of_pose
+from wirebayes.json_files.pose_history import HistoryOfRobot, HistoryReadings, PoseHistoryJson
+from wirebayes.json_files.values import Band, Numbers
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -17,13 +17,14 @@ from wirebayes.report.blocks import (
     Table,
     before_the_answer,
     beside_the_answer,
-    embedded,
+    captioned,
     files_beside,
     number,
     picture_file,
     seed_of_page,
     span,
 )
+from wirebayes.report.cells import NONE, at_row
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.wires_known import wires_known
 from wirebayes.robot.mechanics.wires_used import specimens_in_words
@@ -60,55 +61,78 @@ def pose_history_page(folder: Path, configuration: dict[str, Any], pose: PoseHis
     measured = pose["history"]["kind"] == "measured"
     about = "by its measured joint values" if measured else "on its commanded way"
     lead = f"{of_pose(pose)[-1]}, {about}; the interval holds 90 %."
+    title = f"Robot {pose['robot']}"
     if not pose["feasible"]:
-        return Page(f"Robot {pose['robot']}", lead, [Section("Summary", before_the_answer(pose))])
-    files = {name: picture_file(folder, name) for name in _CAPTIONS}
-    pictures = {
-        name: Picture(embedded(file), _CAPTIONS[name], _CAPTIONS[name], wide=name in _WIDE)
-        for name, file in files.items()
-        if file is not None
-    }
+        return Page(title, lead, [Section("Summary", before_the_answer(pose))])
+    pictures = _pictures(folder)
     shown = [pictures.pop(name) for name in _FIRST if name in pictures]
-    first = [*before_the_answer(pose), *([Pictures(shown)] if shown else []), *beside_the_answer(pose)]
-    first.append(Columns([Points("What was computed", _requested(pose)), *_answers(pose)]))
     wide = [Pictures([pictures.pop(name)]) for name in _WIDE if name in pictures]
     rest = [Pictures(list(pictures.values()))] if pictures else []
-    sections = [Section("Summary", first), Section("More pictures", [*wide, *rest])]
-    sections += [Section("Poses", _poses(pose)), Section("Corrections", _corrections(pose))]
-    sections.append(files_beside(folder, _FILES))
-    sections.append(meaning(("90 % interval", "drift", "specimen spread"), pose["wires"]["effects"]))
-    seed = seed_of_page(configuration)
-    return Page(f"Robot {pose['robot']}", lead, [s for s in sections if s.blocks], seed)
+    first = before_the_answer(pose)
+    if shown:
+        first.append(Pictures(shown))
+    first += beside_the_answer(pose)
+    first.append(Columns([Points("What was computed", _requested(pose)), *_answers(pose)]))
+    sections = [
+        Section("Summary", first),
+        Section("More pictures", [*wide, *rest]),
+        Section("Poses", _poses(pose)),
+        Section("Corrections", _corrections(pose)),
+        files_beside(folder, _FILES),
+        meaning(("90 % interval", "drift", "specimen spread"), pose["wires"]["effects"]),
+    ]
+    filled = [section for section in sections if section.blocks]
+    return Page(title, lead, filled, seed_of_page(configuration))
+
+
+def _pictures(folder: Path) -> dict[str, Picture]:
+    """The pictures of a history that are there, by name."""
+    pictures = {}
+    for name, caption in _CAPTIONS.items():
+        file = picture_file(folder, name)
+        if file is not None:
+            pictures[name] = captioned(file, caption, wide=name in _WIDE)
+    return pictures
 
 
 def _requested(pose: PoseHistoryJson) -> list[str]:
     history, wires = pose["history"], pose["wires"]
     kind = "measured joint values" if history["kind"] == "measured" else "commanded poses"
-    out = [
-        f"{counted(history['rows'], 'row')} of {kind} over {number(float(history['duration_s']))} s; platform of "
-        f"{pose['mass_kg']:g} kg"
-        + (f", payload up to {history['highest_payload_kg']:g} kg." if history["highest_payload_kg"] else "."),
-        f"{wires_known(wires)} Specimens of one line differ by {100 * history['specimen_spread']:g} %. "
-        f"{_began(history)}",
-    ]
+    duration = number(float(history["duration_s"]))
+    rows = f"{counted(history['rows'], 'row')} of {kind} over {duration} s"
+    platform = f"platform of {pose['mass_kg']:g} kg"
+    if history["highest_payload_kg"]:
+        platform += f", payload up to {history['highest_payload_kg']:g} kg"
+    spread = f"Specimens of one line differ by {100 * history['specimen_spread']:g} %."
+    known = wires_known(wires)
+    out = [f"{rows}; {platform}.", f"{known} {spread} {_began(history)}"]
     out += specimens_in_words(wires)
-    started = f"The wires' clocks started {counted(history['holds'], 'time')}"
-    if history["restart_share"] is None:
-        out.append(f"{started}, as the column hold says.")
-    else:
-        out.append(
-            f"{started}: when a command or a load had changed a tension by "
-            f"more than {100 * history['restart_share']:g} % of the mean tension."
-        )
+    out.append(_restarted(history))
     readings = pose.get("readings")
     if readings:
-        out.append(
-            f"{counted(readings['tensions'], 'tension')} (standard error {readings['tension_sd_N']:g} N) and "
-            f"{counted(readings['tilts'], 'inclination')} ({readings['tilt_sd_rad']:g} rad) were read; "
-            f"mean squared residual {number(readings['misfit'])}. Given them, the draws are worth "
-            f"{number(readings['effective_draws'], 2)} independent ones."
-        )
+        out.append(_read(readings))
     return out
+
+
+def _restarted(history: HistoryOfRobot) -> str:
+    """How often the wires' clocks started, and when."""
+    started = f"The wires' clocks started {counted(history['holds'], 'time')}"
+    if history["restart_share"] is None:
+        return f"{started}, as the column hold says."
+    return (
+        f"{started}: when a command or a load had changed a tension by "
+        f"more than {100 * history['restart_share']:g} % of the mean tension."
+    )
+
+
+def _read(readings: HistoryReadings) -> str:
+    """What was read beside the joint values, and what it is worth."""
+    return (
+        f"{counted(readings['tensions'], 'tension')} (standard error {readings['tension_sd_N']:g} N) and "
+        f"{counted(readings['tilts'], 'inclination')} ({readings['tilt_sd_rad']:g} rad) were read; "
+        f"mean squared residual {number(readings['misfit'])}. Given them, the draws are worth "
+        f"{number(readings['effective_draws'], 2)} independent ones."
+    )
 
 
 def _began(history: HistoryOfRobot) -> str:
@@ -127,30 +151,38 @@ def _began(history: HistoryOfRobot) -> str:
 def _answers(pose: PoseHistoryJson) -> list[Points]:
     (drift,) = pose["drift"]
     time = number(float(drift["times_s"][-1]))
-    meant = "from the commanded pose" if pose["history"].get("target") != "without creep" else "from where it would be"
-    meant += "" if "commanded" in meant else " without creep"
-    if "calibration" in pose["history"] and "commanded" not in meant:
-        meant += ", the wires as long as the joint values say"
-    known = [f"After {time} s the platform is {_last(drift['distance_mm'])} mm {meant}."]
+    known = [f"After {time} s the platform is {_last(drift['distance_mm'])} mm {_from_where(pose['history'])}."]
     if pose.get("rotation_vector_rad"):
         known.append(f"It has turned by {_last(drift['rotation_deg'])} degrees.")
     left = pose["corrections"]["left_mm"]
     if left["q50"] and left["q50"][-1] is not None:
         known.append(f"Corrected joint values (corrections.csv) bring it back; they leave {_last(left)} mm.")
-    unknown = []
-    clock = pose["clock"]
-    unknown.append(
+    return [Points("What is known", known), Points("What is not known", _unknown(pose))]
+
+
+def _from_where(history: HistoryOfRobot) -> str:
+    """What the distance of the platform is measured from."""
+    if history.get("target") != "without creep":
+        return "from the commanded pose"
+    if "calibration" in history:
+        return "from where it would be without creep, the wires as long as the joint values say"
+    return "from where it would be without creep"
+
+
+def _unknown(pose: PoseHistoryJson) -> list[str]:
+    clock, history = pose["clock"], pose["history"]
+    unknown = [
         "A test cannot show when a moving wire's clock restarts. If it started once and ran on, the pose would "
         f"differ by {_mm(clock['largest_mm'])} mm at most, {_mm(clock['at_the_end_mm'])} mm at the end."
-    )
-    exact = "calibration" not in pose["history"] and not pose["history"].get("reference_sd_mm")
-    if exact and pose["history"]["kind"] == "measured":
+    ]
+    exact = "calibration" not in history and not history.get("reference_sd_mm")
+    if exact and history["kind"] == "measured":
         unknown.append("Joint values and the robot's geometry are taken to be exact; --reference-sd says otherwise.")
-    return [Points("What is known", known), Points("What is not known", unknown)]
+    return unknown
 
 
 def _last(band: Band) -> str:
-    low, middle, high = (band[q][-1] for q in INTERVAL)
+    low, middle, high = at_row(band, -1)
     return f"{number(middle)} ({span(low, high)})"
 
 
@@ -161,17 +193,24 @@ def _shown(times: Numbers) -> list[int]:
 
 def _poses(pose: PoseHistoryJson) -> list[Block]:
     (drift,) = pose["drift"]
-    place = pose["position_m"]
     lines = []
-    for i in _shown(drift["times_s"]):
-        cells = []
-        for axis in range(3):
-            middle, sd = (None if v is None else v[i][axis] for v in (place["q50"], place["sd"]))
-            cells += [_metres(middle), _mm(None if sd is None else 1e3 * sd)]
-        low, far, high = (drift["distance_mm"][q][i] for q in INTERVAL)
-        lines.append([_seconds(drift["times_s"][i]), *cells, _mm(far), f"{_mm(low)} … {_mm(high)}"])
+    for row in _shown(drift["times_s"]):
+        low, far, high = at_row(drift["distance_mm"], row)
+        time = _seconds(drift["times_s"][row])
+        lines.append([time, *_place(pose["position_m"], row), _mm(far), f"{_mm(low)} … {_mm(high)}"])
     header = ["time, s", "x, m", "sd, mm", "y, m", "sd, mm", "z, m", "sd, mm", "distance, mm", "90 %"]
     return [Table(header, lines, "Some of the rows; all of them, with bands and rotations: poses.csv.")]
+
+
+def _place(position_m: Band, row: int) -> list[str]:
+    """Each coordinate of a row, and its standard deviation."""
+    if position_m["q50"] is None or position_m["sd"] is None:
+        return [NONE] * 6
+    cells = []
+    for middle, sd in zip(position_m["q50"][row], position_m["sd"][row], strict=True):
+        cells.append(_metres(middle))
+        cells.append(_mm(None if sd is None else 1e3 * sd))
+    return cells
 
 
 def _metres(value: float | None) -> str:
@@ -180,7 +219,8 @@ def _metres(value: float | None) -> str:
 
 
 def _mm(value: float | None) -> str:
-    return number(0.0 if value is not None and abs(value) < _SMALLEST_MM else value)
+    is_nothing = value is not None and abs(value) < _SMALLEST_MM
+    return number(0.0 if is_nothing else value)
 
 
 def _seconds(time: float) -> str:
@@ -189,16 +229,14 @@ def _seconds(time: float) -> str:
 
 
 def _corrections(pose: PoseHistoryJson) -> list[Block]:
-    change = pose["corrections"]["change_mm"]
+    corrections = pose["corrections"]
+    change = corrections["change_mm"]
     if not change["mean"]:
         return []
-    times, joints = pose["corrections"]["times_s"], range(len(change["mean"][0]))
-    lines = [
-        [
-            _seconds(times[i]),
-            *(f"{_mm(change['mean'][i][j])} ± {_mm(change['sd'][i][j])}" for j in joints),
-        ]
-        for i in _shown(times)
-    ]
-    header = ["time, s", *(f"joint {j + 1}, mm" for j in joints)]
+    lines = []
+    for i in _shown(corrections["times_s"]):
+        joints = zip(change["mean"][i], change["sd"][i], strict=True)
+        cells = [f"{_mm(mean)} ± {_mm(sd)}" for mean, sd in joints]
+        lines.append([_seconds(corrections["times_s"][i]), *cells])
+    header = ["time, s", *(f"joint {j + 1}, mm" for j in range(len(change["mean"][0])))]
     return [Table(header, lines, "Change of each joint value, mean and standard deviation: corrections.csv.")]

@@ -57,15 +57,15 @@ def predict_page(predicted: Prediction, table: Path) -> Page:
         What the rows were written to.
     """
     about = predicted.attrs
-    warned = zip(about.get("warning_kinds", ()), about.get("warnings", ()), strict=True)
-    warnings: Warned = {"warnings": [{"kind": kind, "text": text} for kind, text in warned]}
+    kinds, texts = about.get("warning_kinds", ()), about.get("warnings", ())
+    warned: Warned = {"warnings": [{"kind": kind, "text": text} for kind, text in zip(kinds, texts, strict=True)]}
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     predicted.plot(figure.subplots())
     alt = f"Predicted readings of {about['experiment']} against the time in each hold, medians and 90 % bands."
     blocks: list[Block] = [
-        *before_the_answer(warnings),
+        *before_the_answer(warned),
         Pictures([Picture(drawn(figure), alt, _CAPTION)]),
-        *beside_the_answer(warnings),
+        *beside_the_answer(warned),
         Text(as_sentence(about["prediction"])),
         _rows(predicted),
     ]
@@ -85,8 +85,9 @@ def in_a_sentence(predicted: Prediction) -> str:
     holds = predicted["hold"].values
     first = np.flatnonzero(holds == holds[0])
     setting = f"{predicted[SET[control]].values[0]:g} {SET_UNIT[control]}"
-    begin, end = (_at(predicted, int(row)) for row in (first[0], first[-1]))
-    course = begin if len(first) == 1 else f"{begin} and {end}"
+    course = _at(predicted, int(first[0]))
+    if len(first) > 1:
+        course += f" and {_at(predicted, int(first[-1]))}"
     others = len(np.unique(holds)) - 1
     more = f"; {counted(others, 'more hold')} below" if others else ""
     return (
@@ -96,26 +97,40 @@ def in_a_sentence(predicted: Prediction) -> str:
 
 
 def _at(predicted: Prediction, row: int) -> str:
+    """Median and interval of one reading, and its time."""
+    middle, low, high = _figures(predicted, row)
     unit = READ_UNIT[_control(predicted)]
-    middle, low, high = (float(predicted[f"{name}_{unit}"].values[row]) for name in ("q50", "q05", "q95"))
     return f"{quantity(middle, low, high, unit)} after {predicted['time_s'].values[row]:g} s"
+
+
+def _figures(predicted: Prediction, row: int) -> tuple[float, float, float]:
+    """Median and ends of the 90 % interval of one reading."""
+    unit = READ_UNIT[_control(predicted)]
+    middle = float(predicted[f"q50_{unit}"].values[row])
+    low = float(predicted[f"q05_{unit}"].values[row])
+    high = float(predicted[f"q95_{unit}"].values[row])
+    return middle, low, high
 
 
 def _rows(predicted: Prediction) -> Table:
     """A row for each reading, with its band."""
     control = _control(predicted)
     unit = READ_UNIT[control]
-    names = ("hold", SET[control], "time_s", f"q50_{unit}", f"q05_{unit}", f"q95_{unit}")
-    columns = [predicted[name].values[:_MOST_ROWS].tolist() for name in names]
-    rows = [
-        [str(hold), f"{setting:g}", f"{time:g}", number_within(middle, low, high), span(low, high)]
-        for hold, setting, time, middle, low, high in zip(*columns, strict=True)
-    ]
+    shown = min(predicted.sizes["reading"], _MOST_ROWS)
+    rows = []
+    for row in range(shown):
+        middle, low, high = _figures(predicted, row)
+        setting = predicted[SET[control]].values[row]
+        time = predicted["time_s"].values[row]
+        hold = str(predicted["hold"].values[row])
+        rows.append([hold, f"{setting:g}", f"{time:g}", number_within(middle, low, high), span(low, high)])
     read = READ[control].split("_")[0]
-    header = ["hold", f"{SET[control].split('_')[0]}, {SET_UNIT[control]}", "time in the hold, s"]
+    was_set = SET[control].split("_")[0]
+    header = ["hold", f"{was_set}, {SET_UNIT[control]}", "time in the hold, s"]
     header += [f"{read}, {unit}", f"90 % band, {unit}"]
-    left = predicted.sizes["reading"] - len(rows)
-    return Table(header, rows, f"The file has {counted(left, 'more row')}." if left else "")
+    left = predicted.sizes["reading"] - shown
+    caption = f"The file has {counted(left, 'more row')}." if left else ""
+    return Table(header, rows, caption)
 
 
 def _control(predicted: Prediction) -> Control:

@@ -14,15 +14,15 @@ def robot_view(folder: Path) -> list[Block]:
     if not (folder / FILE).is_file():
         return []
     scene: SceneJson = read_json(folder / FILE)
+    alt = f"Robot {scene['name']}: exit points, wires and platform"
     known = [tension for row in scene["tensions_N"] for tension in row if tension is not None]
     about = []
     if known:
         reach = f"from {number(min(known))} N (blue) to {number(max(known))} N (red)"
         about.append(f"Wires coloured by their median tension, {reach}; a broken line is a slack wire.")
     if scene["drifted"]:
+        alt += " where it was sent and where creep takes it"
         enlarged = f"enlarged {scene['exaggeration']:g} times"
         about.append(f"Blue platform: the commanded pose. Red platform with dotted wires: the mean drift, {enlarged}.")
     about.append("Squares: exit points with the number of their wire. Drag, or press a button, to turn it.")
-    moved = " where it was sent and where creep takes it" if scene["drifted"] else ""
-    alt = f"Robot {scene['name']}: exit points, wires and platform{moved}."
-    return [View(scene, alt, " ".join(about))]
+    return [View(scene, f"{alt}.", " ".join(about))]

@@ -21,8 +21,8 @@ from wirebayes.report.blocks import (
     files_beside,
     number,
     seed_of_page,
-    unit_text,
 )
+from wirebayes.report.cells import unit_or_dash
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.results.parameters import unit_of
 from wirebayes.sentences import counted, listed, spoken
@@ -41,37 +41,36 @@ def simulate_page(folder: Path, configuration: dict[str, Any]) -> Page:
     content: TruthJson = read_json(folder / "truth.json")
     truths = content["experiments"]
     experiments = read_experiments(folder / "experiments.toml")
-    sections = [_section(e, truths[e.name]) for e in experiments[:_MOST]]
+    shown = experiments[:_MOST]
+    sections = [_section(experiment, truths[experiment.name]) for experiment in shown]
     if len(experiments) > _MOST:
         more = Text(f"The first {_MOST} of {len(experiments)} tests are shown; the files hold all.")
         sections.append(Section("More tests", [more]))
     sections.append(files_beside(folder, _FILES))
     sections.append(meaning(("hold",), configuration["effects"]))
-    stiff = listed([f"{number(truth['parameters']['k1'])} N" for truth in list(truths.values())[:_MOST]])
-    lead = f"Simulated readings of {counted(len(experiments), 'test')}, whose true parameters are known: k1 is {stiff}."
-    return Page("Simulated tests", lead, sections, seed_of_page(configuration))
+    stiffness = []
+    for truth in list(truths.values())[:_MOST]:
+        k1 = number(truth["parameters"]["k1"])
+        stiffness.append(f"{k1} N")
+    tests = counted(len(experiments), "test")
+    lead = f"Simulated readings of {tests}, whose true parameters are known: k1 is {listed(stiffness)}."
+    footer = seed_of_page(configuration)
+    return Page("Simulated tests", lead, sections, footer)
 
 
 def _section(e: Experiment, truth: TrueWire) -> Section:
     effects = truth.get("effects", [])
     beyond = ", ".join(spoken(name) for name in effects) or "nothing: the plain model made these readings"
-    picture = Picture(
-        drawn(figures.measured(e.protocol(), e.readings(), e.name)),
-        f"Readings of {e.name} against what was set.",
-        "Within each hold the readings go from the blue point to the red ones.",
-    )
+    source = drawn(figures.measured(e.protocol(), e.readings(), e.name))
+    alt = f"Readings of {e.name} against what was set."
+    caption = "Within each hold the readings go from the blue point to the red ones."
     known = tuple(effect_named(effect) for effect in effects if effect.split("@")[0] in CATALOGUE)
-    lines = [
-        [
-            name,
-            number(value),
-            unit_text(unit_of(name, known, (e.control,))) or "–",
-            SYMBOLS.get(name, "size of an effect"),
-        ]
-        for name, value in truth["parameters"].items()
-    ]
+    lines = []
+    for name, value in truth["parameters"].items():
+        unit = unit_or_dash(unit_of(name, known, (e.control,)))
+        lines.append([name, number(value), unit, SYMBOLS.get(name, "size of an effect")])
     blocks: list[Block] = [
-        Pictures([picture]),
+        Pictures([Picture(source, alt, caption)]),
         Text(f"{e.material}, {e.length_mm:g} mm. Beyond the plain model: {beyond}."),
         Table(["parameter", "true value", "unit", "what it is"], lines, "What an analysis should find."),
     ]

@@ -6,12 +6,15 @@ from wirebayes.sentences import counted, listed, spoken
 
 def wires_known(wires: WiresUsed) -> str:
     """What is known of a robot's wires: a posterior, the robot's file, or one for some and the other for the rest."""
+    legs = wires["legs"]
     fitted = {*wires["lines"], "default"}  # a leg that names no wire is cut from the only line
-    given = [str(leg) for leg, name in enumerate(wires["legs"], start=1) if name not in fitted]
-    if len(given) == len(wires["legs"]):
+    given = [str(leg) for leg, name in enumerate(legs, start=1) if name not in fitted]
+    if len(given) == len(legs):
         return "The parameters of every wire are those of the robot's file, not of a posterior."
-    effects = [spoken(effect) for effect in wires["effects"]]
-    model = f"the plain model with {listed(effects)}" if effects else "the plain model"
+    model = "the plain model"
+    if wires["effects"]:
+        effects = [spoken(effect) for effect in wires["effects"]]
+        model += f" with {listed(effects)}"
     draws = counted(wires["draws"], "posterior draw")
     known = f"Wires known from {draws} of a sample of {wires['tested_length_mm']:g} mm: {model}."
     if not given:

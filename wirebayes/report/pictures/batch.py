@@ -29,20 +29,21 @@ def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
     far : list of dict
         Its outliers.
     """
-    count = Counter(row["material"] for row in rows if row["material"])
-    materials = sorted(count, key=lambda material: -count[material])[:_MOST_MATERIALS]
+    materials = _most_frequent(rows)
     marked = {(outlier["experiment"], outlier["parameter"]) for outlier in far}
-    upright = len(materials) <= _MOST_UPRIGHT and max(map(len, materials), default=0) <= _LONGEST_UPRIGHT
-    figure = Figure(figsize=(8.6, 5.0 if upright else 6.4), layout="constrained")
+    longest = max(map(len, materials), default=0)
+    upright = len(materials) <= _MOST_UPRIGHT and longest <= _LONGEST_UPRIGHT
+    height, rotation = (5.0, 0) if upright else (6.4, 90)
+    figure = Figure(figsize=(8.6, height), layout="constrained")
     axes = figure.subplots(2, 3).ravel()
     axes[-1].set_axis_off()
     for axis, (name, label) in zip(axes, _SHOWN.items(), strict=False):
-        for at, material in enumerate(materials):
+        for place, material in enumerate(materials):
             members = [row for row in rows if row["material"] == material and name in row["parameters"]]
-            _column(axis, at, name, members, marked)
+            _column(axis, place, name, members, marked)
         axis.set_title(label, fontsize=9, loc="left")
-        axis.set_xticks(range(len(materials)), [verbatim(m) for m in materials])
-        axis.tick_params(axis="x", labelsize=7.5, rotation=0 if upright else 90)
+        axis.set_xticks(range(len(materials)), list(map(verbatim, materials)))
+        axis.tick_params(axis="x", labelsize=7.5, rotation=rotation)
         without_frame(axis)
         axis.set_xlim(-0.6, len(materials) - 0.4)
         axis.tick_params(axis="y", which="both", labelsize=7)
@@ -51,16 +52,23 @@ def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
     return figure
 
 
-def _column(axis: Axes, at: int, name: str, members: list[Row], marked: set[tuple[str, str]]) -> None:
+def _most_frequent(rows: list[Row]) -> list[str]:
+    """The materials of most specimens."""
+    count = Counter(row["material"] for row in rows if row["material"])
+    materials = sorted(count, key=lambda material: -count[material])
+    return materials[:_MOST_MATERIALS]
+
+
+def _column(axis: Axes, place: int, name: str, members: list[Row], marked: set[tuple[str, str]]) -> None:
     """The specimens of one material."""
-    places = at + np.linspace(-0.35, 0.35, len(members) + 2)[1:-1]
+    places = place + np.linspace(-0.35, 0.35, len(members) + 2)[1:-1]
     for x, row in zip(places, members, strict=True):
         scale = 1e3 / row["length_mm"] if name == "B" and row["length_mm"] else 1.0
-        low, middle, high = (scale * row["parameters"][name][q] for q in INTERVAL)
+        low, middle, high = (scale * row["parameters"][name][quantile] for quantile in INTERVAL)
         apart = (row["name"], name) in marked
-        color = HOLD if apart else CHAIN
+        colour = HOLD if apart else CHAIN
         if len(members) <= _MOST_BARS or apart:
-            axis.plot([x, x], [low, high], "-", color=color, lw=0.8, alpha=0.6)
-        axis.plot([x], [middle], "o", color=color, ms=5 if apart else 3)
+            axis.plot([x, x], [low, high], "-", color=colour, lw=0.8, alpha=0.6)
+        axis.plot([x], [middle], "o", color=colour, ms=5 if apart else 3)
         if apart:
-            axis.annotate(row["name"], (x, middle), (4, 4), textcoords="offset points", fontsize=7, color=color)
+            axis.annotate(row["name"], (x, middle), (4, 4), textcoords="offset points", fontsize=7, color=colour)

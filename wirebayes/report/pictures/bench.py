@@ -31,29 +31,44 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
     """
     figure = Figure(figsize=(9.0, 5.4), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.0))
-    starts = [hold.start_s for hold in experiment.holds] if recording is None else recording.start_s.tolist()
-    last = max(start + hold.duration_s for start, hold in zip(starts, experiment.holds, strict=True))
-    scale, unit = (60.0, "min") if last > _MINUTES else (1.0, "s")
-    what_is_set = ["displacement, mm", "tension, N"]
-    if experiment.control == "force":
-        what_is_set.reverse()
-    for axes, label in zip((upper, lower), what_is_set, strict=True):
+    _name_axes(upper, lower, experiment.control)
+    holds = experiment.holds
+    starts = [hold.start_s for hold in holds] if recording is None else recording.start_s.tolist()
+    ends = [start + hold.duration_s for start, hold in zip(starts, holds, strict=True)]
+    scale, unit = (60.0, "min") if max(ends) > _MINUTES else (1.0, "s")
+    time = f"time of the test, {unit}"
+    if recording is None:
+        time += " (moves take none)"
+    else:
+        _draw_recording(upper, lower, recording, scale, experiment.control)
+    _draw_holds(upper, lower, holds, starts, scale)
+    lower.set_xlabel(time)
+    what = f"{experiment.name}: {experiment.length_mm:g} mm of {verbatim(experiment.material)}"
+    upper.set_title(f"{what}; hold numbers above", fontsize=10.5, loc="left", color=INK, pad=16)
+    _name_lines(figure, upper, lower)
+    save_figure(figure, target)
+
+
+def _name_axes(upper: Axes, lower: Axes, control: Control) -> None:
+    """What is set above, what is read below."""
+    labels = ["displacement, mm", "tension, N"]
+    if control == "force":
+        labels.reverse()
+    for axes, label in zip((upper, lower), labels, strict=True):
         axes.set_ylabel(label)
         without_frame(axes)
         axes.tick_params(labelsize=9)
         axes.margins(x=0.01)
-    if recording is not None:
-        _draw_recording(upper, lower, recording, scale, experiment.control)
-    _draw_holds(upper, lower, experiment.holds, starts, scale)
-    lower.set_xlabel(f"time of the test, {unit}" + ("" if recording is not None else " (moves take none)"))
-    what = f"{experiment.name}: {experiment.length_mm:g} mm of {verbatim(experiment.material)}"
-    upper.set_title(f"{what}; hold numbers above", fontsize=10.5, loc="left", color=INK, pad=16)
-    shown = dict(
-        reversed(pair) for axes in (upper, lower) for pair in zip(*axes.get_legend_handles_labels(), strict=True)
-    )
+
+
+def _name_lines(figure: Figure, upper: Axes, lower: Axes) -> None:
+    """A legend of both panels below them, each label once."""
+    shown = {}
+    for axes in (upper, lower):
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            shown[label] = handle
     place: Any = "outside lower center"
     figure.legend(shown.values(), shown.keys(), loc=place, ncols=len(shown), frameon=False, fontsize=8.5)
-    save_figure(figure, target)
 
 
 def _draw_recording(upper: Axes, lower: Axes, recording: Recording, scale: float, control: Control) -> None:
@@ -68,31 +83,38 @@ def _draw_recording(upper: Axes, lower: Axes, recording: Recording, scale: float
 def _draw_holds(upper: Axes, lower: Axes, holds: Sequence[Hold], starts: Sequence[float], scale: float) -> None:
     """Settings above and readings below; every second recorded hold stands on grey."""
     labels = {"held": "held", "gap": "held, not recorded", "kept": "reading"}  # each once in the legend
-    every = int(np.ceil(sum(hold.recorded for hold in holds) / _MOST_NUMBERS))
+    recorded = sum(hold.recorded for hold in holds)
+    every = int(np.ceil(recorded / _MOST_NUMBERS))
     row = 0
     for hold, start in zip(holds, starts, strict=True):
         ends = np.array([start, start + hold.duration_s]) / scale
-        style: dict[str, Any] = {"color": HOLD, "lw": 2.2} if hold.recorded else {"color": INK, "lw": 1.6, "ls": ":"}
-        key = "held" if hold.recorded else "gap"
-        upper.plot(ends, [hold.setting] * 2, zorder=3, label=labels.pop(key, None), **style)
+        setting = [hold.setting] * 2
         if not hold.recorded:
+            upper.plot(ends, setting, zorder=3, label=labels.pop("gap", None), color=INK, lw=1.6, ls=":")
             lower.axvspan(*ends, color=QUIET, alpha=0.3, lw=0)
             continue
+        upper.plot(ends, setting, zorder=3, label=labels.pop("held", None), color=HOLD, lw=2.2)
         if row % 2:
             for axes in (upper, lower):
                 axes.axvspan(*ends, color=QUIET, alpha=0.16, lw=0, zorder=0)
         if row % every == 0:
-            above = float(ends.mean()), 1.02
-            upper.annotate(
-                str(hold.number),
-                above,
-                xycoords=("data", "axes fraction"),
-                ha="center",
-                va="bottom",
-                fontsize=7.5,
-                color=INK,
-            )
+            middle = float(ends.mean())
+            _number(upper, hold, middle)
         time = (start + hold.time_s) / scale
         lower.plot(time, hold.readings, color=QUIET, lw=1.0, zorder=2)
         lower.plot(time, hold.readings, "o", color=CHAIN, ms=3.2, zorder=3, label=labels.pop("kept", None))
         row += 1
+
+
+def _number(axes: Axes, hold: Hold, middle: float) -> None:
+    """A hold's number above the panel."""
+    place = middle, 1.02
+    axes.annotate(
+        str(hold.number),
+        place,
+        xycoords=("data", "axes fraction"),
+        ha="center",
+        va="bottom",
+        fontsize=7.5,
+        color=INK,
+    )

@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 
 from wirebayes.json_files.comparison import ComparedModel, ComparedModels, ModelJson, PredictionScores
 from wirebayes.json_files.read_units import read_value, unit_read
+from wirebayes.numeric.typing import Floats
 from wirebayes.report.blocks import save_figure
-from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, logarithmic, panel
+from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, logarithmic, panel, places_in_holds
 from wirebayes.sentences import spoken
 
 _SEEN = 12.0  # worse by more than this many times the best-known spread is drawn at the edge
@@ -29,14 +30,18 @@ def save_pictures(folder: Path, name: str, table: ComparedModels, models: list[M
     """
     save_figure(elpd_differences(name, table), folder / "differences.svg")
     best = winner(table)
-    held_out = next((m["held_out"] for m in models if m["name"] == best), None)
-    if held_out is not None:
-        save_figure(held_out_errors(name, table), folder / "held-out-errors.svg")
-        for way, words in WORDS.items():
-            if scores := held_out[way]:
-                title = f"{name} under {spoken(str(best))}:\n{words}"
-                save_figure(bands(title, scores), folder / f"held-out-{way.replace('_', '-')}.svg")
-                save_figure(pit(title, scores), folder / f"pit-{way.replace('_', '-')}.svg")
+    held_out = next((model["held_out"] for model in models if model["name"] == best), None)
+    if held_out is None:
+        return
+    save_figure(held_out_errors(name, table), folder / "held-out-errors.svg")
+    for way, words in WORDS.items():
+        scores = held_out[way]
+        if not scores:
+            continue
+        title = f"{name} under {spoken(str(best))}:\n{words}"
+        file = way.replace("_", "-")
+        save_figure(bands(title, scores), folder / f"held-out-{file}.svg")
+        save_figure(pit(title, scores), folder / f"pit-{file}.svg")
 
 
 def winner(table: ComparedModels) -> str | None:
@@ -50,84 +55,104 @@ WORDS: dict[Way, str] = {"free": "held out, predicted freely", "given_first": "h
 
 def elpd_differences(name: str, table: ComparedModels) -> Figure:
     """Elpd difference from the base with two standard errors, one line a model."""
-    rows = [(r, d) for r in table["models"] if (d := r["difference"]) is not None and r["name"] != table["base"]]
-    figure, axes = panel(
-        f"elpd − elpd of {table['base']}, all holds left out in turn", "", name, (5.4, 1.2 + 0.22 * len(rows))
-    )
+    base = table["base"]
+    differences = {}
+    for row in table["models"]:
+        if row["name"] != base and row["difference"] is not None:
+            differences[row["name"]] = row["difference"]
+    rows = [row for row in table["models"] if row["name"] in differences]
+    values = np.array([differences[row["name"]]["elpd"] for row in rows], float)
+    label = f"elpd − elpd of {base}, all holds left out in turn"
+    figure, axes = panel(label, "", name, _size(rows))
     axes.axvline(0, color=QUIET, lw=1)
     axes.axvspan(-4, 4, color=QUIET, alpha=0.25, lw=0)
-    values = np.array([d["elpd"] for _, d in rows], float)
     edge = -max(_SEEN, 3.0 * float(values.max(initial=0.0)), 40.0)
-    for place, ((row, difference), value) in enumerate(zip(rows, values, strict=True)):
-        colour = CHAIN if row["converged"] else QUIET
+    for place, (row, value) in enumerate(zip(rows, values, strict=True)):
         if value < edge:
             axes.annotate(f"← {value:.0f}", (edge, place), fontsize=8, color=HOLD, va="center")
-            continue
-        axes.errorbar(value, place, xerr=2 * difference["se"], fmt="o", ms=4, lw=1, color=colour)
-    _names(axes, [row for row, _ in rows])
+        else:
+            colour = CHAIN if row["converged"] else QUIET
+            error = 2 * differences[row["name"]]["se"]
+            axes.errorbar(value, place, xerr=error, fmt="o", ms=4, lw=1, color=colour)
+    _names(axes, rows)
     axes.set_xlim(edge * 1.05, None)
     return figure
 
 
+def _size(rows: list[ComparedModel]) -> tuple[float, float]:
+    """Of a panel with a line for each model, inches."""
+    return 5.4, 1.2 + 0.22 * len(rows)
+
+
 def held_out_errors(name: str, table: ComparedModels) -> Figure:
     """Root mean square error on the held-out holds, freely and given the first reading."""
-    rows = [(r, held) for r in table["models"] if r["failed"] is None and (held := r["held_out"])]
-    unit = unit_read(rows[0][1]["given_first"] or {}) if rows else "N"
-    figure, axes = panel(f"rms error on held-out holds, {unit}", "", name, (5.4, 1.2 + 0.22 * len(rows)))
-    drawn: tuple[tuple[Way, str, str], ...] = (
-        ("free", CHAIN, "predicted freely"),
-        ("given_first", HOLD, "given the first reading"),
-    )
-    for way, colour, label in drawn:
-        found = [(place, read_value(scores, "rmse")) for place, (_, held) in enumerate(rows) if (scores := held[way])]
-        axes.scatter([v for _, v in found], [p for p, _ in found], s=16, color=colour, label=label)
+    rows = [row for row in table["models"] if row["failed"] is None and row["held_out"]]
+    first = rows[0]["held_out"] if rows else None
+    unit = unit_read(first["given_first"] or {}) if first else "N"
+    figure, axes = panel(f"rms error on held-out holds, {unit}", "", name, _size(rows))
+    _scatter_errors(axes, rows, "free", CHAIN, "predicted freely")
+    _scatter_errors(axes, rows, "given_first", HOLD, "given the first reading")
     logarithmic(axes)
-    _names(axes, [row for row, _ in rows])
+    _names(axes, rows)
     legend_below(figure, axes, 4)
     return figure
 
 
+def _scatter_errors(axes: Any, rows: list[ComparedModel], way: Way, colour: str, label: str) -> None:
+    """The error of each model that was scored in one way."""
+    errors, places = [], []
+    for place, row in enumerate(rows):
+        held = row["held_out"]
+        scores = held[way] if held else None
+        if scores:
+            errors.append(read_value(scores, "rmse"))
+            places.append(place)
+    axes.scatter(errors, places, s=16, color=colour, label=label)
+
+
 def _names(axes: Any, rows: list[ComparedModel]) -> None:
-    axes.set_yticks(range(len(rows)), [spoken(r["name"]) for r in rows], fontsize=8)
+    axes.set_yticks(range(len(rows)), [spoken(row["name"]) for row in rows], fontsize=8)
     axes.set_ylim(len(rows) - 0.4, -0.6)
 
 
 def bands(title: str, scores: PredictionScores) -> Figure:
     """Measured readings minus the predictive median, in the 50, 90 and 99 % bands."""
-    r = {k: np.asarray(v, float) for k, v in scores["readings"].items()}
-    figure, axes = panel(
-        "hold (readings in order of time within each)", f"measured − predicted, {unit_read(r, 'observed')}", title
-    )
-    numbers = list(dict.fromkeys(r["hold"].astype(int).tolist()))
-    longest = max(float(r["time_s"].max()), 1e-9)
-    place = np.array([numbers.index(int(h)) for h in r["hold"]]) - 0.35 + 0.7 * r["time_s"] / longest
-    q = read_value(r, "quantiles")
+    readings = {name: np.asarray(values, float) for name, values in scores["readings"].items()}
+    unit = unit_read(readings, "observed")
+    figure, axes = panel("hold (readings in order of time within each)", f"measured − predicted, {unit}", title)
+    hold = readings["hold"]
+    time_s = readings["time_s"]
+    numbers, place = places_in_holds(hold, time_s)
+    quantiles = read_value(readings, "quantiles")
+    median = quantiles[3]
     for i, number in enumerate(numbers):
-        here = r["hold"] == number
-        for low, high, alpha, label in ((0, 6, 0.12, "99 %"), (1, 5, 0.16, "90 %"), (2, 4, 0.22, "50 %")):
-            axes.fill_between(
-                place[here],
-                (q[low] - q[3])[here],
-                (q[high] - q[3])[here],
-                color=CHAIN,
-                alpha=alpha,
-                lw=0,
-                label=label if i == 0 else None,
-            )
+        here = hold == number
+        own = (quantiles - median)[:, here]
+        _draw_bands(axes, place[here], own, named=i == 0)
     axes.axhline(0, color=CHAIN, lw=1)
-    axes.scatter(place, read_value(r, "observed") - q[3], s=14, color=INK, zorder=3, label="measured − median")
-    axes.set_xticks(range(len(numbers)), [str(n) for n in numbers])
+    observed = read_value(readings, "observed")
+    left = observed - median
+    axes.scatter(place, left, s=14, color=INK, zorder=3, label="measured − median")
+    axes.set_xticks(range(len(numbers)), [str(number) for number in numbers])
     legend_below(figure, axes, 4)
     return figure
+
+
+def _draw_bands(axes: Any, place: Floats, quantiles: Floats, named: bool) -> None:
+    """The 99, 90 and 50 % bands of one hold, from its (7, m) quantiles."""
+    for low, high, alpha, label in ((0, 6, 0.12, "99 %"), (1, 5, 0.16, "90 %"), (2, 4, 0.22, "50 %")):
+        shown = label if named else None
+        axes.fill_between(place, quantiles[low], quantiles[high], color=CHAIN, alpha=alpha, lw=0, label=shown)
 
 
 def pit(title: str, scores: PredictionScores) -> Figure:
     """Share of readings below each level of their predictive distribution, in its simultaneous 95 % band."""
     level, low, high = np.asarray(scores["pit_band"], float)
     values = np.asarray(scores["readings"]["pit"], float)
+    shares = [(values <= x).mean() for x in level]
     figure, axes = panel("level of the predictive distribution", "share of readings below", title)
     axes.fill_between(level, low, high, color=CHAIN, alpha=0.2, lw=0, label="95 % band, all levels at once")
     axes.plot([0, 1], [0, 1], color=QUIET, lw=1)
-    axes.step(level, [(values <= x).mean() for x in level], where="post", color=INK, lw=1.5, label="measured")
+    axes.step(level, shares, where="post", color=INK, lw=1.5, label="measured")
     legend_below(figure, axes, 4)
     return figure

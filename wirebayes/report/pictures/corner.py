@@ -33,25 +33,40 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: C
     _shade_pairs(axes, unit)
     _histograms(axes, unit)
     for i, (name, (values, is_log)) in enumerate(scaled.items()):
-        bottom = count - 1 - i
-        ticks = list(zip(*_few_ticks(values, is_log), strict=True))
-        lines = axis_label(name, effects, control).replace(", ", ",\n").split("\n")
-        words = "\n".join(_narrow(line) for line in lines)
+        places, labels = _few_ticks(values, is_log)
+        ticks = list(zip(places, labels, strict=True))
+        label = axis_label(name, effects, control)
+        words = _in_lines(label)
         _label_below(axes, i, words, ticks)
+        bottom = count - 1 - i
         if i:
             _label_beside(axes, bottom, words, ticks)
-    frames = [Rectangle((j, count - 1 - i), _SIDE, _SIDE) for i in range(count) for j in range(i + 1)]
-    axes.add_collection(PatchCollection(frames, facecolor="none", edgecolor=INK, linewidth=0.8))
+    frames = []
+    for i in range(count):
+        frames += [Rectangle((j, count - 1 - i), _SIDE, _SIDE) for j in range(i + 1)]
+    outlines = PatchCollection(frames, facecolor="none", edgecolor=INK, linewidth=0.8)
+    axes.add_collection(outlines)
     return figure
+
+
+def _in_lines(label: str) -> str:
+    """Name and unit of a parameter, each in lines that stay within a cell."""
+    lines = label.replace(", ", ",\n").split("\n")
+    return "\n".join(_narrow(line) for line in lines)
 
 
 def _shade_pairs(axes: Any, unit: Sequence[Array]) -> None:
     """Below the diagonal, the regions of each pair, as shares of its cell."""
     count = len(unit)
     places = [_bins(values) for values in unit]
-    regions = [_regions(places[j], places[i], (j, count - 1 - i)) for i in range(count) for j in range(i)]
-    for shaded, colour in zip(zip(*regions, strict=True), ("#b5c4d1", CHAIN), strict=True):
-        paths = [path for cell in shaded for path in cell]
+    most: list[Path] = []
+    half: list[Path] = []
+    for i in range(count):
+        for j in range(i):
+            regions = _regions(places[j], places[i], (j, count - 1 - i))
+            most += regions[0]
+            half += regions[1]
+    for paths, colour in ((most, "#b5c4d1"), (half, CHAIN)):
         axes.add_collection(PathCollection(paths, facecolor=colour, linewidth=0.0), autolim=False)
 
 
@@ -129,27 +144,39 @@ def _across(values: Array) -> Array:
 def _few_ticks(values: Array, is_log: bool) -> tuple[Array, list[str]]:
     """Places of a few ticks as shares of the cell, and their labels."""
     low, high = _ends(values)
-    first, last = low + 0.05 * (high - low), high - 0.05 * (high - low)  # labels of neighbouring cells do not touch
+    margin = 0.05 * (high - low)  # labels of neighbouring cells do not touch
     if is_log:
-        decades = np.arange(np.floor(low), np.ceil(high) + 1)
-        for within in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
-            ticks = np.sort(np.log10(within) + decades[:, None], axis=None)
-            ticks = ticks[(first <= ticks) & (ticks <= last)]
-            if len(ticks) <= _MOST_TICKS:
-                break
-        ticks = ticks[:: -(-len(ticks) // _MOST_TICKS)] if len(ticks) else ticks
-        labels = [f"{10**t:.6g}" for t in ticks]
+        ticks = _logarithmic_ticks(low + margin, high - margin)
+        labels = [f"{10**tick:.6g}" for tick in ticks]
     else:
         ticks = np.array(MaxNLocator(_MOST_TICKS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
-        ticks = ticks[(first <= ticks) & (ticks <= last)]
+        ticks = _between(ticks, low + margin, high - margin)
         ticks = np.where(np.abs(ticks) < 1e-9 * (high - low), 0.0, ticks)
-        labels = [f"{t:.10g}".replace("-", "\N{MINUS SIGN}") for t in ticks]
+        labels = [f"{tick:.10g}".replace("-", "\N{MINUS SIGN}") for tick in ticks]
     return (ticks - low) / (high - low), labels
+
+
+def _logarithmic_ticks(first: float, last: float) -> Array:
+    """Decimal logarithms of a few round numbers between two ends."""
+    decades = np.arange(np.floor(first) - 1, np.ceil(last) + 2)
+    for within in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
+        ticks = np.sort(np.log10(within) + decades[:, None], axis=None)
+        ticks = _between(ticks, first, last)
+        if len(ticks) <= _MOST_TICKS:
+            return ticks
+    step = -(-len(ticks) // _MOST_TICKS)
+    return ticks[::step]
+
+
+def _between(ticks: Array, first: float, last: float) -> Array:
+    inside = (first <= ticks) & (ticks <= last)
+    return ticks[inside]
 
 
 def _ticks(axes: Any, places: Sequence[tuple[float, float]], step: tuple[float, float]) -> None:
     """Short lines from the places outwards."""
-    lines = [(place, (place[0] + step[0], place[1] + step[1])) for place in places]
+    across, upward = step
+    lines = [((x, y), (x + across, y + upward)) for x, y in places]
     axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8, clip_on=False))
 
 
@@ -161,17 +188,26 @@ def _bins(unit: Array) -> NDArray[np.int64]:
 
 def _regions(x: NDArray[np.int64], y: NDArray[np.int64], corner: tuple[float, float]) -> tuple[list[Path], list[Path]]:
     """Outlines in a cell of the densest places, smoothed over neighbours: of 50 to 90 % of the draws, and of 50 %."""
-    counts = np.bincount(x * (_BINS + 1) + y, minlength=(_BINS + 1) ** 2).reshape(_BINS + 1, _BINS + 1)[:-1, :-1]
-    density = _SMOOTHING @ counts @ _SMOOTHING.T
+    density = _density(x, y)
     ranked = np.sort(density.ravel())[::-1]
     held = np.cumsum(ranked) / ranked.sum()
-    half, most = (float(ranked[np.searchsorted(held, share)]) for share in (0.5, 0.9))
+    half = float(ranked[np.searchsorted(held, 0.5)])
+    most = float(ranked[np.searchsorted(held, 0.9)])
     if not 0 < most < half < ranked[0]:
         return [], []
     middles = (np.arange(_BINS) + 0.5) / _BINS
-    across, upward = (at + _SIDE * middles for at in corner)
+    across = corner[0] + _SIDE * middles
+    upward = corner[1] + _SIDE * middles
     contours = contour_generator(across, upward, density.T, fill_type=FillType.OuterCode)
     return _outlines(contours, most, half), _outlines(contours, half, np.inf)
+
+
+def _density(x: NDArray[np.int64], y: NDArray[np.int64]) -> Array:
+    """Draws in each cell of a grid, given their bins, smoothed over neighbours; those outside are left out."""
+    cells = _BINS + 1
+    counts = np.bincount(x * cells + y, minlength=cells**2)
+    inside = counts.reshape(cells, cells)[:-1, :-1]
+    return np.asarray(_SMOOTHING @ inside @ _SMOOTHING.T)
 
 
 def _outlines(contours: Any, low: float, high: float) -> list[Path]:
@@ -190,10 +226,12 @@ def _smoothing(cells: int) -> Array:
     """(cells, cells) weights of the neighbours of each cell along one axis: normal, and reflected at the ends."""
     reach = np.arange(-_REACH, _REACH + 1)
     weights = np.exp(-0.5 * (reach / _BLUR) ** 2)
-    neighbour = np.arange(cells)[:, None] + reach
-    inside = np.where(neighbour < 0, -1 - neighbour, np.minimum(neighbour, 2 * cells - 1 - neighbour))
+    own = np.arange(cells)[:, None]
+    neighbour = own + reach
+    from_end = np.minimum(neighbour, 2 * cells - 1 - neighbour)
+    inside = np.where(neighbour < 0, -1 - neighbour, from_end)
     matrix = np.zeros((cells, cells))
-    np.add.at(matrix, (np.arange(cells)[:, None], inside), weights / weights.sum())
+    np.add.at(matrix, (own, inside), weights / weights.sum())
     return matrix
 
 

@@ -17,16 +17,19 @@ def growth(rows: Sequence[Mapping[str, float]]) -> Figure:
         Of ``creep-table.csv``.
     """
     figure, axes = panel("time under constant tension, s", "growth, mm per m")
-    tensions = list(dict.fromkeys(row["tension_N"] for row in rows))
-    for tension, colour in zip(tensions, cycle(len(tensions)), strict=True):
+    every = [row["tension_N"] for row in rows]
+    tensions = list(dict.fromkeys(every))
+    colours = cycle(len(tensions))
+    for tension, colour in zip(tensions, colours, strict=True):
         own = [row for row in rows if row["tension_N"] == tension]
-        times, low, middle, high = ([row[key] for row in own] for key in _COLUMNS)
-        axes.plot(times, middle, "o-", ms=3.5, color=colour, label=f"{tension:g} N")
+        label = f"{tension:g} N"
+        times = [row["time_s"] for row in own]
+        low = [row["q05_mm_per_m"] for row in own]
+        middle = [row["q50_mm_per_m"] for row in own]
+        high = [row["q95_mm_per_m"] for row in own]
+        axes.plot(times, middle, "o-", ms=3.5, color=colour, label=label)
         axes.fill_between(times, low, high, color=colour, alpha=0.2, lw=0)
     logarithmic(axes)
     axes.set_ylim(bottom=0)
     legend_below(figure, axes, 4)
     return figure
-
-
-_COLUMNS = ("time_s", "q05_mm_per_m", "q50_mm_per_m", "q95_mm_per_m")

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import PredictionRequest, chain_course
 from wirebayes.report.figures import CHAIN, HALF_90, HOLD, INK, QUIET, apart, without_frame
@@ -51,34 +52,50 @@ def curve(stored: Stored) -> Curve:
     ----------
     stored : Stored
     """
-    sample, draws = stored.sample, len(stored.theta)
+    sample = stored.sample
     protocol = sample.protocol
-    rows = np.linspace(0, draws - 1, min(draws, DRAWS)).astype(int)
-    own = {name: values[rows] for name, values in stored.draws.items()}
-
-    def course(read: Protocol) -> Floats:
-        holds = len(read.setting)
-        request = PredictionRequest(read, holds, np.zeros(holds, bool), np.full(holds, np.nan))
-        return chain_course(own, sample, request, np.random.default_rng(0))
-
-    quantiles = np.quantile(course(_dense(protocol)), [0.05, 0.5, 0.95], axis=2)[..., :_POINTS]
-    at_readings = np.median(course(protocol), axis=2)
+    own = _some(stored)
+    dense = _course(own, sample, _dense(protocol))
+    quantiles = np.quantile(dense, [0.05, 0.5, 0.95], axis=2)[..., :_POINTS]
+    at_readings = np.median(_course(own, sample, protocol), axis=2)
     inside = _MARGIN + (1.0 - 2.0 * _MARGIN) * _SHARES
     recorded = np.cumsum(protocol.recorded) - 1.0
+    place = recorded[:, None] + inside
     noise = np.hypot(own["sensor_sd"], sample.resolution / np.sqrt(12.0))
-    return Curve(recorded[:, None] + inside, quantiles, at_readings, float(np.median(noise)))
+    return Curve(place, quantiles, at_readings, float(np.median(noise)))
+
+
+def _some(stored: Stored) -> dict[str, Floats]:
+    """Some of the stored draws."""
+    draws = len(stored.theta)
+    rows = np.linspace(0, draws - 1, min(draws, DRAWS)).astype(int)
+    return {name: values[rows] for name, values in stored.draws.items()}
+
+
+def _course(own: dict[str, Floats], sample: Sample, protocol: Protocol) -> Floats:
+    """Readings (H, R, n) of a protocol, given all that was read."""
+    holds = len(protocol.setting)
+    no_hold = np.zeros(holds, bool)
+    no_first = np.full(holds, np.nan)
+    request = PredictionRequest(protocol, holds, no_hold, no_first)
+    return chain_course(own, sample, request, np.random.default_rng(0))
 
 
 def _dense(protocol: Protocol) -> Protocol:
     """The same holds, read so often that the curve is smooth; all of them recorded."""
-    time = _SHARES * protocol.duration_s[:, None]
-    warming = None
-    if protocol.warming_K is not None:
-        each = zip(time, protocol.time_s, protocol.warming_K, protocol.mask, strict=True)
-        warming = np.array(
-            [np.interp(t, at[read], kelvin[read]) if read.any() else 0.0 * t for t, at, kelvin, read in each]
-        )
-    return replace(protocol, time_s=time, mask=np.ones(time.shape, bool), warming_K=warming)
+    time_s = _SHARES * protocol.duration_s[:, None]
+    everywhere = np.ones(time_s.shape, bool)
+    warming = None if protocol.warming_K is None else _warming_at(time_s, protocol, protocol.warming_K)
+    return replace(protocol, time_s=time_s, mask=everywhere, warming_K=warming)
+
+
+def _warming_at(time_s: Floats, protocol: Protocol, warming_K: Floats) -> Floats:
+    """Warming at times of each hold, between those at which it was read; none in a hold without readings."""
+    warming = np.zeros(time_s.shape)
+    for hold, read in enumerate(protocol.mask):
+        if read.any():
+            warming[hold] = np.interp(time_s[hold], protocol.time_s[hold][read], warming_K[hold][read])
+    return warming
 
 
 def through_the_readings(stored: Stored, title: str = "") -> Figure:
@@ -96,8 +113,9 @@ def through_the_readings(stored: Stored, title: str = "") -> Figure:
     draw_readings(above, stored, found)
     _left_over(below, stored, found)
     name_holds(below, stored)
-    unit = READ_UNIT[stored.sample.protocol.control]
-    above.set_ylabel(f"{READ[stored.sample.protocol.control]}, {unit}")
+    control = stored.sample.protocol.control
+    unit = READ_UNIT[control]
+    above.set_ylabel(f"{READ[control]}, {unit}")
     below.set_ylabel(f"measured − model, {unit}")
     above.set_title(title, loc="left", fontsize=10.5, color=INK, y=1.0)
     above.legend(frameon=False, fontsize=8.5, loc="best")
@@ -122,7 +140,8 @@ def on_axes(stored: Stored, axes: Any = None) -> Any:
         import matplotlib.pyplot as plt  # only for users, who look at it on a screen
 
         axes = plt.subplots()[1]
-    found, control = curve(stored), stored.sample.protocol.control
+    found = curve(stored)
+    control = stored.sample.protocol.control
     draw_curve(axes, stored, found, CHAIN, "the model, 90 % band")
     draw_readings(axes, stored, found)
     name_holds(axes, stored)
@@ -179,10 +198,11 @@ def draw_readings(axes: Any, stored: Stored, found: Curve) -> None:
 
 def _left_over(axes: Any, stored: Stored, found: Curve) -> None:
     x, (j, r) = _places(stored, found)
+    left = stored.sample.readings[j, r, 0] - found.at_readings[j, r]
     width = HALF_90 * found.noise
     axes.axhspan(-width, width, color=CHAIN, alpha=0.15, lw=0)
     axes.axhline(0.0, color=QUIET, lw=0.8)
-    axes.plot(x, stored.sample.readings[j, r, 0] - found.at_readings[j, r], "o", color=HOLD, ms=3)
+    axes.plot(x, left, "o", color=HOLD, ms=3)
 
 
 def _places(stored: Stored, found: Curve) -> tuple[Floats, tuple[Any, Any]]:
@@ -190,7 +210,8 @@ def _places(stored: Stored, found: Curve) -> tuple[Floats, tuple[Any, Any]]:
     protocol = stored.sample.protocol
     j, r = np.nonzero(protocol.mask)
     share = protocol.time_s[j, r] / np.maximum(protocol.duration_s[j], 1e-9)
-    first, last = found.place[j, 0], found.place[j, -1]
+    first = found.place[j, 0]
+    last = found.place[j, -1]
     return first + share * (last - first), (j, r)
 
 
@@ -204,6 +225,7 @@ def name_holds(axes: Any, stored: Stored) -> None:
     protocol = stored.sample.protocol
     numbers = protocol.number[protocol.recorded]
     step = -(-len(numbers) // _MOST_TICKS)
-    axes.set_xticks(np.arange(0, len(numbers), step) + 0.5, [str(n) for n in numbers[::step]])
+    middles = np.arange(0, len(numbers), step) + 0.5
+    axes.set_xticks(middles, [str(number) for number in numbers[::step]])
     axes.set_xlim(0, len(numbers))
     axes.set_xlabel("hold; within each, time runs from its beginning to its end")

@@ -1,7 +1,7 @@
 """Pictures of a discovery: readings against the plain and the final model, and what the plain one leaves over where."""
 
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
 
@@ -35,7 +35,9 @@ def pictures(plain: Stored, final: Stored, verdict: ExperimentFindings) -> dict[
     """
     name = plain.sample.name
     figure_of: dict[str, Callable[[], Figure]] = {f"{name}.svg": partial(before_and_after, plain, final, verdict)}
-    return figure_of | {f"{name}/{file}": make for file, make in pictures_of_findings(plain, verdict).items()}
+    for file, make in pictures_of_findings(plain, verdict).items():
+        figure_of[f"{name}/{file}"] = make
+    return figure_of
 
 
 def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings) -> Figure:
@@ -47,36 +49,49 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings) 
     verdict : dict
         The experiment's part of ``discovery.json``.
     """
-    name, control = plain.sample.name, plain.sample.protocol.control
     shown = [("plain model", plain, _WORSE)]
     if verdict["verdict"] != "nothing-missing":
         shown.append((f"with {_added(verdict)}", final, _BAND))
-    figure = Figure(figsize=(9.0, 3.2 + 2.4 * len(shown)), layout="constrained")
-    above, *axes = figure.subplots(1 + len(shown), 1, sharex=True, height_ratios=(1.4, *[1] * len(shown)))
-    curves = [curve(stored) for _, stored, _ in shown]
-    for (title, stored, colour), found in zip(shown, curves, strict=True):
-        draw_curve(above, stored, found, colour, f"{title}, 90 % band")
-    draw_readings(above, plain, curves[0])
-    above.set_title(f"{name}: readings and curves", loc="left", fontsize=10)
-    above.legend(fontsize=8, frameon=False)
+    panels = len(shown)
+    heights = (1.4, *[1] * panels)
+    height = 3.2 + 2.4 * panels
+    figure = Figure(figsize=(9.0, height), layout="constrained")
+    above, *axes = figure.subplots(1 + panels, 1, sharex=True, height_ratios=heights)
+    _draw_curves(above, plain, shown)
+    name, control = plain.sample.name, plain.sample.protocol.control
+    unit = READ_UNIT[control]
+    held = verdict["held_out"]["holds"]
     for axis, (title, stored, _) in zip(axes, shown, strict=True):
         axis.sharey(axes[0])
-        _residuals(axis, stored, verdict["held_out"]["holds"])
+        _residuals(axis, stored, held)
         axis.set_title(f"{name}: {title}", loc="left", fontsize=10)
-        axis.set_ylabel(f"measured − predicted, {READ_UNIT[control]}")
-    above.set_ylabel(f"{READ[control]}, {READ_UNIT[control]}")
+        axis.set_ylabel(f"measured − predicted, {unit}")
+    what = READ[control]
+    above.set_ylabel(f"{what}, {unit}")
     name_holds(axes[-1], plain)
     for axis in (above, *axes):
         without_frame(axis)
-    handles = axes[0].get_legend_handles_labels()
-    figure.legend(*handles, loc="outside lower center", ncols=len(handles[1]), fontsize=8, frameon=False)
+    handles, labels = axes[0].get_legend_handles_labels()
+    columns = len(labels)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
     return figure
+
+
+def _draw_curves(axes: Axes, plain: Stored, shown: Sequence[tuple[str, Stored, str]]) -> None:
+    """The readings with the curve of each model, given with its title and colour; the plain one comes first."""
+    curves = [curve(stored) for _, stored, _ in shown]
+    for (title, stored, colour), found in zip(shown, curves, strict=True):
+        draw_curve(axes, stored, found, colour, f"{title}, 90 % band")
+    draw_readings(axes, plain, curves[0])
+    axes.set_title(f"{plain.sample.name}: readings and curves", loc="left", fontsize=10)
+    axes.legend(fontsize=8, frameon=False)
 
 
 def _added(verdict: ExperimentFindings) -> str:
     """What the final model has beyond the plain one."""
-    unknown = ["something unknown"] if verdict["verdict"] in ("partial", "unknown") else []
-    names = [spoken(effect) for effect in verdict["accepted"]] + unknown
+    names = [spoken(effect) for effect in verdict["accepted"]]
+    if verdict["verdict"] in ("partial", "unknown"):
+        names.append("something unknown")
     return " + ".join(names) or "what may be missing"
 
 
@@ -88,31 +103,49 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     verdict : dict
         The experiment's part of ``discovery.json``, with at least one accepted effect and holds that were held out.
     """
-    steps, floor = verdict["steps"], read_value(verdict["held_out"], "floor")
-    heights = [rmse for s in steps if (rmse := read_value(s, "rmse")) is not None]
+    steps = verdict["steps"]
     unit = unit_read(steps[0])
-    names = ["plain model", *(spoken(s["model"]) for s in steps[1:]), "left over", "noise"]
+    floor = read_value(verdict["held_out"], "floor")
+    errors = [read_value(step, "rmse") for step in steps]
+    heights = [error for error in errors if error is not None]
     bars = _bars(heights, floor)
-    figure = Figure(figsize=(max(1.1 * len(bars), 5.4), 3.4), layout="constrained")
+    width = max(1.1 * len(bars), 5.4)
+    figure = Figure(figsize=(width, 3.4), layout="constrained")
     axis = figure.subplots()
-    for x, ((low, high, colour), label) in enumerate(zip(bars, _sizes(heights, floor, unit), strict=True)):
-        axis.bar(x, max(high - low, 0.002 * max(heights)), bottom=low, color=colour, width=0.7)
-        axis.text(x, high, label, ha="center", va="bottom", fontsize=8)
+    labels = _sizes(heights, floor, unit)
+    least = 0.002 * max(heights)
+    _draw_bars(axis, bars, labels, least)
     for x, height in enumerate([*heights, floor]):
-        axis.plot([x + 0.35, x + 0.65], [height, height], color="0.4", lw=0.8)
-    axis.set_xticks(range(len(names)), [textwrap.fill(n, 12) for n in names], fontsize=9)
+        ends = [x + 0.35, x + 0.65]
+        axis.plot(ends, [height, height], color="0.4", lw=0.8)
+    effects = [spoken(step["model"]) for step in steps[1:]]
+    names = ["plain model", *effects, "left over", "noise"]
+    wrapped = [textwrap.fill(name, 12) for name in names]
+    axis.set_xticks(range(len(names)), wrapped, fontsize=9)
     axis.set_ylabel(f"rms error on held-out holds ({unit})")
     axis.margins(y=0.12)
     without_frame(axis)
     return figure
 
 
+def _draw_bars(axis: Axes, bars: Sequence[tuple[float, float, str]], labels: Sequence[str], least: float) -> None:
+    """Bars of at least some height, with their labels."""
+    for x, ((low, high, colour), label) in enumerate(zip(bars, labels, strict=True)):
+        height = max(high - low, least)
+        axis.bar(x, height, bottom=low, color=colour, width=0.7)
+        axis.text(x, high, label, ha="center", va="bottom", fontsize=8)
+
+
 def _bars(heights: list[float], floor: float) -> list[tuple[float, float, str]]:
     """Lower and upper end and colour of each bar of the waterfall."""
-    measured, last = heights[0], heights[-1]
-    changes = [(min(a, b), max(a, b), _BAND if b <= a else _WORSE) for a, b in pairwise(heights)]
-    left = min(floor, last), last, _HELD
-    return [(0.0, measured, _MEASURED), *changes, left, (0.0, floor, "0.7")]
+    bars = [(0.0, heights[0], _MEASURED)]
+    for before, after in pairwise(heights):
+        colour = _BAND if after <= before else _WORSE
+        bars.append((min(before, after), max(before, after), colour))
+    last = heights[-1]
+    bars.append((min(floor, last), last, _HELD))
+    bars.append((0.0, floor, "0.7"))
+    return bars
 
 
 def _sizes(heights: list[float], floor: float, unit: str) -> list[str]:
@@ -138,9 +171,11 @@ def pictures_of_findings(stored: Stored, verdict: ExperimentFindings) -> dict[st
     left = left_over(stored)
     shown: dict[str, Callable[[], Figure]] = {}
     for finding in verdict["where"]:
-        along = np.broadcast_to(COVARIATES[finding["covariate"]](sample), left.shape)[sample.protocol.mask]
+        covariate = finding["covariate"]
+        values = np.broadcast_to(COVARIATES[covariate](sample), left.shape)
+        along = values[sample.protocol.mask]
         if finding["p"] <= _SHOWN and np.ptp(along) > 0.0:
-            file = f"where-{finding['covariate'].replace(' ', '-')}.svg"
+            file = f"where-{covariate.replace(' ', '-')}.svg"
             shown[file] = partial(_along, sample, left, finding, along)
     return shown
 
@@ -148,22 +183,26 @@ def pictures_of_findings(stored: Stored, verdict: ExperimentFindings) -> dict[st
 def _along(sample: Sample, left: Floats, finding: Disagreement, x: Floats) -> Figure:
     """What is left over, (H, R), along a covariate (m,) of all readings, with the mean of neighbours."""
     mask = sample.protocol.mask
-    within = finding["covariate"] == "time in hold"
-    if within:  # a pattern within holds is hidden by their levels
-        left = left - left.sum(axis=1, keepdims=True) / np.maximum(mask.sum(axis=1, keepdims=True), 1)
+    covariate = finding["covariate"]
+    label = f"measured − plain model ({READ_UNIT[sample.protocol.control]})"
+    if covariate == "time in hold":  # a pattern within holds is hidden by their levels
+        readings = np.maximum(mask.sum(axis=1, keepdims=True), 1)
+        left = left - left.sum(axis=1, keepdims=True) / readings
+        label += ",\nless its hold's mean"
     each = left[mask]
     figure = Figure(figsize=_PANEL, layout="constrained")
     axis = figure.subplots()
     axis.plot(x, each, "o", color=_MEASURED, ms=3, alpha=0.6, label="a reading")
-    middles = [(x[group].mean(), each[group].mean()) for group in _neighbours(x)]
-    axis.plot(*zip(*middles, strict=True), "-", color=_BAND, lw=2, label="mean of neighbours")
+    groups = _neighbours(x)
+    middles = [x[group].mean() for group in groups]
+    means = [each[group].mean() for group in groups]
+    axis.plot(middles, means, "-", color=_BAND, lw=2, label="mean of neighbours")
     axis.axhline(0.0, color="0.5", lw=0.6)
-    axis.set_xlabel(_LABELS[finding["covariate"]])
-    if finding["covariate"] == "direction":
+    axis.set_xlabel(_LABELS[covariate])
+    if covariate == "direction":
         axis.set_xticks([-1, 1], ["unloading", "loading"])
         axis.set_xlim(-2, 2)
-    unit = READ_UNIT[sample.protocol.control]
-    axis.set_ylabel(f"measured − plain model ({unit})" + (",\nless its hold's mean" if within else ""))
+    axis.set_ylabel(label)
     axis.set_title(sample.name, loc="left", fontsize=9)
     axis.legend(fontsize=8, frameon=False)
     return figure
@@ -191,49 +230,46 @@ def left_over(stored: Stored) -> Floats:
 
 def _walked(stored: Stored) -> tuple[Linearised, dict[str, Array]]:
     """The staircase under some of the stored draws, and these."""
-    rows = np.random.default_rng(0).choice(len(stored.theta), min(400, len(stored.theta)), replace=False)
+    rng = np.random.default_rng(0)
+    count = len(stored.theta)
+    rows = rng.choice(count, min(400, count), replace=False)
     own = {name: values[rows] for name, values in stored.draws.items()}
     return linearise(stored.sample.protocol, own, stored.sample.model), own
 
 
 def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
-    sample = stored.sample
-    line, own = _walked(stored)
-    variance = sample.variance(own)
-    width = np.sqrt(variance + (line.by_setting * own["setting_sd"]) ** 2)
-    drawn = line.reading + np.random.default_rng(1).normal(size=line.reading.shape) * width
-    middle = line.reading.mean(axis=2)
-    low, high = np.quantile(drawn, [0.05, 0.95], axis=2)
-    shown = np.flatnonzero(sample.protocol.recorded)
-    for k, j in enumerate(shown):
-        keep = sample.protocol.mask[j]
-        time = sample.protocol.time_s[j][keep]
-        x = k + 0.1 + 0.8 * time / max(float(sample.protocol.duration_s[j]), 1e-9)
-        number = int(sample.protocol.number[j])
+    """Readings less their median, in the 90 % band, hold after hold; those of `held` shaded."""
+    protocol = stored.sample.protocol
+    bands = _left_with_band(stored)
+    shown = np.flatnonzero(protocol.recorded)
+    numbers = [int(number) for number in protocol.number[shown]]
+    for place, (hold, number) in enumerate(zip(shown, numbers, strict=True)):
+        keep = protocol.mask[hold]
+        left, low, high = (values[hold][keep] for values in bands)
+        time = protocol.time_s[hold][keep]
+        duration = max(float(protocol.duration_s[hold]), 1e-9)
+        x = place + 0.1 + 0.8 * time / duration
         if number in held:
-            axis.axvspan(k, k + 1, color=_HELD, zorder=0, label="kept out to test it" if number == held[0] else None)
-        first = k == 0
-        axis.fill_between(
-            x,
-            (low[j] - middle[j])[keep],
-            (high[j] - middle[j])[keep],
-            color=_BAND,
-            alpha=0.3,
-            lw=0,
-            label="90 % band" if first else None,
-        )
-        axis.plot(
-            x,
-            (sample.readings[j, :, 0] - middle[j])[keep],
-            "o-",
-            color=_MEASURED,
-            ms=3,
-            lw=0.8,
-            label="measured" if first else None,
-        )
+            shading = "kept out to test it" if number == held[0] else None
+            axis.axvspan(place, place + 1, color=_HELD, zorder=0, label=shading)
+        band, measured = ("90 % band", "measured") if place == 0 else (None, None)
+        axis.fill_between(x, low, high, color=_BAND, alpha=0.3, lw=0, label=band)
+        axis.plot(x, left, "o-", color=_MEASURED, ms=3, lw=0.8, label=measured)
     axis.axhline(0.0, color="0.5", lw=0.6)
-    axis.set_xticks(np.arange(len(shown)) + 0.5, [str(int(sample.protocol.number[j])) for j in shown])
+    middles = np.arange(len(shown)) + 0.5
+    axis.set_xticks(middles, list(map(str, numbers)))
     axis.set_xlim(0, len(shown))
+
+
+def _left_with_band(stored: Stored) -> tuple[Floats, Floats, Floats]:
+    """Readings less what is expected, and the ends of their 90 % band, each (H, R)."""
+    line, own = _walked(stored)
+    by_setting = line.by_setting * own["setting_sd"]
+    width = np.sqrt(stored.sample.variance(own) + by_setting**2)
+    noise = np.random.default_rng(1).normal(size=line.reading.shape)
+    middle = line.reading.mean(axis=2)
+    low, high = np.quantile(line.reading + noise * width, [0.05, 0.95], axis=2)
+    return stored.sample.readings[..., 0] - middle, low - middle, high - middle
 
 
 _SHOWN = 0.05  # p of a pattern that is worth a picture

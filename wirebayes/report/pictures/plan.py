@@ -30,51 +30,66 @@ def widths_and_effects(plan: PlanJson, target: Path) -> None:
         The picture to write.
     """
     rows = plan["protocols"][:_MOST]
-    names = [*_uncertain(rows), "creep_1h_mm"]
+    quantities = [*_uncertain(rows), "creep_1h_mm"]
     effects = sorted({effect for row in rows for effect in row["effects"]})
-    figure = Figure(figsize=(9.0, 4.0 + 0.13 * len(effects)), layout="constrained")
+    height = 4.0 + 0.13 * len(effects)
+    figure = Figure(figsize=(9.0, height), layout="constrained")
     left, right = figure.subplots(1, 2)
+    middle = (len(rows) - 1) / 2
+    apart = 0.8 / len(rows)
     for i, row in enumerate(rows):
-        shift = (i - (len(rows) - 1) / 2) * (0.8 / len(rows))  # tests stand one below the other
-        _draw_widths(left, row, names, shift, _COLOURS[i])
+        shift = (i - middle) * apart  # tests stand one below the other
+        _draw_widths(left, row, quantities, shift, _COLOURS[i])
         _draw_effects(right, row, effects, shift, _COLOURS[i])
     left.set_xlabel("sd after the test (median) / sd of the guess", fontsize=9)
     left.set_title("parameters: farther left is better known", fontsize=9, loc="left")
     right.set_xlabel("sd of its prior / amplitude seen in 80 % of tests", fontsize=9)
     right.set_title("effects: right of the line is seen", fontsize=9, loc="left")
-    for axes, what in ((left, names), (right, effects)):
-        axes.set_yticks(range(len(what)), [_words(name) for name in what], fontsize=8)
-        axes.axvline(1.0, color="0.6", lw=0.8)
-        logarithmic(axes)
-        axes.invert_yaxis()
-        axes.grid(axis="y", color="0.93", lw=6, zorder=0)
-        axes.set_axisbelow(True)
-        axes.tick_params(axis="x", labelsize=8)
+    _name_rows(left, quantities)
+    _name_rows(right, effects)
     figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     save_figure(figure, target)
 
 
+def _name_rows(axes: Any, names: Sequence[str]) -> None:
+    """Names beside the rows of a panel, from the top, and a line where nothing is gained."""
+    axes.set_yticks(range(len(names)), [_words(name) for name in names], fontsize=8)
+    axes.axvline(1.0, color="0.6", lw=0.8)
+    logarithmic(axes)
+    axes.invert_yaxis()
+    axes.grid(axis="y", color="0.93", lw=6, zorder=0)
+    axes.set_axisbelow(True)
+    axes.tick_params(axis="x", labelsize=8)
+
+
 def _uncertain(rows: Sequence[JudgedProtocol]) -> list[str]:
     """The parameters of every test that the guess does not state exactly."""
-    each = [row["parameters"] for row in rows]
-    shared = [name for name in each[0] if all(name in widths for widths in each)]
-    return [name for name in shared if not all(is_given(widths[name]) for widths in each)]
+    tests = [row["parameters"] for row in rows]
+    names = []
+    for name in tests[0]:
+        shared = all(name in widths for widths in tests)
+        if shared and not all(is_given(widths[name]) for widths in tests):
+            names.append(name)
+    return names
 
 
 def _draw_widths(axes: Any, row: JudgedProtocol, names: Sequence[str], shift: float, colour: str) -> None:
     widths = row["parameters"] | {"creep_1h_mm": row["creep"]["creep_1h_mm"]}
+    shares = [_share(widths[name]) for name in names]
+    places = np.arange(len(names)) + shift
     label = f"{row['rank']}. {verbatim(row['name'])}, {row['duration_min']:.3g} min"
-    axes.plot(
-        [_share(widths[name]) for name in names], np.arange(len(names)) + shift, "o", color=colour, ms=4, label=label
-    )
+    axes.plot(shares, places, "o", color=colour, ms=4, label=label)
 
 
 def _draw_effects(axes: Any, row: JudgedProtocol, effects: Sequence[str], shift: float, colour: str) -> None:
-    there = [(place, row["effects"][name]) for place, name in enumerate(effects) if name in row["effects"]]
-    seen = [(place, power["delta_prior"] / power["delta_80"]) for place, power in there if power["delta_80"]]
-    if seen:
-        places, times = zip(*seen, strict=True)
-        axes.plot(times, np.array(places) + shift, "o", color=colour, ms=4)
+    places, times = [], []
+    for place, name in enumerate(effects):
+        power = row["effects"].get(name)
+        if power is not None and power["delta_80"]:
+            places.append(place + shift)
+            times.append(power["delta_prior"] / power["delta_80"])
+    if places:
+        axes.plot(times, places, "o", color=colour, ms=4)
 
 
 def _share(width: ExpectedWidth) -> float:

@@ -13,6 +13,7 @@ from wirebayes.io.run_folder import write_json
 from wirebayes.json_files.pose import ControllerError, Drift, VarianceShares
 from wirebayes.json_files.scene import SceneJson
 from wirebayes.json_files.values import Band, Numbers
+from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
 from wirebayes.report.blocks import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, verbatim
@@ -21,6 +22,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.pulleys import traced
 from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose.answer import PoseAnswer
+from wirebayes.robot.pose.maps import Map
 from wirebayes.robot.pose.request import PoseRequest
 
 CONTROLLERS = {
@@ -45,22 +47,34 @@ def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: PoseAnswe
     """
     if not found.courses or not found.courses[0.0].found.any():
         return
-    content, pictures = found.content, {}
-    pictures["robot"] = scene(robot, request.position_m, request.rotation, found.courses[0.0])
-    pictures["drift"] = in_time(content["drift"], "distance_mm", "distance from the pose, mm", "Drift")
+    content = found.content
+    course = found.courses[0.0]
+    pictures = {
+        "robot": scene(robot, request.position_m, request.rotation, course),
+        "drift": in_time(content["drift"], "distance_mm", "distance from the pose, mm", "Drift"),
+    }
     if robot.degrees == 6:
-        turned = "rotation, degrees", "Drift of the orientation"
-        pictures["rotation"] = in_time(content["drift"], "rotation_deg", *turned)
+        title = "Drift of the orientation"
+        pictures["rotation"] = in_time(content["drift"], "rotation_deg", "rotation, degrees", title)
     pictures["pose-error"] = error_in_time(content["pose_error"])
     if "shared_draw" in content["variance_shares"]:
         pictures["error-budget"] = error_budget(content["variance_shares"])
-    for i, one in enumerate(one for one in found.maps if len(one.drift.position_m)):
-        key = f"workspace-{i + 1}" if i else "workspace"
-        mapped = workspace_maps(one.drift, orientation(one))
-        pictures |= {f"{key}-{name}": figure for name, figure in mapped.items()}
+    pictures |= _maps(found.maps)
     for name, figure in pictures.items():
         save_figure(figure, folder / f"{name}.svg")
-    write_json(folder / "scene.json", scene_points(robot, request.position_m, request.rotation, found.courses[0.0]))
+    points = scene_points(robot, request.position_m, request.rotation, course)
+    write_json(folder / "scene.json", points)
+
+
+def _maps(maps: Sequence[Map]) -> dict[str, Figure]:
+    """Those of the workspace, by the names of their files."""
+    figures = {}
+    with_places = [one for one in maps if len(one.drift.position_m)]
+    for i, one in enumerate(with_places):
+        key = f"workspace-{i + 1}" if i else "workspace"
+        for name, figure in workspace_maps(one.drift, orientation(one)).items():
+            figures[f"{key}-{name}"] = figure
+    return figures
 
 
 def scene(
@@ -77,7 +91,8 @@ def scene(
         Default: a round factor that makes the drift a twentieth of the robot.
     """
     view = scene_points(robot, position_m, rotation, course, exaggeration)
-    enlarged, here = view["exaggeration"], np.asarray(view["platform"])
+    enlarged = view["exaggeration"]
+    here = np.asarray(view["platform"])
     there = here + enlarged * (view["drifted"][-1] - here)
     figure = Figure(figsize=(6.0, 5.2))
     axes: Any = figure.add_axes((0.0, 0.06, 0.92, 0.86), projection="3d")
@@ -88,17 +103,21 @@ def scene(
     _draw_platform(axes, robot, there, HOLD, "drifted")
     exits = robot.exit_m
     axes.scatter(*exits.T, color=INK, s=14, label="exit points")
-    _label_axes(axes, np.concatenate([exits, here, there]), position_m, np.ptp(exits, axis=0).max())
+    every_point = np.concatenate([exits, here, there])
+    size_m = np.ptp(exits, axis=0).max()
+    _label_axes(axes, every_point, position_m, size_m)
     head = f"{verbatim(robot.name)}: mean drift after {course.times_s[-1]:g} s, enlarged {enlarged:g} times"
     figure.text(0.02, 0.95, head, fontsize=10.5, color=INK)
-    figure.legend(*axes.get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False, fontsize=8.5)
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="lower center", ncols=3, frameon=False, fontsize=8.5)
     return figure
 
 
 def _draw_wire(axes: Any, robot: Robot, i: int, end: Floats, **style: Any) -> None:
     """From its exit point, around its pulley, to its platform point."""
     begin = robot.exit_m[i]
-    axes.plot(*(begin + traced(robot.pulleys, i, end - begin)).T, **style)
+    points = begin + traced(robot.pulleys, i, end - begin)
+    axes.plot(*points.T, **style)
 
 
 def _draw_platform(axes: Any, robot: Robot, points: Floats, colour: str, name: str) -> None:
@@ -138,18 +157,30 @@ def scene_points(
     SceneJson
         At nine times or fewer.
     """
-    position, turned = course.position_m[course.found].mean(0), course.rotation[course.found].mean(0)
-    shown = np.unique(np.linspace(0, len(position) - 1, min(len(position), _MOST_TIMES)).round().astype(int))
-    drifted = position[shown, None] + np.einsum("tij,wj->twi", turned[shown], robot.platform_m)
+    position = course.position_m[course.found].mean(0)
+    turned = course.rotation[course.found].mean(0)
+    shown = evenly(len(position), _MOST_TIMES)
     if exaggeration is None:
-        size = np.ptp(robot.exit_m, axis=0).max()
-        exaggeration = round_factor(0.05 * size / max(float(np.linalg.norm(position[-1] - position_m)), 1e-12))
+        exaggeration = _exaggeration(robot, position[-1] - position_m)
+    platform = np.einsum("tij,wj->twi", turned[shown], robot.platform_m)
+    tensions = course.tension_N[course.found][:, shown]
     return still_points(robot, position_m, rotation) | {
-        "drifted": drifted,
-        "times": [f"{t:.3g} s" if t < 1000 else f"{t:.0f} s" for t in course.times_s[shown]],
-        "tensions_N": np.median(course.tension_N[course.found][:, shown], axis=0),
+        "drifted": position[shown, None] + platform,
+        "times": [_seconds(time) for time in course.times_s[shown]],
+        "tensions_N": np.median(tensions, axis=0),
         "exaggeration": exaggeration,
     }
+
+
+def _exaggeration(robot: Robot, drift_m: Floats) -> float:
+    """A round factor that makes a drift a twentieth of the robot."""
+    size = np.ptp(robot.exit_m, axis=0).max()
+    distance = max(float(np.linalg.norm(drift_m)), 1e-12)
+    return round_factor(0.05 * size / distance)
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.3g} s" if time < 1000 else f"{time:.0f} s"
 
 
 def still_points(robot: Robot, position_m: Floats, rotation: Floats) -> SceneJson:
@@ -160,11 +191,14 @@ def still_points(robot: Robot, position_m: Floats, rotation: Floats) -> SceneJso
     position_m, rotation : (3,), (3, 3) arrays
     """
     here = position_m + robot.platform_m @ rotation.T
+    wires = []
+    for i, (begin, end) in enumerate(zip(robot.exit_m, here, strict=True)):
+        wires.append(begin + traced(robot.pulleys, i, end - begin))
     return {
         "name": robot.name,
         "exits": robot.exit_m,
         "platform": here,
-        "wires": [a + traced(robot.pulleys, i, p - a) for i, (a, p) in enumerate(zip(robot.exit_m, here, strict=True))],
+        "wires": wires,
         "edges": list(platform_edges(robot.platform_m)),
         "drifted": [],
         "times": [],
@@ -176,12 +210,15 @@ def still_points(robot: Robot, position_m: Floats, rotation: Floats) -> SceneJso
 def platform_edges(points: Floats) -> Iterator[tuple[int, int]]:
     """Pairs of platform points that an edge joins: the hull's edges, without those inside a flat face."""
     spread = points - points.mean(0)
-    rank = int((np.linalg.svd(spread, compute_uv=False) > 1e-3 * max(np.abs(spread).max(), 1e-12)).sum())
+    extent = max(np.abs(spread).max(), 1e-12)
+    singular = np.linalg.svd(spread, compute_uv=False)
+    rank = int((singular > 1e-3 * extent).sum())
     try:
         if rank < 3:
-            across = spread @ np.linalg.svd(spread)[2][:2].T
-            hull = ConvexHull(across)
-            yield from ((int(i), int(j)) for i, j in hull.simplices)
+            _, _, axes = np.linalg.svd(spread)
+            across = spread @ axes[:2].T
+            outline = ConvexHull(across)
+            yield from ((int(i), int(j)) for i, j in outline.simplices)
             return
         hull = ConvexHull(points)
     except (QhullError, ValueError):  # all points in one place or on a line
@@ -191,7 +228,9 @@ def platform_edges(points: Floats) -> Iterator[tuple[int, int]]:
         for k in range(3):
             i, j = sorted((int(simplex[k]), int(simplex[k - 1])))
             normals.setdefault((i, j), []).append(equation[:3])
-    yield from (pair for pair, (a, b) in normals.items() if a @ b < 0.99)
+    for edge, (one, other) in normals.items():
+        if one @ other < 0.99:
+            yield edge
 
 
 _MOST_TIMES = 9  # of a view: stops of its slider
@@ -199,8 +238,10 @@ _MOST_TIMES = 9  # of a view: stops of its slider
 
 def round_factor(value: float) -> float:
     """A round number, 1, 2 or 5 times a power of ten, not above the value (and not below 1)."""
-    decade = 10.0 ** np.floor(np.log10(max(value, 1.0)))
-    return float(max(1.0, decade * max(f for f in (1, 2, 5) if f * decade <= max(value, 1.0))))
+    value = max(value, 1.0)
+    decade = 10.0 ** np.floor(np.log10(value))
+    factor = max(digit for digit in (1, 2, 5) if digit * decade <= value)
+    return float(max(1.0, decade * factor))
 
 
 def in_time(drifts: Sequence[Drift], key: Distance, label: str, title: str) -> Figure:
@@ -228,9 +269,10 @@ def in_time(drifts: Sequence[Drift], key: Distance, label: str, title: str) -> F
 def error_in_time(errors: Sequence[ControllerError]) -> Figure:
     """Pose error of the controllers against time, specimens alike; the tolerance dashed."""
     figure, axes = panel("time, s", "pose error, mm", "Pose error by controller")
-    alike = [e for e in errors if e["specimen_spread"] == 0]
+    alike = [error for error in errors if error["specimen_spread"] == 0]
     for entry, colour in zip(alike, _COLOURS, strict=False):
-        _banded(axes, entry["times_s"], entry["distance_mm"], colour, CONTROLLERS[entry["controller"]])
+        label = CONTROLLERS[entry["controller"]]
+        _banded(axes, entry["times_s"], entry["distance_mm"], colour, label)
     axes.axhline(alike[0]["tolerance_mm"], color=INK, lw=0.9, ls="--", label="tolerance")
     _since(axes)
     legend_below(figure, axes)
@@ -253,10 +295,12 @@ def _banded(axes: Any, times_s: Numbers, band: Band, colour: str, label: str) ->
 
 def error_budget(result: VarianceShares) -> Figure:
     """Shares of the drift's variance by parameter."""
+    shares = result["shared_draw"]
     label = f"share of the variance of the drift\nafter {result['time_s']:g} s, %"
-    figure, axes = panel(label, "", "Sources of uncertainty", (4.7, 2.0 + 0.2 * len(result["shared_draw"])))
-    names = list(result["shared_draw"])[::-1]
-    bars = axes.barh(names, [100 * result["shared_draw"][name] for name in names], color=CHAIN)
+    size = (4.7, 2.0 + 0.2 * len(shares))
+    figure, axes = panel(label, "", "Sources of uncertainty", size)
+    names = list(shares)[::-1]
+    bars = axes.barh(names, [100 * shares[name] for name in names], color=CHAIN)
     axes.bar_label(bars, fmt="%.0f", padding=3, fontsize=8.5)
     axes.margins(x=0.12)
     axes.tick_params(axis="y", length=0)

@@ -1,5 +1,6 @@
 """Pictures of a robot's history: drift and corrections over time, a strip of poses, and the same moving."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,8 @@ from matplotlib.ticker import FuncFormatter
 
 from wirebayes.io.run_folder import write_bytes, write_text
 from wirebayes.json_files.pose_history import Corrections, DriftOverTime
-from wirebayes.json_files.values import INTERVAL, Numbers
+from wirebayes.json_files.values import INTERVAL, Band, Numbers
+from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.report.blocks import svg
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
@@ -66,7 +68,7 @@ def banded(drift: DriftOverTime, key: Distance, label: str, title: str, history:
         For what the platform carries.
     """
     figure, axes = panel("time, s", label, title)
-    _band(axes, drift["times_s"], np.array([drift[key][q] for q in INTERVAL]), CHAIN, "median and 90 % of the draws")
+    _band(axes, drift["times_s"], _ends_of(drift[key]), CHAIN, "median and 90 % of the draws")
     axes.set_ylim(bottom=0)
     _in_time(figure, axes, history)
     return figure
@@ -77,11 +79,18 @@ def corrected(corrections: Corrections, history: History) -> Figure:
     figure, axes = panel("time, s", "change of the joint value, mm", "Corrections")
     change = corrections["change_mm"]
     if change["q50"] is not None:
-        for i, ends in enumerate(np.moveaxis(np.array([change[q] for q in INTERVAL]), -1, 0)):
-            _band(axes, corrections["times_s"], ends, _COLOURS[i % len(_COLOURS)], f"joint {i + 1}", 0.14)
+        bands = np.moveaxis(_ends_of(change), -1, 0)
+        for i, ends in enumerate(bands):
+            colour = _COLOURS[i % len(_COLOURS)]
+            _band(axes, corrections["times_s"], ends, colour, f"joint {i + 1}", 0.14)
     axes.axhline(0, color=QUIET, lw=0.8, zorder=0)
     _in_time(figure, axes, history, 4)
     return figure
+
+
+def _ends_of(band: Band) -> Floats:
+    """Lower end, median and upper end of a band, along the first axis."""
+    return np.array([band[quantile] for quantile in INTERVAL])
 
 
 def _band(axes: Any, times: Numbers, ends: Floats, colour: str, label: str, alpha: float = 0.22) -> None:
@@ -95,37 +104,51 @@ def _in_time(figure: Figure, axes: Any, history: History, columns: int = 2) -> N
     axes.set_xlim(history.times_s[0], history.times_s[-1])
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     if np.ptp(history.payload_kg) > 0:
-        load = axes.twinx()
-        load.step(history.times_s, history.payload_kg, where="post", color=INK, lw=0.8, ls="--", alpha=0.6)
-        load.set_ylim(0, 2.5 * history.payload_kg.max())
-        load.set_ylabel("payload, kg", fontsize=9)
-        load.tick_params(labelsize=8)
-        load.spines["top"].set_visible(False)
-        axes.plot([], [], color=INK, lw=0.8, ls="--", label="payload")
+        _draw_payload(axes, history)
     legend_below(figure, axes, columns)
+
+
+def _draw_payload(axes: Any, history: History) -> None:
+    load = axes.twinx()
+    load.step(history.times_s, history.payload_kg, where="post", color=INK, lw=0.8, ls="--", alpha=0.6)
+    load.set_ylim(0, 2.5 * history.payload_kg.max())
+    load.set_ylabel("payload, kg", fontsize=9)
+    load.tick_params(labelsize=8)
+    load.spines["top"].set_visible(False)
+    axes.plot([], [], color=INK, lw=0.8, ls="--", label="payload")
 
 
 def _shapes(robot: Robot, found: HistoryAnswer, rows: Indices) -> tuple[Floats, Floats, float]:
     """Platform points meant and drifted, ``(r, w, 3)``, the drift enlarged by a round factor."""
     assert found.found is not None and found.to is not None
-    track, to = found.found.track, found.to
-    position, rotation = _mean_pose(track, rows)
-    shift = position - to.position_m[rows]
+    meant_position = found.to.position_m[rows]
+    meant_rotation = found.to.rotation[rows]
+    position, rotation = _mean_pose(found.found.track, rows)
+    shift = position - meant_position
+    turn = rotation - meant_rotation
+    factor = _enlarged(robot, shift)
+    meant = _platform_points(robot, meant_position, meant_rotation)
+    moved_position = meant_position + factor * shift
+    moved_rotation = meant_rotation + factor * turn
+    return meant, _platform_points(robot, moved_position, moved_rotation), factor
+
+
+def _enlarged(robot: Robot, shift_m: Floats) -> float:
+    """A round factor that makes the largest shift (r, 3) a small part of the robot."""
     size = float(np.ptp(robot.exit_m, axis=0).max())
-    largest = float(np.nanmax(np.linalg.norm(shift, axis=1), initial=0.0))
-    factor = round_factor(0.07 * size / max(largest, 1e-12))
-    turned = to.rotation[rows] + factor * (rotation - to.rotation[rows])
-    meant = _platform_points(robot, to.position_m[rows], to.rotation[rows])
-    moved = _platform_points(robot, to.position_m[rows] + factor * shift, turned)
-    return meant, moved, factor
+    distances = np.linalg.norm(shift_m, axis=1)
+    largest = float(np.nanmax(distances, initial=0.0))
+    return round_factor(0.07 * size / max(largest, 1e-12))
 
 
 def _mean_pose(track: Track, rows: Indices) -> tuple[Floats, Floats]:
     """Mean positions ``(r, 3)`` and rotations ``(r, 3, 3)`` of draws that hold the platform; NaN where none does."""
     held = track.held[:, rows]
     count = np.maximum(held.sum(0), 1)[:, None]
-    position = np.where(held[..., None], track.position_m[:, rows], 0.0).sum(0) / count
-    rotation = np.where(held[..., None, None], track.rotation[:, rows], 0.0).sum(0) / count[..., None]
+    positions = np.where(held[..., None], track.position_m[:, rows], 0.0)
+    rotations = np.where(held[..., None, None], track.rotation[:, rows], 0.0)
+    position = positions.sum(0) / count
+    rotation = rotations.sum(0) / count[..., None]
     gone = ~held.any(0)
     position[gone] = np.nan
     rotation[gone] = np.nan
@@ -146,23 +169,32 @@ def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
     history : History
     found : HistoryAnswer
     """
-    rows = np.unique(np.linspace(0, len(history.times_s) - 1, _PANELS).round().astype(int))
+    rows = evenly(len(history.times_s), _PANELS)
     meant, moved, factor = _shapes(robot, found, rows)
     figure = Figure(figsize=(2.1 * len(rows), 2.75), layout="constrained")
     figure.suptitle(f"{robot.name}: mean drift enlarged {factor:g} times", fontsize=10.5, color=INK, x=0.01, ha="left")
-    exits = robot.exit_m @ _OBLIQUE.T
     panels = np.atleast_1d(figure.subplots(1, len(rows)))
-    for axes, here, there, k in zip(panels, meant @ _OBLIQUE.T, moved @ _OBLIQUE.T, rows, strict=True):
-        _draw_wires(axes, exits, here, color=QUIET, lw=0.8)
-        _draw_wires(axes, exits, there, color=HOLD, lw=0.6, ls=":")
-        _draw_platform(axes, robot, here, CHAIN)
-        _draw_platform(axes, robot, there, HOLD)
-        axes.scatter(*exits.T, color=INK, s=7)
-        axes.set_aspect("equal")
-        axes.set_axis_off()
-        carried = f", {history.payload_kg[k]:g} kg" if history.payload_kg.max() > 0 else ""
-        axes.set_title(f"{history.times_s[k]:g} s{carried}", fontsize=9, color=INK)
+    for i, (axes, row) in enumerate(zip(panels, rows, strict=True)):
+        here = meant[i] @ _OBLIQUE.T
+        there = moved[i] @ _OBLIQUE.T
+        _draw_robot(axes, robot, here, there)
+        title = f"{history.times_s[row]:g} s"
+        if history.payload_kg.max() > 0:
+            title += f", {history.payload_kg[row]:g} kg"
+        axes.set_title(title, fontsize=9, color=INK)
     return figure
+
+
+def _draw_robot(axes: Any, robot: Robot, meant: Floats, moved: Floats) -> None:
+    """The robot as it is meant to be, and as creep has moved it."""
+    exits = robot.exit_m @ _OBLIQUE.T
+    _draw_wires(axes, exits, meant, color=QUIET, lw=0.8)
+    _draw_wires(axes, exits, moved, color=HOLD, lw=0.6, ls=":")
+    _draw_platform(axes, robot, meant, CHAIN)
+    _draw_platform(axes, robot, moved, HOLD)
+    axes.scatter(*exits.T, color=INK, s=7)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
 
 
 def _draw_wires(axes: Axes, exits: Floats, points: Floats, **style: Any) -> None:
@@ -190,55 +222,90 @@ def moving(robot: Robot, history: History, found: HistoryAnswer) -> str:
     str
         An SVG document that plays by itself.
     """
-    times_s = history.times_s
-    whole = np.linspace(times_s[0], times_s[-1], _FRAMES)
-    rows = np.clip(np.searchsorted(times_s, whole), 0, len(times_s) - 1)
+    rows = _frame_rows(history.times_s)
     meant, moved, factor = _shapes(robot, found, rows)
-    commanded, drifted = meant @ _OBLIQUE.T, moved @ _OBLIQUE.T
+    commanded = meant @ _OBLIQUE.T
+    drifted = moved @ _OBLIQUE.T
     drifted = np.where(np.isfinite(drifted), drifted, commanded)
     exits = robot.exit_m @ _OBLIQUE.T
-    every = np.concatenate([exits, commanded.reshape(-1, 2), drifted.reshape(-1, 2)])
-    low, high = every.min(0), every.max(0)
-    scale = 420.0 / max(float((high - low).max()), 1e-9)
-    width, height = (high - low) * scale + 40
+    everything = [exits, commanded.reshape(-1, 2), drifted.reshape(-1, 2)]
+    canvas = _Canvas.around(np.concatenate(everything))
+    fixed = canvas.at(exits)
+    solid = f'stroke="{QUIET}" stroke-width="0.9"'
+    dashed = f'stroke="{HOLD}" stroke-width="0.9" stroke-dasharray="2 3"'
+    parts = canvas.head(f"drift enlarged {factor:g} times; {history.times_s[-1]:g} s in {_SECONDS} s")
+    parts += _moving_platform(robot, fixed, canvas.at(commanded), CHAIN, solid)
+    parts += _moving_platform(robot, fixed, canvas.at(drifted), HOLD, dashed)
+    for x, y in fixed:
+        parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{INK}"/>')
+    parts.append(canvas.progress())
+    parts.append("</svg>")
+    return "\n".join(parts) + "\n"
 
-    def at(points: Floats) -> Floats:
-        flat = (points - low) * scale + 20
-        return np.asarray(np.stack([flat[..., 0], height - flat[..., 1]], -1))
 
-    fixed = at(exits)
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height + 34:.0f}" '
-        f'font-family="sans-serif" font-size="12" role="img">',
-        f'<rect width="100%" height="100%" fill="white"/>'
-        f'<text x="10" y="16" fill="{INK}">drift enlarged {factor:g} times; {times_s[-1]:g} s in {_SECONDS} s'
-        "</text>",
-        *_moving_platform(robot, fixed, at(commanded), CHAIN, f'stroke="{QUIET}" stroke-width="0.9"'),
-        *_moving_platform(
-            robot, fixed, at(drifted), HOLD, f'stroke="{HOLD}" stroke-width="0.9" stroke-dasharray="2 3"'
-        ),
-    ]
-    parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{INK}"/>' for x, y in fixed]
-    parts.append(
-        f'<rect x="10" y="{height + 18:.0f}" height="4" width="{width - 20:.0f}" fill="{QUIET}"/>'
-        f'<rect x="10" y="{height + 18:.0f}" height="4" width="0" fill="{CHAIN}"><animate attributeName="width" '
-        f'values="0;{width - 20:.0f}" dur="{_SECONDS}s" repeatCount="indefinite"/></rect>'
-    )
-    return "\n".join([*parts, "</svg>"]) + "\n"
+def _frame_rows(times_s: Floats) -> Indices:
+    """The row of a history that each frame of the moving picture shows."""
+    frames = np.linspace(times_s[0], times_s[-1], _FRAMES)
+    return np.clip(np.searchsorted(times_s, frames), 0, len(times_s) - 1)
+
+
+@dataclass(frozen=True)
+class _Canvas:
+    """Where points in metres lie on a moving picture."""
+
+    low: Floats
+    scale: float
+    width: float
+    height: float
+
+    @classmethod
+    def around(cls, points: Floats) -> "_Canvas":
+        """Room for points (n, 2)."""
+        low = points.min(0)
+        extent = points.max(0) - low
+        scale = 420.0 / max(float(extent.max()), 1e-9)
+        width, height = extent * scale + 40
+        return cls(low, scale, width, height)
+
+    def at(self, points: Floats) -> Floats:
+        """Points (..., 2) on the picture, whose second axis points down."""
+        flat = (points - self.low) * self.scale + 20
+        return np.asarray(np.stack([flat[..., 0], self.height - flat[..., 1]], -1))
+
+    def head(self, title: str) -> list[str]:
+        """What the picture begins with."""
+        return [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width:.0f} {self.height + 34:.0f}" '
+            f'font-family="sans-serif" font-size="12" role="img">',
+            f'<rect width="100%" height="100%" fill="white"/><text x="10" y="16" fill="{INK}">{title}</text>',
+        ]
+
+    def progress(self) -> str:
+        """A bar that fills while the picture plays."""
+        place = f'<rect x="10" y="{self.height + 18:.0f}" height="4"'
+        whole = f"{self.width - 20:.0f}"
+        return (
+            f'{place} width="{whole}" fill="{QUIET}"/>'
+            f'{place} width="0" fill="{CHAIN}"><animate attributeName="width" '
+            f'values="0;{whole}" dur="{_SECONDS}s" repeatCount="indefinite"/></rect>'
+        )
 
 
 def _moving_platform(robot: Robot, exits: Floats, points: Floats, colour: str, wire: str) -> list[str]:
     """Wires from the exit points (w, 2) to the platform points of each frame (f, w, 2), and the platform's edges."""
+    edge = f'stroke="{colour}" stroke-width="2"'
     parts = []
     for i in range(robot.legs):
-        frames = [np.stack([exits[i], p[i]]) for p in points]
+        frames = [np.stack([exits[i], frame[i]]) for frame in points]
         parts.append(_moving_line(frames, wire))
     edges = list(platform_edges(robot.platform_m))
     for i, j in edges:
-        parts.append(_moving_line([p[[i, j]] for p in points], f'stroke="{colour}" stroke-width="2"'))
+        parts.append(_moving_line([frame[[i, j]] for frame in points], edge))
     if not edges:  # a point: a short stroke
-        tick = np.array([[-4.0, 0.0], [4.0, 0.0]])
-        parts.append(_moving_line([p[0] + tick for p in points], f'stroke="{colour}" stroke-width="8"'))
+        stroke = np.array([[-4.0, 0.0], [4.0, 0.0]])
+        frames = [frame[0] + stroke for frame in points]
+        thick = f'stroke="{colour}" stroke-width="8"'
+        parts.append(_moving_line(frames, thick))
     return parts
 
 

@@ -23,11 +23,14 @@ def drifts_in_time(drifts_mm: Mapping[str, Array], times_s: Array, limit_mm: flo
         The paper's.
     """
     figure, axes = panel("time, s", "distance from the pose, mm", title)
-    for (name, drift), colour in zip(drifts_mm.items(), cycle(len(drifts_mm)), strict=True):
-        low, middle, high = np.nanquantile(drift, [0.05, 0.5, 0.95], axis=0)
+    colours = cycle(len(drifts_mm))
+    for (name, drift), colour in zip(drifts_mm.items(), colours, strict=True):
+        quantiles = np.nanquantile(drift, [0.05, 0.5, 0.95], axis=0)
+        low, middle, high = quantiles
         axes.plot(times_s, middle, color=colour, label=name)
         axes.fill_between(times_s, low, high, color=colour, alpha=0.18, lw=0)
-    axes.axhline(limit_mm, color=INK, lw=0.9, ls="--", label=f"{limit_mm:g} mm")
+    limit = f"{limit_mm:g} mm"
+    axes.axhline(limit_mm, color=INK, lw=0.9, ls="--", label=limit)
     axes.set_xscale("log")
     axes.set_ylim(bottom=0)
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -42,12 +45,17 @@ def budgets(shares: Mapping[str, Mapping[str, float]], title: str) -> Figure:
     ----------
     shares : mapping of line to mapping of parameter to share
     """
-    figure, axes = panel("share of the variance of the drift, %", "", title, (4.7, 1.9 + 0.35 * len(shares)))
-    parameters = list(dict.fromkeys(name for own in shares.values() for name in own))
+    height = 1.9 + 0.35 * len(shares)
+    size = (4.7, height)
+    figure, axes = panel("share of the variance of the drift, %", "", title, size)
+    every = [name for own in shares.values() for name in own]
+    parameters = list(dict.fromkeys(every))
     lines = list(shares)[::-1]
+    colours = cycle(len(parameters))
     done = np.zeros(len(lines))
-    for name, colour in zip(parameters, cycle(len(parameters)), strict=True):
-        width = np.array([100 * max(shares[line].get(name, 0.0), 0.0) for line in lines])
+    for name, colour in zip(parameters, colours, strict=True):
+        share = np.array([shares[line].get(name, 0.0) for line in lines])
+        width = 100 * np.maximum(share, 0.0)
         axes.barh(lines, width, left=done, color=colour, label=name, height=0.6)
         done = done + width
     axes.tick_params(axis="y", length=0)

@@ -1,6 +1,6 @@
 """Maps of a robot's workspace: a minute's drift and tilt, slice by slice."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -26,39 +26,60 @@ def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]
     dict of str to Figure
         ``drift`` and, where anything tilts, ``tilt``.
     """
-    across_axis, along_axis, slice_axis = _axes(result.position_m)
-    slices = np.unique(result.position_m[:, slice_axis])
-    fields = {
-        "drift": (1e3 * result.median_distance_m, "drift, mm"),
-        "tilt": (np.degrees(result.median_tilt_rad), "tilt, degrees"),
-    }
-    if not np.nanmax(fields["tilt"][0], initial=0.0):
-        del fields["tilt"]  # parallel lines: nothing tilts
-    across, along = (np.unique(result.position_m[:, k]) for k in (across_axis, along_axis))
+    position_m = result.position_m
+    plane = _Plane(*_axes(position_m))
+    values = {"drift": 1e3 * result.median_distance_m, "tilt": np.degrees(result.median_tilt_rad)}
+    units = {"drift": "mm", "tilt": "degrees"}
+    if not np.nanmax(values["tilt"], initial=0.0):
+        del values["tilt"]  # parallel lines: nothing tilts
     figures = {}
-    for name, (value, label) in fields.items():
-        figure = Figure(figsize=_size(across, along, len(slices)), layout="constrained")
-        panels: Any = figure.subplots(len(slices), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-        figure.suptitle(_headed(name, title), fontsize=10.5, x=0.02, ha="left", color=INK)
-        image: Any = None
-        for axes, level in zip(panels, slices[::-1], strict=True):
-            here = result.position_m[:, slice_axis] == level
-            places = result.position_m[here][:, [across_axis, along_axis]]
-            field = _field(across, along, places, value[here])
-            image = _draw_slice(axes, across, along, field, _ends(value)) or image
-            axes.set_title(f"{'xyz'[slice_axis]} = {level:.3g} m", fontsize=9.5)
-            axes.set_ylabel(f"{'xyz'[along_axis]}, m")
-        panels[-1].set_xlabel(f"{'xyz'[across_axis]}, m")
+    for name, value in values.items():
+        figure, image = _slices(position_m, value, plane, _headed(name, title))
         if image is not None:
-            figure.colorbar(image, ax=list(panels), label=label)
+            figure.colorbar(image, ax=figure.axes, label=f"{name}, {units[name]}")
         figures[name] = figure
     return figures
+
+
+class _Plane(NamedTuple):
+    """Axes across, along and through the slices, 0 to 2."""
+
+    across: int
+    along: int
+    through: int
+
+
+def _slices(position_m: Floats, value: Floats, plane: _Plane, headline: str) -> tuple[Figure, Any]:
+    """A figure with a panel for each slice, and the last image in it, if there is anything to colour."""
+    across = np.unique(position_m[:, plane.across])
+    along = np.unique(position_m[:, plane.along])
+    height = position_m[:, plane.through]
+    levels = np.unique(height)
+    size = _size(across, along, len(levels))
+    figure = Figure(figsize=size, layout="constrained")
+    grid: Any = figure.subplots(len(levels), 1, sharex=True, sharey=True, squeeze=False)
+    panels = grid[:, 0]
+    figure.suptitle(headline, fontsize=10.5, x=0.02, ha="left", color=INK)
+    x, y, z = ("xyz"[axis] for axis in plane)
+    ends = _ends(value)
+    image: Any = None
+    for axes, level in zip(panels, levels[::-1], strict=True):
+        here = height == level
+        places = position_m[here][:, [plane.across, plane.along]]
+        field = _field(across, along, places, value[here])
+        image = _draw_slice(axes, across, along, field, ends) or image
+        axes.set_title(f"{z} = {level:.3g} m", fontsize=9.5)
+        axes.set_ylabel(f"{y}, m")
+    panels[-1].set_xlabel(f"{x}, m")
+    return figure, image
 
 
 def _ends(values: Floats) -> tuple[float, float]:
     """Least and largest of what is known; infinite where nothing is."""
     known = values[np.isfinite(values)]
-    return float(np.min(known, initial=np.inf)), float(np.max(known, initial=-np.inf))
+    least = np.min(known, initial=np.inf)
+    largest = np.max(known, initial=-np.inf)
+    return float(least), float(largest)
 
 
 def _headed(name: str, title: str) -> str:
@@ -68,8 +89,9 @@ def _headed(name: str, title: str) -> str:
 
 def _size(across: Floats, along: Floats, slices: int) -> tuple[float, float]:
     """Of a figure with so many slices above each other, inches."""
-    height = 2.6 * (np.ptp(along) / max(np.ptp(across), 1e-9) if len(across) > 1 else 1.0)
-    return 4.0, 0.8 + slices * (min(max(height, 1.0), 3.6) + 0.35)
+    ratio = np.ptp(along) / max(np.ptp(across), 1e-9) if len(across) > 1 else 1.0
+    height = min(max(2.6 * ratio, 1.0), 3.6)
+    return 4.0, 0.8 + slices * (height + 0.35)
 
 
 def _field(across: Floats, along: Floats, places: Floats, values: Floats) -> Floats:
@@ -100,7 +122,10 @@ def orientation(one: Map) -> str:
     ----------
     one : Map
     """
-    return f"({', '.join(f'{value:.3g}' for value in one.rotation_rad)}) rad" if one.rotation_rad.any() else ""
+    if not one.rotation_rad.any():
+        return ""
+    components = ", ".join(f"{value:.3g}" for value in one.rotation_rad)
+    return f"({components}) rad"
 
 
 def _axes(position_m: Floats) -> tuple[int, int, int]:
@@ -116,4 +141,6 @@ def _edges(centres: Floats) -> Floats:
     if len(centres) == 1:
         return centres[0] + np.array([-0.05, 0.05])
     middle = 0.5 * (centres[1:] + centres[:-1])
-    return np.concatenate([[1.5 * centres[0] - 0.5 * centres[1]], middle, [1.5 * centres[-1] - 0.5 * centres[-2]]])
+    first = 1.5 * centres[0] - 0.5 * centres[1]
+    last = 1.5 * centres[-1] - 0.5 * centres[-2]
+    return np.concatenate([[first], middle, [last]])
