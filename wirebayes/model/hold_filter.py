@@ -95,15 +95,35 @@ def filter_hold(
     along_s = summed(by_setting, surprise) * noise.weight
     creep, setting = known.errors(along_c, along_s)
     left = surprise - by_creep * creep - by_setting * setting
-    pull_c = ((1.0 + noise.setting_var * known.ss) * along_c - noise.setting_var * known.cs * along_s) / known.det
-    pull_s = ((1.0 + p * known.cc) * along_s - p * known.cs * along_c) / known.det
-    # a sum of squares: the shorter difference of products can turn negative at absurd parameters
-    square = summed(left, left) * noise.weight + p * pull_c**2 + noise.setting_var * pull_s**2
-    log_density = -0.5 * (square + surprise.shape[0] * noise.log_variance + np.log(known.det))
-    carry_c, carry_s = line.carry_by_creep[j], line.carry_by_setting[j]
-    mean = carry_c * (m + creep) + carry_s * setting
-    var = known.var_along(carry_c, carry_s)
+    pull_c, pull_s = known.pulls(along_c, along_s, p, noise.setting_var)
+    log_density = _log_density(left, p * pull_c**2, noise.setting_var * pull_s**2, known.det, noise)
+    mean, var = _carried(line, j, m + creep, setting, known)
     return HoldRead(log_density, mean, var, left, pull_c, pull_s, known.cc, known.ss)
+
+
+def _log_density(left: Array, of_creep: Array, of_setting: Array, det: Array, noise: ReadingNoise) -> Array:
+    """Of a hold's readings, by a sum of squares: the shorter difference of products can turn negative at absurd values.
+
+    Parameters
+    ----------
+    left : (R, n) array
+        What they leave over.
+    of_creep, of_setting, det : (n,) arrays
+        What either error adds to the squares; the determinant of `HoldInformation`.
+    noise : ReadingNoise
+    """
+    of_readings = summed(left, left) * noise.weight
+    square = of_readings + of_creep + of_setting
+    log_noise = len(left) * noise.log_variance
+    return -0.5 * (square + log_noise + np.log(det))
+
+
+def _carried(line: Linearised, j: int, creep: Array, setting: Array, known: "HoldInformation") -> tuple[Array, Array]:
+    """Mean and variance of the creep carried on, by the creep carried in and the setting error given the readings."""
+    carry_c = line.carry_by_creep[j]
+    carry_s = line.carry_by_setting[j]
+    mean = carry_c * creep + carry_s * setting
+    return mean, known.var_along(carry_c, carry_s)
 
 
 def summed(one: Array, other: Array) -> Array:
@@ -131,6 +151,12 @@ class HoldInformation(NamedTuple):
         creep = self.v_cc * along_c + self.v_cs * along_s
         setting = self.v_cs * along_c + self.v_ss * along_s
         return creep, setting
+
+    def pulls(self, along_c: Array, along_s: Array, p: Array, q: Array) -> tuple[Array, Array]:
+        """By how much the readings pull at either, which have variances p and q before."""
+        at_creep = (1.0 + q * self.ss) * along_c - q * self.cs * along_s
+        at_setting = (1.0 + p * self.cc) * along_s - p * self.cs * along_c
+        return at_creep / self.det, at_setting / self.det
 
     def var_along(self, a: Array, c: Array) -> Array:
         """Variance of a times the creep carried in plus c times the setting error."""
@@ -186,22 +212,44 @@ class Later:
         readings : (R, n) or (R, 1) array
         mask : (R,) bool array
         """
-        carry_c, carry_s = line.carry_by_creep[j], line.carry_by_setting[j]
+        joint = self._with_setting(line, j, readings[mask], mask, noise.weight)
+        return self._without_setting(joint, noise, int(mask.sum()))
+
+    def _with_setting(self, line: Linearised, j: int, readings: Array, mask: Array, weight: Array) -> "_JointLater":
+        """The same with those readings, jointly by the creep carried into their hold and by its setting error."""
+        carry_c = line.carry_by_creep[j]
+        carry_s = line.carry_by_setting[j]
         by_creep = line.by_creep[j][mask]
         by_setting = line.by_setting[j][mask]
-        left = readings[mask] - line.reading[j][mask]
-        squares = summed(left, left) * noise.weight
-        # jointly in the carried creep and the setting error ...
-        cc = summed(by_creep, by_creep) * noise.weight + self.precision * carry_c * carry_c
-        cs = summed(by_creep, by_setting) * noise.weight + self.precision * carry_c * carry_s
-        ss = summed(by_setting, by_setting) * noise.weight + self.precision * carry_s * carry_s
-        pull_c = summed(by_creep, left) * noise.weight + self.pull * carry_c
-        pull_s = summed(by_setting, left) * noise.weight + self.pull * carry_s
-        # ... which is then integrated out
-        wider = 1.0 + noise.setting_var * ss
+        left = readings - line.reading[j][mask]
+        precise_c = self.precision * carry_c
+        precise_s = self.precision * carry_s
+        cc = summed(by_creep, by_creep) * weight + precise_c * carry_c
+        cs = summed(by_creep, by_setting) * weight + precise_c * carry_s
+        ss = summed(by_setting, by_setting) * weight + precise_s * carry_s
+        pull_c = summed(by_creep, left) * weight + self.pull * carry_c
+        pull_s = summed(by_setting, left) * weight + self.pull * carry_s
+        squares = summed(left, left) * weight
+        return _JointLater(cc, cs, ss, pull_c, pull_s, squares)
+
+    def _without_setting(self, joint: "_JointLater", noise: ReadingNoise, count: int) -> "Later":
+        """With the setting error of that hold, of so many readings, integrated out."""
+        wider = 1.0 + noise.setting_var * joint.ss
         known_s = noise.setting_var / wider
-        log_noise = len(left) * noise.log_variance + np.log(wider)
-        constant = self.constant - 0.5 * (squares + log_noise - known_s * pull_s**2)
-        precision = np.maximum(cc - known_s * cs * cs, 0.0)
-        pull = pull_c - known_s * cs * pull_s
-        return Later(precision, pull, constant, self.square + squares)
+        log_noise = count * noise.log_variance + np.log(wider)
+        by_readings = joint.squares + log_noise - known_s * joint.pull_s**2
+        precision = joint.cc - known_s * joint.cs * joint.cs
+        pull = joint.pull_c - known_s * joint.cs * joint.pull_s
+        constant = self.constant - 0.5 * by_readings
+        return Later(np.maximum(precision, 0.0), pull, constant, self.square + joint.squares)
+
+
+class _JointLater(NamedTuple):
+    """Precision and pull of `Later` by the creep carried in, c, and a setting error, s; squared residuals of a hold."""
+
+    cc: Array
+    cs: Array
+    ss: Array
+    pull_c: Array
+    pull_s: Array
+    squares: Array

@@ -75,14 +75,16 @@ def chain(
     var = np.zeros((holds + 1, n))
     noise = ReadingNoise.of(variance, setting_sd)
     for j in range(holds):
-        if mask[j].any():
-            known_noise = noise.where_read(readings[j], mask[j])
-            found = filter_hold(line, j, readings[j], mask[j], mean[j], var[j], known_noise)
-            log_likelihood[j] = found.log_density
-            mean[j + 1] = found.mean
-            var[j + 1] = found.var
-        else:
-            mean[j + 1], var[j + 1] = carried_unread(line, j, mean[j], var[j], noise)
+        m = mean[j]
+        p = var[j]
+        if not mask[j].any():
+            mean[j + 1], var[j + 1] = carried_unread(line, j, m, p, noise)
+            continue
+        known_noise = noise.where_read(readings[j], mask[j])
+        found = filter_hold(line, j, readings[j], mask[j], m, p, known_noise)
+        log_likelihood[j] = found.log_density
+        mean[j + 1] = found.mean
+        var[j + 1] = found.var
     return Filtered(log_likelihood, mean, var)
 
 
@@ -109,17 +111,20 @@ def standardised(
     assert isinstance(line, Linearised)  # nothing is streamed without the kernel
     n = line.reading.shape[2]
     noise = ReadingNoise.of(variance, setting_sd)
-    log_likelihood, mean, var = np.zeros(n), np.zeros(n), np.zeros(n)
+    log_likelihood = np.zeros(n)
+    mean = np.zeros(n)
+    var = np.zeros(n)
     residuals: list[Array] = []
-    for j in range(len(mask)):
-        if mask[j].any():
-            known_noise = noise.where_read(readings[j], mask[j])
-            found = filter_hold(line, j, readings[j], mask[j], mean, var, known_noise)
-            residuals += _residuals(found, var, known_noise)
-            log_likelihood = log_likelihood + found.log_density
-            mean, var = found.mean, found.var
-        else:
+    for j, taken in enumerate(mask):
+        if not taken.any():
             mean, var = carried_unread(line, j, mean, var, noise)
+            continue
+        known_noise = noise.where_read(readings[j], taken)
+        found = filter_hold(line, j, readings[j], taken, mean, var, known_noise)
+        residuals += _residuals(found, var, known_noise)
+        log_likelihood = log_likelihood + found.log_density
+        mean = found.mean
+        var = found.var
     return log_likelihood, np.concatenate(residuals)
 
 
@@ -218,21 +223,28 @@ def seen(
     gram = np.zeros((k, k, n))
     along = np.zeros((k, n))
     mean = np.zeros((k, n))  # of the carried creep, had the shapes been the readings
+    setting_var = setting_sd * setting_sd
     for j, keep in enumerate(mask):
         by_creep = line.by_creep[j][keep]
         by_setting = line.by_setting[j][keep]
-        known = information_of(by_creep, by_setting, 1.0 / variance, filtered.carried_var[j], setting_sd * setting_sd)
+        known = information_of(by_creep, by_setting, 1.0 / variance, filtered.carried_var[j], setting_var)
         surprise = readings[j][keep] - line.reading[j][keep] - by_creep * filtered.carried_mean[j]
         # what is left of the shapes beside the creep that they would have carried in
         left = shapes[j][keep][:, :, None] - by_creep[:, None] * mean
-        along_c, along_s = (_along(slopes, left) / variance for slopes in (by_creep, by_setting))
+        along_c = _along(by_creep, left) / variance
+        along_s = _along(by_setting, left) / variance
         creep, setting = known.errors(along_c, along_s)
         gram += np.einsum("rkn,rln->kln", left, left) / variance
-        gram -= np.einsum("kn,ln->kln", along_c, creep) + np.einsum("kn,ln->kln", along_s, setting)
+        gram -= _products(along_c, creep) + _products(along_s, setting)
         left -= creep * by_creep[:, None] + setting * by_setting[:, None]
         along += _along(surprise, left) / variance
         mean = line.carry_by_creep[j] * (mean + creep) + line.carry_by_setting[j] * setting
     return np.moveaxis(gram, -1, 0), along.T
+
+
+def _products(one: Array, other: Array) -> Array:
+    """(k, k, n) products of rows (k, n)."""
+    return np.asarray(np.einsum("kn,ln->kln", one, other))
 
 
 def _seen_by(
@@ -290,12 +302,13 @@ def without_each_hold(
         Log densities.
     """
     holds, _, n = line.reading.shape
-    noise, out = ReadingNoise.of(variance, setting_sd), np.zeros((holds, n))
+    noise = ReadingNoise.of(variance, setting_sd)
+    out = np.zeros((holds, n))
     out[1:] = np.cumsum(filtered.log_likelihood[:-1], axis=0)
     later = Later(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n))
     for j in reversed(range(holds)):
-        m, p = filtered.carried_mean[j], filtered.carried_var[j]
-        log_density = out[j] + later.log_density(*carried_unread(line, j, m, p, noise))
+        mean, var = carried_unread(line, j, filtered.carried_mean[j], filtered.carried_var[j], noise)
+        log_density = out[j] + later.log_density(mean, var)
         out[j] = np.where(later.square < _ABSURD, log_density, -np.inf)
         later = later.with_hold(line, j, readings[j], mask[j], noise)
     return out
