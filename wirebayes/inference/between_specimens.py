@@ -60,26 +60,39 @@ def between_specimens(logarithms: list[Floats], prior: tuple[Floats, Floats], co
     rng : numpy Generator
     """
     information = [_information(values, prior) for values in logarithms]
-    mean = float(np.log(SPREAD.median()))
-    sd = float(np.log(SPREAD.ppf(_ONE_SD)) - mean)  # of log s, which is normal
-    p = len(prior[0])
+    middle = float(np.log(SPREAD.median()))
+    sd = float(np.log(SPREAD.ppf(_ONE_SD)) - middle)  # of log s, which is normal
 
     def log_density(log_s: Floats) -> Floats:
-        return _collapsed(log_s, information, prior)[0] - 0.5 * (((log_s - mean) / sd) ** 2).sum(1)
+        log_prior = -0.5 * (((log_s - middle) / sd) ** 2).sum(1)
+        return _collapsed(log_s, information, prior)[0] + log_prior
 
-    def unlikely(log_s: Any) -> float:
-        return -float(log_density(np.asarray(log_s)[None])[0])
-
-    bounds = [(mean - _REACH * sd, mean + _REACH * sd)] * p
-    mode = np.asarray(optimize.minimize(unlikely, [mean] * p, method="L-BFGS-B", bounds=bounds).x)
+    mode = _mode(log_density, np.full(len(prior[0]), middle), _REACH * sd)
     root = np.asarray(np.linalg.cholesky(_covariance(log_density, mode, sd)), np.float64)
     log_s, weight = _weighted(log_density, mode, root, rng)
     chosen = log_s[rng.permutation(systematic_rows(weight, count, rng))]
     _, precision, vector = _collapsed(chosen, information, prior)
+    effective = float(1.0 / (weight**2).sum())
+    return LineDraws(_normal_draws(precision, vector, rng), np.exp(chosen), effective)
+
+
+def _mode(log_density: Callable[[Floats], Floats], start: Floats, reach: float) -> Floats:
+    """Where the density of log s is largest, no farther than so much from the start in any coordinate."""
+
+    def unlikely(log_s: Any) -> float:
+        return -float(log_density(np.asarray(log_s)[None])[0])
+
+    bounds = [(middle - reach, middle + reach) for middle in start]
+    found = optimize.minimize(unlikely, start, method="L-BFGS-B", bounds=bounds)
+    return np.asarray(found.x)
+
+
+def _normal_draws(precision: Floats, vector: Floats, rng: Generator) -> Floats:
+    """A draw (p,) of each of n normal distributions, of precisions (n, p, p) and their products with the means."""
     covariance = np.linalg.inv(precision)
     centre = np.einsum("nij,nj->ni", covariance, vector)
-    noise = np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), rng.standard_normal((count, p)))
-    return LineDraws(centre + noise, np.exp(chosen), float(1.0 / (weight**2).sum()))
+    root = np.linalg.cholesky(covariance)
+    return centre + np.einsum("nij,nj->ni", root, rng.standard_normal(vector.shape))
 
 
 def _weighted(
@@ -99,16 +112,17 @@ def _weighted(
 
 def _information(values: Floats, prior: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
     """Precision and vector of a specimen's readings alone: its posterior without the prior, never below none."""
-    mean, covariance = values.mean(0), np.atleast_2d(np.cov(values.T))
     before = np.linalg.inv(prior[1])
-    precision = np.linalg.inv(covariance)
+    precision = np.linalg.inv(np.atleast_2d(np.cov(values.T)))
+    vector = precision @ values.mean(0) - before @ prior[0]
     scale = np.sqrt(np.diag(precision))
-    vector = precision @ mean - before @ prior[0]
-    sizes, axes = np.linalg.eigh((precision - before) / np.outer(scale, scale))
+    products = np.outer(scale, scale)
+    sizes, axes = np.linalg.eigh((precision - before) / products)
     kept = sizes > 1e-6  # what the readings say nothing of may come out negative
     axes = axes[:, kept]
+    known = (axes * sizes[kept]) @ axes.T
     part = scale[:, None] * (axes @ (axes.T @ (vector / scale))[:, None])
-    return np.outer(scale, scale) * ((axes * sizes[kept]) @ axes.T), part[:, 0]
+    return products * known, part[:, 0]
 
 
 def _collapsed(
@@ -126,21 +140,30 @@ def _collapsed(
         within = np.linalg.inv(both)
         precision += inverse - inverse @ within @ inverse
         vector += np.einsum("nij,njk,k->ni", inverse, within, own_vector)
-        log_likelihood += (
-            0.5 * np.einsum("i,nij,j->n", own_vector, within, own_vector) - 0.5 * np.linalg.slogdet(both)[1]
-        )
+        square = np.einsum("i,nij,j->n", own_vector, within, own_vector)
+        log_likelihood += 0.5 * square - 0.5 * _log_determinant(both)
         log_likelihood -= log_s.sum(1)
     centre = np.linalg.solve(precision, vector[..., None])[..., 0]
-    log_likelihood += 0.5 * (vector * centre).sum(1) - 0.5 * np.linalg.slogdet(precision)[1]
+    explained = (vector * centre).sum(1)
+    log_likelihood += 0.5 * explained - 0.5 * _log_determinant(precision)
     return log_likelihood, precision, vector
+
+
+def _log_determinant(matrices: Floats) -> Floats:
+    """(n,) of (n, p, p)."""
+    return np.asarray(np.linalg.slogdet(matrices)[1])
 
 
 def _covariance(log_density: Callable[[Floats], Floats], mode: Floats, sd: float) -> Floats:
     """Inverse curvature at the mode, no wider than the prior in any direction."""
     p = len(mode)
     steps = _STEP * np.eye(p)
-    pairs = [mode + a * steps[i] + b * steps[j] for i in range(p) for j in range(p) for a in (1, -1) for b in (1, -1)]
-    values = log_density(np.array(pairs)).reshape(p, p, 4)
-    hessian = -(values[..., 0] - values[..., 1] - values[..., 2] + values[..., 3]) / (4 * _STEP**2)
+    corners = []
+    for one in steps:
+        for other in steps:
+            corners += [mode + a * one + b * other for a in (1, -1) for b in (1, -1)]
+    both, one_back, other_back, both_back = log_density(np.array(corners)).reshape(p * p, 4).T
+    second = both - one_back - other_back + both_back
+    hessian = -second.reshape(p, p) / (4 * _STEP**2)
     sizes, axes = np.linalg.eigh(0.5 * (hessian + hessian.T))
     return np.asarray((axes / np.maximum(sizes, sd**-2)) @ axes.T)

@@ -27,7 +27,11 @@ def bulk_ess(values: Array) -> float:
 
 def tail_ess(values: Array) -> float:
     """Effective number of draws in the worse of the two 5 % tails, of (chains, draws)."""
-    return min(_ess(_split((values <= end).astype(float))) for end in np.quantile(values, _TAILS))
+    found = []
+    for end in np.quantile(values, _TAILS):
+        within = (values <= end).astype(float)
+        found.append(_ess(_split(within)))
+    return min(found)
 
 
 def r_hat(values: Array) -> float:
@@ -95,12 +99,18 @@ def cumulative_distance(values: Array, weight: Array) -> float:
     plain = np.linspace(1.0 / n, 1.0 - 1.0 / n, n - 1)
     weighted = np.cumsum(weight[order] / weight.sum())[:-1]
     middle = 0.5 * (plain + weighted)
-    areas = np.array([plain @ widths, weighted @ widths])
-    diverged = 0.0
-    for share, excess in ((plain, areas[1] - areas[0]), (weighted, areas[0] - areas[1])):
-        integral = widths @ (share * (_log2(share) - _log2(middle)))
-        diverged += max(0.0, float(integral + 0.5 / np.log(2.0) * excess))
-    return float(np.sqrt(diverged / areas.sum()))
+    plain_area = float(plain @ widths)
+    weighted_area = float(weighted @ widths)
+    diverged = _diverged(plain, middle, widths, weighted_area - plain_area)
+    diverged += _diverged(weighted, middle, widths, plain_area - weighted_area)
+    return float(np.sqrt(diverged / (plain_area + weighted_area)))
+
+
+def _diverged(share: Array, middle: Array, widths: Array, excess: float) -> float:
+    """Cumulative divergence of one distribution from the middle of two; the other's area exceeds its own by so much."""
+    log_ratio = _log2(share) - _log2(middle)
+    integral = widths @ (share * log_ratio)
+    return max(0.0, float(integral + 0.5 / np.log(2.0) * excess))
 
 
 def _log2(share: Array) -> Array:
@@ -132,33 +142,47 @@ def _between_over_within(chains: Array) -> float:
 
 def _ess(chains: Array) -> float:
     """Effective number of draws of the mean of (chains, draws), by Geyer's initial monotone sequence."""
-    m, n = chains.shape
     if np.ptp(chains) < _SAME:
         return float(chains.size)
+    correlation = _autocorrelation(chains)
+    most = max((chains.shape[1] - 1) // 2, 1)
+    pairs = correlation[: 2 * most].reshape(-1, 2).sum(axis=1)
+    ends = np.flatnonzero(pairs <= 0.0)
+    last = int(ends[0]) if len(ends) else len(pairs) - 1
+    rest = float(correlation[2 * last])  # of this pair only the first correlation counts, and once
+    if not pairs[last] >= 0.0:
+        rest = max(rest, 0.0)
+    falling = np.minimum.accumulate(pairs[:last])
+    time = -1.0 + 2.0 * float(falling.sum()) + rest
+    return float(chains.size / max(time, 1.0 / np.log10(chains.size)))
+
+
+def _autocorrelation(chains: Array) -> Array:
+    """(lags,) autocorrelation of all (chains, draws) together, chains that are apart included."""
+    m, n = chains.shape
     covariance = _autocovariance(chains).mean(axis=0)
     between = chains.mean(axis=1).var(ddof=1) if m > 1 else 0.0
     within = covariance[0] * n / (n - 1.0)
     correlation = 1.0 - (within - covariance) / (covariance[0] + between)
     correlation[0] = 1.0
-    pairs = correlation[: 2 * max((n - 1) // 2, 1)].reshape(-1, 2).sum(axis=1)
-    ends = np.flatnonzero(pairs <= 0.0)
-    last = int(ends[0]) if len(ends) else len(pairs) - 1  # of this pair only the first correlation counts, and once
-    rest = float(correlation[2 * last]) if pairs[last] >= 0.0 else max(float(correlation[2 * last]), 0.0)
-    time = -1.0 + 2.0 * float(np.minimum.accumulate(pairs[:last]).sum()) + rest
-    return float(chains.size / max(time, 1.0 / np.log10(chains.size)))
+    return np.asarray(correlation)
 
 
 def _autocovariance(chains: Array) -> Array:
     """(chains, lags) autocovariance of (chains, draws), each about the mean of its chain."""
     n = chains.shape[1]
+    away = chains - chains.mean(axis=1, keepdims=True)
     padded = 1 << (2 * n - 1).bit_length()  # so that the ends do not meet
-    spectrum = np.fft.rfft(chains - chains.mean(axis=1, keepdims=True), padded, axis=1)
-    return np.fft.irfft(spectrum * spectrum.conj(), padded, axis=1)[:, :n] / n
+    spectrum = np.fft.rfft(away, padded, axis=1)
+    product = np.fft.irfft(spectrum * spectrum.conj(), padded, axis=1)
+    return product[:, :n] / n
 
 
 def _tail_size(n: int, independent: float) -> int:
     """How many of n draws make up the tail, each worth a share of an independent one."""
-    return int(3.0 * np.sqrt(n / independent)) if n * independent > _FEW else n // 5
+    if n * independent > _FEW:
+        return int(3.0 * np.sqrt(n / independent))
+    return n // 5
 
 
 def _smoothed(log_ratio: Array, size: int) -> tuple[Array, float]:
@@ -168,12 +192,22 @@ def _smoothed(log_ratio: Array, size: int) -> tuple[Array, float]:
     largest = order[-size:]
     threshold = float(np.exp(log_weight[order[-size - 1]]))
     excess = np.exp(log_weight[largest]) - threshold
-    shape, scale = pareto_fit(excess) if size >= _LEAST_TAIL and np.ptp(excess) > 0.0 else (np.nan, np.nan)
+    shape = scale = np.nan
+    if size >= _LEAST_TAIL and np.ptp(excess) > 0.0:
+        shape, scale = pareto_fit(excess)
     if np.isfinite(shape):
-        level = (np.arange(size) + 0.5) / size
-        quantile = np.expm1(-shape * np.log1p(-level)) / shape if shape else -np.log1p(-level)
-        log_weight[largest] = np.minimum(np.log(threshold + scale * quantile), 0.0)
+        smooth = threshold + scale * _pareto_quantiles(shape, size)
+        log_weight[largest] = np.minimum(np.log(smooth), 0.0)
     return log_weight - logsumexp(log_weight), shape
+
+
+def _pareto_quantiles(shape: float, size: int) -> Array:
+    """(size,) evenly spaced quantiles of a generalised Pareto distribution of unit scale."""
+    level = (np.arange(size) + 0.5) / size
+    hazard = -np.log1p(-level)
+    if shape == 0.0:
+        return np.asarray(hazard)
+    return np.asarray(np.expm1(shape * hazard) / shape)
 
 
 def pareto_fit(excess: Array) -> tuple[float, float]:
@@ -192,12 +226,10 @@ def pareto_fit(excess: Array) -> tuple[float, float]:
         NaN where a quarter of the values stand on the threshold: then there is no such tail.
     """
     n = len(excess)
-    steps = 30 + int(np.sqrt(n))
     quartile = excess[int(n / 4 + 0.5) - 1]
     if not quartile > 0.0:
         return np.nan, np.nan
-    below_one = 1.0 - np.sqrt(steps / (np.arange(steps) + 0.5))
-    rates = below_one / (3.0 * quartile) + 1.0 / excess[-1]
+    rates = _rates_to_try(excess, quartile)
     shapes = np.log1p(-rates[:, None] * excess).mean(axis=1)
     log_likelihood = n * (np.log(-rates / shapes) - shapes - 1.0)
     weight = np.exp(log_likelihood - logsumexp(log_likelihood))
@@ -205,6 +237,13 @@ def pareto_fit(excess: Array) -> tuple[float, float]:
     rate = float(rates @ weight / weight.sum())
     shape = float(np.log1p(-rate * excess).mean())
     return (n * shape + 5.0) / (n + 10.0), -shape / rate
+
+
+def _rates_to_try(excess: Array, quartile: float) -> Array:
+    """Zhang and Stephens' grid of the rate, which is minus shape over scale; `quartile` is that of the values."""
+    steps = 30 + int(np.sqrt(len(excess)))
+    below_one = 1.0 - np.sqrt(steps / (np.arange(steps) + 0.5))
+    return below_one / (3.0 * quartile) + 1.0 / excess[-1]
 
 
 _TAILS = (0.05, 0.95)  # the ends of a 90 % interval

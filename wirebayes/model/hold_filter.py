@@ -153,7 +153,15 @@ class HoldInformation(NamedTuple):
         return creep, setting
 
     def pulls(self, along_c: Array, along_s: Array, p: Array, q: Array) -> tuple[Array, Array]:
-        """By how much the readings pull at either, which have variances p and q before."""
+        """By how much the readings pull at either.
+
+        Parameters
+        ----------
+        along_c, along_s : (n,) arrays
+            What they have along the slopes, divided by the variance of a reading.
+        p, q : (n,) arrays
+            Variances of either before.
+        """
         at_creep = (1.0 + q * self.ss) * along_c - q * self.cs * along_s
         at_setting = (1.0 + p * self.cc) * along_s - p * self.cs * along_c
         return at_creep / self.det, at_setting / self.det

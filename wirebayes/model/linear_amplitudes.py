@@ -18,6 +18,7 @@ from wirebayes.model.sample import Sample
 from wirebayes.numeric import linear_algebra
 from wirebayes.numeric.distributions import Normal, ours
 from wirebayes.numeric.typing import Array
+from wirebayes.wire.effect import Effect
 from wirebayes.wire.staircase import Linearised, simulate
 
 _ROWS = 2048  # draws completed at once
@@ -58,12 +59,15 @@ class MarginalisedProblem(Problem):
         with np.errstate(all="ignore"):
             lines = self._lines(theta)
             seen = self._seen(lines, readings)
-            best = (np.swapaxes(linear_algebra.inv(seen.factor), 1, 2) @ seen.along[..., None])[..., 0].T
-            for i, (sample, (line, variance, setting_sd)) in enumerate(zip(self.samples, lines, strict=True)):
+            best = seen.amplitudes(seen.along).T
+            for i, sample in enumerate(self.samples):
                 y = sample.readings if readings is None else readings[i]
-                left = y - np.einsum("hrk,kn->hrn", self.shapes[i] * self.sd, best)
-                residuals.append(likelihoods.standardised(line, left, sample.protocol.mask, variance, setting_sd)[1])
-            return self._log_likelihood(seen), np.concatenate([*residuals, best, np.log(seen.diagonal.T)])
+                added = np.einsum("hrk,kn->hrn", self.shapes[i] * self.sd, best)
+                line, variance, setting_sd = lines[i]
+                _, left = likelihoods.standardised(line, y - added, sample.protocol.mask, variance, setting_sd)
+                residuals.append(left)
+            residuals += [best, np.log(seen.diagonal.T)]
+            return self._log_likelihood(seen), np.concatenate(residuals)
 
     def _lines(self, theta: Array) -> list[tuple[Linearised, Array, Array]]:
         return [self.linearised(theta, sample) for sample in self.samples]
@@ -71,39 +75,40 @@ class MarginalisedProblem(Problem):
     def _log_likelihood(self, seen: "_Seen") -> Array:
         explained = (seen.along**2).sum(axis=1)
         # At absurd parameters rounding may make more of the readings than there is to explain.
-        regular = (seen.diagonal > 1.0 - _ROUNDING).all(axis=1) & (explained <= (1.0 + _ROUNDING) * seen.square)
-        total = seen.total + 0.5 * (explained - ((self.mean / self.sd) ** 2).sum()) - np.log(seen.diagonal).sum(axis=1)
+        precise = (seen.diagonal > 1.0 - _ROUNDING).all(axis=1)
+        regular = precise & (explained <= (1.0 + _ROUNDING) * seen.square)
+        by_prior = ((self.mean / self.sd) ** 2).sum()
+        total = seen.total + 0.5 * (explained - by_prior) - np.log(seen.diagonal).sum(axis=1)
         return np.where(regular & np.isfinite(total), total, -np.inf)
 
     def drawn(self, theta: Array, rng: Generator) -> tuple[Array, Array]:
         """(n, k) amplitudes given the other parameters, and (n,) the log density of being drawn."""
         seen = self._seen(self._lines(theta), None)
         normal = rng.normal(size=seen.along.shape)
-        inverse = np.swapaxes(linear_algebra.inv(seen.factor), 1, 2)
-        amplitudes = (inverse @ (seen.along + normal)[..., None])[..., 0] * self.sd
-        log_density = (np.log(seen.diagonal) - 0.5 * normal**2 - 0.5 * np.log(2.0 * np.pi)).sum(axis=1)
-        return amplitudes, log_density - np.log(self.sd).sum()
+        amplitudes = seen.amplitudes(seen.along + normal) * self.sd
+        log_densities = np.log(seen.diagonal) - 0.5 * normal**2 - 0.5 * np.log(2.0 * np.pi)
+        log_volume = np.log(self.sd).sum()
+        return amplitudes, log_densities.sum(axis=1) - log_volume
 
     def _seen(self, lines: Sequence[tuple[Linearised, Array, Array]], readings: Any) -> "_Seen":
         """What the readings say of the amplitudes."""
+        expected = self.mean / self.sd
         total: Any = 0.0
-        square: Any = ((self.mean / self.sd) ** 2).sum()
+        square: Any = (expected**2).sum()
         precision: Any = np.eye(len(self.sd))
-        pull: Any = self.mean / self.sd
+        pull: Any = expected
         for i, sample in enumerate(self.samples):
-            y, mask = sample.readings if readings is None else readings[i], sample.protocol.mask
+            y = sample.readings if readings is None else readings[i]
+            mask = sample.protocol.mask
             line, variance, setting_sd = lines[i]
             filtered = likelihoods.chain(line, y, mask, variance, setting_sd)
             gram, along = likelihoods.seen(line, filtered, y, self.shapes[i] * self.sd, mask, variance, setting_sd)
             height = filtered.log_likelihood.sum(axis=0)
             total = total + height
             square = square - 2.0 * height - mask.sum() * np.log(2.0 * np.pi * variance)
-            precision, pull = precision + gram, pull + along
-        factor = linear_algebra.cholesky(precision)
-        finite = np.isfinite(factor).all(axis=(1, 2))
-        factor[~finite] = np.eye(len(self.sd))
-        along = np.linalg.solve(factor, pull[..., None])[..., 0]
-        return _Seen(np.where(finite, total, -np.inf), square, factor, along)
+            precision = precision + gram
+            pull = pull + along
+        return _Seen.of(total, square, precision, pull)
 
 
 @dataclass(frozen=True)
@@ -127,10 +132,32 @@ class _Seen:
     factor: Array
     along: Array
 
+    @classmethod
+    def of(cls, total: Array, square: Array, precision: Array, pull: Array) -> "_Seen":
+        """The same by the posterior precision, without a likelihood where that has no factor.
+
+        Parameters
+        ----------
+        total, square : (n,) arrays
+        precision : (n, k, k) array
+        pull : (n, k) array
+            Its product with the posterior mean.
+        """
+        factor = linear_algebra.cholesky(precision)
+        finite = np.isfinite(factor).all(axis=(1, 2))
+        factor[~finite] = np.eye(pull.shape[1])
+        along = np.linalg.solve(factor, pull[..., None])[..., 0]
+        return cls(np.where(finite, total, -np.inf), square, factor, along)
+
     @property
     def diagonal(self) -> Array:
         """(n, k) of the factor."""
         return np.einsum("nii->ni", self.factor)
+
+    def amplitudes(self, along: Array) -> Array:
+        """(n, k) those whose product with the factor's transpose is `along` (n, k)."""
+        inverse = np.swapaxes(linear_algebra.inv(self.factor), 1, 2)
+        return np.asarray((inverse @ along[..., None])[..., 0])
 
 
 def integrated(problem: Problem) -> Problem:
@@ -139,15 +166,17 @@ def integrated(problem: Problem) -> Problem:
     That are those of effects that only add to the reading, if no other effect comes after them and their priors are
     normal.
     """
-    last = {effect.key: effect for sample in problem.samples for effect in sample.model.at("reading")[-1:]}
-    additive = {key: effect for key, effect in last.items() if effect.adds}
-    gone = [column for effect in additive.values() for column in effect.columns() if column in problem.names]
+    additive = _additive_effects(problem)
+    columns = [column for effect in additive.values() for column in effect.columns()]
+    gone = [column for column in columns if column in problem.names]
+    if not gone or problem.likelihood != "chain":
+        return problem
     priors = [ours(problem.prior.distributions[column]) for column in gone]
-    if not gone or problem.likelihood != "chain" or not all(isinstance(p, Normal) for p in priors):
+    if not all(isinstance(prior, Normal) for prior in priors):
         return problem
     shapes = [_shapes(problem, i, gone) for i in range(len(problem.samples))]
-    shows = np.any([(s != 0).any(axis=(0, 1)) for s in shapes], axis=0)
-    left = {name: d for name, d in problem.prior.distributions.items() if name not in gone}
+    shows = np.any([(shape != 0).any(axis=(0, 1)) for shape in shapes], axis=0)
+    left = {name: prior for name, prior in problem.prior.distributions.items() if name not in gone}
     samples = tuple(_without(sample, additive) for sample in problem.samples)
     return MarginalisedProblem(
         samples,
@@ -158,10 +187,20 @@ def integrated(problem: Problem) -> Problem:
         stated=problem.stated,
         whole=problem,
         columns=tuple(np.array(gone)[shows]),
-        shapes=tuple(s[..., shows] for s in shapes),
-        mean=np.array([p.mean() for p in priors])[shows],
-        sd=np.array([p.std() for p in priors])[shows],
+        shapes=tuple(shape[..., shows] for shape in shapes),
+        mean=np.array([prior.mean() for prior in priors])[shows],
+        sd=np.array([prior.std() for prior in priors])[shows],
     )
+
+
+def _additive_effects(problem: Problem) -> dict[str, Effect]:
+    """By key the effects that only add to the reading of a sample, and come last of all that act on it."""
+    found = {}
+    for sample in problem.samples:
+        for effect in sample.model.at("reading")[-1:]:
+            if effect.adds:
+                found[effect.key] = effect
+    return found
 
 
 def _without(sample: Sample, effects: Container[str]) -> Sample:
@@ -186,15 +225,18 @@ def completed(problem: Problem, theta: Array, rng: Generator) -> tuple[Problem, 
     """
     if not isinstance(problem, MarginalisedProblem):
         return problem, theta, np.zeros(len(theta))
-    whole = problem.whole.prior
+    prior = problem.whole.prior
     parts = [problem.drawn(theta[i : i + _ROWS], rng) for i in range(0, len(theta), _ROWS)]
-    amplitudes, log_density = (np.concatenate(part) for part in zip(*parts, strict=True))
-    values = dict(zip((*problem.names, *problem.columns), np.hstack([theta, amplitudes]).T, strict=True))
-    for name in whole.names:
+    amplitudes = np.concatenate([drawn for drawn, _ in parts])
+    log_density = np.concatenate([of_part for _, of_part in parts])
+    values = dict(zip(problem.names, theta.T, strict=True))
+    values |= dict(zip(problem.columns, amplitudes.T, strict=True))
+    for name in prior.names:
         if name not in values:
-            values[name] = whole.distributions[name].rvs(len(theta), random_state=rng)
-            log_density = log_density + whole.distributions[name].logpdf(values[name])
-    return problem.whole, np.stack([values[name] for name in whole.names], axis=1), log_density
+            distribution = prior.distributions[name]
+            values[name] = distribution.rvs(len(theta), random_state=rng)
+            log_density = log_density + distribution.logpdf(values[name])
+    return problem.whole, np.stack([values[name] for name in prior.names], axis=1), log_density
 
 
 def _shapes(problem: Problem, i: int, columns: list[str]) -> Array:

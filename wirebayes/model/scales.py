@@ -131,11 +131,13 @@ def _stretched(experiment: Experiment, k1_N: float) -> Experiment:
 
 
 def _under_steps(experiment: Experiment) -> Scales:
-    recorded = experiment.recorded_holds
     settings = np.array([hold.setting for hold in experiment.holds])
     step = typical_step(settings) or _SMALLEST_STEP * experiment.length_mm
-    reach = float(max(settings.max(), 0.0) - min(settings.min(), 0.0)) or step
-    tension = typical_tension(np.concatenate([hold.readings for hold in recorded]) if recorded else np.zeros(1))
+    highest = max(settings.max(), 0.0)
+    lowest = min(settings.min(), 0.0)
+    reach = float(highest - lowest) or step
+    read = [hold.readings for hold in experiment.recorded_holds] or [np.zeros(1)]
+    tension = typical_tension(np.concatenate(read))
     return Scales(step, reach, tension, _typical_hold(experiment), tension * step / reach)
 
 
@@ -144,16 +146,24 @@ def _under_weights(experiment: Experiment) -> Scales:
     recorded = experiment.recorded_holds
     weights = np.array([hold.setting for hold in recorded])
     first = np.array([hold.readings[0] for hold in recorded])
-    seen = float(np.ptp(np.concatenate([hold.readings for hold in recorded])))
-    seen = seen or _SMALLEST_STEP * experiment.length_mm
-    heaviest = float(weights.max())
-    reach = seen * min(MOST_OF_SPAN, heaviest / float(np.ptp(weights))) if np.ptp(weights) else MOST_OF_SPAN * seen
-    step = (typical_step(first) if len(first) > 1 else 0.0) or reach
+    reach = _reach_under_weights(experiment, weights)
+    moved = typical_step(first) if len(first) > 1 else 0.0
+    step = moved or reach
     lightest = int(weights.argmin())
-    zero = float(first[lightest] - reach * weights[lightest] / heaviest)
+    zero = float(first[lightest] - reach * weights[lightest] / float(weights.max()))
     settings = [hold.setting for hold in experiment.holds]
     hold_s = _typical_hold(experiment)
     return Scales(step, reach, typical_tension(settings), hold_s, typical_step(settings), {experiment.name: zero})
+
+
+def _reach_under_weights(experiment: Experiment, weights: np.ndarray) -> float:
+    """How far the heaviest weight stretches the wire, by what was seen between the lightest and it, mm."""
+    read = np.concatenate([hold.readings for hold in experiment.recorded_holds])
+    seen = float(np.ptp(read)) or _SMALLEST_STEP * experiment.length_mm
+    span = float(np.ptp(weights))
+    if not span:
+        return MOST_OF_SPAN * seen
+    return seen * min(MOST_OF_SPAN, float(weights.max()) / span)
 
 
 def _typical_hold(experiment: Experiment) -> float:

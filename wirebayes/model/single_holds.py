@@ -56,14 +56,18 @@ def standardised_hold_by_hold(
     -------
     (n,) and (m, n) arrays
     """
-    total, out, sd = np.zeros(len(variance)), [np.zeros((0, len(variance)))], np.sqrt(variance)
+    sd = np.sqrt(variance)
+    total = np.zeros(len(variance))
+    residuals = [np.zeros((0, len(variance)))]
     for _, valid, left, best, aa in _single_holds(protocol, theta, model, readings):
         every = np.vstack([left, best[None]]) / sd
-        log_sd = 0.5 * np.sqrt(len(left)) * np.log(variance)
-        value = -0.5 * ((every**2).sum(axis=0) + len(left) * (np.log(variance) + LOG_2PI) + np.log1p(aa))
+        square = (every**2).sum(axis=0)
+        value = -0.5 * (square + len(left) * (np.log(variance) + LOG_2PI) + np.log1p(aa))
         total = total + np.where(valid, value, 0.0)
-        out.append(np.where(valid, np.vstack([every, log_sd[None]]), 0.0))
-    return total, np.concatenate(out)
+        log_sd = 0.5 * np.sqrt(len(left)) * np.log(variance)
+        of_hold = np.vstack([every, log_sd[None]])
+        residuals.append(np.where(valid, of_hold, 0.0))
+    return total, np.concatenate(residuals)
 
 
 def _single_holds(
@@ -110,16 +114,29 @@ def hold_courses(
     n = np.shape(theta["B"])[0]
     theta = dict(theta) | {"preload": np.zeros(n)}
     if protocol.control == "force":
-        return _under_weights(protocol, theta | {"k1": np.full(n, np.inf)}, model, first)
+        rigid = theta | {"k1": np.full(n, np.inf)}
+        return _under_weights(protocol, rigid, model, first)
     first = np.broadcast_to(first, (len(protocol.setting), n))
+    return _under_steps(protocol, theta, model, first)
+
+
+def _under_steps(
+    protocol: Protocol, theta: Theta, model: Model, first: Array
+) -> list[tuple[Array, Array, Array] | None]:
+    """`hold_courses` where the displacement is set, compiled where that can be."""
+    out: list[tuple[Array, Array, Array] | None] = [None] * len(first)
+    recorded = np.flatnonzero(protocol.recorded).tolist()
     call = compiled.call(protocol, theta, model)
-    if call is not None:
-        tension, slope = compiled.kernel.courses(*call, first, _NEWTON_STEPS)
-        valid = (first > 0) & (slope[:, 0] > 0)
-        recorded = protocol.recorded
-        return [(t, s, v) if known else None for t, s, v, known in zip(tension, slope, valid, recorded, strict=True)]
-    walk = Walk(protocol, theta, model)
-    return [_course(walk, j, first[j]) if protocol.mask[j].any() else None for j in range(len(protocol.setting))]
+    if call is None:
+        walk = Walk(protocol, theta, model)
+        for j in recorded:
+            out[j] = _course(walk, j, first[j])
+        return out
+    tension, slope = compiled.kernel.courses(*call, first, _NEWTON_STEPS)
+    valid = (first > 0) & (slope[:, 0] > 0)
+    for j in recorded:
+        out[j] = tension[j], slope[j], valid[j]
+    return out
 
 
 def _course(walk: Walk, j: int, first: Array) -> tuple[Array, Array, Array]:
@@ -128,14 +145,16 @@ def _course(walk: Walk, j: int, first: Array) -> tuple[Array, Array, Array]:
     valid = first > 0
     target = np.where(valid, first, 1.0)
     strain = target / walk.k1
-    displacement = length_mm * strain
+    stretch = length_mm * strain
+    displacement = stretch
     if walk.model.law == "modified":
         displacement = displacement / np.maximum(1.0 - strain, 0.1)
     for _ in range(_NEWTON_STEPS):
         tension, slope = walk.fresh(j, displacement, slice(1))
         # A slack guess has no slope: go out until it pulls.
         pulls = slope[0] > 0
-        move = np.where(pulls, (target - tension[0]) / np.where(pulls, slope[0], 1.0), strain * length_mm)
+        newton = (target - tension[0]) / np.where(pulls, slope[0], 1.0)
+        move = np.where(pulls, newton, stretch)
         displacement = displacement + move
         if np.max(np.abs(move)) < 1e-12 * length_mm:
             break
@@ -148,11 +167,11 @@ def _under_weights(
 ) -> list[tuple[Array, Array, Array] | None]:
     """`hold_courses` where the tension is set: a wire that does not stretch creeps from its first reading on."""
     courses = simulate_alone(protocol, theta, model)
-    out: list[tuple[Array, Array, Array] | None] = []
-    for j, course in enumerate(courses):
-        grown = course - course[0]
+    out: list[tuple[Array, Array, Array] | None] = [None] * len(courses)
+    for j in np.flatnonzero(protocol.recorded).tolist():
+        grown = courses[j] - courses[j][0]
         valid = np.isfinite(grown).all(axis=0) & np.isfinite(first[j])
-        out.append((first[j] + grown, np.ones_like(grown), valid) if protocol.recorded[j] else None)
+        out[j] = first[j] + grown, np.ones_like(grown), valid
     return out
 
 
