@@ -10,6 +10,7 @@ import pytest
 import wirebayes as wb
 from wirebayes.cli import main
 from wirebayes.io.next_hold import NEXT_HOLD, write_next_hold
+from wirebayes.io.readings import protocol_holds, protocol_table
 
 FEW = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
 
@@ -41,6 +42,12 @@ def test_the_next_hold_is_a_step_beyond_the_furthest(options, set_, value, tmp_p
     assert {row["hold"] for row in rows} == {str(len(experiment.holds) + 1)}
     assert {row[set_] for row in rows} == {value}
     assert [row["time_s"] for row in rows] == ["0.0", "30.0", "60.0"]
+
+
+def test_the_next_hold_of_an_elastic_thread_is_one_that_predict_reads(tmp_path) -> None:
+    rows = example_of(one_test(lengths=[10.0], displacements=[20, 40, 70]), tmp_path)
+    assert {row["displacement_mm"] for row in rows} == {"80.0"}
+    assert protocol_holds(protocol_table(tmp_path / NEXT_HOLD), 10.0)
 
 
 def test_it_goes_on_at_the_last_temperature_and_has_few_of_many_times(tmp_path) -> None:

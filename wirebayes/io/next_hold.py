@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.readings import READ, SET, Hold
+from wirebayes.io.readings import READ, SET, STRETCH, Hold
 from wirebayes.io.run_folder import write_csv
 
 NEXT_HOLD = "next.csv"
@@ -42,7 +42,10 @@ def _one_step_further(experiment: Experiment) -> float:
     """A setting as far beyond the largest of the test as that lies beyond the second largest."""
     settings = sorted({hold.setting for hold in experiment.holds})
     step = settings[-1] - settings[-2] if len(settings) > 1 else 0.0
-    return float(f"{settings[-1] + step:.10g}")
+    further = settings[-1] + step
+    if experiment.control == "displacement":
+        further = min(further, STRETCH * experiment.length_mm)  # predict reads no more
+    return float(f"{further:.10g}")
 
 
 def _some_of_its_times(hold: Hold) -> list[float]:
