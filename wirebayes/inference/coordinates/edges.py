@@ -52,11 +52,14 @@ def _half_normal(sd: float, log_prior: Function) -> Edge:
 
     def score(value: Array) -> Array:
         u = value / unit
-        return np.where(u < 0.5, ndtri(np.maximum(erf(u), _NEAREST)), -ndtri(erfc(np.maximum(u, 0.5))))
+        lower = ndtri(np.maximum(erf(u), _NEAREST))
+        upper = -ndtri(erfc(np.maximum(u, 0.5)))
+        return np.where(u < 0.5, lower, upper)
 
     def value(score: Array) -> Array:
-        low, high = erfinv(ndtr(np.minimum(score, 0.0))), erfcinv(ndtr(-np.maximum(score, 0.0)))
-        return np.asarray(unit * np.where(score < 0.0, low, high))
+        lower = erfinv(ndtr(np.minimum(score, 0.0)))
+        upper = erfcinv(ndtr(-np.maximum(score, 0.0)))
+        return np.asarray(unit * np.where(score < 0.0, lower, upper))
 
     return Edge(score, value, log_prior, False)
 
@@ -64,17 +67,25 @@ def _half_normal(sd: float, log_prior: Function) -> Edge:
 def _cut_off(known: TruncatedNormal) -> Edge:
     """Each half from its own tail."""
     least, middle, sd = known.least_sd, known.centre, known.sd
-    below, above, end = ndtr(least), ndtr(-least), known.support()[0]
-    end = 0.0 if abs(end) < 1e-12 * sd else end  # where it was cut off, but for rounding
+    below = ndtr(least)
+    above = ndtr(-least)
+    end = known.support()[0]
+    if abs(end) < 1e-12 * sd:
+        end = 0.0  # where it was cut off, but for rounding
 
     def score(value: Array) -> Array:
         u = np.maximum((value - middle) / sd, least)
-        left = ndtr(-u) / above
-        return np.where(left < 0.5, -ndtri(left), ndtri(np.maximum((ndtr(u) - below) / above, _NEAREST)))
+        right = ndtr(-u) / above
+        left = (ndtr(u) - below) / above
+        lower = ndtri(np.maximum(left, _NEAREST))
+        return np.where(right < 0.5, -ndtri(right), lower)
 
     def value(score: Array) -> Array:
-        low = ndtri(below + ndtr(np.minimum(score, 0.0)) * above)
-        found = middle + sd * np.where(score < 0.0, low, -ndtri(ndtr(-np.maximum(score, 0.0)) * above))
+        left = ndtr(np.minimum(score, 0.0))
+        right = ndtr(-np.maximum(score, 0.0))
+        lower = ndtri(below + left * above)
+        upper = -ndtri(right * above)
+        found = middle + sd * np.where(score < 0.0, lower, upper)
         return np.asarray(np.maximum(found, end))  # rounding may lead beyond
 
     return Edge(score, value, known.log_density(), False)

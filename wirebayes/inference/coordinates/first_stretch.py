@@ -138,19 +138,32 @@ class FirstStretch:
 
     def _beginning(self, theta: Array) -> tuple[Array, Array]:
         """(n,) tension at the beginning that suits readings best, N; its standard deviation in those of a reading."""
-        k1, U = self._k1(theta), self.ridge.get(theta, "U")
-        longer = np.exp(_of(theta, self.length_exponent) * self.log_ratio)
-        reached = self.ridge.reached(theta, self.times_s[:, None])
-        strain_for_one = self.ridge.get(theta, "B") * longer * reached / self.length
-        tension, square = np.full(len(theta), self.read[0]), np.ones(len(theta))
+        k1 = self._k1(theta)
+        U = self.ridge.get(theta, "U")
+        strain_for_one = self._strain_for_one(theta)
+        read = self.read[:, None]
+        tension = np.full(len(theta), self.read[0])
+        square = np.ones(len(theta))
         for _ in range(_REPETITIONS):
             crept = strain_for_one * tension**U
-            expected = tension - (k1 - tension) * crept if self.modified else (tension - k1 * crept) / (1.0 + crept)
+            expected = self._after_creep(tension, k1, crept)
             slope = np.clip(1.0 - U * (1.0 - expected / tension), _LEAST_SLOPE, 1.0)
             square = (slope * slope).sum(axis=0)
-            change = (slope * (self.read[:, None] - expected)).sum(axis=0) / square
+            change = (slope * (read - expected)).sum(axis=0) / square
             tension = np.clip(tension + change, self.read[0] / _MOST, self.read[0] * _MOST)
         return tension, 1.0 / np.sqrt(square)
+
+    def _strain_for_one(self, theta: Array) -> Array:
+        """(r, n) strain by creep at the readings under a constant tension of 1 N."""
+        longer = np.exp(_of(theta, self.length_exponent) * self.log_ratio)
+        reached = self.ridge.reached(theta, self.times_s[:, None])
+        return self.ridge.get(theta, "B") * longer * reached / self.length
+
+    def _after_creep(self, tension: Array, k1: Array, crept: Array) -> Array:
+        """(r, n) readings after a beginning at a tension (n,), by the strain (r, n) that creep has taken, N."""
+        if self.modified:
+            return tension - (k1 - tension) * crept
+        return (tension - k1 * crept) / (1.0 + crept)
 
     def _extrapolated(self, theta: Array) -> Array:
         """(n,) tension at the beginning by the first and the last reading and the course of the creep, N."""

@@ -42,14 +42,20 @@ def suiting_powers(
     known = np.isfinite(lost)
     if known.sum() < _LEAST_HOLDS or not lost[known].any():
         return _LOG_HAZARDS, np.full(len(_LOG_HAZARDS), middle)
-    gained = _gained(np.exp(powers), log_tension, relative_s**N)[known]
-    lost = lost[known, None, None]
-    scale = (gained * lost).sum(axis=0) / np.maximum((gained**2).sum(axis=0), 1e-300)
-    left = ((lost - scale * gained) ** 2).sum(axis=0) / (lost**2).sum() + _LEAST_LEFT
-    log_likelihood = -0.5 * len(lost) * np.log(left)
+    gained = _gained(np.exp(powers), log_tension, relative_s**N)
+    log_likelihood = _log_likelihood(lost[known, None, None], gained[known])
     log_density = log_likelihood - 0.5 * _SPREADS**2
     weight = np.exp(log_density - log_density.max(axis=1, keepdims=True))
     return _LOG_HAZARDS, weight @ powers / weight.sum(axis=1)
+
+
+def _log_likelihood(lost: Array, gained: Array) -> Array:
+    """(m, p) of losses (h, 1, 1) in proportion to elongations (h, m, p), residuals being of unknown size."""
+    product = (gained * lost).sum(axis=0)
+    scale = product / np.maximum((gained**2).sum(axis=0), 1e-300)
+    square = ((lost - scale * gained) ** 2).sum(axis=0)
+    left = square / (lost**2).sum() + _LEAST_LEFT
+    return -0.5 * len(lost) * np.log(left)
 
 
 def _gained(powers: Array, log_tension: Array, relative_s: Array) -> Array:

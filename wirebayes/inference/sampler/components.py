@@ -83,10 +83,9 @@ class Components:
         chosen = which, np.arange(n)
         degrees = self.mixture.degrees[which]
         stretch = random.chisquare(degrees + d) / (degrees + distances[chosen])
-        points = np.empty((n, d + 1))
-        points[:, 0] = self._until[which] - self.mixture.weights[which] * random.uniform(size=n)
-        points[:, 1:] = ndtr(deviates[chosen] * np.sqrt(stretch)[:, None])
-        return points
+        back = self.mixture.weights[which] * random.uniform(size=n)
+        within = deviates[chosen] * np.sqrt(stretch)[:, None]
+        return np.column_stack([self._until[which] - back, ndtr(within)])
 
     def _deviates(self, x: Array) -> tuple[Array, Any]:
         """(components, n, d) of places (n, d), each in a component's own units, and what straightening adds to logs."""

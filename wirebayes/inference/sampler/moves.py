@@ -136,20 +136,29 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
         log_factor : (n,) array
             Added to the log acceptance ratio; not zero where the map that straightens the coordinates changes volume.
         """
-        n, d = x.shape
         u, slope = self._forward(x)
         pool, _ = self._forward(others[0])
+        difference = self._differences(pool, len(x), random)
+        lengths = self._lengths(x.shape[1])
+        u = u + random.choice(lengths, size=(len(x), 1)) * difference
+        moved = self.straight.inverse(u) if self.straight else u
+        y, _ = _within(moved, x)
+        return y, slope - self._forward(y)[1]
+
+    def _differences(self, pool: Array, n: int, random: Any) -> Array:
+        """(n, d) differences, for each of n walkers between two of its own ensemble's part of the pool (m, d)."""
         each = len(pool) // self.ensembles
-        first = np.repeat(np.arange(self.ensembles) * each, n // self.ensembles)  # of the walker's own ensemble
+        first = np.repeat(np.arange(self.ensembles) * each, n // self.ensembles)
         one = random.randint(each, size=n)
         other = (one + random.randint(1, each, size=n)) % each
-        difference = pool[first + one] - pool[first + other]
-        scale = 2.38 / np.sqrt(2.0 * d)
-        # short steps for the walker whom long ones do not serve
-        lengths = (scale, 0.5 * scale) if self.straight else (scale, scale, scale, scale, 1.0)
-        u = u + random.choice(lengths, size=(n, 1)) * difference
-        y, _ = _within(self.straight.inverse(u) if self.straight else u, x)
-        return y, slope - self._forward(y)[1]
+        return np.asarray(pool[first + one] - pool[first + other])
+
+    def _lengths(self, d: int) -> tuple[float, ...]:
+        """Equally likely lengths of a step in so many dimensions, in those of a difference."""
+        usual = 2.38 / np.sqrt(2.0 * d)
+        if self.straight is None:
+            return usual, usual, usual, usual, 1.0
+        return usual, 0.5 * usual  # short steps for the walker whom long ones do not serve
 
     def _forward(self, x: Array) -> tuple[Array, Array]:
         return self.straight.forward(x) if self.straight else (x, np.zeros(len(x)))

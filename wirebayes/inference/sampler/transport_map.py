@@ -96,11 +96,11 @@ class Straight:
     def inverse(self, u: Array) -> Array:
         """(n, d) points of straightened ones."""
         left = _skewed(np.ascontiguousarray(u.T), self.shape[:, :, None])
-        v, held = np.zeros_like(left), np.zeros_like(left)
+        v = np.zeros_like(left)
+        held = np.zeros_like(left)
         for j in range(len(v)):
-            before, inside = v[:j], held[:j]
-            mean = self.constant[j] + self.linear[j, :j] @ before
-            mean += ((self.quadratic[j, :j, :j] @ inside) * (before - 0.5 * inside)).sum(axis=0)
+            before = v[:j]
+            mean = self._mean(j, before, held[:j])
             log_scale = self.log_scale[j, 0] + self.log_scale[j, 1 : j + 1] @ before
             log_scale = np.clip(log_scale, self.least[j], self.most[j])
             v[j] = mean + left[j] * np.exp(log_scale)
@@ -108,6 +108,13 @@ class Straight:
         x = np.empty(v.T.shape)
         x[:, self.order] = v.T * self.scale + self.centre
         return x
+
+    def _mean(self, j: int, before: Array, inside: Array) -> Array:
+        """(n,) of coordinate j by those before it (j, n), and by these kept in the range of the points fitted."""
+        mean = self.constant[j] + self.linear[j, :j] @ before
+        bend = self.quadratic[j, :j, :j] @ inside
+        mean += (bend * (before - 0.5 * inside)).sum(axis=0)
+        return np.asarray(mean)
 
 
 def fit_map(points: WeightedPoints, order: Ints) -> Straight:
@@ -203,11 +210,13 @@ def _straighten(v: Array, j: int, weight: Array, clear: float, every: bool) -> _
     # Far out a bend that is only noise throws everything aside: none without evidence.
     kept = np.abs(t[j + 1 :]) > clear
     if not kept.all():
-        one, other = one[kept], other[kept]
-        terms = terms[:, np.concatenate([np.ones(j + 1, bool), kept])]
+        one = one[kept]
+        other = other[kept]
+        terms = terms[:, np.append(np.ones(j + 1, bool), kept)]
         of_mean, of_scale, _ = _regress(terms, lines, y, weight, of_scale)
     spread = lines @ of_scale
-    return _Straightened(one, other, of_mean, of_scale, spread, (y - terms @ of_mean) * np.exp(-spread))
+    left = (y - terms @ of_mean) * np.exp(-spread)
+    return _Straightened(one, other, of_mean, of_scale, spread, left)
 
 
 def _seen_at_once(
@@ -224,7 +233,8 @@ def _seen_at_once(
     basis = np.linalg.qr(root * lines)[0]
     left = both - basis @ (basis.T @ both)
     size = np.maximum(np.sqrt((left**2).sum(axis=0)), 1e-300)
-    t = np.abs(left[:, :-1].T @ left[:, -1]) / (size[:-1] * size[-1]) * np.sqrt(weight.sum())
+    along = np.abs(left[:, :-1].T @ left[:, -1])
+    t = along / (size[:-1] * size[-1]) * np.sqrt(weight.sum())
     best = np.argsort(-t, kind="stable")[:MOST_PAIRS]
     best = np.sort(best[t[best] > clear])
     return one[best], other[best]
@@ -252,30 +262,40 @@ def _shapes(x: Array, weight: Array) -> Array:
     For each of many skewnesses location and width are a weighted straight-line fit; the weights, slopes of the map,
     make of a distance between quantiles one between scores.
     """
-    middle = weight @ x / weight.sum()
-    spread = np.maximum(np.sqrt(weight @ (x - middle) ** 2 / weight.sum()), 1e-12)
+    worth = weight.sum()
+    middle = weight @ x / worth
+    variance = weight @ (x - middle) ** 2 / worth
+    spread = np.maximum(np.sqrt(variance), 1e-12)
     quantiles = (_quantiles(x, weight, ndtr(SCORES)) - middle) / spread
-    inner = np.arcsinh(SCORES) + SKEWNESSES[:, None]
-    curve = np.sinh(inner)
-    slope = (np.cosh(inner) / np.sqrt(1.0 + SCORES**2))[..., None]
-    lines = np.stack([np.ones_like(curve), curve], axis=-1) / slope
-    weighted = quantiles / slope
-    line = np.linalg.pinv(lines) @ weighted
-    width = np.maximum(line[:, 1], 1e-3)
-    misfit = ((weighted - lines @ line) ** 2).sum(axis=1) / width**2
+    locations, widths, misfit = _line_of_each_skewness(quantiles)
     reserve = (RESERVE * SKEWNESSES[:, None]) ** 2
     best = np.argmin(misfit + reserve, axis=0)
     chosen = best, np.arange(x.shape[1])
-    location = line[:, 0][chosen]
-    return np.array([middle + spread * location, spread * width[chosen], SKEWNESSES[best]])
+    return np.array([middle + spread * locations[chosen], spread * widths[chosen], SKEWNESSES[best]])
+
+
+def _line_of_each_skewness(quantiles: Array) -> tuple[Array, Array, Array]:
+    """(skewnesses, m) location and width that suit quantiles (scores, m) best at each skewness, and the misfit left."""
+    inner = np.arcsinh(SCORES) + SKEWNESSES[:, None]
+    curve = np.sinh(inner)
+    slope = np.cosh(inner) / np.sqrt(1.0 + SCORES**2)
+    slope = slope[..., None]
+    lines = np.stack([np.ones_like(curve), curve], axis=-1) / slope
+    weighted = quantiles / slope
+    line = np.linalg.pinv(lines) @ weighted
+    left = weighted - lines @ line
+    width = np.maximum(line[:, 1], 1e-3)
+    return line[:, 0], width, (left**2).sum(axis=1) / width**2
 
 
 def _quantiles(x: Array, weight: Array, shares: Array) -> Array:
     """(k, m) quantiles of weighted points (n, m)."""
     rows = np.argsort(x, axis=0)
+    ranked = np.take_along_axis(x, rows, axis=0)
     until = np.cumsum(weight[rows], axis=0)
-    until = (until - 0.5 * weight[rows]) / until[-1]
-    return np.stack([np.interp(shares, until[:, j], x[rows[:, j], j]) for j in range(x.shape[1])], axis=1)
+    middles = (until - 0.5 * weight[rows]) / until[-1]
+    of_each = [np.interp(shares, *column) for column in zip(middles.T, ranked.T, strict=True)]
+    return np.stack(of_each, axis=1)
 
 
 def _regress(
@@ -286,24 +306,35 @@ def _regress(
     `points` (n,) are weights of the rows, `of_scale` is what the log scale is sought from.
     """
     worth = points.sum()
-    of_scale = np.zeros(lines.shape[1]) if of_scale is None else of_scale
+    if of_scale is None:
+        of_scale = np.zeros(lines.shape[1])
     bend = RIDGE * worth * np.eye(terms.shape[1])
-    information = 2.0 * (lines.T * points) @ lines + RIDGE * worth * np.eye(lines.shape[1])
-
-    def weights() -> Array:
-        weight = points * np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0))
-        return np.asarray(weight * (worth / weight.sum()))
-
+    information = 2.0 * (lines.T * points) @ lines
+    information = information + RIDGE * worth * np.eye(lines.shape[1])
     for _ in range(ALTERNATIONS):
-        weighted = terms.T * weights()
+        precision = _precision(lines, of_scale)
+        weighted = terms.T * _of_worth(points * precision, worth)
         of_mean = np.linalg.solve(weighted @ terms + bend, weighted @ y)
         # a point far out says where the scale grows, but no single one decides
-        square = np.minimum((y - terms @ of_mean) ** 2 * np.exp(-2.0 * np.clip(lines @ of_scale, -6.0, 3.0)), 9.0)
+        square = np.minimum((y - terms @ of_mean) ** 2 * precision, 9.0)
         step = np.linalg.solve(information, lines.T @ (points * (square - 1.0)))
         of_scale = of_scale + step
-        if points @ (lines @ step) ** 2 < SETTLED**2 * worth:
+        moved = lines @ step
+        if points @ moved**2 < SETTLED**2 * worth:
             break
-    weight = weights()
+    weight = _of_worth(points * _precision(lines, of_scale), worth)
     inverse = np.linalg.inv((terms.T * weight) @ terms + bend)
-    variance = weight @ (y - terms @ of_mean) ** 2 / worth
+    left = y - terms @ of_mean
+    variance = weight @ left**2 / worth
     return of_mean, of_scale, of_mean / np.sqrt(variance * np.diag(inverse))
+
+
+def _precision(lines: Array, of_scale: Array) -> Array:
+    """(n,) 1 / variance of y by the coefficients of its log scale, within limits."""
+    log_scale = np.clip(lines @ of_scale, -6.0, 3.0)
+    return np.asarray(np.exp(-2.0 * log_scale))
+
+
+def _of_worth(weight: Array, worth: Any) -> Array:
+    """Weights that sum to so much."""
+    return np.asarray(weight * (worth / weight.sum()))
