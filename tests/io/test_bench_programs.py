@@ -111,10 +111,3 @@ def test_labview_without_a_column_of_times_counts_from_its_preamble(tmp_path, de
 def test_a_page_that_is_called_a_workbook_is_named(tmp_path):
     with pytest.raises(wb.InputError, match="line 1: found HTML or XML, expected .* save it as xlsx"):
         read(tmp_path, "<html><body><table>", ["<tr><td>1</td><td>2</td></tr>"])
-
-
-def test_columns_that_are_named_by_units_alone_stand_in_the_options(tmp_path):
-    lines = [f"{t},{x},{f:.4f}" for t, x, f in ROWS]
-    with pytest.raises(wb.InputError, match='--map "mm=displacement" --map "s=time" --map "N=tension"$'):
-        read(tmp_path, "s,mm,N", lines)
-    assert_is_the_test(read(tmp_path, "s,mm,N", lines, mapping=("mm=displacement", "s=time", "N=tension")))

@@ -64,14 +64,6 @@ def test_specimens_side_by_side_are_a_test_each(tmp_path, header, rows, names):
     assert all("one of several specimens: " in each.notes[0] for each in made)
 
 
-def test_a_unit_alone_names_no_column_of_one_specimen(tmp_path):
-    """It may be a diameter."""
-    rows = [row.rpartition(",")[0].rpartition(",")[0] for row in COMMON]
-    for header in ("s,mm,N", "Roc,,\ns,mm,N"):
-        with pytest.raises(InputError, match="found no column of displacement, time or tension among s, mm, N"):
-            read(tmp_path, header, rows)
-
-
 def test_a_unit_that_is_of_no_quantity_leaves_the_names_as_they_are(tmp_path):
     with pytest.raises(InputError, match="found s a second time"):
         read(tmp_path, "red,,,blue,,\ns,mm,V,s,mm,V", APART)

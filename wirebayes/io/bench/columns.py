@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from wirebayes.errors import InputError, shown
 from wirebayes.io.bench.clock import UNDERSTOOD, are_moments, has_moments, looks_like_a_moment
@@ -25,6 +25,7 @@ from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
 from wirebayes.io.bench.two_units import finest_of_same
 from wirebayes.io.bench.undecided import Undecided
+from wirebayes.io.bench.unit_names import units_alone
 from wirebayes.io.bench.words import ERRORS, last_named, speaks_of, words_in
 from wirebayes.sentences import listed
 from wirebayes.strict.hint import hint
@@ -45,12 +46,15 @@ class Column:
     header : str
     unit : Unit or None
         None for hold numbers and clocks.
+    by_unit_alone : bool
+        Whether nothing but its unit names it.
     """
 
     role: Role
     index: int
     header: str
     unit: Unit | None
+    by_unit_alone: bool = False
 
 
 def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
@@ -96,6 +100,11 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
         first, *others = open_questions.values()
         raise Undecided(first.found, first.question, first.answers, others)
     missing = [role for role in _NEEDED if role not in roles]
+    if missing == [*_NEEDED]:
+        by_units = units_alone(table, _NEEDED, {*free, *(column.index for column in roles.values())})
+        if by_units:
+            of_units = {role: _by_unit_alone(table, index, role) for role, index in by_units.items()}
+            return roles | of_units
     if missing:
         unread = [i for i in free if i not in [column.index for column in roles.values()]]
         raise _missing(table, free, unread, missing)
@@ -218,6 +227,12 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
     if unit is not None:
         check_itself(table, index, role, unit)
     return Column(role, index, header, unit)
+
+
+def _by_unit_alone(table: RawTable, index: int, role: Role) -> Column:
+    """The column of a quantity whose header is a unit of it and nothing else."""
+    unit = table.header[index].strip("[]() ")
+    return replace(_column(table, index, role, unit), by_unit_alone=True)
 
 
 def _no_unit(table: RawTable, index: int, role: Role) -> InputError:

@@ -153,7 +153,7 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     if not table.rows:
         found = "no row with a time, a displacement and a tension, all of them numbers"
         raise InputError(f"{table.sheet.path}: found {found}, expected readings")
-    notes = [*_whose(table, columns), _read_as(table, columns, decimal), *notes, *left_out]
+    notes = [*_whose(table, columns), _read_as(table, columns, decimal), *_by_units_alone(columns), *notes, *left_out]
     texts: dict[Role, list[str]] = {
         role: _numbers(table, column, decimal) for role, column in numbers.items() if role != "hold"
     }
@@ -224,6 +224,16 @@ def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> 
         parts.append(f"{role} from {column.header!r}{unit}{how}")
     comma = ", decimal comma" if decimal == "comma" else ""
     return f"{table.sheet.described}{comma}; {listed(parts)}"
+
+
+def _by_units_alone(columns: Mapping[Role, Column]) -> list[str]:
+    """Which columns are named by nothing but their units, in a sentence; none where all have names."""
+    if not columns["displacement"].by_unit_alone:
+        return []
+    told = [f"{column.header} is the {role}" for role, column in columns.items() if column.by_unit_alone]
+    length = columns["displacement"].header
+    unless = f"if {length} is a diameter or a gauge length, say so with --map {length}=ignore"
+    return [f"columns named by units alone: {listed(told)}; {unless}"]
 
 
 def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:

@@ -1,17 +1,20 @@
 """Columns that a unit alone names, under names of specimens: ``Rope A;;Rope B;`` over ``mm;N;mm;N``.
 
-A unit under the name of a specimen says which quantity of it the column holds. Without names of several specimens above
-it does not: a column of millimetres may be a diameter.
+A unit under the name of a specimen says which quantity of it the column holds. Elsewhere it does so only where no other
+column has a unit of the quantity, and where millimetres change: the same in every row, they may be a diameter.
 """
 
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
-from wirebayes.io.bench.header import NO_UNIT
+from wirebayes.io.bench.header import NO_UNIT, name_and_unit
+from wirebayes.io.bench.multiples import unit_in_header
 from wirebayes.io.bench.quantities import ROLES, Role, quantity_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.words import plain_letters, speaks_of_a_quantity
 
 _UNIT = {"unit", "units", "einheit", "unite", "unidad", "unita", "unidade", "eenheid", "enhet", "enhed"}
+_NAMED_AS_OFTEN = {"m", "d", "p", "g"}  # a mass or minutes, a diameter, a pressure: letters that are units, too
 
 
 def with_quantities(table: RawTable) -> RawTable:
@@ -58,6 +61,53 @@ def with_units_beside(table: RawTable) -> RawTable:
             if any(quantity_unit(unit, role) for role in ROLES):
                 header[i], units[i - 1] = "", unit
     return replace(table, header=tuple(header), units=tuple(units))
+
+
+def units_alone(table: RawTable, needed: Sequence[Role], columns: Collection[int]) -> dict[Role, int]:
+    """The columns of quantities where nothing names one but its unit, as ``s,mm,N`` does; none where that leaves doubt.
+
+    Parameters
+    ----------
+    table : RawTable
+        In which no column is named after a quantity that is needed.
+    needed : sequence of str
+        The quantities.
+    columns : collection of int
+        Those that the user does not leave out.
+
+    Returns
+    -------
+    dict of Role to int
+        For each quantity the only column with a unit of it.
+    """
+    found: dict[Role, int] = {}
+    for role in needed:
+        with_unit = [index for index in columns if _has_unit_of(table, index, role)]
+        if len(with_unit) != 1:
+            return {}
+        (only,) = with_unit
+        if not _is_named_by_unit_alone(table, only, role):
+            return {}
+        if role == "displacement" and len(set(table.column(only))) == 1:
+            return {}
+        found[role] = only
+    return found
+
+
+def _has_unit_of(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a column's name is, holds or stands above a unit of a quantity."""
+    header = table.header[index]
+    in_name = quantity_unit(header.strip("[]() "), role) or name_and_unit(header, role)[1]
+    return bool(in_name or unit_in_header(table.units[index], role))
+
+
+def _is_named_by_unit_alone(table: RawTable, index: int, role: Role) -> bool:
+    """Whether a column's name is a unit of a length, a time or a force, and can hardly be anything else."""
+    name = table.header[index].strip("[]() ")
+    unit = quantity_unit(name, role)
+    if unit is None or unit.is_mass or unit.of_sample:
+        return False
+    return name.casefold() not in _NAMED_AS_OFTEN and table.units[index] in NO_UNIT
 
 
 def _are_named_by_units(cells: tuple[str, ...]) -> bool:
