@@ -72,7 +72,27 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
         columns could be it, or its unit is not said.
     """
     mapped = _mapped(table, mapping)
+    roles, open_questions = _said(table, mapped)
     taken = {index for index, _, _ in mapped}
+    free = [i for i, name in enumerate(table.header) if name and i not in taken]
+    for role in ROLES:
+        if role in roles or role in open_questions:
+            continue
+        likely = _likely(table, free, role)
+        if not likely:
+            continue
+        try:
+            roles[role] = _one(table, likely, role)
+        except Undecided as question:
+            open_questions[role] = question
+    if open_questions:
+        first, *others = open_questions.values()
+        raise Undecided(first.found, first.question, first.answers, others)
+    return _complete(table, roles, free)
+
+
+def _said(table: RawTable, mapped: Sequence[tuple[int, str, str]]) -> tuple[dict[Role, Column], dict[Role, Undecided]]:
+    """The columns that the user names, and the questions that are left about others of them."""
     roles: dict[Role, Column] = {}
     open_questions: dict[Role, Undecided] = {}
     for index, role, unit in mapped:
@@ -86,29 +106,32 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
             roles[known] = _column(table, index, known, unit)
         except Undecided as question:
             open_questions[known] = question
-    free = [i for i, name in enumerate(table.header) if name and i not in taken]
-    for role in [role for role in ROLES if role not in roles and role not in open_questions]:
-        likely = [i for i in free if may_be(table, i, role)] or [i for i in free if is_of_rig(table, i, role)]
-        likely = likely or [i for i in free if is_called_of_sample(table, i, role)]
-        likely = likely or [i for i in free if role == "time" and are_moments(table, i)]
-        try:
-            if likely:
-                roles[role] = _one(table, likely, role)
-        except Undecided as question:
-            open_questions[role] = question
-    if open_questions:
-        first, *others = open_questions.values()
-        raise Undecided(first.found, first.question, first.answers, others)
+    return roles, open_questions
+
+
+def _likely(table: RawTable, free: Sequence[int], role: Role) -> list[int]:
+    """The columns that may be a quantity's: by its name, else by one of a rig's parts, of a strain or of a clock."""
+    for fits in (may_be, is_of_rig, is_called_of_sample):
+        likely = [i for i in free if fits(table, i, role)]
+        if likely:
+            return likely
+    if role != "time":
+        return []
+    return [i for i in free if are_moments(table, i)]
+
+
+def _complete(table: RawTable, roles: dict[Role, Column], free: Sequence[int]) -> dict[Role, Column]:
+    """The columns of quantities, with those that units alone name; all that are needed are among them."""
     missing = [role for role in _NEEDED if role not in roles]
-    if missing == [*_NEEDED]:
-        by_units = units_alone(table, _NEEDED, {*free, *(column.index for column in roles.values())})
+    if not missing:
+        return roles
+    used = {column.index for column in roles.values()}
+    if missing == list(_NEEDED):
+        by_units = units_alone(table, _NEEDED, used.union(free))
         if by_units:
-            of_units = {role: _by_unit_alone(table, index, role) for role, index in by_units.items()}
-            return roles | of_units
-    if missing:
-        unread = [i for i in free if i not in [column.index for column in roles.values()]]
-        raise _missing(table, free, unread, missing)
-    return roles
+            return roles | {role: _by_unit_alone(table, index, role) for role, index in by_units.items()}
+    unread = [i for i in free if i not in used]
+    raise _missing(table, free, unread, missing)
 
 
 def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
