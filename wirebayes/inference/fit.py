@@ -79,28 +79,38 @@ def fit_problem(
     own = problem.in_units(problem.own_units)
     target = LogPosterior(integrated(own))
     walked = target.problem.names
-
-    def sampled(theta: Array) -> Array:
-        """Sampled coordinates of (n, d) parameters in the problem's units."""
-        columns = [problem.names.index(name) for name in walked]
-        return target.coordinates.to_sampled(problem.theta_in(own.units, theta)[:, columns])
-
     start = None
     if near is not None and near.keys() >= set(walked):
-        start = sampled(np.array([[near.get(name, 1.0) for name in problem.names]]))
-        start = np.round(start, _START_DIGITS)
-    cloud = None if rough is None else sampled(rough)
+        known = np.array([[near.get(name, 1.0) for name in problem.names]])
+        start = np.round(_sampled(problem, target, known), _START_DIGITS)
+    cloud = None if rough is None else _sampled(problem, target, rough)
     chains = ensemble.sample_posterior(
         target, seed, policy, checkpoint=checkpoint, progress=progress, near=start, rough=cloud
     )
-    m, steps, walkers, d = chains.z.shape
-    thin = max(1, steps * walkers // STORED_DRAWS)
-    z = np.moveaxis(chains.z[:, thin - 1 :: thin], 2, 1)
-    log_density = np.moveaxis(chains.log_density[:, thin - 1 :: thin], 2, 1).reshape(m, -1)
-    theta = target.coordinates.to_natural(z.reshape(-1, d))
-    _, theta, added = completed(target.problem, theta, np.random.default_rng(seed_of(seed, "completed")))
+    z, log_density, thin = _stored(chains)
+    theta = target.coordinates.to_natural(z.reshape(-1, z.shape[-1]))
+    rng = np.random.default_rng(seed_of(seed, "completed"))
+    _, theta, added = completed(target.problem, theta, rng)
     theta = own.theta_in(problem.units, theta)
-    return Fit(problem, theta.reshape(m, -1, theta.shape[1]), log_density + added.reshape(m, -1), chains, thin)
+    of_each = theta.reshape(len(z), -1, theta.shape[1])
+    return Fit(problem, of_each, log_density + added.reshape(log_density.shape), chains, thin)
+
+
+def _sampled(problem: Problem, target: LogPosterior, theta: Array) -> Array:
+    """Sampled coordinates of (n, d) parameters in the problem's units."""
+    columns = [problem.names.index(name) for name in target.problem.names]
+    own = problem.theta_in(target.problem.units, theta)
+    return target.coordinates.to_sampled(own[:, columns])
+
+
+def _stored(chains: Chains) -> tuple[Array, Array, int]:
+    """Draws (chains, walkers, steps, d) worth storing, their log densities (chains, n), and which step is stored."""
+    m, steps, walkers, _ = chains.z.shape
+    thin = max(1, steps * walkers // STORED_DRAWS)
+    kept = slice(thin - 1, None, thin)
+    z = np.moveaxis(chains.z[:, kept], 2, 1)
+    log_density = np.moveaxis(chains.log_density[:, kept], 2, 1)
+    return z, log_density.reshape(m, -1), thin
 
 
 _START_DIGITS = 6  # the digits of a start that are the same in every unit: conversions change the sixteenth

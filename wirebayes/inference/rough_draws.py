@@ -52,16 +52,19 @@ def _weighted(target: LogPosterior, found: Optimum, rng: Generator, n: int) -> A
     """
     proposals = [mixture.from_modes(found.z, _WIDER * found.covariance, found.log_evidence)]
     components = int(np.clip(len(found.z) + _BESIDE_MODES, *_COMPONENTS))
-    z, height = np.empty((0, found.z.shape[1])), np.empty(0)
+    z = np.empty((0, found.z.shape[1]))
+    height = np.empty(0)
     by_proposal = np.empty((0, 0))  # log density of each proposal at each draw
     for _ in range(_ROUNDS):
         new = proposals[-1].rvs(_EACH, rng)
         by_proposal = np.vstack([by_proposal, proposals[-1].log_density(z)])
-        by_proposal = np.hstack([by_proposal, [proposal.log_density(new) for proposal in proposals]])
-        z, height = np.concatenate([z, new]), np.append(height, target(new))
+        at_new = [proposal.log_density(new) for proposal in proposals]
+        by_proposal = np.hstack([by_proposal, at_new])
+        z = np.concatenate([z, new])
+        height = np.append(height, target(new))
         drawn_from = log_sum(by_proposal)
         log_weight = height - drawn_from
-        if effective(log_weight[:, None])[0] >= min(n, _ENOUGH) and tail(log_weight) <= LARGEST_K:
+        if _are_enough(log_weight, n):
             return z[truncated_rows(log_weight, n, rng)]
         points = WeightedPoints.weighted(z, _HOT * height - drawn_from).thinned(_LEARNED, rng)
         try:
@@ -69,6 +72,12 @@ def _weighted(target: LogPosterior, found: Optimum, rng: Generator, n: int) -> A
         except np.linalg.LinAlgError:
             break
     return None
+
+
+def _are_enough(log_weight: Array, n: int) -> bool:
+    """Whether weights of draws leave n effective ones, or as many as are needed at most, and can be trusted."""
+    there = effective(log_weight[:, None])[0]
+    return bool(there >= min(n, _ENOUGH) and tail(log_weight) <= LARGEST_K)
 
 
 _WIDER = 3.0  # times the covariance at a mode; with 2, posteriors of many modes needed twice as many rounds

@@ -69,15 +69,21 @@ def weighted_posterior(problem: Problem, seed: int, ess: float) -> WeightedPoste
     pool = witnessed(target, rng, ess)
     z = pool.drawn(0, min(_DRAWS, len(pool.z)), rng)
     _, theta, _ = completed(target.problem, target.coordinates.to_natural(z), rng)
-    found, k = effective(pool.log_weight)[0], tail(pool.log_weight[:, 0])
-    why = f"importance sampling: {found:.0f} effective draws of {len(pool.z)}, Pareto k {k:.2f}"
-    log_units = sum(
-        sample.protocol.mask.sum() * np.log(own.read_unit(sample) / problem.read_unit(sample))
-        for sample in problem.samples
-    )
-    log_evidence = float(pool.log_integral[0] - log_units)
     theta = own.theta_in(problem.units, theta)
+    found = effective(pool.log_weight)[0]
+    k = tail(pool.log_weight[:, 0])
+    why = f"importance sampling: {found:.0f} effective draws of {len(pool.z)}, Pareto k {k:.2f}"
+    log_evidence = float(pool.log_integral[0] - _log_units(own, problem))
     return WeightedPosterior(problem, theta, log_evidence, bool(pool.settled[0]), why)
+
+
+def _log_units(own: Problem, problem: Problem) -> float:
+    """Log of what a density of readings in one problem's units is in those of the other."""
+    total = 0.0
+    for sample in problem.samples:
+        ratio = own.read_unit(sample) / problem.read_unit(sample)
+        total += sample.protocol.mask.sum() * np.log(ratio)
+    return total
 
 
 def witnessed(target: LogPosterior, rng: Generator, ess: float) -> Weighted:
@@ -122,7 +128,8 @@ def _of_both(target: LogPosterior, pool: Weighted, others: Mixture, rng: Generat
     """(n, d) rough draws of a posterior, from those of a proposal and of where another search would draw."""
     z = others.rvs(_WITNESSES, rng)
     height, _, of_both = _balanced(target, pool, 0, others, z)
-    return np.vstack([pool.z, z])[truncated_rows(height - of_both, _DRAWS, rng)]
+    rows = truncated_rows(height - of_both, _DRAWS, rng)
+    return np.vstack([pool.z, z])[rows]
 
 
 def _balanced(
@@ -164,10 +171,13 @@ def overlooked_share(
     E. Veach and L. J. Guibas, Optimally combining sampling techniques, SIGGRAPH 1995: the balance heuristic.
     """
     n = len(pool.z)
-    height, of_pool, of_both = _balanced(target, pool, column, others, others.rvs(_WITNESSES, rng))
+    z = others.rvs(_WITNESSES, rng)
+    height, of_pool, of_both = _balanced(target, pool, column, others, z)
     height -= log_integral
     hardly = height - of_pool + np.log(n) > _HARDLY
-    found, had = np.exp(height - of_both)[hardly].sum(), np.exp(height - of_pool)[:n][hardly[:n]].sum()
+    found = np.exp(height - of_both)[hardly].sum()
+    by_pool = np.exp(height - of_pool)[:n]
+    had = by_pool[hardly[:n]].sum()
     return float(found - had)
 
 

@@ -28,26 +28,35 @@ def inverse(function: Function, target: Array) -> Array:
         target, the target itself where that is not above zero.
     """
     wanted = target.real
-    at = np.where(wanted > 0, wanted, 1.0)
-    low, high = np.zeros_like(at), np.full_like(at, np.inf)
     with np.errstate(all="ignore"):
-        for _ in range(_MOST_STEPS):
-            value, slope = _with_slope(function, at)
-            beyond = ~((value <= wanted) & (slope > 0))  # or past where the function stops rising
-            low, high = np.where(beyond, low, at), np.where(beyond, at, high)
-            newton = at - (value - wanted) / slope
-            between = (newton >= low) & (newton <= high) & (slope > 0)  # where it falls, steps lead further off
-            moved = np.where(between, newton, np.where(np.isinf(high), 2.0 * at, 0.5 * (low + high)))
-            done = ~(np.abs(moved - at) > _EXACT * moved) | ~(wanted > 0)
-            at = moved
-            if done.all():
-                break
+        at = _nearest(function, wanted)
         value, slope = _with_slope(function, at)
         reached = (np.abs(value - wanted) <= _MISSED * wanted) & (slope > 0)
         found = np.where(reached, at, np.nan)
         if np.iscomplexobj(target) or np.iscomplexobj(function(at)):
             found = found - (function(at + 0j) - target) / slope  # one more step from the root has its derivatives
     return np.where(wanted > 0, found, target)
+
+
+def _nearest(function: Function, wanted: Array) -> Array:
+    """Where the function comes nearest to real values, by Newton's steps as long as they stay between bounds."""
+    at = np.where(wanted > 0, wanted, 1.0)
+    low = np.zeros_like(at)
+    high = np.full_like(at, np.inf)
+    for _ in range(_MOST_STEPS):
+        value, slope = _with_slope(function, at)
+        beyond = ~((value <= wanted) & (slope > 0))  # or past where the function stops rising
+        low = np.where(beyond, low, at)
+        high = np.where(beyond, at, high)
+        newton = at - (value - wanted) / slope
+        between = (newton >= low) & (newton <= high) & (slope > 0)  # where it falls, steps lead further off
+        halved = np.where(np.isinf(high), 2.0 * at, 0.5 * (low + high))
+        moved = np.where(between, newton, halved)
+        open_still = (np.abs(moved - at) > _EXACT * moved) & (wanted > 0)
+        at = moved
+        if not open_still.any():
+            break
+    return at
 
 
 def _with_slope(function: Function, at: Array) -> tuple[Array, Array]:

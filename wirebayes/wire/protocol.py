@@ -55,16 +55,17 @@ class Protocol:
         longer = self._longer
         if not longer.any():
             return
-        end = self.last_reading + 1
-        more = int(end[longer].max() == self.mask.shape[1])
-        arrays = {"time_s": self.time_s, "mask": self.mask, "warming_K": self.warming_K}
-        padded = {name: np.pad(array, [(0, 0), (0, more)]) for name, array in arrays.items() if array is not None}
-        rows, at = np.flatnonzero(longer), end[longer]
-        padded["time_s"][rows, at] = self.duration_s[rows]
-        if "warming_K" in padded:  # the wire keeps the temperature that was read last
-            padded["warming_K"][rows, at] = padded["warming_K"][rows, at - 1]
-        for name, array in padded.items():
-            object.__setattr__(self, name, array)
+        rows = np.flatnonzero(longer)
+        at = self.last_reading[rows] + 1
+        more = int(at.max() == self.mask.shape[1])
+        time_s = _widened(self.time_s, more)
+        time_s[rows, at] = self.duration_s[rows]
+        object.__setattr__(self, "time_s", time_s)
+        if self.warming_K is not None:
+            warming_K = _widened(self.warming_K, more)
+            warming_K[rows, at] = warming_K[rows, at - 1]  # the wire keeps the temperature that was read last
+            object.__setattr__(self, "warming_K", warming_K)
+        object.__setattr__(self, "mask", _widened(self.mask, more))
 
     @property
     def _longer(self) -> Bools:
@@ -144,21 +145,22 @@ class Protocol:
     @cached_property
     def holds(self) -> tuple[dict[str, Any], ...]:
         """What `wirebayes.wire.effect.HoldContext` says of each hold whatever the wire."""
-        start, time = self.start_s, self._asked_s
+        start_s = self.start_s
+        recorded = self.recorded
+        time = self._asked_s
         warming = np.zeros_like(time) if self.warming_K is None else self.warming_K
         directions = _directions(self.setting)
         out = []
-        for j, number in enumerate(self.number):
-            later = self.number[j:][self.number[j:] >= 0]
+        for j, setting in enumerate(self.setting):
             out.append(
                 {
                     "index": j,
-                    "recorded": bool(self.recorded[j]),
-                    "order": float(number) if number >= 0 else (float(later[0]) - 0.5 if later.size else np.inf),
-                    "displacement_mm": float(self.setting[j]) if self.control == "displacement" else np.nan,
+                    "recorded": bool(recorded[j]),
+                    "order": self._order(j),
+                    "displacement_mm": float(setting) if self.control == "displacement" else np.nan,
                     "direction": int(directions[j]),
                     "first_direction": int(directions[0]),
-                    "start_s": float(start[j]),
+                    "start_s": float(start_s[j]),
                     "duration_s": float(self.duration_s[j]),
                     "time_s": time[j][:, None],
                     "warming_K": warming[j][:, None],
@@ -167,10 +169,24 @@ class Protocol:
             )
         return tuple(out)
 
+    def _order(self, j: int) -> float:
+        """The number of a hold; of an unrecorded one half less than the next number, or infinity."""
+        later = self.number[j:]
+        later = later[later >= 0]
+        if not later.size:
+            return np.inf
+        return float(later[0]) if self.number[j] >= 0 else float(later[0]) - 0.5
+
+
+def _widened(array: Any, columns: int) -> Any:
+    """A copy with so many columns of nothing behind."""
+    return np.pad(array, [(0, 0), (0, columns)])
+
 
 def _directions(setting: Floats) -> Floats:
     """(H,) sign of the last move; a hold without a move keeps the one before, and a test begins upwards."""
-    out, current = np.empty(len(setting)), 1.0
+    out = np.empty(len(setting))
+    current = 1.0
     for j, move in enumerate(np.sign(np.diff(setting, prepend=0.0))):
         current = move or current
         out[j] = current

@@ -141,19 +141,20 @@ def _by_complex_steps(protocol: Protocol, theta: Theta, model: Model) -> Lineari
     twice = {name: np.tile(value, 2) for name, value in theta.items()}
     walk = Walk(protocol, twice, model)
     out = _nothing(protocol, n)
-    of_setting, of_creep = slice(None, n), slice(n, None)
     setting_step, creep_step = 1j * np.repeat([[_STEP, 0.0], [0.0, _STEP]], n, axis=1)
     carried, beside = walk.begin(2 * n)
     out.creep[0] = carried[:n]
     for j, setting in enumerate(protocol.setting):
         creep = np.tile(out.creep[j], 2) + creep_step
         reading, carried, beside = walk.hold(j, setting + setting_step, creep, beside)
-        out.reading[j] = reading[:, of_creep].real
-        out.by_setting[j] = reading[:, of_setting].imag / _STEP
-        out.by_creep[j] = reading[:, of_creep].imag / _STEP
-        out.creep[j + 1] = carried[of_creep].real
-        out.carry_by_setting[j] = carried[of_setting].imag / _STEP
-        out.carry_by_creep[j] = carried[of_creep].imag / _STEP
+        of_setting = reading[:, :n]
+        of_creep = reading[:, n:]
+        out.reading[j] = of_creep.real
+        out.by_setting[j] = of_setting.imag / _STEP
+        out.by_creep[j] = of_creep.imag / _STEP
+        out.creep[j + 1] = carried[n:].real
+        out.carry_by_setting[j] = carried[:n].imag / _STEP
+        out.carry_by_creep[j] = carried[n:].imag / _STEP
         walk.past = [(start_s, goal.real, k2.real) for start_s, goal, k2 in walk.past]
         beside = {key: value.real for key, value in beside.items()}
     return out
@@ -259,14 +260,18 @@ class Walk:
         """Let time pass before a hold begins, as in a hold that nobody reads; what is then beside the creep."""
         if not np.any(wait_s):
             return beside
-        law, times, warming = self.creep, hold.time_s, hold.warming_K
-        hold.time_s, hold.warming_K = wait_s, warming[:1]
-        amount = law.amount(hold.initial_tension, hold)
+        times = hold.time_s
+        warming = hold.warming_K
+        hold.time_s = wait_s
+        hold.warming_K = warming[:1]
+        amount = self.creep.amount(hold.initial_tension, hold)
         hold.grown = hold.carried + amount * laws.creep_fraction(wait_s, self.k2, self.N)
         self.past.append((hold.start_s, hold.carried + amount, self.k2))
-        beside = law.beside(beside, hold)
+        beside = self.creep.beside(beside, hold)
         self.past[:] = [(start_s - wait_s, goal, k2) for start_s, goal, k2 in self.past]
-        hold.time_s, hold.warming_K, hold.carried = times, warming, hold.grown
+        hold.time_s = times
+        hold.warming_K = warming
+        hold.carried = hold.grown
         hold.initial_tension = self._first(held, sum(beside.values(), hold.carried), hold)
         return beside
 
@@ -317,12 +322,10 @@ class Walk:
         """
         zero = self.protocol.length_mm + creep
         first, by_stretched, by_zero = self._tension(stretched, zero)
-        taut = first > 0
-        safe = np.where(taut, first, 1.0)
-        target = np.where(taut, self.B * np.power(safe, self.U), 0.0)
-        slope = self.U * target / safe * self.k1
+        target, slope = self._target(first)
         amount = target - self.kept * creep
-        amount_by_setting, amount_by_creep = slope * by_stretched, slope * by_zero - self.kept
+        amount_by_setting = slope * by_stretched
+        amount_by_creep = slope * by_zero - self.kept
         every = self.fraction[self.where[j]]
         fraction = every[rows]
         tension, by_stretched, by_zero = self._tension(stretched, zero + amount * fraction)
@@ -330,8 +333,16 @@ class Walk:
         by_setting = stiff * (by_stretched + by_zero * (amount_by_setting * fraction))
         by_creep = stiff * (by_zero * (1.0 + amount_by_creep * fraction))
         end = every[self.protocol.end[j]]
-        carried = creep + amount * end, amount_by_setting * end, 1.0 + amount_by_creep * end
-        return np.maximum(tension, 0.0), by_setting, by_creep, *carried
+        carried = creep + amount * end
+        carry_by_creep = 1.0 + amount_by_creep * end
+        return np.maximum(tension, 0.0), by_setting, by_creep, carried, amount_by_setting * end, carry_by_creep
+
+    def _target(self, tension: Array) -> tuple[Array, Array]:
+        """Final creep (n,) at a tension, mm, and its derivative by the strain; zero when slack."""
+        taut = tension > 0
+        safe = np.where(taut, tension, 1.0)
+        target = np.where(taut, self.B * np.power(safe, self.U), 0.0)
+        return target, self.U * target / safe * self.k1
 
     def _tension(self, stretched: Array, zero: Array) -> tuple[Array, ...]:
         """Tension, N, and the slopes of strain by stretched and zero-tension length, 1/mm; (n,) or (r, n) arrays."""

@@ -75,19 +75,20 @@ class Proposal:
     def _parts(self) -> tuple[list[tuple[float, Mixture]], list[tuple[float, Mixture]]]:
         """Shares and mixtures of straightened points, then of others; shares that sum to one."""
         close, wide, plain, start, excess = self.shares
-        straightened, others = [(close, self.close), (wide, self.wide)], [(plain, self.plain), (start, self.start)]
+        straightened = [(close, self.close), (wide, self.wide)]
+        others = [(plain, self.plain), (start, self.start)]
         if self.excess is not None:
             straightened.append((excess, self.excess))
         total = sum(share for share, _ in straightened + others)
-        straightened, others = ([(share / total, part) for share, part in kind] for kind in (straightened, others))
-        return straightened, others
+        return _divided(straightened, total), _divided(others, total)
 
     def log_density(self, x: Array) -> Array:
         """(n,) log density of points (n, d)."""
         u, jacobian = self.straight.forward(x)
         straightened, others = self._parts
         logs = [np.log(share) + part.log_density(u) + jacobian for share, part in straightened]
-        return log_sum(np.array([*logs, *(np.log(share) + part.log_density(x) for share, part in others)]))
+        logs += [np.log(share) + part.log_density(x) for share, part in others]
+        return log_sum(np.array(logs))
 
     @cached_property
     def components(self) -> Components:
@@ -107,11 +108,17 @@ class Proposal:
         return self.components.from_cube(rng.uniform(size=(n, len(self.straight.order) + 1)), rng)
 
 
+def _divided(parts: list[tuple[float, Mixture]], total: float) -> list[tuple[float, Mixture]]:
+    """Parts whose shares are of a total."""
+    return [(share / total, part) for share, part in parts]
+
+
 def components(of: Mixture | Proposal) -> Components:
     """The components of what the learned move draws from."""
     if isinstance(of, Proposal):
         return of.components
-    return Components(replace(of, degrees=np.full(len(of.weights), of.degrees)))
+    degrees = np.full(len(of.weights), of.degrees)
+    return Components(replace(of, degrees=degrees))
 
 
 def fit_proposal(
@@ -194,14 +201,15 @@ def with_excess(of: Proposal, drawn: WeightedPoints, value: Array, rng: Generato
     over -= np.quantile(over, 0.5, weights=drawn.weight, method="inverted_cdf")
     weight = drawn.weight * -np.expm1(np.minimum(TAKEN_AS_IT_IS - over, 0.0))
     some = weight > 0.0
-    u = of.straight.forward(drawn.z[some])[0]
+    u, _ = of.straight.forward(drawn.z[some])
     if some.sum() < TOO_FEW or not np.isfinite(u).all():
         return of
     points = WeightedPoints(u, weight[some]).worth(effective_number(weight[some]))
     try:
-        return replace(of, excess=mixture.fit_around(points, of.close, rng, most=EXCESS_COMPONENTS, wider=WIDER))
+        excess = mixture.fit_around(points, of.close, rng, most=EXCESS_COMPONENTS, wider=WIDER)
     except np.linalg.LinAlgError:
         return of
+    return replace(of, excess=excess)
 
 
 _PARTS = ("close", "wide", "plain", "start", "excess")
