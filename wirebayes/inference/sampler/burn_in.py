@@ -116,22 +116,25 @@ def burn_in_round(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn
     if state.learned.acceptance < USEFUL:
         state, walk = _walked(target, state, policy)
         state = _fitted(target, state, policy, *_weighted_twice(*walk))
-    state, (z, value, base) = _drawn(target, state, policy)
+    state, drawn = _drawn(target, state, policy)
+    z, value, base = drawn
     weight = value - base
     typical = weight[truncated_rows(weight, len(weight), state.generator)]
-    acceptance = float(np.exp(np.minimum(weight - state.generator.permutation(typical), 0.0)).mean())
+    against = state.generator.permutation(typical)
+    acceptance = float(np.exp(np.minimum(weight - against, 0.0)).mean())
     state = state.knowing(acceptance=acceptance)
     middle, high = np.quantile(typical, [0.5, 0.999])
     settled = acceptance >= GOOD_ACCEPTANCE and high - middle < policy.tail
     last = state.round >= policy.rounds and settled or state.round >= policy.most_rounds
     if acceptance >= USEFUL:
-        seen = _weighted_twice(z, value, base)
-        state = _fitted(target, state, policy, *seen, points=POINTS if last else PASSING_POINTS)
+        state = _fitted(target, state, policy, *_weighted_twice(*drawn), points=POINTS if last else PASSING_POINTS)
         left = left_by_search(state.learned, middle) if last else None
         state = _with_excess(state, z, value, weight, left)
+    if not last:
+        return state
     # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
     steps = int(np.clip(np.exp(high - middle), 1, LONGEST_SETTLING))
-    return _frozen(target, state, policy, (z, value, base), steps) if last else state
+    return _frozen(target, state, policy, drawn, steps)
 
 
 def _frozen(
@@ -183,7 +186,8 @@ def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
     state : Sampling
     policy : Policy
     """
-    learned, done = replace(state.learned, again=state.learned.again + 1, previous=None), policy.rounds - 1
+    learned = replace(state.learned, again=state.learned.again + 1, previous=None)
+    done = policy.rounds - 1
     if _hard_to_find(learned):  # few rounds of many draws: what is overlooked is rare
         done = max(done, policy.most_rounds - FEW_ROUNDS)
     return _of_kept(target, replace(state, learned=learned), policy, done)
@@ -205,13 +209,14 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy, *, draws_stay
     found = distinct([known, _climbed(target, state, known)])
     state = replace(state, evaluations=state.evaluations + target.evaluations - before)
     if len(found.z) > len(known.z):
-        start = _overdispersed(found)
-        return again(target, replace(state, learned=replace(state.learned, start=start, modes=len(found.z))), policy)
+        learned = replace(state.learned, start=_overdispersed(found), modes=len(found.z))
+        return again(target, replace(state, learned=learned), policy)
     earlier = state.all_kept if draws_stay else Kept()
     previous = state.learned.proposal if earlier.steps else None
-    state = replace(state, learned=replace(state.learned, again=state.learned.again + 1, previous=previous))
-    learned = _as_frozen(_of_kept(target, state, policy, policy.rounds).learned)
-    return replace(state, learned=learned, kept=Kept(), earlier=earlier, diagnostics=None)
+    learned = replace(state.learned, again=state.learned.again + 1, previous=previous)
+    state = replace(state, learned=learned)
+    fitted = _of_kept(target, state, policy, policy.rounds)
+    return replace(state, learned=_as_frozen(fitted.learned), kept=Kept(), earlier=earlier, diagnostics=None)
 
 
 def _climbed(target: LogPosterior, state: Sampling, known: Optimum) -> Optimum:
@@ -354,10 +359,12 @@ def _walking(target: LogPosterior, policy: Policy) -> int:
 
 def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> tuple[Array, Array]:
     """Draws of a mixture where the density is above zero, and its logarithm there."""
-    drawn, values = np.empty((0, len(target.problem.names))), np.empty(0)
+    drawn = np.empty((0, len(target.problem.names)))
+    values = np.empty(0)
     while len(drawn) < n:
         z = known.rvs(n, random)
         value = target(z)
         good = np.isfinite(value)
-        drawn, values = np.vstack([drawn, z[good]]), np.concatenate([values, value[good]])
+        drawn = np.vstack([drawn, z[good]])
+        values = np.concatenate([values, value[good]])
     return drawn[:n], values[:n]

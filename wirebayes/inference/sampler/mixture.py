@@ -125,12 +125,12 @@ def fit_mixture(
     numpy.linalg.LinAlgError
         If the points do not span their space.
     """
-    x, d = points.z, points.z.shape[1]
     share = points.weight / points.weight.sum()
-    middle = share @ x
-    scale = ((x - middle) * share[:, None]).T @ (x - middle)
+    middle = share @ points.z
+    away = points.z - middle
+    scale = (away * share[:, None]).T @ away
     root = np.linalg.cholesky(scale + 1e-9 * np.diag(np.diag(scale)))
-    x = np.linalg.solve(root, (x - middle).T).T
+    x = np.linalg.solve(root, away.T).T
     if not np.isfinite(x).all():  # a map fitted to too few points may overflow
         raise np.linalg.LinAlgError("the points do not span their space")
 
@@ -141,7 +141,7 @@ def fit_mixture(
         for k in range(most, 0, -1):
             centres = x[spread_rows(x, k, rng, share)]
             if len(centres) == k:
-                yield Mixture(np.full(k, 1.0 / k), centres, np.repeat(np.eye(d)[None], k, axis=0), degrees)
+                yield _round_components(centres, degrees)
 
     for start in starts():
         try:
@@ -150,6 +150,12 @@ def fit_mixture(
             continue
         return Mixture(found.weights, middle + found.centres @ root.T, root @ found.factors, degrees)
     raise np.linalg.LinAlgError("the points do not span their space")
+
+
+def _round_components(centres: Array, degrees: float = DEGREES) -> Mixture:
+    """Equal components of unit scale about centres (k, d)."""
+    k, d = centres.shape
+    return Mixture(np.full(k, 1.0 / k), centres, np.repeat(np.eye(d)[None], k, axis=0), degrees)
 
 
 def fit_around(points: WeightedPoints, of: Mixture, rng: Generator, *, most: int, wider: float) -> Mixture:
@@ -175,10 +181,10 @@ def fit_around(points: WeightedPoints, of: Mixture, rng: Generator, *, most: int
     d = len(middle)
     root = np.linalg.cholesky(wider * covariance)
     x = np.linalg.solve(root, (points.z - middle).T).T
-    k = int(np.clip(points.weight.sum() / d, 1, most))
-    centres = x[spread_rows(x, k, rng, points.weight / points.weight.sum())]
-    k = len(centres)
-    start = Mixture(np.full(k, 1.0 / k), centres, np.repeat(np.eye(d)[None], k, axis=0))
+    worth = points.weight.sum()
+    k = int(np.clip(worth / d, 1, most))
+    centres = x[spread_rows(x, k, rng, points.weight / worth)]
+    start = _round_components(centres)
     found = _em(x, points.weight, start, kind=np.float64, of_the_whole=float(d), fewest=0.0)
     return Mixture(found.weights, middle + found.centres @ root.T, root @ found.factors)
 
