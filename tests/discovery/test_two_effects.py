@@ -134,7 +134,7 @@ def test_no_more_readings_than_parameters_are_evidence_for_nothing(weights: int,
     with np.errstate(all="raise", under="ignore"):
         begin = start(block, block.z)
         scanned = scan(x)
-    assert np.isfinite(begin.largest).all()
+    assert np.isfinite(begin.log_density).all()
     assert not np.isnan(scanned.two).any()
     pairs = two_effects.log_bayes_of_each_pair(x)
     assert not np.isnan(pairs).any()

@@ -1,6 +1,6 @@
 """The way up one path: at every rung the parameters follow, and the evidence of the effect is evaluated."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -15,18 +15,10 @@ from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Bools, Ints
 
 _STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
-
-
 # of a Gauss-Newton step, tried in one batch: whole, and shorter where the tangent does not reach so far
 _LENGTHS = np.array([1.0, 0.4, 0.1])
-
-
 _SETTLED, _HOPELESS = 0.05, -15.0  # nats: a gain too small to go on for, a rung from which none leads up again
-
-
 _NEVER = -1e300  # log Bayes factor of what cannot be computed: finite, so that sums of it stay numbers
-
-
 _LONGEST = 3.0  # of a step, in any sampled coordinate
 
 
@@ -45,13 +37,10 @@ class Start:
 
     Attributes
     ----------
-    z : (places n, d) array
+    z : (n, d) array
         Places without the effect of n data sets, in the coordinates that are sampled.
-    log_density : (places n,) array
-        Log marginal density, each in the units of its place.
-    largest : (places n,) array
-        The largest among the places of each data set, in the same units.
-    data_sets : int
+    log_density : (n,) array
+        Log marginal density there.
     readings : sequence of (H, R, n) arrays or None
         Theirs, a sample; None for the measured ones.
     degrees : int
@@ -60,17 +49,19 @@ class Start:
 
     z: Array
     log_density: Array
-    largest: Array
-    data_sets: int
     readings: Sequence[Array] | None
     degrees: int
+
+    @property
+    def data_sets(self) -> int:
+        return len(self.z)
 
 
 def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) -> Start:
     """The best places without an effect, of the same density and by the same steps as on a ladder.
 
     The plain fit is the best with its own noise; with the noise integrated out some place nearby is better, by up to a
-    tenth of a nat where it was measured. Places that differ in their noise are compared in the same units.
+    tenth of a nat where it was measured.
 
     Parameters
     ----------
@@ -80,38 +71,40 @@ def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) 
     readings : sequence of (H, R, n) arrays, optional
         Their readings, a sample; the measured ones when left out.
     """
-    target, n = block.target, len(z)
+    target = block.target
     free = moving_columns(target.problem)
     y = z.copy()
-    units = _log_units(target, y)
-    best, height, rows = y.copy(), np.full(len(y), -np.inf), np.arange(len(y))
+    best = y.copy()
+    height = np.full(len(y), -np.inf)
+    rows = np.arange(len(y))
     for step in range(_STEPS + 1):
-        own = None if readings is None else [r[..., rows % n] for r in readings]
+        own = _of_rows(readings, rows)
         with np.errstate(all="ignore"):
             x = tangent(target, y[rows], own, free)
-        here = weigh(x, np.zeros_like(x.residual), 0.0, 0.0, x.degrees)
+        no_signature = np.zeros_like(x.residual)
+        here = weigh(x, no_signature, 0.0, 0.0, x.degrees)
         value = np.nan_to_num(here.height + x.prior, nan=-np.inf)
         with np.errstate(invalid="ignore"):
             gain = value - height[rows]
         better = gain > 0
-        best[rows[better]], height[rows[better]] = y[rows[better]], value[better]
-        go = np.flatnonzero(np.minimum(gain, here.promise) >= _SETTLED)
+        improved = rows[better]
+        best[improved] = y[improved]
+        height[improved] = value[better]
+        hope = np.minimum(gain, here.promise)
+        go = np.flatnonzero(hope >= _SETTLED)
         if step == _STEPS or not len(go):
             break
-        rows, own = rows[go], None if own is None else [r[..., go] for r in own]
+        rows = rows[go]
+        own = _of_rows(readings, rows)
         y[rows] = _follow(target, y[rows], own, x.of(go), here.of(go), free, x.degrees)
-    largest = (height - units).reshape(-1, n).max(axis=0)
-    return Start(best, height, np.tile(largest, len(y) // n) + units, n, readings, x.degrees)
+    return Start(best, height, readings, x.degrees)
 
 
-def _log_units(target: LogPosterior, z: Array) -> Array:
-    """(n,) log of the units in which readings are weighed, their standard deviations, summed over all readings."""
-    theta, total = target.coordinates.to_natural(z), np.zeros(len(z))
-    for sample in target.problem.samples:
-        own = target.problem.parameters(theta, sample)
-        variance = sample.variance(own)
-        total += 0.5 * sample.protocol.mask.sum() * np.log(variance)
-    return total
+def _of_rows(readings: Sequence[Array] | None, rows: Ints) -> list[Array] | None:
+    """The readings of some data sets, a sample each; None for the measured ones."""
+    if readings is None:
+        return None
+    return [of_sample[..., rows] for of_sample in readings]
 
 
 def lead(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> PathEvidence:
@@ -126,27 +119,39 @@ def lead(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> PathEvidence
     """
     n = begin.data_sets
     ascent, y = _begin(block, ladder, begin)
-    moving = [i for i in moving_columns(ascent.target.problem) if i != ascent.column]
-    shapes = set(ladder.effect.columns()[1:])
-    rigid = [i for i in moving if ascent.target.problem.names[i].split("[")[0] not in shapes]
-    every = np.tile(ladder.amplitudes, len(y) // (len(ladder.probes) * n)).repeat(n, axis=1)
-    unseen = _Places.unseen(y)
-    best, found, alive = _Places.unseen(y), list[_Places](), np.ones(n, bool)
-    for amplitudes in every:
-        # Shape constants mean nothing while the amplitude is small, and would wander.
-        is_low = bool((np.abs(amplitudes) < 0.999 * np.abs(every[-1]) * FIRST / LAST).all())
-        rung = ascent.look(y, amplitudes, alive, rigid if is_low else moving, _FEW if is_low else _STEPS)
+    moving = ascent.moving()
+    rigid = ascent.moving(but_for=ladder.effect.columns()[1:])
+    rungs = ladder.amplitudes.repeat(n, axis=1)
+    low_below = 0.999 * np.abs(rungs[-1]) * FIRST / LAST
+    best = _Places.unseen(y)
+    found: list[_Places] = []
+    alive = np.ones(n, bool)
+    for amplitudes in rungs:
+        is_low = np.all(np.abs(amplitudes) < low_below)
+        if is_low:
+            # Shape constants mean nothing while the amplitude is small, and would wander.
+            rung = ascent.look(y, amplitudes, alive, rigid, _FEW)
+        else:
+            rung = ascent.look(y, amplitudes, alive, moving, _STEPS)
+            alive = alive & (ascent.best_start(rung.log_bayes) >= _HOPELESS)
         y = rung.z
         found.append(rung)
         best.improve(np.arange(len(y)), rung)
-        if not is_low:
-            alive = alive & (ascent.best_start(rung.log_bayes + ascent.behind) >= _HOPELESS)
         if ascent.is_beyond(amplitudes) or not alive.any():
-            found += [unseen] * (len(ladder.amplitudes) - len(found))
             break
-    found.append(ascent.look(best.z, best.amplitude, np.ones(n, bool), moving, _STEPS))
-    rungs = ([getattr(rung, name) for rung in found] for name in ("log_bayes", "amplitude", "norm"))
-    return PathEvidence(*(np.array(values).reshape(-1, n) for values in rungs))
+    not_reached = len(rungs) - len(found)
+    found += [_Places.unseen(y)] * not_reached
+    every_set = np.ones(n, bool)
+    found.append(ascent.look(best.z, best.amplitude, every_set, moving, _STEPS))
+    return _evidence(found, n)
+
+
+def _evidence(found: Sequence["_Places"], n: int) -> PathEvidence:
+    """What was found at the rungs of n data sets, a row a rung and start."""
+    log_bayes = np.array([rung.log_bayes for rung in found])
+    amplitude = np.array([rung.amplitude for rung in found])
+    norm = np.array([rung.norm for rung in found])
+    return PathEvidence(log_bayes.reshape(-1, n), amplitude.reshape(-1, n), norm.reshape(-1, n))
 
 
 @dataclass(frozen=True)
@@ -184,12 +189,10 @@ class _Ascent:
         Of the amplitude.
     neutral, low, high : float
         Where the amplitude changes nothing, and its ends.
-    readings : sequence of (H, R, n) arrays or None
-    data_sets, degrees : int
+    begin : Start
+        The data sets.
     nothing : (starts n,) array
-        The largest log marginal density without the effect.
-    behind : (starts n,) array
-        How much less it is where the start is.
+        The log marginal density without the effect.
     half : (starts n,) array
         Ratio of an amplitude to where the stretch of its rung ends.
     """
@@ -199,20 +202,25 @@ class _Ascent:
     neutral: float
     low: float
     high: float
-    readings: Sequence[Array] | None
-    data_sets: int
-    degrees: int
+    begin: Start
     nothing: Array
-    behind: Array
     half: Array
+
+    def moving(self, but_for: Sequence[str] = ()) -> list[int]:
+        """The columns of the parameters that follow, without the amplitude and some columns of the effect."""
+        names = self.target.problem.names
+        columns = moving_columns(self.target.problem)
+        return [i for i in columns if i != self.column and names[i].split("[")[0] not in but_for]
 
     def best_start(self, values: Array) -> Array:
         """(n,) the largest value of each data set."""
-        return np.asarray(values.reshape(-1, self.data_sets).max(axis=0))
+        by_start = values.reshape(-1, self.begin.data_sets)
+        return np.asarray(by_start.max(axis=0))
 
     def is_beyond(self, amplitudes: Array) -> bool:
         """Whether all amplitudes have reached their ends."""
-        return bool(np.isin(np.clip(self.neutral + amplitudes, self.low, self.high), (self.low, self.high)).all())
+        within = np.clip(self.neutral + amplitudes, self.low, self.high)
+        return bool(np.isin(within, (self.low, self.high)).all())
 
     def look(self, z: Array, amplitude: Array, alive: Bools, free: list[int], steps: int) -> _Places:
         """The best places at one step of the path: the other parameters follow while the amplitude is held.
@@ -236,33 +244,42 @@ class _Ascent:
         -------
         _Places
         """
-        n = self.data_sets
+        degrees = self.begin.degrees
         at, first, last = self._stretch(amplitude)
         z = z.copy()
         z[:, self.column] = (self.neutral + at) / self._scale
         best = _Places.unseen(z, at)
-        rows = np.flatnonzero(np.tile(alive, len(z) // n))
+        starts = len(z) // len(alive)
+        rows = np.flatnonzero(np.tile(alive, starts))
         for step in range(steps + 1):
             with np.errstate(all="ignore"):
                 both = tangent(self.target, z[rows], self._seen(rows), [*free, self.column])
             signature = both.parameters[..., -1] / self._scale
-            here = weigh(without_last(both), signature, first[rows], last[rows], self.degrees)
+            here = weigh(without_last(both), signature, first[rows], last[rows], degrees)
             log_bayes = here.height + both.prior - self.nothing[rows]
             log_bayes = np.nan_to_num(log_bayes, nan=_NEVER, neginf=_NEVER)
-            gain = np.full(len(z), -np.inf)
-            gain[rows] = np.minimum(log_bayes - best.log_bayes[rows], here.promise)
-            better = best.improve(rows, _Places(z[rows], log_bayes, at[rows] + here.move, here.norm))
+            gain = log_bayes - best.log_bayes[rows]
+            hope = np.minimum(gain, here.promise)
+            moved = at[rows] + here.move
+            better = best.improve(rows, _Places(z[rows], log_bayes, moved, here.norm))
             # A step that led down, where the wire went slack say, is the last one.
-            go = np.flatnonzero(better & (self.best_start(gain) >= _SETTLED)[rows % n])
+            go = np.flatnonzero(better & self._is_hopeful(rows, hope))
             if step == steps or not len(go):
                 break
             rows = rows[go]
-            z[rows] = _follow(self.target, z[rows], self._seen(rows), both.of(go), here.of(go), free, self.degrees)
+            z[rows] = _follow(self.target, z[rows], self._seen(rows), both.of(go), here.of(go), free, degrees)
         return best
 
+    def _is_hopeful(self, rows: Ints, hope: Array) -> Bools:
+        """Whether the data sets of some climbs may gain something, by what each climb hopes for."""
+        every = np.full(len(self.nothing), -np.inf)
+        every[rows] = hope
+        by_set = self.best_start(every) >= _SETTLED
+        return np.asarray(by_set[rows % len(by_set)])
+
     def _seen(self, rows: Ints) -> list[Array] | None:
-        """The readings of the data sets of some climbs, a sample each; None for the measured ones."""
-        return None if self.readings is None else [r[..., rows % self.data_sets] for r in self.readings]
+        """The readings of the data sets of some climbs."""
+        return _of_rows(self.begin.readings, rows % self.begin.data_sets)
 
     @property
     def _scale(self) -> float:
@@ -271,51 +288,72 @@ class _Ascent:
 
     def _stretch(self, amplitude: Array) -> tuple[Array, Array, Array]:
         """Distances (m,) from neutral within the amplitude's ends, and the ends of the moves that each speaks for."""
-        at, near, far = (
-            np.clip(self.neutral + amplitude * share, self.low, self.high)
-            for share in (1.0, 1.0 / self.half, self.half)
-        )
+        at = self._within(amplitude)
+        near = self._within(amplitude * (1.0 / self.half))
+        far = self._within(amplitude * self.half)
         return at - self.neutral, np.minimum(near, far) - at, np.maximum(near, far) - at
+
+    def _within(self, amplitude: Array) -> Array:
+        """Values at distances from neutral, no farther than the amplitude's ends."""
+        return np.clip(self.neutral + amplitude, self.low, self.high)
 
 
 def _begin(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> tuple[_Ascent, Array]:
     """What a lead needs, and the points (starts n, d) at which it begins."""
-    n, places = begin.data_sets, len(begin.z) // begin.data_sets
-    target, column, y = _with_effect(block, ladder, np.split(begin.z, places))
+    target, column, y = _with_effect(block, ladder, begin.z)
     # The amplitude, and shape constants that are free, integrate to one where nothing depends on them.
-    plain = begin.largest - 0.5 * np.log(2.0 * np.pi) * (len(target.problem.names) - begin.z.shape[1])
-    each_place = np.stack([np.where(np.isfinite(plain), plain, np.inf), begin.largest - begin.log_density])
-    nothing, behind = each_place.reshape(2, places, n).repeat(len(ladder.probes), axis=1).reshape(2, -1)
+    more_parameters = y.shape[1] - begin.z.shape[1]
+    plain = begin.log_density - 0.5 * np.log(2.0 * np.pi) * more_parameters
+    nothing = np.where(np.isfinite(plain), plain, np.inf)
     # From where to where a rung speaks: half way, by ratio, to its neighbours.
-    apart = np.tile(ladder.amplitudes[1] / ladder.amplitudes[0], places).repeat(n)
+    apart = ladder.amplitudes[1] / ladder.amplitudes[0]
     main = ladder.effect.amplitudes[0]
-    low, high = (float(v) for v in main.prior.support())
+    low, high = main.prior.support()
     ascent = _Ascent(
-        target, column, main.neutral, low, high, begin.readings, n, begin.degrees, nothing, behind, np.sqrt(apart)
+        target,
+        column,
+        main.neutral,
+        float(low),
+        float(high),
+        begin,
+        nothing=np.tile(nothing, len(ladder.probes)),
+        half=np.sqrt(apart.repeat(begin.data_sets)),
     )
     return ascent, y
 
 
-def _with_effect(block: LaplaceFit, ladder: AmplitudePath, places: Sequence[Array]) -> tuple[LogPosterior, int, Array]:
-    """The block's density with the effect, its amplitude's column, and its points (places starts n, d) at each start.
+def _with_effect(block: LaplaceFit, ladder: AmplitudePath, z: Array) -> tuple[LogPosterior, int, Array]:
+    """The block's density with the effect, its amplitude's column, and its points (starts n, d) at each start.
 
-    `places` (n, d) are points of the density without the effect.
+    `z` (n, d) are points of the density without the effect.
     """
     effect = ladder.effect
     problem = block.problem_with(effect)
     column = column_of(problem, effect)
     # A prior that is not felt, in whose standard deviations the column counts.
-    wide = Normal(0.0, 100.0 * float(np.abs(ladder.amplitudes).max()))
-    free = problem.prior.distributions | {problem.names[column]: wide}
-    target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
-    theta = []
-    for z in places:
-        values = dict(zip(block.target.problem.names, block.target.coordinates.to_natural(z).T, strict=True))
-        for probe in ladder.probes:
-            own = probe.own | {effect.columns()[0]: effect.amplitudes[0].neutral}
-            each = [values.get(name, np.full(len(z), own.get(name.split("[")[0]))) for name in problem.names]
-            theta.append(np.stack(each, axis=1))
+    largest = float(np.abs(ladder.amplitudes).max())
+    wide = Normal(0.0, 100.0 * largest)
+    distributions = problem.prior.distributions | {problem.names[column]: wide}
+    prior = replace(problem.prior, distributions=distributions)
+    target = LogPosterior(replace(problem, prior=prior), for_draws=False)
+    plain = block.target.coordinates.to_natural(z)
+    known = dict(zip(block.target.problem.names, plain.T, strict=True))
+    without_effect = {effect.columns()[0]: effect.amplitudes[0].neutral}
+    theta = [_extended(known, problem.names, probe.own | without_effect) for probe in ladder.probes]
     return target, column, target.coordinates.to_sampled(np.concatenate(theta))
+
+
+def _extended(known: Mapping[str, Array], names: Sequence[str], added: Mapping[str, float]) -> Array:
+    """(n, d) parameters of some names: those that are known (n,), and an effect's own, the same in all rows."""
+    n = len(next(iter(known.values())))
+    columns = []
+    for name in names:
+        if name in known:
+            columns.append(known[name])
+        else:
+            value = added[name.split("[")[0]]
+            columns.append(np.full(n, value))
+    return np.stack(columns, axis=1)
 
 
 def _follow(
@@ -328,19 +366,29 @@ def _follow(
     degrees: int,
 ) -> Array:
     """Move the parameters a step, or as much of it as is best, or not at all."""
-    step = here.step * np.minimum(1.0, _LONGEST / np.maximum(np.abs(here.step).max(axis=1, keepdims=True), 1e-300))
+    size = np.abs(here.step).max(axis=1, keepdims=True)
+    step = here.step * np.minimum(1.0, _LONGEST / np.maximum(size, 1e-300))
     many = len(_LENGTHS)
     trial = np.repeat(z[None], 1 + many, axis=0)
     trial[1:, :, columns] += _LENGTHS[:, None, None] * step
     flat = trial[1:].reshape(-1, z.shape[1])
-    tiled = None if readings is None else [np.tile(y, (1, 1, many)) for y in readings]
+    tiled = None
+    if readings is not None:
+        tiled = [np.tile(of_sample, (1, 1, many)) for of_sample in readings]
     moved, prior = residuals(target, flat, tiled)
-    r = np.concatenate([x.residual[None], moved.reshape(many, len(z), -1)])
-    levels = r.transpose(1, 0, 2) @ x.left
-    shrink = damp(x.singular, here.ratio[:, None])
-    square = (r**2).sum(axis=2) - (levels**2 @ shrink[..., None])[..., 0].T
+    residual = np.concatenate([x.residual[None], moved.reshape(many, len(z), -1)])
+    priors = np.concatenate([x.prior[None], prior.reshape(many, -1)])
+    square = _squares(x, here.ratio, residual)
     with np.errstate(invalid="ignore"):
-        prior = np.concatenate([x.prior[None], prior.reshape(many, -1)])
-        value = prior - 0.5 * degrees * np.log(np.maximum(square, x.least))
+        value = priors - 0.5 * degrees * np.log(np.maximum(square, x.least))
     best = np.argmax(or_impossible(value), axis=0)
-    return np.asarray(trial[best, np.arange(len(z))])
+    rows = np.arange(len(z))
+    return np.asarray(trial[best, rows])
+
+
+def _squares(x: Tangent, ratio: Array, residual: Array) -> Array:
+    """(k, n) sums of squares of residuals (k, n, N) in the metric of the noise, at its ratio (n,)."""
+    levels = residual.transpose(1, 0, 2) @ x.left
+    shrink = damp(x.singular, ratio[:, None])
+    whole_holds = (levels**2 @ shrink[..., None])[..., 0]
+    return np.asarray((residual**2).sum(axis=2) - whole_holds.T)
