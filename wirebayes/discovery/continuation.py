@@ -45,13 +45,20 @@ def strengths(ways: Sequence[AmplitudePath], climbed: Sequence[Mapping[int, Path
     for ladder, each in zip(ways, climbed, strict=True):
         prior = occam(ladder.probes[0].one_sided)
         for candidate in ladder.candidates:
-            here = [(each[b].log_bayes, each[b].amplitude, each[b].norm) for b in candidate.blocks]
-            if len(here) > 1 and candidate.shared:
-                value = shared_amplitude(*(np.array(v) for v in zip(*here, strict=True)))[0].max(axis=0) + prior
-            else:
-                value = np.sum([lr.max(axis=0) + prior for lr, _, _ in here], axis=0)
-            out[candidate] = value
+            here = [each[b] for b in candidate.blocks]
+            out[candidate] = _strength(here, candidate.shared, prior)
     return out
+
+
+def _strength(here: Sequence[PathEvidence], shared: bool, prior: float) -> Array:
+    """(n,) log Bayes factor of a candidate by its paths on its blocks, with one amplitude for all or one each."""
+    if len(here) == 1 or not shared:
+        return np.sum([path.log_bayes.max(axis=0) + prior for path in here], axis=0)
+    log_bayes = np.array([path.log_bayes for path in here])
+    amplitude = np.array([path.amplitude for path in here])
+    norm = np.array([path.norm for path in here])
+    value, _ = shared_amplitude(log_bayes, amplitude, norm)
+    return np.asarray(value.max(axis=0) + prior)
 
 
 class Continuation:
@@ -100,22 +107,30 @@ class Continuation:
         with scans of all names, and p would not be uniform; so ladders count up to p = `BY_LARGER`, or where p is as
         small as it can be. Simulations are those of an earlier call, and more.
         """
-        values, count = self._values, len(test.null)
-        clear = max(BY_LARGER, 1.0 / (1 + count))
+        clear = max(BY_LARGER, 1.0 / (1 + len(test.null)))
         needed = float(np.quantile(test.null, 1.0 - clear))  # below it no surprise can make p so small
-        # Simulations come out no lower along the paths than in the scan, so a value is no more surprising than there.
-        most = {name: float(test.scales[name].surprise(v)) for name, v in values.items()}
-        lead = {name: v - float(np.quantile(test.chance[name], _LEVEL)) for name, v in values.items()}
-        surprises, largest = dict(test.surprises), float(test.null.max())
-        may = [n for n in lead if most[n] >= needed and most[n] > surprises[n]]
-        for name in sorted(may, key=lambda n: -lead[n])[:_TRIED]:
+        largest = float(test.null.max())
+        surprises = dict(test.surprises)
+        for name in self._worth_trying(test, needed)[:_TRIED]:
             chance = self._chance(name, test.chance[name], simulated, needed, largest)
-            surprises[name] = max(surprises[name], _surprise(values[name], chance))
+            surprise = _surprise(self._values[name], chance)
+            surprises[name] = max(surprises[name], surprise)
             if surprises[name] > largest:
                 break
         larger = replace(test, surprises=surprises)
         self.p = larger.p
         return larger if larger.p <= clear else test
+
+    def _worth_trying(self, test: GlobalTest, needed: float) -> list[str]:
+        """Names whose paths may make them as surprising as is needed, those farthest above chance first."""
+        lead = {}
+        for name, value in self._values.items():
+            # Simulations come out no lower along the paths than in the scan, so a value is no more surprising than
+            # there.
+            most = float(test.scales[name].surprise(value))
+            if most >= needed and most > test.surprises[name]:
+                lead[name] = value - float(np.quantile(test.chance[name], _LEVEL))
+        return sorted(lead, key=lambda name: -lead[name])
 
     def _chance(
         self, name: str, linear: Array, simulated: Sequence[Replicates], needed: float, largest: float
@@ -126,22 +141,33 @@ class Continuation:
         clearly more surprising than all simulations, of which the most surprising one is by `largest`.
         """
         linear = linear[:_MOST_ROWS]
+        value = self._values[name]
         known = self._known.get(name, np.empty(0))
-        ways = [way for way in self._ways if way.effect.name == name]
-        out, decided = np.empty(0), False
-        while len(out) < len(linear) and not decided:
-            last = min(len(out) + int(np.clip(len(out), _FIRST_ROWS, _ROWS)), len(linear))
+        out = np.empty(0)
+        while len(out) < len(linear):
+            more = int(np.clip(len(out), _FIRST_ROWS, _ROWS))
+            last = min(len(out) + more, len(linear))
             if last > len(known):
                 rows = slice(len(known), last)
-                climbed = self._strengths(ways, [(s.z[rows], [y[..., rows] for y in s.readings]) for s in simulated])
-                known = np.append(known, np.max(list(climbed.values()), axis=0))
+                known = np.append(known, self._climbed(name, simulated, rows))
             out = np.maximum(linear[:last], known[:last])
-            as_high = int((out >= self._values[name]).sum())
-            too_common = as_high > 0 and np.log1p(len(linear)) - np.log1p(as_high) < needed
-            clear = len(out) >= _ROWS and _surprise(self._values[name], out) >= largest + _CLEARLY
-            decided = bool(too_common or clear)
+            as_high = int((out >= value).sum())
+            if as_high and np.log1p(len(linear)) - np.log1p(as_high) < needed:
+                break  # too common
+            if len(out) >= _ROWS and _surprise(value, out) >= largest + _CLEARLY:
+                break
         self._known[name] = known
         return out
+
+    def _climbed(self, name: str, simulated: Sequence[Replicates], rows: slice) -> Array:
+        """(m,) largest log Bayes factor of a name along its ladders, in some of the simulations."""
+        ways = [way for way in self._ways if way.effect.name == name]
+        plain = []
+        for block in simulated:
+            readings = [of_sample[..., rows] for of_sample in block.readings]
+            plain.append((block.z[rows], readings))
+        climbed = self._strengths(ways, plain)
+        return np.max(list(climbed.values()), axis=0)
 
     def _strengths(self, ways: Sequence[AmplitudePath], plain: Sequence[tuple[Array, Any]]) -> dict[Candidate, Array]:
         z, readings = zip(*plain, strict=True)

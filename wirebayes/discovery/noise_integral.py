@@ -84,14 +84,17 @@ def project(x: Expansion) -> Projected:
     """Project residual, signatures and smooth functions on what the parameters leave, in the metric of each ratio."""
     shrink = damp(x.singular[:, None], RATIOS[:, None])
     log_volume, every = _beside_parameters(x, shrink)
-    signatures = x.signatures.shape[2]
-    residual, form = every.between(0, 1), every.between(1, 1 + signatures)
-    smooth = [every.between(own.start, own.stop) for own in _slices(x.processes, 1 + signatures)]
-    log_metric = np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2)
+    first_smooth = 1 + x.signatures.shape[2]
+    residual = every.between(0, 1)
+    form = every.between(1, first_smooth)
+    slices = _slices(x.processes, first_smooth)
+    smooth = [every.between(own.start, own.stop) for own in slices]
+    moved_whole = np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2)
     square = form.squares(shrink)
-    is_left = square > ABSORBED * (form.plain**2).sum(axis=1)[:, None]
+    alone = (form.plain**2).sum(axis=1)
+    is_left = square > ABSORBED * alone[:, None]
     return Projected(
-        shared=-0.5 * log_metric - log_volume,
+        shared=-0.5 * moved_whole.sum(axis=2) - log_volume,
         rss=residual.squares(shrink)[..., 0] + x.prior_square[:, None],
         along=form.along(residual, shrink),
         square=np.where(is_left, square, np.inf),
@@ -109,21 +112,32 @@ def _beside_parameters(x: Expansion, shrink: Array) -> tuple[Array, "Functions"]
     The columns are the residual, the signatures and the smooth functions.
     """
     p = x.parameters.shape[2]
-    columns = np.concatenate([x.parameters, x.residual[..., None], x.signatures, x.flexible], axis=2)
+    residual = x.residual[..., None]
+    columns = np.concatenate([x.parameters, residual, x.signatures, x.flexible], axis=2)
     levels = np.swapaxes(x.left, 1, 2) @ columns
-    # Inner products of the parameters with everything, at each ratio.
-    shrunk = np.swapaxes(levels[..., :p], 1, 2)[:, None] * shrink[:, :, None]
-    gram = (np.swapaxes(x.parameters, 1, 2) @ columns)[:, None] - shrunk @ levels[:, None]
-    gram[..., :p] += x.prior_precision[:, None]
-    gram[..., p] += x.prior_gradient[:, None]
+    gram = _with_parameters(x, columns, levels, shrink)
     factor = cholesky(gram[..., :p])
     regular = np.isfinite(factor).all(axis=(2, 3))
     factor[~regular] = np.eye(p)
     # What the parameters take of each column, in coordinates in which it is a sum of squares.
     taken = np.linalg.inv(factor) @ gram[..., p:]
     taken[~regular] = 0.0
-    log_volume = np.log(np.einsum("nkpp->nkp", factor)).sum(axis=2)
-    return np.where(regular, log_volume, np.inf), Functions(columns[..., p:], taken, levels[..., p:])
+    diagonal = np.einsum("nkpp->nkp", factor)
+    log_volume = np.log(diagonal).sum(axis=2)
+    functions = Functions(columns[..., p:], taken, levels[..., p:])
+    return np.where(regular, log_volume, np.inf), functions
+
+
+def _with_parameters(x: Expansion, columns: Array, levels: Array, shrink: Array) -> Array:
+    """(n, k, p, c) inner products of the parameters with columns (n, N, c), themselves first, and the prior's part."""
+    p = x.parameters.shape[2]
+    of_parameters = np.swapaxes(levels[..., :p], 1, 2)
+    shrunk = of_parameters[:, None] * shrink[:, :, None]
+    plain = np.swapaxes(x.parameters, 1, 2) @ columns
+    gram = plain[:, None] - shrunk @ levels[:, None]
+    gram[..., :p] += x.prior_precision[:, None]
+    gram[..., p] += x.prior_gradient[:, None]
+    return np.asarray(gram)
 
 
 def with_each_signature(x: Expansion, found: Projected) -> tuple[Array, Array]:
@@ -204,20 +218,30 @@ def _taken_by(square: Array, along: Array) -> tuple[Array, Array]:
     `square` (..., q, q) and `along` (..., q) are the inner products of its functions with themselves and the residual.
     """
     q = along.shape[-1]
-    share = SIZES**2 / np.maximum(np.einsum("...ff->...", square), 1e-300)[..., None]
-    # One Cholesky factor of I + share square, bordered by the residual's products, holds both; the corner is not used.
-    bordered = np.zeros((*share.shape, q + 1, q + 1))
-    bordered[..., :q, :q] = share[..., None, None] * square[..., None, :, :]
-    bordered.reshape(-1, (q + 1) ** 2)[:, :: q + 2] += 1.0
-    bordered[..., q, :q] = np.sqrt(share)[..., None] * along[..., None, :]
-    bordered[..., q, q] = LARGEST_SLOPE
-    factor = cholesky(bordered)
+    factor = cholesky(_bordered(square, along))
+    pivots = np.einsum("...ff->...f", factor)[..., :q]
     with np.errstate(invalid="ignore"):
-        log_volume = np.log(np.einsum("...ff->...f", factor)[..., :q]).sum(axis=-1)
+        log_volume = np.log(pivots).sum(axis=-1)
         less = (factor[..., q, :q] ** 2).sum(axis=-1)
     # Functions that the parameters take entirely leave rounding errors.
     seen = np.isfinite(log_volume + less)
     return np.where(seen, log_volume, 0.0), np.where(seen, less, 0.0)
+
+
+def _bordered(square: Array, along: Array) -> Array:
+    """I + share square for each size, bordered by the residual's products: one Cholesky factor of it holds both.
+
+    The corner is not used.
+    """
+    q = along.shape[-1]
+    whole = np.einsum("...ff->...", square)
+    share = SIZES**2 / np.maximum(whole, 1e-300)[..., None]
+    out = np.zeros((*share.shape, q + 1, q + 1))
+    out[..., :q, :q] = share[..., None, None] * square[..., None, :, :]
+    out.reshape(-1, (q + 1) ** 2)[:, :: q + 2] += 1.0
+    out[..., q, :q] = np.sqrt(share)[..., None] * along[..., None, :]
+    out[..., q, q] = LARGEST_SLOPE
+    return out
 
 
 def has_tangent(x: Expansion) -> Bools:

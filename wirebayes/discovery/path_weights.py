@@ -107,18 +107,23 @@ def _weigh_few(x: Tangent, signature: Array, near: Array, far: Array, degrees: i
     amplitude = np.divide(free.along, free.square, out=np.zeros_like(free.square), where=free.square > 0)
     amplitude = np.clip(amplitude, near[:, None], far[:, None])
     left = free.left(amplitude, x.least)
-    log_volume = -0.5 * np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2).sum(axis=2) - free.log_volume
-    height = np.where(free.regular, log_volume - 0.5 * degrees * np.log(left), -np.inf)
-    rows, k = np.arange(len(height)), np.argmax(height, axis=1)
-    best = rows, k
-    after = np.maximum(left[best] - (free.taken[best] ** 2).sum(axis=1), x.least)
+    moved_whole = np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2)
+    log_volume = -0.5 * moved_whole.sum(axis=2) - free.log_volume
+    height = log_volume - 0.5 * degrees * np.log(left)
+    height = np.where(free.regular, height, -np.inf)
+    k = np.argmax(height, axis=1)
+    best = np.arange(len(height)), k
+    left_best = left[best]
+    by_step = (free.taken[best] ** 2).sum(axis=1)
+    after = np.maximum(left_best - by_step, x.least)
+    total = _summed(height, height[best])
     return Weighed(
-        height=np.where(smooth, _summed(height, height[best]), -np.inf),
+        height=np.where(smooth, total, -np.inf),
         move=amplitude[best],
-        norm=np.sqrt(free.square[best] * degrees / left[best]),
+        norm=np.sqrt(free.square[best] * degrees / left_best),
         step=_steps(free.gram[best], free.regular[best]),
         ratio=RATIOS[k],
-        promise=0.5 * degrees * np.log(left[best] / after),
+        promise=0.5 * degrees * np.log(left_best / after),
     )
 
 
@@ -158,12 +163,13 @@ def _eliminated(gram: Array) -> _Free:
     factor = cholesky(bordered)
     regular = np.isfinite(factor[..., 0, 0])
     factor[~regular] = 1.0
+    diagonal = np.einsum("nkpp->nkp", factor[..., :p, :p])
     pivot = factor[..., p, p]
     square = pivot**2 - added
     return _Free(
         gram,
         regular,
-        log_volume=np.log(np.einsum("nkpp->nkp", factor[..., :p, :p])).sum(axis=2),
+        log_volume=np.log(diagonal).sum(axis=2),
         along=factor[..., -1, p] * pivot,
         square=np.where(square > ABSORBED * own, square, 0.0),
         taken=factor[..., -1, :p],

@@ -16,7 +16,7 @@ from wirebayes.discovery.profile import Profile, has_near_neighbours, integral_o
 from wirebayes.discovery.sharing import alike
 from wirebayes.inference.laplace_fit import LaplaceFit, Pinned
 from wirebayes.inference.optimum import Optimum
-from wirebayes.numeric.typing import Array, Function
+from wirebayes.numeric.typing import Array, Function, Ints
 from wirebayes.wire.effect import Effect
 
 # δ; end of an amplitude's prior. Hardly matters: twice as much takes ln 2 from every name alike
@@ -177,23 +177,34 @@ class _Amplitude:
 
 def _looked_closer(amplitude: _Amplitude, profile: Profile) -> Profile:
     """The profile with amplitudes about its top, followed outwards where that lies at an end."""
-    outward = closer = 0
+    end = amplitude.neutral if amplitude.one_sided else None
+    outward = 0
+    closer = 0
     while closer < _CLOSER and not (closer and has_near_neighbours(profile)):
-        at = float(profile.amplitude[profile.best])
-        at_end = profile.best in (0, len(profile.amplitude) - 1)
-        goes_on = at_end and amplitude.low < at < amplitude.high and at != amplitude.neutral and outward < _OUTWARD
+        goes_on = outward < _OUTWARD and _may_go_on(amplitude, profile)
         if goes_on:
             # The scan's unit was too small, or climbs from afar ended nowhere: go on outwards before looking closer.
-            finer = amplitude.outwards(at)
+            best = float(profile.amplitude[profile.best])
+            finer = amplitude.outwards(best)
             outward += 1
         else:
-            finer = _around(profile, amplitude.neutral if amplitude.one_sided else None, amplitude.per_delta)
+            finer = _around(profile, end, amplitude.per_delta)
             closer += 1
         found = _with_news(amplitude, profile, finer)
-        if found is profile:  # nor would the same climbs again bring any
-            outward, closer = (_OUTWARD, closer) if goes_on else (outward, _CLOSER)
-        profile = found
+        if found is not profile:
+            profile = found
+        elif goes_on:  # nor would the same climbs again bring any
+            outward = _OUTWARD
+        else:
+            break
     return profile
+
+
+def _may_go_on(amplitude: _Amplitude, profile: Profile) -> bool:
+    """Whether the top lies at an end of the profile from which it may be followed outwards."""
+    best = float(profile.amplitude[profile.best])
+    at_end = profile.best in (0, len(profile.amplitude) - 1)
+    return at_end and amplitude.low < best < amplitude.high and best != amplitude.neutral
 
 
 def _with_news(amplitude: _Amplitude, profile: Profile, finer: Array) -> Profile:
@@ -211,20 +222,29 @@ def _followed(amplitude: _Amplitude, profile: Profile) -> Profile:
     A climb from the fit without the effect may end nowhere, or in a lesser mode.
     """
     number = np.arange(len(profile.amplitude))
-    side = np.sign(profile.amplitude - amplitude.neutral)
-    towards = np.clip(number - side.astype(np.int64), 0, len(number) - 1)
-    inner = np.where(side[towards] == side, towards, number)
+    inner = _next_inwards(profile.amplitude, amplitude.neutral)
     news = np.isfinite(profile.value)
     for _ in range(_SWEEPS):
-        hopeful = profile.value[inner] > profile.value.max() - _FAR
-        rows = np.flatnonzero(news[inner] & hopeful & (inner != number))
+        least = profile.value.max() - _FAR
+        hopeful = news[inner] & (profile.value[inner] > least)
+        rows = np.flatnonzero(hopeful & (inner != number))
         if not len(rows):
             break
-        tried = amplitude.climbed(profile.amplitude[rows], [ends.z[inner[rows]] for ends in profile.ends])
+        begin = [ends.z[inner[rows]] for ends in profile.ends]
+        tried = amplitude.climbed(profile.amplitude[rows], begin)
         better = tried.value > profile.value[rows] + _NEWS
         profile = profile.with_rows(rows[better], tried.rows(better))
         news = np.isin(number, rows[better])
     return profile
+
+
+def _next_inwards(amplitudes: Array, neutral: float) -> Ints:
+    """(a,) number of each amplitude's neighbour towards neutral on its own side; its own number where there is none."""
+    number = np.arange(len(amplitudes))
+    side = np.sign(amplitudes - neutral)
+    towards = number - side.astype(np.int64)
+    towards = np.clip(towards, 0, len(number) - 1)
+    return np.where(side[towards] == side, towards, number)
 
 
 def within(prior: Any, neutral: float, reach: float) -> Function:
@@ -270,31 +290,52 @@ def _around(profile: Profile, end: float | None, per_delta: float) -> Array:
 
     An amplitude that is the only one with evidence has neighbours `per_delta` away.
     """
-    grid, best = profile.amplitude, profile.best
-    next_up = grid[1] if len(grid) > 1 else grid[0] + per_delta
-    outside = 2 * grid[0] - next_up if end is None else end
-    left = grid[best - 1] if best else outside
-    right = next_up if len(grid) == 1 else grid[min(best + 1, len(grid) - 1)]
-    if 0 < best < len(grid) - 1:
-        bend, slope, _ = np.polyfit(grid[best - 1 : best + 2] - grid[best], profile.value[best - 1 : best + 2], 2)
-        if bend < 0:
-            about = grid[best] - 0.5 * slope / bend + _ABOUT_TOP / np.sqrt(-2.0 * bend)
-            about = about[(left < about) & (about < right)]
-            if len(about) >= _ENOUGH:
-                return about
+    left, right = _beside_best(profile, end, per_delta)
+    about = _about_top(profile)
+    about = about[(left < about) & (about < right)]
+    if len(about) >= _ENOUGH:
+        return about
     return np.linspace(left, right, 8)[1:-1]
 
 
-def _summary(effect: Effect, which: Sequence[int], amplitude: _Amplitude, profile: Profile) -> Refit:
+def _beside_best(profile: Profile, end: float | None, per_delta: float) -> tuple[float, float]:
+    """The neighbours of the best amplitude, or what stands for one that is missing."""
+    grid = profile.amplitude
     best = profile.best
-    at = profile.amplitude[best : best + 1]
+    last = len(grid) - 1
+    next_up = grid[1] if last else grid[0] + per_delta
+    right = grid[min(best + 1, last)] if last else next_up
+    if best:
+        return grid[best - 1], right
+    return 2 * grid[0] - next_up if end is None else end, right
+
+
+def _about_top(profile: Profile) -> Array:
+    """Amplitudes about the top of the parabola through the best and its neighbours; none where there is no such top."""
+    grid = profile.amplitude
+    best = profile.best
+    if not 0 < best < len(grid) - 1:
+        return np.empty(0)
+    three = slice(best - 1, best + 2)
+    away = grid[three] - grid[best]
+    bend, slope, _ = np.polyfit(away, profile.value[three], 2)
+    if not bend < 0:
+        return np.empty(0)
+    top = grid[best] - 0.5 * slope / bend
+    return np.asarray(top + _ABOUT_TOP / np.sqrt(-2.0 * bend))
+
+
+def _summary(effect: Effect, which: Sequence[int], amplitude: _Amplitude, profile: Profile) -> Refit:
+    only_best = profile.rows(slice(profile.best, profile.best + 1))
+    at = only_best.amplitude
     top = top_of(profile, amplitude.per_delta)
     if top is None:
         log_bayes, sd = integral_of(profile, amplitude.neutral, amplitude.per_delta)
     else:
-        log_bayes, sd = top.log_integral(amplitude.low, amplitude.high), top.sd
-    ends = [end.z[best : best + 1] for end in profile.ends]
-    theta = tuple(p.natural(z, at)[0] for p, z in zip(amplitude.pinned, ends, strict=True))
+        log_bayes = top.log_integral(amplitude.low, amplitude.high)
+        sd = top.sd
+    each_block = zip(amplitude.pinned, only_best.ends, strict=True)
+    theta = tuple(pinned.natural(end.z, at)[0] for pinned, end in each_block)
     return Refit(effect, tuple(which), log_bayes, float(at[0]), sd, theta)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model import likelihoods
 from wirebayes.model.problem import Problem
-from wirebayes.model.sample import NOISES
+from wirebayes.model.sample import NOISES, Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.staircase import linearise, simulate
 
@@ -172,24 +172,39 @@ def points_of(target: LogPosterior, around: Around, readings: Sequence[Array] | 
     readings : sequence of (H, R, n) arrays or None
         Replicates that stand in for the measured readings, an array a sample.
     """
-    problem, n = target.problem, around.points
-    both = around.theta[: n * (1 + around.columns)]
-    theta = both[:n]
-    for at, sample in enumerate(problem.samples):
-        protocol, model = sample.protocol, sample.model
-        mask = protocol.mask
-        own = problem.parameters(theta, sample)
+    theta = around.theta[: around.points]
+    for at, sample in enumerate(target.problem.samples):
+        mask = sample.protocol.mask
+        own = target.problem.parameters(theta, sample)
         sd = np.sqrt(sample.variance(own))
-        line = linearise(protocol, own, model)
+        line = linearise(sample.protocol, own, sample.model)
         y = sample.readings if readings is None else readings[at]
-        residual = ((y - line.reading)[mask] / sd).T
-        moved = simulate(protocol, problem.parameters(both, sample), model)
-        moved = moved.reshape(*moved.shape[:2], 1 + around.columns, n)
-        slopes = np.moveaxis((moved[:, :, 1:] - moved[:, :, :1]) / _STEP, 2, -1)
-        by_parameters = (slopes[mask] / sd[:, None]).transpose(1, 0, 2)
-        by_setting = likelihoods.setting_jacobian(line)[mask] * (own["setting_sd"] / sd)
+        residual = (y - line.reading)[mask] / sd
+        slopes = _slopes(target, around, sample)
+        by_parameters = slopes[mask] / sd[:, None]
+        setting = likelihoods.setting_jacobian(line)
+        by_setting = setting[mask] * (own["setting_sd"] / sd)
         rounding = np.broadcast_to(sample.resolution**2 / 12.0, sd.shape)
-        yield Point(line.reading, slopes, sd, residual, by_parameters, np.moveaxis(by_setting, -1, 0), rounding / sd**2)
+        yield Point(
+            line.reading,
+            slopes,
+            sd,
+            residual.T,
+            by_parameters.transpose(1, 0, 2),
+            np.moveaxis(by_setting, -1, 0),
+            rounding / sd**2,
+        )
+
+
+def _slopes(target: LogPosterior, around: Around, sample: Sample) -> Array:
+    """(H, R, n, p) derivatives of a sample's tensions by the coordinates stepped along."""
+    n = around.points
+    theta = around.theta[: n * (1 + around.columns)]
+    own = target.problem.parameters(theta, sample)
+    flat = simulate(sample.protocol, own, sample.model)
+    moved = flat.reshape(*flat.shape[:2], 1 + around.columns, n)
+    slopes = (moved[:, :, 1:] - moved[:, :, :1]) / _STEP
+    return np.moveaxis(slopes, 2, -1)
 
 
 def tangent_of(target: LogPosterior, around: Around, points: Sequence[Point]) -> Tangent:
@@ -208,7 +223,8 @@ def tangent_of(target: LogPosterior, around: Around, points: Sequence[Point]) ->
     # K's size is what ρ measures: give it a typical column of length one. It has none where the wire is slack
     # throughout: then no setting error moves any reading.
     ratio = (k**2).sum(axis=(1, 2)) / k.shape[2]
-    left, singular = _directions(k / np.sqrt(np.where(ratio > 0, ratio, 1.0))[:, None, None])
+    length = np.sqrt(np.where(ratio > 0, ratio, 1.0))
+    left, singular = _directions(k / length[:, None, None])
     prior, gradient, precision = _prior(target, around)
     residual = np.concatenate([p.residual for p in points], axis=1)
     residual[beyond] = np.nan
@@ -252,7 +268,8 @@ def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None =
             sd = np.sqrt(sample.variance(own))
             y = sample.readings if readings is None else readings[at]
             left = y - simulate(sample.protocol, own, sample.model)
-            parts.append((left[sample.protocol.mask] / sd).T)
+            scaled = left[sample.protocol.mask] / sd
+            parts.append(scaled.T)
     return np.concatenate(parts, axis=1), _prior_density(target, theta, z)
 
 
@@ -264,21 +281,32 @@ def _prior_density(target: LogPosterior, theta: Array, z: Array) -> Array:
 
 def _prior(target: LogPosterior, around: Around) -> tuple[Array, Array, Array]:
     """Log density of the prior; its gradient and (diagonal, positive) precision by the coordinates stepped along."""
-    n, p, h = around.points, around.columns, _PRIOR_STEP
+    n = around.points
+    p = around.columns
     rows = np.r_[:n, n * (1 + p) : len(around.z)]
     values = _prior_density(target, around.theta[rows], around.z[rows])
-    centre, plus, minus = values[:n, None], *values[n:].reshape(2, p, n).swapaxes(1, 2)
+    at_points = values[:n]
+    plus, minus = values[n:].reshape(2, p, n).swapaxes(1, 2)
+    gradient, diagonal = _parabola(at_points[:, None], plus, minus)
+    precision = np.zeros((n, p, p))
+    columns = np.arange(p)
+    precision[:, columns, columns] = diagonal
+    return at_points, gradient, precision
+
+
+def _parabola(centre: Array, plus: Array, minus: Array) -> tuple[Array, Array]:
+    """(n, p) slope and positive precision of log densities at points (n, 1) and at a step to either side (n, p)."""
+    h = _PRIOR_STEP
     # A boundary of the prior has no slope that means anything: there the column keeps a weak precision alone.
     inside = np.isfinite(plus) & np.isfinite(minus) & np.isfinite(centre)
     with np.errstate(invalid="ignore"):
-        gradient = np.where(inside, (plus - minus) / (2 * h), 0.0)
+        slope = (plus - minus) / (2 * h)
+        gradient = np.where(inside, slope, 0.0)
         bend = -(plus + minus - 2 * centre) / h**2
         # Along an edge the density falls without a bend, as an exponential: its width is that of its slope.
-        bend = np.where(bend > _FLAT, bend, np.maximum(gradient**2, _FLAT))
-        diagonal = np.where(inside, bend, 1.0)
-    precision = np.zeros((n, p, p))
-    precision[:, np.arange(p), np.arange(p)] = diagonal
-    return values[:n], gradient, precision
+        width = np.maximum(gradient**2, _FLAT)
+        bend = np.where(bend > _FLAT, bend, width)
+    return gradient, np.where(inside, bend, 1.0)
 
 
 def damp(singular: Array, ratio: Array | float) -> Array:

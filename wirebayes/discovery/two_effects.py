@@ -45,17 +45,20 @@ def log_bayes_of_each_pair(x: Expansion) -> Array:
     As in `log_bayes_of_two`, for effects in the order of their numbers in `x.kinds`. Each effect alone, in any form, is
     on the diagonal.
     """
-    groups, first_row = _forms_of_each(x), x.of(np.array([0]))
+    groups = _forms_of_each(x)
+    first_row = x.of(np.array([0]))
     if not has_tangent(first_row)[0]:
         return np.full((len(groups), len(groups)), -np.inf)
     found = project(first_row)
-    single = log_sum(with_each_signature(first_row, found)[1], axis=1)
-    plain = np.maximum(found.rss, first_row.least[:, None])
-    nothing = log_sum(found.shared - 0.5 * x.degrees * np.log(plain), axis=1)
-    value = _log_evidence(first_row, found, _best_forms(single, groups), groups)[0]
+    _, each = with_each_signature(first_row, found)
+    single = log_sum(each, axis=1)
+    best = _best_forms(single, groups)
+    value = _log_evidence(first_row, found, best, groups)[0]
     pairs = np.stack([log_sum(value[:, group], axis=1) for group in groups], axis=1)
     alone = single[0] + _log_shares(x, groups)
     np.fill_diagonal(pairs, [log_sum(alone[group]) for group in groups])
+    left = np.maximum(found.rss, first_row.least[:, None])
+    nothing = log_sum(found.shared - 0.5 * x.degrees * np.log(left), axis=1)
     return pairs - nothing[0]
 
 
@@ -66,13 +69,16 @@ def _forms_of_each(x: Expansion) -> list[Ints]:
 
 def _log_evidence(x: Expansion, found: Projected, first: Ints, groups: list[Ints]) -> Array:
     """(n, j, m) of some signatures (n, j) with each one of another effect; forms share the weight of their effect."""
-    left = np.maximum(found.rss[:, :, None, None] - _explained(x, found, first), x.least[:, None, None, None])
+    unexplained = found.rss[:, :, None, None] - _explained(x, found, first)
+    left = np.maximum(unexplained, x.least[:, None, None, None])
+    shared = found.shared[:, :, None, None]
     with np.errstate(invalid="ignore"):  # what explains nothing, with as many readings as parameters
-        evidence = log_sum(found.shared[:, :, None, None] - 0.5 * x.degrees * np.log(left), axis=1)
+        evidence = log_sum(shared - 0.5 * x.degrees * np.log(left), axis=1)
     prior = _log_shares(x, groups)
     different = x.kinds[first][:, :, None] != x.kinds
     # with no more readings than parameters, what explains nothing has no finite evidence
-    return np.where(different, or_impossible(evidence) + prior[first][:, :, None] + prior, -np.inf)
+    value = or_impossible(evidence) + prior[first][:, :, None] + prior
+    return np.where(different, value, -np.inf)
 
 
 def _log_shares(x: Expansion, groups: list[Ints]) -> Array:
@@ -97,9 +103,11 @@ def _leading(single: Array, groups: list[Ints]) -> Ints:
 
 def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
     """(n, k, j, m) of the sum of squares by some signatures with each one; -inf where an amplitude has no meaning."""
+    b = found.along[:, :, None, :]
+    c = found.square[:, :, None, :]
     own = first[:, None, :]
-    b, c = found.along[:, :, None, :], found.square[:, :, None, :]
-    b_first, c_first = (np.take_along_axis(v, own, axis=2)[..., None] for v in (found.along, found.square))
+    b_first = np.take_along_axis(found.along, own, axis=2)[..., None]
+    c_first = np.take_along_axis(found.square, own, axis=2)[..., None]
     cross = found.form.of(first).products(found.form, found.shrink)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         determinant = c_first * c - cross**2
@@ -107,7 +115,8 @@ def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
         a = (c_first * b - cross * b_first) / determinant
         explained = a_first * b_first + a * b
         apart = determinant > LEAST_LEFT * c_first * c
+    any_sign_first = ~x.one_sided[first][:, None, :, None]
     possible = apart & np.isfinite(explained)
-    possible &= (a_first >= 0.0) | ~x.one_sided[first][:, None, :, None]
+    possible &= (a_first >= 0.0) | any_sign_first
     possible &= (a >= 0.0) | ~x.one_sided
     return np.where(possible, explained, -np.inf)

@@ -91,6 +91,12 @@ class _Climbs:
         least = np.where(self.arrived[rows], -np.inf, self.value[rows] + _ENOUGH * self.promised[rows])
         return np.asarray(np.isfinite(ahead) & (ahead > least))
 
+    def lead_back(self, density: Density, rows: Ints) -> None:
+        """Rows that do not gain enough: done if they have just begun, else led to where a damped step leads."""
+        at_start = self.arrived[rows]
+        self.done[rows[at_start]] = True  # there is no density where they are
+        self.lead_damped(density, rows[~at_start])
+
     def lead_damped(self, density: Density, rows: Ints) -> None:
         """Lead rows whose step was not good to where the best damped one leads; those that none leads up are done."""
         if not len(rows):
@@ -108,18 +114,21 @@ class _Climbs:
     def take_step(self, rows: Ints, local: _Local, tolerance: float) -> None:
         """Lead rows to what they looked at, and plan their next steps from what is known there."""
         here = self.ahead[rows]
-        self.z[rows] = here
-        self.value[rows] = local.value
         eigen, vectors = _positive(local.curvature)
         slope = np.einsum("nij,ni->nj", vectors, local.gradient)
+        self.z[rows] = here
+        self.value[rows] = local.value
         self.eigen[rows] = eigen
         self.vectors[rows] = vectors
         self.slope[rows] = slope
-        self.converged[rows] = self.done[rows] = _half_decrement(slope, eigen) < tolerance
+        is_near = _half_decrement(slope, eigen) < tolerance
+        self.converged[rows] = is_near
+        self.done[rows] = is_near
         damping = self._relaxed(rows)
+        step = _step(slope, eigen, vectors, damping)
         self.damping[rows] = damping[:, 0]
         self.promised[rows] = _half_decrement(slope, eigen + damping)
-        self.ahead[rows] = here + _step(slope, eigen, vectors, damping)[:, 0]
+        self.ahead[rows] = here + step[:, 0]
         self.arrived[rows] = False
 
     def _relaxed(self, rows: Ints) -> Array:
@@ -181,7 +190,9 @@ def climb(
     curvature_at_end : bool
         Where only the places matter, the curvature may stay that of the last step: the Hessian takes d² evaluations.
     """
-    look = partial(_by_differences, density) if residuals is None else partial(_by_residuals, residuals)
+    look = partial(_by_differences, density)
+    if residuals is not None:
+        look = partial(_by_residuals, residuals)
     group = np.zeros(len(start), np.int64) if of is None else of
     ends = Ends.of(known or [nowhere(start.shape[1])])
     climbs = _Climbs.beginning(start)
@@ -193,21 +204,21 @@ def climb(
         kept = climbs.gain_enough(rows, local.value)
         here = rows
         if not kept.all():
-            astray = rows[~kept]
-            at_start = climbs.arrived[astray]
-            climbs.done[astray[at_start]] = True  # there is no density where they are
-            climbs.lead_damped(density, astray[~at_start])
-            here, local = rows[kept], local.rows(kept)
+            climbs.lead_back(density, rows[~kept])
+            here = rows[kept]
+            local = local.rows(kept)
         climbs.take_step(here, local, tolerance)
         left = rows[~climbs.done[rows]]
-        if reach == np.inf and of is None:
-            continue
-        hopeless = climbs.most_promised(left) < _best(climbs.value, group)[left] - reach
+        if reach < np.inf:
+            least = _best(climbs.value, group) - reach
+            hopeless = climbs.most_promised(left) < least[left]
+            climbs.give_up(left[hopeless])
         if of is not None:
             ended = here[climbs.converged[here]]
-            ends = ends.joined(of[ended], climbs.optimum(ended)) if len(ended) else ends
-            hopeless |= ends.near(of[left], climbs.z[left], climbs.value[left])
-        climbs.give_up(left[hopeless])
+            if len(ended):
+                ends = ends.joined(of[ended], climbs.optimum(ended))
+            same = ends.near(of[left], climbs.z[left], climbs.value[left])
+            climbs.give_up(left[same])
     found = climbs.optimum(np.arange(len(start)))
     return curved(density, found) if curvature_at_end else found
 
@@ -285,15 +296,16 @@ def _by_residuals(residuals: Residuals, z: Array, rows: Ints, *_: Array) -> _Loc
     flat, each = residuals(points.reshape(-1, d), np.repeat(rows, d + 1))
     values = flat.reshape(n, d + 1)
     each = each.reshape(-1, n, d + 1)
+    here = values[:, :1]
     with np.errstate(all="ignore"):
         moved = each[..., 1:] - each[..., :1]
         moved /= _NEAR
         slopes = _finite(np.moveaxis(moved, 0, 1))
         curvature = np.swapaxes(slopes, 1, 2) @ slopes
-        one_sided = (values[:, 1:] - values[:, :1]) / _NEAR
-        put_right = 0.5 * _NEAR * np.einsum("nii->ni", curvature)
-        gradient = _finite(one_sided + put_right)
-    return _Local(values[:, 0], gradient, curvature)
+        one_sided = (values[:, 1:] - here) / _NEAR
+        bend = np.einsum("nii->ni", curvature)
+        gradient = _finite(one_sided + 0.5 * _NEAR * bend)
+    return _Local(here[:, 0], gradient, curvature)
 
 
 @cache
@@ -312,14 +324,17 @@ def _by_differences(density: Density, z: Array, rows: Ints, eigen: Array, vector
 
     Of that, `eigen` (n, d) are the eigenvalues, `vectors` (n, d, d) the vectors.
     """
-    bend = np.einsum("nij,nj->ni", vectors**2, eigen)
+    n, d = z.shape
     value = density(z, rows)
+    gradient = np.zeros((n, d))
+    hessian = np.tile(np.eye(d), (n, 1, 1))
     inside = np.isfinite(value)
-    gradient, hessian = np.zeros(z.shape), np.tile(np.eye(z.shape[1]), (len(z), 1, 1))
     if inside.any():
-        gradient[inside], hessian[inside] = _derivatives(
-            density, z[inside], rows[inside], value[inside], _steps(bend[inside]), sides=1
-        )
+        bend = np.einsum("nij,nj->ni", vectors**2, eigen)
+        steps = _steps(bend[inside])
+        slope, bends = _derivatives(density, z[inside], rows[inside], value[inside], steps, sides=1)
+        gradient[inside] = slope
+        hessian[inside] = bends
     return _Local(value, gradient, -hessian)
 
 
@@ -336,20 +351,35 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
     """
     n, d = z.shape
     i, j = np.triu_indices(d, 1)
-    unit = np.eye(d)
-    both = unit[i] + unit[j]
-    moves = np.concatenate([unit, -unit, both, -both] if sides == 2 else [unit, -unit, both])
+    moves = _differences(d, sides)
     points = z[:, None] + moves * h[:, None]
-    found = density(points.reshape(-1, d), np.repeat(rows, len(moves))).reshape(n, -1)
+    found = density(points.reshape(-1, d), np.repeat(rows, len(moves)))
+    found = found.reshape(n, -1)
     centre = value[:, None]
     found = np.where(np.isfinite(found), found, centre - _NO_DENSITY)
-    plus, minus, both_plus, both_minus = np.split(found, [d, 2 * d, 2 * d + len(i)], axis=1)
+    plus = found[:, :d]
+    minus = found[:, d : 2 * d]
+    both_plus, both_minus = np.split(found[:, 2 * d :], [len(i)], axis=1)
     mixed = both_plus - plus[:, i] - plus[:, j] + centre
     if sides == 2:
         mixed = 0.5 * (mixed + both_minus - minus[:, i] - minus[:, j] + centre)
-    hessian = np.zeros((n, d, d))
-    hessian[:, i, j] = hessian[:, j, i] = mixed / (h[:, i] * h[:, j])
+    mixed = mixed / (h[:, i] * h[:, j])
     diagonal = np.arange(d)
+    hessian = np.zeros((n, d, d))
+    hessian[:, i, j] = mixed
+    hessian[:, j, i] = mixed
     hessian[:, diagonal, diagonal] = (plus + minus - 2.0 * centre) / h**2
     gradient = (plus - minus) / (2.0 * h)
     return gradient, hessian
+
+
+@cache
+def _differences(d: int, sides: int) -> Array:
+    """(m, d) along each coordinate and back, along each pair of them, and where there are two sides, back."""
+    i, j = np.triu_indices(d, 1)
+    unit = np.eye(d)
+    both = unit[i] + unit[j]
+    moves = [unit, -unit, both]
+    if sides == 2:
+        moves.append(-both)
+    return np.concatenate(moves)

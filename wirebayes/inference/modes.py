@@ -11,7 +11,7 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.optimum import REACH, Optimum, distinct, together
 from wirebayes.numeric.resampling import next_power, systematic_rows
 from wirebayes.numeric.spread_rows import spread_rows
-from wirebayes.numeric.typing import Array, Function
+from wirebayes.numeric.typing import Array, Function, Ints
 
 _ANNEALED = 400  # prior draws
 _EFFECTIVE = 0.2  # share of the rows that stays so at each step of the cooling
@@ -129,18 +129,26 @@ def search(target: LogPosterior, rng: Generator, *, extra: Array | None = None) 
     z = _prior(target, _ANNEALED, rng)
     value = density(z)
     passed, height = _cooled(density, z, value, rng)
-    width = passed.std(axis=0)
-    apart = spread_rows(passed / np.where(width > 0, width, 1.0), _FIRST, rng)
-    highest = int(np.argmax(height))
+    landmarks = _landmarks(passed, height, rng)
     possible = _possible(z, value)
-    [spread] = alone.with_ratios([_spread(target, possible, _FIRST, rng)])
-    begin = [spread, passed[[highest, *apart]]]
+    spread = _spread(target, possible, _FIRST, rng)
+    begin = [*alone.with_ratios([spread]), landmarks]
     if extra is not None:
         begin.append(extra)
     found = alone.climbed([np.vstack(begin)], [])
-    [every] = alone.further(found, [_some(possible, _STARTS, rng)])
-    warm, cold = passed[-_WARM_STEPS * _ANNEALED :], passed[-_ANNEALED:]
-    return Search(every, warm, cold, height[-_ANNEALED:])
+    others = _some(possible, _STARTS, rng)
+    [every] = alone.further(found, [others])
+    warm = passed[-_WARM_STEPS * _ANNEALED :]
+    return Search(every, warm, passed[-_ANNEALED:], height[-_ANNEALED:])
+
+
+def _landmarks(passed: Array, height: Array, rng: Generator) -> Array:
+    """Of the places (n, d) that the annealing passed the highest one, and some far from one another."""
+    width = passed.std(axis=0)
+    scaled = passed / np.where(width > 0, width, 1.0)
+    apart = spread_rows(scaled, _FIRST, rng)
+    highest = int(np.argmax(height))
+    return np.asarray(passed[[highest, *apart]])
 
 
 class _SideBySide:
@@ -161,20 +169,26 @@ class _SideBySide:
 
     def climbed(self, begin: Sequence[Array], before: Sequence[Optimum]) -> list[Optimum]:
         """The modes to which climbs lead from (m, d) places of each density, but for those known before."""
-        of = np.repeat(np.arange(self.n), [len(b) for b in begin])
-        residuals = self.residuals
-        end = climb(
-            lambda z, rows: self.density(z, of[rows]),
-            np.vstack(begin),
-            None if residuals is None else lambda z, rows: residuals(z, of[rows]),
-            of=of,
-            known=before,
-            reach=REACH,
-            curvature_at_end=False,
-        )
+        of = self._numbers(begin)
+
+        def density(z: Array, rows: Ints) -> Array:
+            return self.density(z, of[rows])
+
+        def residuals(z: Array, rows: Ints) -> tuple[Array, Array]:
+            return self.residuals(z, of[rows])
+
+        end = climb(density, np.vstack(begin), residuals, of=of, known=before, reach=REACH, curvature_at_end=False)
         found = [distinct([end.rows(of == i)]) for i in range(self.n)]
-        of = np.repeat(np.arange(self.n), [len(f.z) for f in found])
+        of = self._numbers([modes.z for modes in found])
         every = curved(self.density, together(found), of)
+        return self._of_each(every, of)
+
+    def _numbers(self, places: Sequence[Array]) -> Ints:
+        """(m,) the density to which each of the places belongs, put one after the other."""
+        return np.repeat(np.arange(self.n), [len(own) for own in places])
+
+    def _of_each(self, every: Optimum, of: Ints) -> list[Optimum]:
+        """The rows of each density."""
         return [every.rows(of == i) for i in range(self.n)]
 
     def with_ratios(self, begin: Sequence[Array]) -> Sequence[Array]:
@@ -216,28 +230,36 @@ class _SideBySide:
 
         Climbs have the other coordinates alone: no derivative is taken by the fixed ones, which `kept` sets.
         """
-        of = np.repeat(np.arange(self.n), [len(b) for b in begin])
+        of = self._numbers(begin)
         start = np.vstack(begin)
-        free = np.delete(np.arange(start.shape[1]), fixed)
+        n, d = start.shape
+        free = np.delete(np.arange(d), fixed)
 
-        def whole(z: Array, rows: Array) -> Array:
-            out = np.empty((len(z), start.shape[1]))
+        def whole(z: Array, rows: Ints) -> Array:
+            out = np.empty((len(z), d))
             out[:, free] = z
             return kept(out, rows)
 
+        def density(z: Array, rows: Ints) -> Array:
+            return self.density(whole(z, rows), of[rows])
+
+        def residuals(z: Array, rows: Ints) -> tuple[Array, Array]:
+            return self.residuals(whole(z, rows), of[rows])
+
         found = climb(
-            lambda z, rows: self.density(whole(z, rows), of[rows]),
+            density,
             start[:, free],
-            lambda z, rows: self.residuals(whole(z, rows), of[rows]),
+            residuals,
             iterations=_LED,
             tolerance=_LED_TO,
             of=of if together else None,
             curvature_at_end=False,
         )
-        curvature = np.zeros((len(of), start.shape[1], start.shape[1]))
-        curvature[np.ix_(np.arange(len(of)), free, free)] = found.curvature
-        found = Optimum(whole(found.z, np.arange(len(of))), found.log_density, curvature, found.converged)
-        return [found.rows(of == i) for i in range(self.n)]
+        rows = np.arange(n)
+        curvature = np.zeros((n, d, d))
+        curvature[np.ix_(rows, free, free)] = found.curvature
+        led = Optimum(whole(found.z, rows), found.log_density, curvature, found.converged)
+        return self._of_each(led, of)
 
 
 def _prior(target: LogPosterior, n: int, rng: Generator) -> Array:
@@ -272,21 +294,32 @@ def _cooled(density: Function, z: Array, value: Array, rng: Generator) -> tuple[
     Each step of the power leaves a fifth of the rows effective and moves them by differential evolution: near enough to
     the modes to find them.
     """
-    m, d = z.shape
     value = np.where(np.isfinite(value), value, -1e300)
-    power, way, height = 0.0, [], []
+    power = 0.0
+    way = []
+    height = []
     while power < 1.0:
         step = next_power(value, 1.0 - power, _EFFECTIVE)
         power += step
         weight = np.exp(step * (value - value.max()))
-        kept = systematic_rows(weight, m, rng)
-        z, value = z[kept], value[kept]
-        one, other = rng.integers(m, size=(2, m))
-        moved = z + 2.38 / np.sqrt(2.0 * d) * (z[one] - z[other]) + 1e-3 * rng.normal(size=z.shape)
+        kept = systematic_rows(weight, len(z), rng)
+        z = z[kept]
+        value = value[kept]
+        moved = _evolved(z, rng)
         tried = density(moved)
-        taken = np.log(rng.uniform(size=m)) < power * (tried - value)
+        chance = np.log(rng.uniform(size=len(z)))
+        taken = chance < power * (tried - value)
         z = np.where(taken[:, None], moved, z)
         value = np.where(taken, tried, value)
         way.append(z)
         height.append(value)
     return np.concatenate(way), np.concatenate(height)
+
+
+def _evolved(z: Array, rng: Generator) -> Array:
+    """(n, d) proposals of differential evolution: places moved by the difference of two others."""
+    n, d = z.shape
+    one, other = rng.integers(n, size=(2, n))
+    stretch = 2.38 / np.sqrt(2.0 * d)
+    jitter = 1e-3 * rng.normal(size=z.shape)
+    return np.asarray(z + stretch * (z[one] - z[other]) + jitter)
