@@ -51,23 +51,23 @@ def alternatives(
     list of Alternative
         The final model first, probabilities summing to one; empty where it stands alone.
     """
-    found = decision.posterior
     names = frozenset(effect.name for effect in final.effects)
     weights: dict[Key, float] = {}
+    found = decision.posterior
     for s, weight in zip(found.sets, found.weights.values(), strict=True):
         acting = frozenset(name for name in s.names if s.presence[name][i] > 0.5)
-        swaps = acting - names <= set(undecided) and names - acting <= set(undecided)
-        if acting and acting != names and swaps and s.key == acting and fits.knows(s.key):
-            weights[s.key] = weights.get(s.key, 0.0) + weight
-        elif acting == names:
-            weights[names] = weights.get(names, 0.0) + weight
+        swapped = acting ^ names
+        is_fitted = acting and s.key == acting and fits.knows(acting)
+        if not swapped or (is_fitted and swapped <= set(undecided)):
+            weights[acting] = weights.get(acting, 0.0) + weight
     weights.setdefault(names, 0.0)
     kept = [names, *_others(weights, names)]
     total = sum(weights[k] for k in kept)
     if total <= 0.0 or len(kept) == 1:
         return []
-    blocks = [final, *(fits.of(k)[i] for k in kept[1:])]
-    return [Alternative(block, remains, weights[k] / total) for block, k in zip(blocks, kept, strict=True)]
+    blocks = [final]
+    blocks += [fits.of(key)[i] for key in kept[1:]]
+    return [Alternative(block, remains, weights[key] / total) for block, key in zip(blocks, kept, strict=True)]
 
 
 def _others(weights: Mapping[Key, float], names: Key) -> list[Key]:

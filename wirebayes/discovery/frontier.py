@@ -1,6 +1,6 @@
 """Which sets of effects to fit next: those that may come close to the best, and the way to those not met yet."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -49,22 +49,33 @@ class Frontier:
         """
         key = parent.key | {name}
         falls_short = parent.log_bayes - own_fit > FALLS_SHORT
-        value = (own_fit if falls_short else parent.log_bayes) + found.log_bayes[name]
-        known = self.known.get(key)
-        if key in self.fitted:  # its fit searched from many starts; of what its refits found, the better counts
-            assert known is not None
-            if value > known.log_bayes + SAME_EVIDENCE:
-                self.fitted[key] = self.fitted[key].weighing(value)
-                self.known[key] = self.fitted[key].effects
-        else:
-            ahead = np.inf if known is None else value - known.log_bayes
-            if abs(ahead) < SAME_EVIDENCE:
-                ahead = parent.log_bayes - self.known[self.parents[key][0]].log_bayes
-            if ahead > 0.0:
-                presence = {**parent.presence, name: found.presence[name]}
-                self.known[key] = EffectSet((*parent.names, name), value, presence, None)
-                self.parents[key] = parent.key, name
-        self.credit[key] = max(self.credit.get(key, -np.inf), credit)
+        before = own_fit if falls_short else parent.log_bayes
+        value = before + found.log_bayes[name]
+        if key in self.fitted:
+            self._weigh_again(key, value)
+        elif self._is_better(key, value, parent):
+            presence = {**parent.presence, name: found.presence[name]}
+            self.known[key] = EffectSet((*parent.names, name), value, presence, None)
+            self.parents[key] = parent.key, name
+        known_credit = self.credit.get(key, -np.inf)
+        self.credit[key] = max(known_credit, credit)
+
+    def _weigh_again(self, key: Key, value: float) -> None:
+        """The fit of a set searched from many starts; of what its refits found, the better counts."""
+        if value > self.known[key].log_bayes + SAME_EVIDENCE:
+            fitted = self.fitted[key].weighing(value)
+            self.fitted[key] = fitted
+            self.known[key] = fitted.effects
+
+    def _is_better(self, key: Key, value: float, parent: EffectSet) -> bool:
+        """Whether this order of a set's names is better than the one that is known, if any is."""
+        if key not in self.known:
+            return True
+        ahead = value - self.known[key].log_bayes
+        if abs(ahead) < SAME_EVIDENCE:
+            known_parent, _ = self.parents[key]
+            ahead = parent.log_bayes - self.known[known_parent].log_bayes
+        return ahead > 0.0
 
     def promise(self, key: Key) -> float:
         """The largest log weight that a set may come to, by what is known so far."""
@@ -78,8 +89,6 @@ class Frontier:
     def next_looks(self, most: int) -> list[Key]:
         """Sets to be fitted next: of those close enough to the best one each combination of families first.
 
-        Look-alikes would use up all looks, and what only shows beside one of them would never be met.
-
         Parameters
         ----------
         most : int
@@ -87,19 +96,29 @@ class Frontier:
         """
         promises = {key: self.promise(key) for key in self.known}
         best = max(promises.values(), default=-np.inf)
-        near = [k for k, promise in promises.items() if k not in self.fitted and promise > best - REACH]
-        near.sort(key=lambda k: (-promises[k], sorted(k)))
+        near = self._in_turn(promises, best - REACH)
+        wanted = [*self.towards, self.pair]
+        waiting = [key for key in wanted if key in self.known and key not in self.fitted]
+        # as many at once whatever the number of cores, so that the sets are the same
+        wave = list(dict.fromkeys([*waiting, *near]))[:most]
+        if wave:
+            return wave
+        return [key for key in near if promises[key] == best][:1]  # the best set is always fitted
+
+    def _in_turn(self, promises: Mapping[Key, float], least: float) -> list[Key]:
+        """Sets that are not fitted and promise more than the least, each combination of families in turn.
+
+        Look-alikes would use up all looks, and what only shows beside one of them would never be met.
+        """
+        near = [key for key, promise in promises.items() if key not in self.fitted and promise > least]
+        near.sort(key=lambda key: (-promises[key], sorted(key)))
         looked = [self.kinds(key) for key in self.fitted]
         rank = {}
         for key in near:
-            rank[key] = looked.count(self.kinds(key))
-            looked.append(self.kinds(key))
-        near.sort(key=lambda k: rank[k])  # the order within a rank stays
-        pair = [self.pair] if self.pair in self.known else []
-        waiting = [k for k in (*self.towards, *pair) if k not in self.fitted]
-        # as many at once whatever the number of cores, so that the sets are the same
-        wave = list(dict.fromkeys([*waiting, *near]))[:most]
-        return wave or [k for k in near if promises[k] == best][:1]  # the best set is always fitted
+            kinds = self.kinds(key)
+            rank[key] = looked.count(kinds)
+            looked.append(kinds)
+        return sorted(near, key=lambda key: rank[key])  # the order within a rank stays
 
     def lead_to(self, pair: Key) -> None:
         """Go towards two effects that only show together: to the better one, and from there to both.

@@ -12,7 +12,7 @@ from wirebayes.discovery.probes import Probe
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model.problem import Problem, with_protocols
-from wirebayes.model.sample import LENGTH_EXPONENT
+from wirebayes.model.sample import LENGTH_EXPONENT, Sample
 from wirebayes.model.scales import NATURAL, Units
 from wirebayes.numeric.typing import Array
 from wirebayes.sentences import short, spoken, to_be_held
@@ -67,28 +67,45 @@ def other_measurements(p: Protocol, alone: bool, units: Units = NATURAL, setting
     settings : str
         What is set in all the samples; displacements or weights, as in this one, when left out.
     """
-    unit, settings = SET_UNIT[p.control], settings or _SETTINGS[p.control]
-    one, second = units.of(unit), units.time_s
+    settings = settings or _SETTINGS[p.control]
+    span = f"each sample's {settings}"
+    last = ", of every sample"
+    if alone:
+        span, last = _ends_in_words(p, units)
     x = p.setting[p.recorded]
     times = _longest_series(p)
     long = LONGER * (times[-1] or p.duration_s.max() or 1.0)
-    log_times = np.concatenate([[0.0], np.geomspace(long / 300.0, long, 24)])
-    ends = list(dict.fromkeys(short(one * end) for end in (x.min(), x.max())))
-    span = f"{' to '.join(ends)} {unit}" if alone else f"each sample's {settings}"
-    dense = f"{to_be_held(second * long)} with 25 readings spaced evenly in the logarithm of time"
-    held = f"each held {to_be_held(second * times[-1])}"
-    there_and_back = np.concatenate([x, x[-2::-1] if len(x) > 1 else x])
-    last = f" from {short(one * x.max())} to {short(one * x.min())} {unit}" if alone else ", of every sample"
+    spread = np.geomspace(long / 300.0, long, 24)
+    log_times = np.concatenate([[0.0], spread])
+    held = f"each held {to_be_held(units.time_s * times[-1])}"
+    dense = f"{to_be_held(units.time_s * long)} with 25 readings spaced evenly in the logarithm of time"
+    back = x[-2::-1] if len(x) > 1 else x
+    there_and_back = np.concatenate([x, back])
     halved, finer = _halved(x, span, held)
+
+    def plan(words: str, holds: Array, moments: Array) -> MeasurementPlan:
+        return MeasurementPlan(words, holds, moments, p.length_mm, p.control)
+
     return [
-        MeasurementPlan(words, holds, moments, p.length_mm, p.control)
-        for words, holds, moments in (
-            (f"unload the wire after the last hold: the same {settings} back{last}, {held}", there_and_back, times),
-            (f"hold each of the {settings} {span} for {dense}", x, log_times),
-            (f"load and unload over {span}, each hold {dense}", there_and_back, log_times),
-            (finer, halved, times),
-        )
+        plan(
+            f"unload the wire after the last hold: the same {settings} back{last}, {held}",
+            there_and_back,
+            times,
+        ),
+        plan(f"hold each of the {settings} {span} for {dense}", x, log_times),
+        plan(f"load and unload over {span}, each hold {dense}", there_and_back, log_times),
+        plan(finer, halved, times),
     ]
+
+
+def _ends_in_words(p: Protocol, units: Units) -> tuple[str, str]:
+    """What is set from the least to the largest, and the way back."""
+    unit = SET_UNIT[p.control]
+    set_in_test = units.of(unit) * p.setting[p.recorded]
+    low = short(set_in_test.min())
+    high = short(set_in_test.max())
+    span = low if low == high else f"{low} to {high}"
+    return f"{span} {unit}", f" from {high} to {low} {unit}"
 
 
 def _halved(x: Array, span: str, held: str) -> tuple[Array, str]:
@@ -117,25 +134,31 @@ def _holds(setting: Array, times: Array, length_mm: float, control: Control) -> 
 
 
 def _another_length(problem: Problem) -> tuple[str, Problem]:
-    """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares.
-
-    Twice the length takes twice the displacements; weights stay.
-    """
+    """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares."""
     longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
-    p = longest.protocol
-    length = 2.0 * p.length_mm
-    stretch, alike = (1.0, "the same weights") if p.control == "force" else (2.0, "steps scaled alike")
-    settings = stretch * p.setting[p.recorded]
-    protocol = _holds(settings, _longest_series(p), length, p.control)
-    unread = np.zeros((*protocol.time_s.shape, 1))
-    model = replace(longest.model, length_ref_mm=longest.model.length_ref_mm or p.length_mm)
-    more = replace(longest, protocol=protocol, readings=unread, model=model)
-    exponent = {} if LENGTH_EXPONENT in problem.prior.names else {LENGTH_EXPONENT: 1.0}
-    prior = replace(problem.prior, fixed=exponent | problem.prior.fixed)
+    more = _twice_as_long(longest)
+    fixed = problem.prior.fixed
+    if LENGTH_EXPONENT not in problem.prior.names:
+        fixed = {LENGTH_EXPONENT: 1.0} | fixed
+    prior = replace(problem.prior, fixed=fixed)
     lengths = {s.protocol.length_mm for s in problem.samples}
     which = "a second" if len(lengths) == 1 else "another"
-    words = f"repeat the test at {which} length, {problem.units.length_mm * length:g} mm, with {alike}"
+    length = problem.units.length_mm * more.protocol.length_mm
+    alike = "the same weights" if more.protocol.control == "force" else "steps scaled alike"
+    words = f"repeat the test at {which} length, {length:g} mm, with {alike}"
     return words, replace(problem, samples=(*problem.samples, more), prior=prior)
+
+
+def _twice_as_long(sample: Sample) -> Sample:
+    """A sample of twice the length, not yet read: it takes twice the displacements; weights stay."""
+    p = sample.protocol
+    stretch = 1.0 if p.control == "force" else 2.0
+    settings = stretch * p.setting[p.recorded]
+    protocol = _holds(settings, _longest_series(p), 2.0 * p.length_mm, p.control)
+    unread = np.zeros((*protocol.time_s.shape, 1))
+    preloaded = sample.model.length_ref_mm or p.length_mm
+    model = replace(sample.model, length_ref_mm=preloaded)
+    return replace(sample, protocol=protocol, readings=unread, model=model)
 
 
 def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakest: Probe | None) -> str:
@@ -185,18 +208,27 @@ def next_for_remainder(block: LaplaceFit) -> str:
 
 def _best_plan(block: LaplaceFit, value: Callable[[LogPosterior], float]) -> tuple[str, float]:
     """Words of the plan with the largest value, and that value over the present test's."""
-    problem = block.target.problem
+    here = value(block.target)
+    ranked = []
+    for words, other in _planned(block.target.problem):
+        target = replace_problem(block.target, other)
+        ranked.append((value(target), words))
+    best, words = max(ranked)
+    return words, best / here if here > 0 else np.inf
+
+
+def _planned(problem: Problem) -> list[tuple[str, Problem]]:
+    """The tests considered, in words and as a problem without readings."""
     planned = [_another_length(problem)]
     alone = len(problem.samples) == 1
-    settings = " and ".join(sorted({_SETTINGS[s.protocol.control] for s in problem.samples}))
+    kinds = {_SETTINGS[s.protocol.control] for s in problem.samples}
+    settings = " and ".join(sorted(kinds))
     each = [other_measurements(s.protocol, alone, problem.units, settings) for s in problem.samples]
     for plans in zip(*each, strict=True):
         protocols = [plan.protocol for plan in plans]
         empty = [np.zeros((*p.time_s.shape, 1)) for p in protocols]
         planned.append((plans[0].words, with_protocols(problem, protocols, empty)))
-    here = value(block.target)
-    best, words = max((value(replace_problem(block.target, other)), words) for words, other in planned)
-    return words, best / here if here > 0 else np.inf
+    return planned
 
 
 def _remainder_seen(target: LogPosterior, block: LaplaceFit) -> float:

@@ -66,17 +66,22 @@ def preview(experiment: Experiment, kinds: Kinds, rng: Generator) -> Preview:
     """
     block = fitted((experiment,), (), PLAIN_SPEC, rng)
     problem = block.target.problem
-    theta = problem.theta_in(NATURAL, rough_draws.draws(block.target, block.modes, rng))
-    before = problem.theta_in(NATURAL, problem.prior.rvs(4000, rng))
+    draws = rough_draws.draws(block.target, block.modes, rng)
+    theta = problem.theta_in(NATURAL, draws)
+    prior_draws = problem.prior.rvs(4000, rng)
+    before = problem.theta_in(NATURAL, prior_draws)
     problem = problem.in_units(NATURAL)
     sample = problem.samples[0]
-    own, prior = problem.parameters(theta, sample), problem.parameters(before, sample)
-    controls = [sample.protocol.control]
-    parameters = {
-        name: _range(theta[:, i], before[:, i], unit_of(name, (), controls)) for i, name in enumerate(problem.names)
-    }
-    ends = hold_ends.cost(problem, np.array(list(block.best.values())), theta.std(axis=0, ddof=1))
-    return Preview(parameters, _effects(block, kinds, rng), of_posterior(own, prior, sample), ends)
+    parameters = {}
+    for i, name in enumerate(problem.names):
+        unit = unit_of(name, (), [sample.protocol.control])
+        parameters[name] = _range(theta[:, i], before[:, i], unit)
+    best = np.array(list(block.best.values()))
+    ends = hold_ends.cost(problem, best, theta.std(axis=0, ddof=1))
+    own = problem.parameters(theta, sample)
+    prior = problem.parameters(before, sample)
+    warnings = of_posterior(own, prior, sample)
+    return Preview(parameters, _effects(block, kinds, rng), warnings, ends)
 
 
 def _range(draws: Array, before: Array, unit: str) -> ParameterRange:
@@ -96,20 +101,19 @@ def _range(draws: Array, before: Array, unit: str) -> ParameterRange:
 
 def _effects(block: LaplaceFit, kinds: Kinds, rng: Generator) -> dict[str, EffectSize]:
     """Each effect at the size at which it would be seen, in the form and at the hold where it is seen best."""
-    trials, candidates = screening.candidate_probes([block], kinds)
     control = block.experiments[0].control
     if expand(block.target, block.z, []).degrees < 1:
         return {name: _hidden(kind, "fewer readings than parameters", control) for name, kind in kinds.items()}
+    trials, candidates = screening.candidate_probes([block], kinds)
+    effects = {name: _hidden(kind, kind.shows, control) for name, kind in kinds.items()}
     if not candidates:
-        return {name: _hidden(kind, kind.shows, control) for name, kind in kinds.items()}
+        return effects
     null = screening.replicated(block, trials, SIMULATIONS, rng).scan
-    found = power.detectable(null, trials, candidates, screening.chance_level(candidates, [null]))
-    return {
-        name: _shown(block, trials[found[name][0]].effect, found[name][1])
-        if name in found
-        else _hidden(kind, kind.shows, control)
-        for name, kind in kinds.items()
-    }
+    level = screening.chance_level(candidates, [null])
+    found = power.detectable(null, trials, candidates, level)
+    for name, (number, amplitude) in found.items():
+        effects[name] = _shown(block, trials[number].effect, amplitude)
+    return effects
 
 
 def _shown(block: LaplaceFit, effect: Effect, amplitude: float | None) -> EffectSize:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from wirebayes.inference.optimum import Optimum, together
-from wirebayes.numeric.typing import Array, Ints
+from wirebayes.numeric.typing import Array, Bools, Ints
 
 _NEAR_TOP = 1.0  # nats below it that a parabola is fitted to; neighbours alone may differ in their last digits only
 _LEAST_INSIDE = 1e-3  # of a parabola; one farther outside the prior's ends is not the profile's
@@ -91,15 +91,16 @@ def top_of(profile: Profile, per_delta: float) -> Top | None:
     per_delta : float
         What amounts to δ = 1.
     """
-    grid, value, best = profile.amplitude, profile.value, profile.best
-    if not 0 < best < len(grid) - 1:
+    best = profile.best
+    if not 0 < best < len(profile.amplitude) - 1:
         return None
-    near = (value > value[best] - _NEAR_TOP) & np.isfinite(value)
-    near[best - 1 : best + 2] = True
-    y = value[near] - value[best]
+    near = _about_best(profile)
+    highest = profile.value[best]
+    y = profile.value[near] - highest
     if not np.isfinite(y).all():
         return None
-    away = (grid[near] - grid[best]) / per_delta
+    middle = profile.amplitude[best]
+    away = (profile.amplitude[near] - middle) / per_delta
     scale = np.abs(away).max()
     x = away / scale
     bend, slope, height = np.polyfit(x, y, 2)
@@ -107,8 +108,18 @@ def top_of(profile: Profile, per_delta: float) -> Top | None:
         return None
     summit = float(np.clip(-0.5 * slope / bend, x.min(), x.max()))
     rise = height + slope * summit + bend * summit**2
+    amplitude = middle + summit * scale * per_delta
     sd = per_delta * scale / np.sqrt(-2.0 * bend)
-    return Top(float(grid[best] + summit * scale * per_delta), float(sd), float(value[best] + rise))
+    return Top(float(amplitude), float(sd), float(highest + rise))
+
+
+def _about_best(profile: Profile) -> Bools:
+    """(a,) which amplitudes are the best one, its neighbours, or nearly as good."""
+    best = profile.best
+    least = profile.value[best] - _NEAR_TOP
+    near = (profile.value > least) & np.isfinite(profile.value)
+    near[best - 1 : best + 2] = True
+    return np.asarray(near)
 
 
 def integral_of(profile: Profile, neutral: float, per_delta: float) -> tuple[float, float]:
@@ -122,18 +133,27 @@ def integral_of(profile: Profile, neutral: float, per_delta: float) -> tuple[flo
     per_delta : float
         What amounts to δ = 1: the standard deviation where nothing is known.
     """
-    grid, value = profile.amplitude, profile.value
-    top = float(value[profile.best])
+    top = float(profile.value[profile.best])
     if not np.isfinite(top):
         return -np.inf, per_delta
-    if not grid[0] <= neutral <= grid[-1]:  # between neutral and the least amplitude it hardly changes
-        first = 0 if neutral < grid[0] else len(grid)
-        nearest = value[0] if first == 0 else value[-1]
-        grid, value = np.insert(grid, first, neutral), np.insert(value, first, nearest)
+    grid, value = _up_to(neutral, profile)
     share = np.exp(value - top)
     whole = float(np.trapezoid(share, grid))
     if not whole > 0.0:
         return -np.inf, per_delta
     mean = float(np.trapezoid(share * grid, grid)) / whole
-    variance = float(np.trapezoid(share * (grid - mean) ** 2, grid)) / whole
-    return top + float(np.log(whole)), float(np.sqrt(variance)) or per_delta
+    square = share * (grid - mean) ** 2
+    variance = float(np.trapezoid(square, grid)) / whole
+    sd = float(np.sqrt(variance))
+    return top + float(np.log(whole)), sd or per_delta
+
+
+def _up_to(neutral: float, profile: Profile) -> tuple[Array, Array]:
+    """Amplitudes up to neutral, and the values; between neutral and the least amplitude the value hardly changes."""
+    grid = profile.amplitude
+    value = profile.value
+    if neutral < grid[0]:
+        return np.insert(grid, 0, neutral), np.insert(value, 0, value[0])
+    if neutral > grid[-1]:
+        return np.append(grid, neutral), np.append(value, value[-1])
+    return grid, value

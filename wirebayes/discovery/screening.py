@@ -102,16 +102,23 @@ def _variants(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protocol]) 
         return []
     if kind.scope in FILE_WIDE:
         return _of_the_bench(kind, block, tests)
-    if not issubclass(kind, EventEffect):
-        found_by_all = kind.variants([e.protocol() for e in block.experiments])
-        learned = any(name.startswith(LENGTH_EXPONENT) for name in block.target.problem.names)
-        return [v for v in found_by_all if not (learned and v.key == _LEARNED_EXPONENT)]
-    taken = {e.key for e in block.effects}
+    if issubclass(kind, EventEffect):
+        return _events(kind, block, several_tests=len(tests) > 1)
+    found = kind.variants([e.protocol() for e in block.experiments])
+    if any(name.startswith(LENGTH_EXPONENT) for name in block.target.problem.names):
+        return [v for v in found if v.key != _LEARNED_EXPONENT]
+    return list(found)
+
+
+def _events(kind: type[EventEffect], block: LaplaceFit, several_tests: bool) -> list[Effect]:
+    """The forms of an event in each test of a block, none where one of the kind is in the model already."""
     if kind.name in {e.name for e in block.effects}:
         return []
-    found = [(e.name, v) for e in block.experiments for v in kind.variants([e.protocol()])]
-    out = [replace(v, test=name) if len(tests) > 1 else v for name, v in found]  # type: ignore[type-var]
-    return [v for v in out if v.key not in taken]
+    out: list[Effect] = []
+    for e in block.experiments:
+        for event in kind.variants([e.protocol()]):
+            out.append(replace(event, test=e.name) if several_tests else event)  # type: ignore[type-var]
+    return out
 
 
 def _of_the_bench(kind: type[Effect], block: LaplaceFit, tests: Sequence[Protocol]) -> list[Effect]:
@@ -130,18 +137,27 @@ def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array
     """(n,) log Bayes factor with the same prior on every amplitude, best amplitude, and amplitude per δ."""
     blocks = candidate.blocks
     one_sided = bool(scans[blocks[0]].pieces.one_sided[candidate.probe])
-    chosen = [(scans[b], own) for b, own in zip(blocks, best_probes(candidate, scans), strict=True)]
-    log_ratio = np.array([_each(found.effects, own) for found, own in chosen])
-    amplitude = np.array([_each(found.amplitude, own) for found, own in chosen])
-    norm = np.array([_each(found.norm, own) for found, own in chosen])
+    prior = occam(one_sided)
+    log_ratio, amplitude, norm = _in_each_block(candidate, scans)
     if one_sided:
         amplitude = np.maximum(amplitude, 0.0)
     if not candidate.shared or len(blocks) == 1:
-        value = log_ratio.sum(axis=0) + occam(one_sided) * len(blocks)
+        value = log_ratio.sum(axis=0) + prior * len(blocks)
         return value, amplitude[0], 1.0 / np.maximum(norm[0], 1e-300)
     value, mean = shared_amplitude(log_ratio, amplitude, norm)
-    together = np.sqrt(np.maximum((norm**2).sum(axis=0), 1e-300))
-    return value + occam(one_sided), mean, 1.0 / together
+    square = (norm**2).sum(axis=0)
+    together = np.sqrt(np.maximum(square, 1e-300))
+    return value + prior, mean, 1.0 / together
+
+
+def _in_each_block(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array, Array]:
+    """(b, n) log likelihood ratio, best amplitude, and δ per amplitude."""
+    log_ratio, amplitude, norm = [], [], []
+    for b, numbers in zip(candidate.blocks, best_probes(candidate, scans), strict=True):
+        log_ratio.append(_each(scans[b].effects, numbers))
+        amplitude.append(_each(scans[b].amplitude, numbers))
+        norm.append(_each(scans[b].norm, numbers))
+    return np.array(log_ratio), np.array(amplitude), np.array(norm)
 
 
 def best_probes(candidate: Candidate, scans: Sequence[Scan]) -> list[Ints]:
@@ -222,13 +238,16 @@ def replicated(
     y = [replicate(problem, theta, s, rng) for s in problem.samples]
     density, residuals = block.target.rowwise(y)
     found = climb(density, z, residuals, iterations=25, tolerance=1e-2, curvature_at_end=False)
-    shapes, smooth = forms(block.target, block.z, trials), plain_reference(problem)
-    at_once = int(np.clip(_NUMBERS / max(sum(shape.size for shape in shapes), 1), 1, _ROWS))
+    shapes = forms(block.target, block.z, trials)
+    smooth = plain_reference(problem)
+    numbers = sum(shape.size for shape in shapes)
+    at_once = int(np.clip(_NUMBERS / max(numbers, 1), 1, _ROWS))
     parts = []
     for begin in range(0, n, at_once):
         rows = slice(begin, begin + at_once)
         own = [v[..., rows] for v in y]
-        parts.append(scan(expand(block.target, found.z[rows], trials, own, columns, shapes, smooth)))
+        x = expand(block.target, found.z[rows], trials, own, columns, shapes, smooth)
+        parts.append(scan(x))
     return Replicates(joined(parts), found.z, y)
 
 

@@ -7,7 +7,7 @@ The evidence of a set comes from a chain of refits, each effect refitted beside 
 amplitude is the same in every set, so the order of the chain does not matter.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, repeat
 
@@ -25,6 +25,7 @@ from wirebayes.discovery.noise_integral import Expansion
 from wirebayes.discovery.probes import Probe
 from wirebayes.discovery.refit import occam
 from wirebayes.discovery.remainder_evidence import Reference, reference_of, remainder_evidence
+from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.settings import (
     FIRST_LOOK,
     LEFT_OVER,
@@ -71,25 +72,39 @@ def explore(
         The built-in `map`, or one over processes; the sets are the same.
     """
     references = [reference_of(block) for block in plain]
-    smooth = np.array([remainder_evidence(b, r) for b, r in zip(plain, references, strict=True)])
-    root = EffectSet((), 0.0, {}, smooth)
+    root = EffectSet((), 0.0, {}, _remainders(plain, references))
     start = FittedSet(root, plain, (), found, ([], []))
     frontier = Frontier(len(settings.kinds), families)
-    credits = _credits(expansions, trials)
-    for name in found.winners:
-        beside = np.maximum(smooth + credits[name], 0.0).sum() if name in credits else -np.inf
-        frontier.add(root, name, found, float(beside))
+    _add_singles(frontier, root, found, _credits(expansions, trials))
     frontier.lead_to(_leading_pair(expansions, trials))
     common = repeat(families), repeat(references), repeat(settings)
     while wave := frontier.next_looks(_looks(len(frontier.fitted))):
-        parents = [frontier.fitted.get(frontier.parents[key][0], start) for key in wave]
-        names = [frontier.parents[key][1] for key in wave]
-        fitted_sets = parallel_map(_fit, parents, names, *common, rng.spawn(len(wave)))
+        origins = [frontier.parents[key] for key in wave]
+        parents = [frontier.fitted.get(before, start) for before, _ in origins]
+        names = [name for _, name in origins]
+        generators = rng.spawn(len(wave))
+        fitted_sets = parallel_map(_fit, parents, names, *common, generators)
         for key, new in zip(wave, fitted_sets, strict=True):
             own_fit = _log_evidence(new.blocks) - _log_evidence(plain)
             _keep(frontier, key, new, own_fit)
     sets = root, *frontier.known.values()
     return Explored(sets, frontier.fitted, _left_over(frontier), frontier.parents, start)
+
+
+def _remainders(blocks: Sequence[LaplaceFit], references: Sequence[Reference]) -> Array:
+    """(b,) log Bayes factor of a smooth remainder in each block."""
+    return np.array([remainder_evidence(b, r) for b, r in zip(blocks, references, strict=True)])
+
+
+def _add_singles(frontier: Frontier, root: EffectSet, found: NameEvidence, credits: Mapping[str, Array]) -> None:
+    """Add the sets of one effect, each with what it may come to beside a remainder."""
+    assert root.remainder is not None
+    for name in found.winners:
+        credit = -np.inf
+        if name in credits:
+            beside = np.maximum(root.remainder + credits[name], 0.0)
+            credit = float(beside.sum())
+        frontier.add(root, name, found, credit)
 
 
 def _looks(done: int) -> int:
@@ -170,9 +185,9 @@ def _fit(
     names = (*parent.effects.names, name)
     probed = screening.candidate_probes(blocks, settings.kinds)
     further = _further(parent, names, blocks, probed, families)
-    remainder = np.array([remainder_evidence(b, r) for b, r in zip(blocks, references, strict=True)])
     accepted = (*parent.accepted, Accepted(name, tuple(effects), effects))
-    return FittedSet(EffectSet(names, 0.0, {}, remainder), blocks, accepted, further, probed)
+    fitted_set = EffectSet(names, 0.0, {}, _remainders(blocks, references))
+    return FittedSet(fitted_set, blocks, accepted, further, probed)
 
 
 def _further(
@@ -188,12 +203,24 @@ def _further(
     scans = [scan(expand(block.target, block.z, trials)) for block in blocks]
     explained = {other for own in names for other in family_of(own, families)}  # what they were, they are no more
     before = {n: -np.inf if n in explained else value for n, value in parent.further.tried.items()}
-    by_scan = (float(screening.log_bayes(c, scans)[0][0]) for c in candidates)
-    if not candidates or all(value < WORTH_A_REFIT for value in chain(before.values(), by_scan)):
+    if not _may_show(candidates, scans, before):
         return None
-    reach = parent.further.reach
     further = weigh_names(
-        blocks, trials, candidates, scans, reach=reach, before=before, most=MOST_BESIDE, forms_a_name=1
+        blocks,
+        trials,
+        candidates,
+        scans,
+        reach=parent.further.reach,
+        before=before,
+        most=MOST_BESIDE,
+        forms_a_name=1,
     )
     best = max((further.log_bayes[n] for n in further.winners), default=-np.inf)
     return further if best >= WORTH_ADDING else None
+
+
+def _may_show(candidates: Sequence[screening.Candidate], scans: Sequence[Scan], before: Mapping[str, float]) -> bool:
+    """Whether any candidate is worth a refit, by what its name was beside fewer effects, or by the scan."""
+    by_scan = (float(screening.log_bayes(c, scans)[0][0]) for c in candidates)
+    hopeless = all(value < WORTH_A_REFIT for value in chain(before.values(), by_scan))
+    return bool(candidates) and not hopeless
