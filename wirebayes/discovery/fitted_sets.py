@@ -156,14 +156,14 @@ def added(
     rng : numpy.random.Generator
     """
     assert parent.further is not None
-    blocks, effects = list(parent.blocks), {}
+    blocks = list(parent.blocks)
     refits = parent.further.amplitudes(name)
-    for b, r in refits.items():
-        effects[b] = r.effect
-        near = r.theta[r.blocks.index(b)]
-        every = (*blocks[b].effects, r.effect)
-        scales = blocks[b].scales
-        blocks[b] = fitted(blocks[b].experiments, every, settings.spec, rng, near, scales=scales)
-    if any(len(r.blocks) > 1 for r in refits.values()):
-        blocks = informed(blocks, effects, rng)
-    return blocks, effects
+    for b, refit in refits.items():
+        block = blocks[b]
+        effects = (*block.effects, refit.effect)
+        near = refit.theta[refit.blocks.index(b)]
+        blocks[b] = fitted(block.experiments, effects, settings.spec, rng, near, scales=block.scales)
+    forms = {b: refit.effect for b, refit in refits.items()}
+    if any(len(refit.blocks) > 1 for refit in refits.values()):
+        blocks = informed(blocks, forms, rng)
+    return blocks, forms

@@ -249,16 +249,20 @@ def _strike_gross_errors(
     block: LaplaceFit, trials: list[Probe], candidates: list[Candidate], i: int, rng: Generator
 ) -> tuple[LaplaceFit, list[GrossError]]:
     """The block refitted without its gross errors, and these; `i` is its number among all."""
+    own = [c.probe for c in candidates if i in c.blocks]
     struck: list[GrossError] = []
-    most = max(1, int(gross_errors.MOST * gross_errors.readings_of(block.experiments)))
-    while len(struck) < most:
+    share = gross_errors.MOST * gross_errors.readings_of(block.experiments)
+    while len(struck) < max(1, int(share)):
         here = scan(expand(block.target, block.z, trials))
-        rival = max((float(here.effects[0, c.probe]) for c in candidates if i in c.blocks), default=0.0)
-        found = gross_errors.suspect(block, max(rival, float(here.flexible[0])))
+        by_effect = max((float(here.effects[0, k]) for k in own), default=0.0)
+        rival = max(by_effect, float(here.flexible[0]))
+        found = gross_errors.suspect(block, rival)
         if found is None:
             break
         name, hold, reading, value = found
-        members = [gross_errors.without(e, hold, reading) if e.name == name else e for e in block.experiments]
+        members = list(block.experiments)
+        at = block.names.index(name)
+        members[at] = gross_errors.without(members[at], hold, reading)
         block = fitted(members, block.effects, block.spec, rng, scales=block.scales)
         struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
     return block, struck

@@ -8,7 +8,6 @@ import numpy as np
 
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.refit import occam
-from wirebayes.discovery.scans import Scan
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import GrossError
@@ -23,23 +22,25 @@ def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | No
 
     `rival` is the log Bayes factor of the best effect; a gross error must beat it and chance by a clear margin.
     """
-    cells = [(at, j, r) for at, s in enumerate(block.target.problem.samples) for j, r in np.argwhere(s.protocol.mask)]
+    samples = block.target.problem.samples
+    cells = [(at, j, r) for at, s in enumerate(samples) for j, r in np.argwhere(s.protocol.mask)]
 
     def columns(problem: Any, at: int, tension: Array, slopes: Array) -> Array:
         out = np.zeros((*tension.shape, len(cells)))
-        for i, (sample, j, r) in enumerate(cells):
-            if sample == at:
+        for i, (of_sample, j, r) in enumerate(cells):
+            if of_sample == at:
                 out[j, r, :, i] = 1.0
         return out
 
-    found: Scan = scan(expand(block.target, block.z, [], columns=columns))
-    best = int(np.argmax(found.effects[0]))
-    value = float(found.effects[0, best]) + occam(False) - np.log(len(cells))
+    x = expand(block.target, block.z, [], columns=columns)
+    effects = scan(x).effects[0]
+    best = int(np.argmax(effects))
+    value = float(effects[best]) + occam(False) - np.log(len(cells))
     if value < max(3.0, rival + 2.0):
         return None
     at, j, r = cells[best]
-    sample = block.target.problem.samples[at]
-    return sample.name, int(sample.protocol.number[j]), int(r), value
+    number = int(samples[at].protocol.number[j])
+    return samples[at].name, number, int(r), value
 
 
 def without(experiment: Experiment, hold: int, reading: int) -> Experiment:

@@ -106,26 +106,27 @@ def predicted(
 def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng: Generator) -> HeldOut:
     """The recorded holds of a sample after the first `train`, predicted with draws of its own parameters."""
     line = linearise(sample.protocol, own, model)
-    variance = sample.variance(own)
-    noise = variance, own["setting_sd"]
+    noise = sample.variance(own), own["setting_sd"]
     last = np.flatnonzero(sample.protocol.recorded)[train:]
-    mask = sample.protocol.mask.copy()
-    mask[last] = False
-    carried = likelihoods.chain(line, sample.readings, mask, *noise)
-    log_p = likelihoods.held_out_density(line, carried, sample.readings, sample.protocol.mask & ~mask, *noise)
-    elpd = logsumexp(or_impossible(log_p), axis=1) - np.log(log_p.shape[1])
+    trained_on = sample.protocol.mask.copy()
+    trained_on[last] = False
+    left_out = sample.protocol.mask & ~trained_on
+    carried = likelihoods.chain(line, sample.readings, trained_on, *noise)
+    log_p = likelihoods.held_out_density(line, carried, sample.readings, left_out, *noise)
+    draws = log_p.shape[1]
+    elpd = logsumexp(or_impossible(log_p), axis=1) - np.log(draws)
     holds = [_scored_hold(sample, line, carried, int(j), noise, rng) for j in last]
     error = np.concatenate([hold.error for hold in holds])
     floor = np.concatenate([hold.floor for hold in holds])
     inside = np.concatenate([hold.inside for hold in holds])
     return HeldOut(
-        [int(n) for n in sample.protocol.number[last]],
-        float((error**2).mean()),
-        len(error),
-        float(floor.mean()),
-        elpd,
-        float(inside.mean()),
-        tuple(len(hold.error) for hold in holds),
+        holds=[int(n) for n in sample.protocol.number[last]],
+        squares=float((error**2).mean()),
+        readings=len(error),
+        floor=float(floor.mean()),
+        elpd=elpd,
+        inside=float(inside.mean()),
+        readings_each=tuple(len(hold.error) for hold in holds),
     )
 
 

@@ -101,17 +101,25 @@ def verdict_on(found: Evidence) -> Judgement:
     -------
     Judgement
     """
-    established = found.established
-    if found.p > ALPHA or (found.nothing > 0.5 and not established):
+    if found.p > ALPHA:
         return Judgement("nothing-missing")
-    open_ = [tuple(family.members) for family in established if family.name is None]
-    undecided = open_[0] if open_ else ()
-    if established and found.remainder_counts:
-        return Judgement("partial", undecided)
-    if established:
-        return Judgement("ambiguous", undecided) if undecided else Judgement("named")
-    predicts = found.best_gain is not None and found.best_gain > KEEP_ELPD
-    likely = tuple(smallest_set({name: share for name, share in found.shares.items() if name != "unknown"}))
-    if predicts and likely and found.shares.get("unknown", 0.0) <= 1.0 - IN_SET:
+    if found.established:
+        return _of_established(found)
+    if found.nothing > 0.5:
+        return Judgement("nothing-missing")
+    if found.best_gain is None or not found.best_gain > KEEP_ELPD:
+        return Judgement("unknown")
+    names = {name: share for name, share in found.shares.items() if name != "unknown"}
+    likely = tuple(smallest_set(names))
+    if likely and found.shares.get("unknown", 0.0) <= 1.0 - IN_SET:
         return Judgement("ambiguous", likely)
     return Judgement("unknown")
+
+
+def _of_established(found: Evidence) -> Judgement:
+    """The verdict where at least one family is established."""
+    unnamed = [family for family in found.established if family.name is None]
+    undecided = tuple(unnamed[0].members) if unnamed else ()
+    if found.remainder_counts:
+        return Judgement("partial", undecided)
+    return Judgement("ambiguous", undecided) if undecided else Judgement("named")

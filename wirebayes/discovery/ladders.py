@@ -75,19 +75,20 @@ def ladders(
     """
     out = []
     for shapes in _lasting_forms(trials):
-        every = [k for numbers in shapes for k in numbers]
-        here = tuple(c for c in candidates if c.probe == every[0])
+        first = shapes[0][0]
+        here = tuple(c for c in candidates if c.probe == first)
         on = sorted({b for c in here for b in c.blocks})
-        strength = {k: float(np.sqrt(sum(data[b].norm[0, k] ** 2 for b in on))) for k in every}
         starts: list[_LadderEnds] = []
         for numbers in shapes:
+            strength = {k: float(np.sqrt(sum(data[b].norm[0, k] ** 2 for b in on))) for k in numbers}
             visible = [k for k in numbers if strength[k] > 0]
             if visible:
                 # Of a one-sided form the probe that lies in the middle of the ladder.
-                k = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
-                starts += _both_signs(trials[k], strength[k], [blocks[b] for b in on])
+                middle = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
+                starts += _both_signs(trials[middle], strength[middle], [blocks[b] for b in on])
         if starts:
-            out.append(AmplitudePath(tuple(s.probe for s in starts), _rungs(starts), here))
+            probes = tuple(s.probe for s in starts)
+            out.append(AmplitudePath(probes, _rungs(starts), here))
     return out
 
 

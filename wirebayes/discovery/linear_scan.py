@@ -15,7 +15,7 @@ from wirebayes.discovery.noise_integral import (
 )
 from wirebayes.discovery.probes import Probe, forms
 from wirebayes.discovery.scans import Pieces, Scan, joined
-from wirebayes.discovery.tangent import around_points, block_diagonal, moving_columns, points_of, tangent_of
+from wirebayes.discovery.tangent import Point, around_points, block_diagonal, moving_columns, points_of, tangent_of
 from wirebayes.discovery.two_effects import log_bayes_of_two
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.model.problem import Problem
@@ -63,30 +63,36 @@ def expand(
     problem = target.problem
     around = around_points(target, z, moving_columns(problem))
     points = list(points_of(target, around, readings))
+    reference = reference or plain_reference(problem)
+    shapes = shapes or forms(target, z[:1], trials)
     added: list[Array] = []
     functions: list[list[Array]] = []
-    reference = reference or plain_reference(problem)
     for at, (sample, point) in enumerate(zip(problem.samples, points, strict=True)):
         mask = sample.protocol.mask
-        shape = (shapes or forms(target, z[:1], trials))[at][mask]
-        each = [shape[None] / point.sd[:, None, None]]
+        sd = point.sd[:, None, None]
+        each = [shapes[at][mask][None] / sd]
         if columns is not None:
             more = columns(problem, at, point.tension, point.slopes)
-            each.append(np.stack([point.rows(more[..., i], mask) for i in range(more.shape[-1])], axis=-1))
+            each.append(_rows(point, more, mask))
         added.append(np.concatenate(each, axis=-1))
-        functions.append([f[mask][None] / point.sd[:, None, None] for f in reference[at]])
+        functions.append([f[mask][None] / sd for f in reference[at]])
     signatures = np.concatenate(added, axis=1)
     one_sided, kinds = _described(trials, signatures.shape[-1])
-    plain = tangent_of(target, around, points)
     processes = [block_diagonal(each) for each in zip(*functions, strict=True)]
     return Expansion(
-        **vars(plain),
+        **vars(tangent_of(target, around, points)),
         signatures=signatures,
         one_sided=one_sided,
         kinds=kinds,
         flexible=np.concatenate(processes, axis=2),
         processes=tuple(f.shape[2] for f in processes),
     )
+
+
+def _rows(point: Point, values: Array, mask: Array) -> Array:
+    """(H, R, n, m) to (n, N, m) in units of the reading error."""
+    columns = [point.rows(values[..., i], mask) for i in range(values.shape[-1])]
+    return np.stack(columns, axis=-1)
 
 
 def _described(trials: Sequence[Probe], m: int) -> tuple[Bools, Ints]:
@@ -110,25 +116,32 @@ def scan(x: Expansion) -> Scan:
 def _scan_few(x: Expansion) -> Scan:
     """Scan at once: noise of every ratio is integrated out, each amplitude is at its best."""
     found = project(x)
-    b, c = found.along, found.square
     left, effects = with_each_signature(x, found)
     by_effect = log_sum(effects, axis=1)
     plain, beside = without_and_with(x, found)
     nothing = log_sum(plain, axis=1)
     seen = np.isfinite(nothing)
     nothing = np.where(seen, nothing, 0.0)
-    flexible = log_sum(beside.reshape(len(beside), -1), axis=1) - np.log(beside.shape[2])
+    summed = log_sum(beside.reshape(len(beside), -1), axis=1)
+    flexible = summed - np.log(beside.shape[2])
     two = log_bayes_of_two(x, found, by_effect, nothing)
     amplitude, norm = _most_probable(effects, found, left, x.degrees)
+    pieces = Pieces(
+        found.shared.T,
+        found.rss.T,
+        np.swapaxes(found.along, 0, 1),
+        np.swapaxes(found.square, 0, 1),
+        x.degrees,
+        x.least,
+        x.one_sided,
+    )
     return Scan(
         np.where(seen[:, None], by_effect - nothing[:, None], 0.0),
         np.where(seen, flexible - nothing, 0.0),
         np.where(seen, two, 0.0),
         amplitude,
         norm,
-        Pieces(
-            found.shared.T, found.rss.T, np.swapaxes(b, 0, 1), np.swapaxes(c, 0, 1), x.degrees, x.least, x.one_sided
-        ),
+        pieces,
     )
 
 

@@ -147,18 +147,20 @@ def log_weights(
         Log Bayes factor of a remainder that is not smooth, beside a set.
     """
     kinds = names - sum(len(f) - 1 for f in families)
-    without, beside = [], []
+    without = []
+    beside = []
     for s in sets:
         smooth = -np.inf if s.remainder is None else over_subsets(s.remainder)[0]
-        if s.names:
-            members = sum(np.log(len(family_of(n, families))) for n in s.names)
-            alone = log_prior(len(s.names), kinds) - members + s.log_bayes
-            more = np.logaddexp(smooth, other.get(s.key, -np.inf))
-            without.append(alone)
-            beside.append(alone + np.log(MORE) + more)
-        else:
+        if not s.names:
             without.append(-np.inf)  # nothing at all: the global test has excluded it
             beside.append(np.log(UNKNOWN_WEIGHT) + smooth)
+            continue
+        sizes = [len(family_of(name, families)) for name in s.names]
+        members = sum(np.log(size) for size in sizes)
+        alone = log_prior(len(s.names), kinds) - members + s.log_bayes
+        remainder = np.logaddexp(smooth, other.get(s.key, -np.inf))
+        without.append(alone)
+        beside.append(alone + np.log(MORE) + remainder)
     return np.array(without), np.array(beside)
 
 
@@ -181,15 +183,12 @@ def posterior(
     families : sequence of tuple of str
         As for `log_weights`.
     """
-    total = logsumexp([*without, *beside])
-    p_without, p_beside = np.exp(without - total), np.exp(beside - total)
-    whole = p_without.sum() + p_beside.sum()  # one but for rounding, which grows with the log weights
-    p_without, p_beside = p_without / whole, p_beside / whole
-    own = dict.fromkeys(name for s in sets for name in s.names)
-    sums = _Sums.over(own, tuple(dict.fromkeys(family_of(name, families) for name in own)), blocks)
+    p_without, p_beside = _normalised(without, beside)
+    names = dict.fromkeys(name for s in sets for name in s.names)
+    of_names = dict.fromkeys(family_of(name, families) for name in names)
+    sums = _Sums.over(names, of_names, blocks)
     for s, bare, more in zip(sets, p_without, p_beside, strict=True):
         sums.add(s, bare, more)
-    shares = [_shares({name: float(value[b]) for name, value in sums.first.items()}) for b in range(blocks)]
     return ModelPosterior(
         tuple(sets),
         p_without,
@@ -199,8 +198,17 @@ def posterior(
         {name: _at_most_one(value) for name, value in sums.inclusion.items()},
         tuple(sums.together),
         [_at_most_one(value) for value in sums.together.values()],
-        shares,
+        [_shares(sums.leading(b)) for b in range(blocks)],
     )
+
+
+def _normalised(without: Array, beside: Array) -> tuple[Array, Array]:
+    """Probabilities of log weights, which together sum to one."""
+    total = logsumexp([*without, *beside])
+    p_without = np.exp(without - total)
+    p_beside = np.exp(beside - total)
+    whole = p_without.sum() + p_beside.sum()  # one but for rounding, which grows with the log weights
+    return p_without / whole, p_beside / whole
 
 
 def _at_most_one(probability: Array) -> Array:
@@ -241,6 +249,10 @@ class _Sums:
         first = {name: np.zeros(blocks) for name in (*names, "unknown")}
         return cls(np.zeros(blocks), np.zeros(blocks), inclusion, together, first)
 
+    def leading(self, block: int) -> dict[str, float]:
+        """In one material, that each name is the first of those that act."""
+        return {name: float(value[block]) for name, value in self.first.items()}
+
     def add(self, s: EffectSet, without: float, beside: float) -> None:
         """Add a set.
 
@@ -250,8 +262,17 @@ class _Sums:
         without, beside : float
             Its probability without a remainder and with one.
         """
-        whole = without + beside
-        remains = np.ones(len(self.nothing)) if s.remainder is None else over_subsets(s.remainder)[1]
+        idle = self._add_names(s, without + beside)
+        remains = np.ones(len(self.nothing))
+        if s.remainder is not None:
+            remains = over_subsets(s.remainder)[1]
+        with_remainder = beside * remains
+        self.remainder[:] += with_remainder
+        self.first["unknown"] += with_remainder * idle
+        self.nothing[:] += without * idle + beside * (1.0 - remains) * idle
+
+    def _add_names(self, s: EffectSet, whole: float) -> Array:
+        """Add the names of a set and their families; (b,) the probability that none of them acts."""
         idle = np.ones(len(self.nothing))  # no effect before acts here
         for name in s.names:
             acts = s.presence[name]
@@ -259,11 +280,10 @@ class _Sums:
             self.inclusion[name] += whole * acts
             idle = idle * (1.0 - acts)
         for family, probability in self.together.items():
-            absent = np.prod([1.0 - s.presence[name] for name in s.names if name in family], axis=0)
+            idle_members = [1.0 - s.presence[name] for name in s.names if name in family]
+            absent = np.prod(idle_members, axis=0)
             probability += whole * (1.0 - absent)
-        self.remainder[:] += beside * remains
-        self.first["unknown"] += beside * remains * idle
-        self.nothing[:] += without * idle + beside * (1.0 - remains) * idle
+        return idle
 
 
 def _shares(leading: Mapping[str, float]) -> dict[str, float]:

@@ -107,16 +107,27 @@ def weigh_names(
     refitted: dict[str, float] = {}
     while wave := _next_wave(waiting, promise, list(refitted.values()), room):
         waiting = waiting[len(wave) :]
-        promising = [form for name in wave for form in by_name[name][:forms_a_name]]
+        promising = []
+        every = []
+        for name in wave:
+            promising += by_name[name][:forms_a_name]
+            every += by_name[name]
         tasks = _tasks(promising, trials, scans, reach)
-        on_blocks = [on for _, on in tasks]
-        done = parallel_map(partial(refit, blocks), on_blocks, *zip(*tasks.values(), strict=True))
-        found |= zip(tasks, done, strict=True)
-        every = [form for name in wave for form in by_name[name]]
+        found |= _refits(blocks, tasks, parallel_map)
         summed = _summed(every, found, len(blocks))
         refitted |= {name: summed.log_bayes[name] for name in wave}
-    tried = {**before, **refitted}
-    return replace(_summed(forms, found, len(blocks)), reach=reach, tried=tried)
+    result = _summed(forms, found, len(blocks))
+    return replace(result, reach=reach, tried={**before, **refitted})
+
+
+def _refits(
+    blocks: Sequence[LaplaceFit], tasks: Mapping[_Place, _Task], parallel_map: ParallelMap
+) -> dict[_Place, Refit]:
+    """Each task done: an effect refitted on the blocks of its place."""
+    on_blocks = [on for _, on in tasks]
+    arguments = zip(*tasks.values(), strict=True)
+    done = parallel_map(partial(refit, blocks), on_blocks, *arguments)
+    return dict(zip(tasks, done, strict=True))
 
 
 def _by_name(forms: Sequence[_Form]) -> dict[str, list[_Form]]:
@@ -187,19 +198,23 @@ def reaches(
     trials, candidates
         See `wirebayes.discovery.screening.candidate_probes`.
     """
-    lengths = []
-    for block in blocks:
-        x = expand(block.target, block.z, trials)
-        lengths.append((projected(x, float(x.ratio[0])) ** 2).sum(axis=0))
+    squares = [_squared_lengths(block, trials) for block in blocks]
     out: dict[_Place, float] = {}
     for c in candidates:
-        probe = trials[c.probe]
-        per_unit = float(np.sqrt(sum(lengths[b][c.probe] for b in c.blocks)))
+        square = sum(squares[b][c.probe] for b in c.blocks)
+        per_unit = float(np.sqrt(square))
         own = LARGEST / per_unit if per_unit > 0.0 else np.inf
-        place = probe.effect.key, c.blocks
+        place = trials[c.probe].effect.key, c.blocks
         # of the ladder of a nonlinear form, and of its shapes, the one that reaches farthest
         out[place] = max(out.get(place, 0.0), own)
     return out
+
+
+def _squared_lengths(block: LaplaceFit, trials: Sequence[Probe]) -> Array:
+    """(m,) of the probes' signatures, free of what the parameters absorb, in the noise of the fit."""
+    x = expand(block.target, block.z, trials)
+    signatures = projected(x, float(x.ratio[0]))
+    return np.asarray((signatures**2).sum(axis=0))
 
 
 @dataclass(frozen=True)

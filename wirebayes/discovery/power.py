@@ -75,19 +75,29 @@ def detectable(
         What chance reaches over all blocks.
     block : int
     """
-    best: dict[str, dict[float, int]] = {}  # of each name, the strongest probe at each amplitude
-    strength = np.median(null.norm, axis=0)
-    for c in candidates:
-        if block in c.blocks:
-            ladder, step = best.setdefault(c.name, {}), trials[c.probe].step
-            if step not in ladder or strength[c.probe] > strength[ladder[step]]:
-                ladder[step] = c.probe
+    here = [c for c in candidates if block in c.blocks]
     found = {}
-    for name, ladder in best.items():
+    for name, ladder in _strongest(null, trials, here).items():
         threshold = level.threshold(name, ALPHA)
-        rungs = [(step, k, amplitude_80(null, trials[k], k, threshold)) for step, k in sorted(ladder.items())]
+        rungs = []
+        for step, k in sorted(ladder.items()):
+            seen = amplitude_80(null, trials[k], k, threshold)
+            rungs.append((step, k, seen))
         found[name] = smallest_seen(rungs)
     return found
+
+
+def _strongest(null: Scan, trials: Sequence[Probe], candidates: Sequence[Candidate]) -> dict[str, dict[float, int]]:
+    """Of each name the number of the strongest probe at each amplitude."""
+    strength = np.median(null.norm, axis=0)
+    best: dict[str, dict[float, int]] = {}
+    for c in candidates:
+        ladder = best.setdefault(c.name, {})
+        step = trials[c.probe].step
+        known = ladder.get(step)
+        if known is None or strength[c.probe] > strength[known]:
+            ladder[step] = c.probe
+    return best
 
 
 def smallest_seen(rungs: Sequence[tuple[float, int, float | None]]) -> tuple[int, float | None]:
@@ -250,19 +260,27 @@ def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible:
         known: list[type[Effect]] = [_Compliance] if "fixture_compliance" in possible else []
         if control == "force":
             known.append(_DisplacementScale)  # there it is the gain of the sensor
-        absorbable = [kind() for kind in _ABSORBABLE if kind not in known]
-        of_this_bench = [effect.under(control) for effect in absorbable]
-        trials = [Probe(effect, {effect.columns()[0]: 1e-3}, 1e-3, False) for effect in of_this_bench]
-        x = expand(block.target, block.z, trials)
-        wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
-        left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
         of_which = f" ({WORD[control]})" if len(controls) > 1 else ""
-        out += [
-            f"{_of_sensor(effect.name, control)}{of_which}: {100 * (1 - rest / whole):.1f} % of it is absorbed by the "
-            "model's own parameters"
-            for effect, whole, rest in zip(of_this_bench, wholes, left, strict=True)
-            if rest < 0.1 * whole
-        ]
-    return out + [
-        f"{kind.name}: this protocol cannot show it ({kind.shows})" for kind in kinds if kind.name not in possible
-    ]
+        for name, share in _absorbed(block, control, known).items():
+            out.append(
+                f"{_of_sensor(name, control)}{of_which}: {100 * share:.1f} % of it is absorbed by the model's own "
+                "parameters"
+            )
+    for kind in kinds:
+        if kind.name not in possible:
+            out.append(f"{kind.name}: this protocol cannot show it ({kind.shows})")
+    return out
+
+
+def _absorbed(block: LaplaceFit, control: Control, known: Sequence[type[Effect]]) -> dict[str, float]:
+    """The share that the parameters take up of effects of the bench, of those of which they take most."""
+    trials = []
+    for kind in _ABSORBABLE:
+        if kind not in known:
+            effect = kind().under(control)
+            trials.append(Probe(effect, {effect.columns()[0]: 1e-3}, 1e-3, False))
+    x = expand(block.target, block.z, trials)
+    wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
+    left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
+    each = zip(trials, wholes, left, strict=True)
+    return {trial.effect.name: 1 - rest / whole for trial, whole, rest in each if rest < 0.1 * whole}

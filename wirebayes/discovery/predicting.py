@@ -5,6 +5,7 @@ of which only the size is unknown, and much from a name: a share of the prior wi
 and shape could have been. Leaving out one hold at a time takes the same from both.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -77,19 +78,29 @@ class Predicting:
         return not key or key in self.explored.fitted
 
     def _is_outpredicted(self, s: EffectSet, weight: float, found: ModelPosterior) -> bool:
-        larger = {
-            other.key: own
-            for other, own in zip(found.sets, found.without.tolist(), strict=True)
-            if other.key > s.key and len(other.key) > 1
-        }
+        larger = {}
+        for other, own in zip(found.sets, found.without.tolist(), strict=True):
+            if other.key > s.key and len(other.key) > 1:
+                larger[other.key] = own
         if sum(larger.values()) < np.exp(-REACH) * weight:
             return False
-        fitted = sorted(larger.keys() & self.explored.fitted.keys(), key=lambda key: (-larger[key], sorted(key)))
-        best = next((k for k in fitted if self.last_predicts(self.explored.fitted[k], found)), None)
+        best = self._best_predicting(larger, found)
         if best is None:
             return False
         by_remainder = self._gain_of_remainder(s.key)
-        return by_remainder is not None and self._elpd(best) - self._elpd(s.key) > by_remainder + KEEP_ELPD
+        if by_remainder is None:
+            return False
+        by_names = self._elpd(best) - self._elpd(s.key)
+        return by_names > by_remainder + KEEP_ELPD
+
+    def _best_predicting(self, weights: Mapping[Key, float], found: ModelPosterior) -> Key | None:
+        """The most probable of some sets that is fitted and whose last family predicts."""
+        fitted = self.explored.fitted
+        known = weights.keys() & fitted.keys()
+        for key in sorted(known, key=lambda key: (-weights[key], sorted(key))):
+            if self.last_predicts(fitted[key], found):
+                return key
+        return None
 
     def _elpd(self, key: Key) -> float:
         return sum(float(each.sum()) for each in self.left_out.of(self.fits.of(key)))

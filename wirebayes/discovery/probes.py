@@ -1,13 +1,15 @@
 """Effects at finite amplitudes, and what each adds to the readings."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wirebayes.inference.log_posterior import LogPosterior
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
+from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import simulate
 
 
@@ -63,25 +65,38 @@ def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array
     list of (H, R, m) arrays
         One a sample, N; zero where the effect cannot be computed or belongs to another sample.
     """
-    problem, theta = target.problem, target.coordinates.to_natural(z)
+    theta = target.coordinates.to_natural(z)
     alike: dict[str, list[int]] = {}
     for k, probe in enumerate(trials):
         alike.setdefault(probe.effect.key, []).append(k)
     out = []
-    for sample in problem.samples:
-        own = problem.parameters(theta, sample)
+    for sample in target.problem.samples:
+        own = target.problem.parameters(theta, sample)
         shapes = np.zeros((*sample.protocol.time_s.shape, len(trials)))
         plain: Array | None = None
         for numbers in alike.values():
-            effect = trials[numbers[0]].effect
-            if not effect.acts_on(sample.name, sample.protocol.control):
+            tried = [trials[k] for k in numbers]
+            if not tried[0].effect.acts_on(sample.name, sample.protocol.control):
                 continue
-            each = {name: np.repeat(value, len(numbers)) for name, value in own.items()}
-            each |= {name: np.array([trials[k].own[name] for k in numbers]) for name in trials[numbers[0]].own}
-            with np.errstate(all="ignore"):
-                plain = simulate(sample.protocol, own, sample.model) if plain is None else plain
-                effects = (*sample.model.effects, effect)
-                added = simulate(sample.protocol, each, replace(sample.model, effects=effects)) - plain
-            shapes[..., numbers] = np.where(np.isfinite(added), added, 0.0) / [trials[k].step for k in numbers]
+            if plain is None:
+                plain = _simulated(sample, own, sample.model)
+            added = _with_each(sample, own, tried) - plain
+            steps = [probe.step for probe in tried]
+            shapes[..., numbers] = np.where(np.isfinite(added), added, 0.0) / steps
         out.append(shapes)
     return out
+
+
+def _with_each(sample: Sample, own: Mapping[str, Array], tried: Sequence[Probe]) -> Array:
+    """(H, R, k) tensions with each of some probes of one effect, at parameters (1,)."""
+    parameters = {name: np.repeat(value, len(tried)) for name, value in own.items()}
+    for name in tried[0].own:
+        parameters[name] = np.array([probe.own[name] for probe in tried])
+    effects = (*sample.model.effects, tried[0].effect)
+    return _simulated(sample, parameters, replace(sample.model, effects=effects))
+
+
+def _simulated(sample: Sample, own: dict[str, Array], model: Model) -> Array:
+    """(H, R, k) tensions; no numbers where the model cannot be computed."""
+    with np.errstate(all="ignore"):
+        return simulate(sample.protocol, own, model)

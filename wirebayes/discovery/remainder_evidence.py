@@ -47,25 +47,34 @@ def remainder_evidence(block: LaplaceFit, reference: Reference) -> float:
     float
         The mean over processes and over their sizes.
     """
-    target, best = block.target, block.z
+    target = block.target
+    best = block.z
     fit = expand(target, best, [], reference=reference)
     plain, beside = evidences(fit)
     without = float(log_sum(plain, axis=1)[0])
     if not np.isfinite(without):
         return 0.0
     found = [_mean(beside)]
-    starts = [(best, fit, beside)]
-    for other in block.modes.z[1:_MODES]:
-        there = expand(target, other[None], [], reference=reference)
-        starts.append((other[None], there, evidences(there)[1]))
-    for start, here, known in starts:
+    for start, here, known in [(best, fit, beside), *_at_other_modes(block, reference)]:
         z, moved = _refitted(target, start, here, _most_probable(known), reference)
-        prior = _priors(target, z, best)
-        tops = _top_of_prior(moved) - prior[0] + prior[1] - _top_of_prior(fit)
+        _, beside_moved = evidences(moved)
+        at_z, with_noise_of_fit = _priors(target, z, best)
+        tops = _top_of_prior(moved) - at_z + with_noise_of_fit - _top_of_prior(fit)
         units = _log_units(target, z) - _log_units(target, best)
-        found.append(_mean(evidences(moved)[1]) + tops - units)
+        found.append(_mean(beside_moved) + tops - units)
     values = np.array(found)
     return float(values[np.isfinite(values)].max(initial=-np.inf)) - without
+
+
+def _at_other_modes(block: LaplaceFit, reference: Reference) -> list[tuple[Array, Expansion, Array]]:
+    """Further modes of the fit, the expansion at each, and the evidence of remainders there."""
+    out = []
+    for mode in block.modes.z[1:_MODES]:
+        z = mode[None]
+        there = expand(block.target, z, [], reference=reference)
+        _, beside = evidences(there)
+        out.append((z, there, beside))
+    return out
 
 
 def _priors(target: LogPosterior, z: Array, best: Array) -> Array:

@@ -43,6 +43,18 @@ COVARIATES: dict[str, Callable[[Sample], Array]] = {
 }
 
 
+# of a covariate, up to which its powers are tried; a direction has but two values
+_HIGHEST_POWER = {
+    "displacement": 3,
+    "time in hold": 3,
+    "elapsed time": 3,
+    "tension": 3,
+    "direction": 1,
+    "temperature": 2,
+    "length": 1,
+}
+
+
 @dataclass(frozen=True)
 class Pattern:
     """One column of the search.
@@ -74,30 +86,55 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
     covariates = _covariates(problem)
     moving = [name.split("[")[0] for name in problem.names]
     moving = [name for name in moving if name not in NOISES]
-    along = [name for name in (_set_in(problem), "elapsed time") if any(c[0] == name for c in covariates)]
-    holds = [
-        (at, int(sample.protocol.number[j]), j)
-        for at, sample in enumerate(problem.samples)
-        for j in np.flatnonzero(sample.protocol.recorded)
-    ]
+    parameters = {name: moving.index(name) for name in _PARAMETERS if name in moving}
+    found = {name for name, _, _ in covariates}
+    along = [name for name in (_set_in(problem), "elapsed time") if name in found]
+    holds = [(at, int(j)) for at, s in enumerate(problem.samples) for j in np.flatnonzero(s.protocol.recorded)]
     listed = [Pattern(name) for name, _, degrees in covariates for _ in range(degrees)]
-    listed += [Pattern(name, moves=p) for name in along for p in _PARAMETERS if p in moving]
-    listed += [_of_hold(problem, problem.samples[at], number) for at, number, _ in holds]
+    listed += [Pattern(name, moves=p) for name in along for p in parameters]
+    listed += [_of_hold(problem, problem.samples[at], j) for at, j in holds]
+    return listed, _Columns(covariates, along, list(parameters.values()), holds)
 
-    def columns(problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
+
+@dataclass(frozen=True)
+class _Columns:
+    """The columns of a block's patterns.
+
+    Attributes
+    ----------
+    covariates : list
+        As `_covariates` returns them.
+    along : list of str
+        Covariates with which parameters may move.
+    parameters : list of int
+        Their numbers among those that move the mean.
+    holds : list of (int, int)
+        Sample and row of each hold that may lie off.
+    """
+
+    covariates: list[tuple[str, list[Array], int]]
+    along: list[str]
+    parameters: list[int]
+    holds: list[tuple[int, int]]
+
+    def __call__(self, problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
+        """(H, R, n, more) of one sample, of its tension and the derivatives."""
         out: list[Array] = []
-        by_name = {name: values[at] for name, values, _ in covariates}
-        for name, _, degrees in covariates:
-            out += [np.broadcast_to((by_name[name] ** d)[..., None], tension.shape) for d in range(1, degrees + 1)]
-        for name in along:
-            out += [slopes[..., moving.index(p)] * by_name[name][..., None] for p in _PARAMETERS if p in moving]
-        for of_sample, _, j in holds:
-            out.append(np.zeros(tension.shape))
+        by_name = {}
+        for name, values, degrees in self.covariates:
+            by_name[name] = values[at]
+            for power in range(1, degrees + 1):
+                added = values[at] ** power
+                out.append(np.broadcast_to(added[..., None], tension.shape))
+        for name in self.along:
+            value = by_name[name][..., None]
+            out += [slopes[..., number] * value for number in self.parameters]
+        for of_sample, j in self.holds:
+            level = np.zeros(tension.shape)
             if of_sample == at:
-                out[-1][j] = 1.0
+                level[j] = 1.0
+            out.append(level)
         return np.stack(out, axis=-1).reshape(*tension.shape, -1)
-
-    return listed, columns
 
 
 def _set_in(problem: Problem) -> str:
@@ -105,31 +142,28 @@ def _set_in(problem: Problem) -> str:
     return "displacement" if any(s.protocol.control == "displacement" for s in problem.samples) else "tension"
 
 
-def _of_hold(problem: Problem, sample: Sample, number: int) -> Pattern:
+def _of_hold(problem: Problem, sample: Sample, j: int) -> Pattern:
     """A hold that lies off by itself."""
+    number = int(sample.protocol.number[j])
     unit = READ_UNIT[sample.protocol.control]
     return Pattern("hold", hold=number, counts_as=problem.read_unit(sample), unit=unit)
 
 
 def _covariates(problem: Problem) -> list[tuple[str, list[Array], int]]:
     """Name, values (H, R) for each sample scaled to about one, and the highest power."""
-    samples = problem.samples
     out: list[tuple[str, list[Array], int]] = []
-
-    def add(name: str, values: list[Array], degrees: int) -> None:
-        everything = np.concatenate([v[s.protocol.mask] for v, s in zip(values, samples, strict=True)])
-        middle, spread = everything.mean(), everything.std()
+    for name, degrees in _HIGHEST_POWER.items():
+        values = [np.broadcast_to(COVARIATES[name](s), s.protocol.time_s.shape) for s in problem.samples]
+        if name == "time in hold":
+            scales = [max(0.1 * s.typical_hold_s, 1e-9) for s in problem.samples]
+            values = [np.log1p(time / scale) for time, scale in zip(values, scales, strict=True)]
+        masks = [s.protocol.mask for s in problem.samples]
+        read = np.concatenate([v[mask] for v, mask in zip(values, masks, strict=True)])
+        middle = read.mean()
+        spread = read.std()
         if spread > 1e-9 * (1.0 + abs(middle)):
-            out.append((name, [(v - middle) / spread for v in values], degrees))
-
-    def of(name: str) -> list[Array]:
-        return [np.broadcast_to(COVARIATES[name](s), s.protocol.time_s.shape) for s in samples]
-
-    add("displacement", of("displacement"), 3)
-    scales = [max(0.1 * s.typical_hold_s, 1e-9) for s in samples]
-    add("time in hold", [np.log1p(t / scale) for t, scale in zip(of("time in hold"), scales, strict=True)], 3)
-    for name, degrees in (("elapsed time", 3), ("tension", 3), ("direction", 1), ("temperature", 2), ("length", 1)):
-        add(name, of(name), degrees)
+            scaled = [(v - middle) / spread for v in values]
+            out.append((name, scaled, degrees))
     return out
 
 
@@ -148,18 +182,15 @@ def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names
     out: list[Disagreement] = []
     for covariate in dict.fromkeys(p.covariate for p in listed):
         columns = [skip + i for i, p in enumerate(listed) if p.covariate == covariate]
-        here, chance = data.effects[0, columns], null.effects[:, columns].max(axis=1)
-        p = float((1 + (chance >= here.max()).sum()) / (1 + len(chance)))
+        here = data.effects[0, columns]
+        chance = null.effects[:, columns].max(axis=1)
+        as_large = (chance >= here.max()).sum()
+        p = float((1 + as_large) / (1 + len(chance)))
         best = columns[int(np.argmax(here))]
         pattern = listed[best - skip]
-        out.append(
-            {
-                "covariate": covariate,
-                "hold": pattern.hold,
-                "p": p,
-                "sentence": _sentence(pattern, float(data.amplitude[0, best]), p, names),
-            }
-        )
+        amplitude = float(data.amplitude[0, best])
+        sentence = _sentence(pattern, amplitude, p, names)
+        out.append({"covariate": covariate, "hold": pattern.hold, "p": p, "sentence": sentence})
     return sorted(out, key=lambda item: item["p"])
 
 
@@ -169,15 +200,23 @@ def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
         return f"{names}: the residuals show no dependence on {pattern.covariate} ({chance})."
     if pattern.hold is not None:
         side = "above" if amplitude > 0 else "below"
-        size = f"{abs(amplitude) * pattern.counts_as:.3g} {pattern.unit}"
-        return f"{names}: hold {pattern.hold} lies {size} {side} what the others predict ({chance})."
+        size = abs(amplitude) * pattern.counts_as
+        off = f"{size:.3g} {pattern.unit}"
+        return f"{names}: hold {pattern.hold} lies {off} {side} what the others predict ({chance})."
     if pattern.moves is not None:
-        way = "grows" if amplitude > 0 else "decreases"
-        factor = np.exp(np.clip(2 * abs(amplitude), 0, 20))
-        share = 100 * (factor - 1 if amplitude > 0 else 1 - 1 / factor)
-        size = f"{share:.2g} %" if factor < 2 else f"a factor of {factor:.3g}"
+        parameter = _PARAMETERS[pattern.moves]
         return (
-            f"{names}: the residuals suggest that {_PARAMETERS[pattern.moves]} {way} with {pattern.covariate}, "
-            f"by {size} over two standard deviations of {pattern.covariate} ({chance})."
+            f"{names}: the residuals suggest that {parameter} {_change(amplitude, pattern.covariate)} over two "
+            f"standard deviations of {pattern.covariate} ({chance})."
         )
     return f"{names}: the residuals of the plain model depend on {pattern.covariate} ({chance})."
+
+
+def _change(amplitude: float, covariate: str) -> str:
+    """Which way, and by how much, a parameter changes whose logarithm changes by `amplitude` a standard deviation."""
+    grows = amplitude > 0
+    factor = np.exp(np.clip(2 * abs(amplitude), 0, 20))
+    share = factor - 1 if grows else 1 - 1 / factor
+    size = f"{100 * share:.2g} %" if factor < 2 else f"a factor of {factor:.3g}"
+    way = "grows" if grows else "decreases"
+    return f"{way} with {covariate}, by {size}"

@@ -104,19 +104,22 @@ def retested(best: FittedSet, rng: Generator, parallel_map: ParallelMap) -> Rete
     trials, candidates = best.probed
     if not candidates:
         return Retest(None, [[] for _ in best.blocks])
-    patterns = [residual_patterns.patterns(block.target.problem) for block in best.blocks]
-    data = [
-        scan(expand(block.target, block.z, trials, columns=columns))
-        for block, (_, columns) in zip(best.blocks, patterns, strict=True)
-    ]
+    listed = []
+    data = []
+    for block in best.blocks:
+        own_patterns, columns = residual_patterns.patterns(block.target.problem)
+        x = expand(block.target, block.z, trials, columns=columns)
+        listed.append(own_patterns)
+        data.append(scan(x))
     simulated: list[Replicates] = []
     for n in ((RETESTS + 1) // 2, RETESTS // 2):
         simulated = with_more(simulated, best.blocks, trials, n, rng, parallel_map)
-        test = screening.global_test(candidates, data, [s.scan for s in simulated])
+        nulls = [s.scan for s in simulated]
+        test = screening.global_test(candidates, data, nulls)
         if test.p > ALPHA_AFTER and not is_close(test.p, ALPHA_AFTER, len(test.null)):
             break
-    where = [
-        residual_patterns.findings(listed, len(trials), here, s.scan, ", ".join(block.names))
-        for block, (listed, _), here, s in zip(best.blocks, patterns, data, simulated, strict=True)
-    ]
+    where = []
+    for block, own_patterns, here, null in zip(best.blocks, listed, data, nulls, strict=True):
+        names = ", ".join(block.names)
+        where.append(residual_patterns.findings(own_patterns, len(trials), here, null, names))
     return Retest(test.p, where)

@@ -84,22 +84,30 @@ def joined(scans: Sequence[Scan]) -> Scan:
     """Scans of consecutive rows as one."""
     if len(scans) == 1:
         return scans[0]
-    parts = [s.pieces for s in scans]
-    ends = np.cumsum([len(p.least) for p in parts])
-    few = parts[: 1 + int(np.searchsorted(ends, _PIECES_OF))]
-    pieces = replace(
-        parts[0],
-        shared=np.concatenate([p.shared for p in few], axis=1)[:, :_PIECES_OF],
-        rss=np.concatenate([p.rss for p in few], axis=1)[:, :_PIECES_OF],
-        along=np.concatenate([p.along for p in few], axis=1)[:, :_PIECES_OF],
-        square=np.concatenate([p.square for p in few], axis=1)[:, :_PIECES_OF],
-        least=np.concatenate([p.least for p in few])[:_PIECES_OF],
-    )
     return Scan(
         effects=np.concatenate([s.effects for s in scans]),
         flexible=np.concatenate([s.flexible for s in scans]),
         two=np.concatenate([s.two for s in scans]),
         amplitude=np.concatenate([s.amplitude for s in scans]),
         norm=np.concatenate([s.norm for s in scans]),
-        pieces=pieces,
+        pieces=_first_pieces([s.pieces for s in scans]),
+    )
+
+
+def _first_pieces(parts: Sequence[Pieces]) -> Pieces:
+    """The pieces of the first rows, as many as are kept."""
+    ends = np.cumsum([len(p.least) for p in parts])
+    last = int(np.searchsorted(ends, _PIECES_OF))
+    few = parts[: 1 + last]
+
+    def first(values: Sequence[Array]) -> Array:
+        return np.concatenate(values, axis=1)[:, :_PIECES_OF]
+
+    return replace(
+        parts[0],
+        shared=first([p.shared for p in few]),
+        rss=first([p.rss for p in few]),
+        along=first([p.along for p in few]),
+        square=first([p.square for p in few]),
+        least=np.concatenate([p.least for p in few])[:_PIECES_OF],
     )

@@ -239,21 +239,15 @@ def _common(
 ) -> SharedFindings:
     """What the experiments of one block share in the report; of amplitudes those of the effects that act on `e`."""
     answer = answers[i]
-    names, members = [a.name for a in answer.accepted], answer.set
-    named = [m for m in members if m != "unknown"]
-    shared = [n for a in answer.accepted for b in a.blocks if b != i for n in plain[b].names]
+    names = [a.name for a in answer.accepted]
     return {
         "verdict": answer.verdict,
-        "effects": {"ambiguous": list(answer.judgement.undecided)}.get(answer.verdict, names),
+        "effects": list(answer.judgement.undecided) if answer.verdict == "ambiguous" else names,
         "best": answer.best,
-        "set": members,
-        "group": (power.group_of(named, alike) if named else []) + (["unknown"] if "unknown" in members else []),
+        "set": answer.set,
+        "group": _group(answer.set, alike),
         "accepted": names,
-        "amplitudes": {
-            a.name: _amplitude(answer.stages[-1], a.effects[i])
-            for a in answer.accepted
-            if a.effects[i].acts_on(e.name, e.control)
-        },
+        "amplitudes": _amplitudes(answer, i, e),
         "probabilities": answer.shares,
         "probability_nothing": None if answer.found is None else answer.found.nothing,
         "inclusion": _inclusion(answer.found),
@@ -263,9 +257,38 @@ def _common(
         "p_global": test.p,
         "p_interval": list(test.p_interval),
         "p_simulations": len(test.null),
-        "shared_with": list(dict.fromkeys(shared)),
+        "shared_with": _sharing(answer, i, plain),
         "where": where,
     }
+
+
+def _group(members: Sequence[str], alike: Cosines) -> list[str]:
+    """The names of a set and their look-alikes; what is unknown has none."""
+    named = [name for name in members if name != "unknown"]
+    group = power.group_of(named, alike) if named else []
+    if "unknown" in members:
+        group.append("unknown")
+    return group
+
+
+def _amplitudes(answer: MaterialAnswer, i: int, e: Experiment) -> dict[str, AmplitudeEstimate]:
+    """Of each effect in the final model of material `i` that acts on an experiment."""
+    out = {}
+    for accepted in answer.accepted:
+        effect = accepted.effects[i]
+        if effect.acts_on(e.name, e.control):
+            out[accepted.name] = _amplitude(answer.stages[-1], effect)
+    return out
+
+
+def _sharing(answer: MaterialAnswer, i: int, plain: Sequence[LaplaceFit]) -> list[str]:
+    """The experiments of other materials that have an effect's amplitude in common with material `i`."""
+    names: dict[str, None] = {}
+    for accepted in answer.accepted:
+        for b in accepted.blocks:
+            if b != i:
+                names |= dict.fromkeys(plain[b].names)
+    return list(names)
 
 
 def _only(x: Expansion, m: int) -> Expansion:

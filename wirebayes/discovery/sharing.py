@@ -30,15 +30,27 @@ def informed(blocks: Sequence[LaplaceFit], effects: Mapping[int, Effect], rng: n
     out = list(blocks)
     for b, effect in effects.items():
         others = [(blocks[other], form) for other, form in effects.items() if other != b]
-        common = [effect.columns()[0], *effect.common_shapes()]
-        tables = {column: _told(others, column) for column in common}
-        priors = {column: table for column, table in tables.items() if table is not None}
+        priors = _priors(effect, others)
         if priors:
-            with_prior = [replace(e, priors=e.priors | priors) for e in blocks[b].experiments]
-            near = blocks[b].theta[0]
-            block = blocks[b]
-            out[b] = fitted(with_prior, block.effects, block.spec, rng, near, scales=block.scales)
+            out[b] = _with_priors(blocks[b], priors, rng)
     return out
+
+
+def _priors(effect: Effect, others: Sequence[tuple[LaplaceFit, Effect]]) -> dict[str, dict[str, Any]]:
+    """What other blocks know of the parameters of an effect that they share."""
+    priors = {}
+    for column in (effect.columns()[0], *effect.common_shapes()):
+        table = _told(others, column)
+        if table is not None:
+            priors[column] = table
+    return priors
+
+
+def _with_priors(block: LaplaceFit, priors: dict[str, dict[str, Any]], rng: np.random.Generator) -> LaplaceFit:
+    """The block refitted with priors in its experiments."""
+    experiments = [replace(e, priors=e.priors | priors) for e in block.experiments]
+    near = block.theta[0]
+    return fitted(experiments, block.effects, block.spec, rng, near, scales=block.scales)
 
 
 def _told(blocks: Sequence[tuple[LaplaceFit, Effect]], column: str) -> dict[str, Any] | None:

@@ -81,22 +81,31 @@ def shrinking(
     models = ["plain", *names]
     if not all(train):
         return [_not_predicted(models) for _ in train]
-    bases = [plain, *(stages[-1:] if remains else [])] if remains or stages else []
+    bases = _bases(plain, stages, remains)
     smooth = _beside_discrepancy(bases, train, rng, parallel_map)
     trained = _to_be_trained(plain, stages, train, smooth)
     predicted = parallel_map(_predicted, trained, rng.spawn(len(trained)))
-    elpd = left_out.of(_fits_compared(plain, stages, smooth)) if smooth else []
+    gain = None
+    if smooth:
+        elpd = left_out.of(_fits_compared(plain, stages, smooth))
+        gain = _gain(elpd, len(stages[-1:]), len(train), remains)
     found = list(predicted)  # handed over before, so that no core idles
-    by_step, beside_smooth = found[: len(models)], [part[0] for part in found[len(models) :]]
-    n = len(train)
-    flexible = beside_smooth[:n] if smooth else [None] * n
-    final = beside_smooth[-n:] if remains else by_step[-1]
-    gain = _gain(elpd, len(stages[-1:]), n, remains) if smooth else None
+    by_step = found[: len(models)]
+    beside_smooth = [part[0] for part in found[len(models) :]]
+    flexible = beside_smooth[: len(train)]
+    final = beside_smooth[-len(train) :] if remains else by_step[-1]
     out = []
-    for i in range(n):
-        report = _compared(by_step[0][i], final[i], flexible[i], gain)
+    for i in range(len(train)):
+        report = _compared(by_step[0][i], final[i], flexible[i] if flexible else None, gain)
         out.append(Shrinking(report, _steps(models, by_step, i)))
     return out
+
+
+def _bases(plain: LaplaceFit, stages: Sequence[LaplaceFit], remains: bool) -> list[LaplaceFit]:
+    """The models beside which a smooth discrepancy stands: none where the plain model is the final one."""
+    if remains:
+        return [plain, *stages[-1:]]
+    return [plain] if stages else []
 
 
 def _not_predicted(models: Sequence[str]) -> Shrinking:
@@ -155,7 +164,8 @@ def _beside_discrepancy(
     handed_over = []
     for base in bases:
         first = [e.train(k) for e, k in zip(base.experiments, train, strict=True)]
-        added = parallel_map(with_discrepancy, repeat(base), [*base.experiments, *first], rng.spawn(2 * n))
+        experiments = [*base.experiments, *first]
+        added = parallel_map(with_discrepancy, repeat(base), experiments, rng.spawn(2 * n))
         handed_over.append((base, added, rng.spawn(n)))
     fitting = []
     for base, added, generators in handed_over:
@@ -163,7 +173,8 @@ def _beside_discrepancy(
         singly = [(e,) for e in base.experiments]
         one_scale = partial(fitted, scales=base.scales)
         fits = parallel_map(one_scale, singly, effects[:n], repeat(base.spec), generators)
-        trained = [_Trained(e, (k,), extra, base) for e, k, extra in zip(singly, train, effects[n:], strict=True)]
+        each = zip(singly, train, effects[n:], strict=True)
+        trained = [_Trained(alone, (k,), extra, base) for alone, k, extra in each]
         fitting.append((fits, trained))
     return [_Smooth(list(fits), trained) for fits, trained in fitting]
 

@@ -24,16 +24,15 @@ def beside_smooth(x: Expansion) -> Array:
     seen = np.isfinite(found.shared[0])  # ratios at which the parameters can be distinguished
     if not seen.any():
         return nothing
-    shared, rss, along, square = _with_remainder(found, seen)
-    upward = np.where(x.one_sided, np.maximum(along, 0.0), along)
-    absorbed = ABSORBED * (x.signatures[0] ** 2).sum(axis=0)
-    gain = np.where(square > absorbed, upward**2 / np.where(square > 0, square, np.inf), 0.0)
-    least, half = float(x.least[0]), 0.5 * x.degrees
-    left = np.maximum(rss, least)
-    left_beside = np.maximum(left[..., None] - gain, least)
-    without = shared - half * np.log(left)
-    beside = shared[..., None] - half * np.log(left_beside)
-    return np.asarray(log_sum(beside.reshape(-1, beside.shape[2])) - log_sum(without.ravel()))
+    products = _with_remainder(found, seen)
+    least = float(x.least[0])
+    half = 0.5 * x.degrees
+    left = np.maximum(products.rss, least)
+    left_beside = np.maximum(left[..., None] - _gain(x, products), least)
+    without = products.shared - half * np.log(left)
+    beside = products.shared[..., None] - half * np.log(left_beside)
+    by_signature = beside.reshape(-1, beside.shape[2])
+    return np.asarray(log_sum(by_signature) - log_sum(without.ravel()))
 
 
 class _Products(NamedTuple):
@@ -45,25 +44,35 @@ class _Products(NamedTuple):
     square: Array
 
 
+def _gain(x: Expansion, products: _Products) -> Array:
+    """(k, s, m) what each signature takes of the sum of squares at its best amplitude."""
+    upward = np.where(x.one_sided, np.maximum(products.along, 0.0), products.along)
+    absorbed = ABSORBED * (x.signatures[0] ** 2).sum(axis=0)
+    square = np.where(products.square > 0, products.square, np.inf)
+    return np.where(products.square > absorbed, upward**2 / square, 0.0)
+
+
 def _with_remainder(found: Projected, seen: Bools) -> _Products:
     """The first row's inner products at some ratios, free of what a remainder of one process takes, too."""
-    (functions,), (with_residual,), (smooth,) = found.smooth_square, found.smooth_along, found.smooth
+    [functions] = found.smooth_square
+    [with_residual] = found.smooth_along
+    [smooth] = found.smooth
     crossed = smooth.products(found.form, found.shrink)
     # along the eigenvectors of its functions' products the remainder is a sum of independent ones
     values, vectors = eigh(functions[0][seen])
     values = np.maximum(values, 0.0)
     turn = np.swapaxes(vectors, 1, 2)
-    of_residual = (turn @ with_residual[0][seen][..., None])[:, None, :, 0]
+    turned = turn @ with_residual[0][seen][..., None]
+    of_residual = turned[:, None, :, 0]
     of_signatures = turn @ crossed[0][seen]
-    variance = (SIZES**2 / np.maximum(values.sum(axis=1), 1e-300)[:, None])[..., None]
+    whole = np.maximum(values.sum(axis=1), 1e-300)
+    variance = (SIZES**2 / whole[:, None])[..., None]
     excess = variance * values[:, None]
     taken = variance / (1.0 + excess)
-    shared, rss, along, square = (
-        each[0][seen][:, None] for each in (found.shared, found.rss, found.along, found.square)
-    )
+    volume = np.log1p(excess).sum(axis=2)
     return _Products(
-        shared - 0.5 * np.log1p(excess).sum(axis=2),
-        rss - (taken * of_residual**2).sum(axis=2),
-        along - (taken * of_residual) @ of_signatures,
-        square - taken @ of_signatures**2,
+        found.shared[0][seen][:, None] - 0.5 * volume,
+        found.rss[0][seen][:, None] - (taken * of_residual**2).sum(axis=2),
+        found.along[0][seen][:, None] - (taken * of_residual) @ of_signatures,
+        found.square[0][seen][:, None] - taken @ of_signatures**2,
     )

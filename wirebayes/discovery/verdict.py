@@ -76,7 +76,8 @@ def decide(
     -------
     Decision
     """
-    predicting = Predicting(explored, Fits(plain, explored, settings, rng), left_out, rng, parallel_map)
+    fits = Fits(plain, explored, settings, rng)
+    predicting = Predicting(explored, fits, left_out, rng, parallel_map)
     weigh = partial(model_space.log_weights, names=len(settings.kinds), families=families, other=explored.left_over)
     sets, gave_way, found = _predicting_sets(explored, weigh, predicting, families, len(plain))
     best = _best_fitted(found, explored)
@@ -87,18 +88,27 @@ def decide(
         predicts = partial(predicting.last_predicts, found=found)
         passing = complete(found, explored, best, predicts, rng, parallel_map)
         if passing is not None:
-            sets = [s for s in sets if s.key != best.effects.key and s.key not in passing.failed]
-            best, retest = passing.best, passing.retest
+            failed = passing.failed | {best.effects.key}
+            sets = [s for s in sets if s.key not in failed]
+            best = passing.best
+            retest = passing.retest
     weights = _after(retest, sets, weigh(sets), best, found)
     found = _posterior(sets, weights, gave_way, families, len(plain))
     if not found.best.names:
         return Decision(found, None, retest)
-    if any(len(e.recorded_holds) < LEAST_HOLDS for block in plain for e in block.experiments):
+    if _has_few_holds(plain):
         return Decision(found, best, retest)
-    own = dict.fromkeys(found.family(name) for name in best.effects.names)
-    by_family = {family: family_gain(best, family, found, predicting.fits, left_out) for family in own}
+    by_family = {}
+    for family in dict.fromkeys(found.family(name) for name in best.effects.names):
+        by_family[family] = family_gain(best, family, found, predicting.fits, left_out)
     first_gain = name_gain(best, best.effects.names[0], predicting.fits, left_out)
     return Decision(found, best, retest, by_family, first_gain)
+
+
+def _has_few_holds(blocks: Sequence[LaplaceFit]) -> bool:
+    """Whether any test has too few holds to leave one out."""
+    counts = [len(e.recorded_holds) for block in blocks for e in block.experiments]
+    return min(counts) < LEAST_HOLDS
 
 
 _Weights = tuple[Array, Array]  # log weights of sets, without a remainder and with one
@@ -200,23 +210,31 @@ def evidence(decision: Decision, p: float, block: int, remainder_gain: float | N
         What a smooth discrepancy beside the established families gains.
     """
     found = decision.posterior
-    accepted = decision.gains if decision.best is None else [found.family(n) for n in decision.best.effects.names]
-    together = dict(zip(found.families, found.together, strict=True))
-    ranked = sorted(found.families, key=lambda family: -together[family][block])
-    families = []
-    for family in dict.fromkeys([*accepted, *ranked]):
-        each = {name: float(found.inclusion[name][block]) for name in family if name in found.inclusion}
-        members = largest_first(each)
-        families.append(FamilyEvidence(members, float(together[family][block]), decision.gains.get(family)))
     return Evidence(
         p=p,
         nothing=float(found.nothing[block]) if found.shares[block] else 1.0,
-        families=tuple(families),
+        families=tuple(_families(decision, block)),
         shares=found.shares[block],
         best_gain=decision.best_gain,
         remainder=float(found.remainder[block]),
         remainder_gain=remainder_gain,
     )
+
+
+def _families(decision: Decision, block: int) -> list[FamilyEvidence]:
+    """What is known of each family in a material: those of the best set first, then the others by probability."""
+    found = decision.posterior
+    together = {family: float(p[block]) for family, p in zip(found.families, found.together, strict=True)}
+    accepted = list(decision.gains)
+    if decision.best is not None:
+        accepted = [found.family(name) for name in decision.best.effects.names]
+    ranked = sorted(found.families, key=lambda family: -together[family])
+    out = []
+    for family in dict.fromkeys([*accepted, *ranked]):
+        known = [name for name in family if name in found.inclusion]
+        members = largest_first({name: float(found.inclusion[name][block]) for name in known})
+        out.append(FamilyEvidence(members, together[family], decision.gains.get(family)))
+    return out
 
 
 def accepted_effects(decision: Decision, found: Evidence, block: int) -> list[Accepted]:
