@@ -260,9 +260,7 @@ def _strike_gross_errors(
         if found is None:
             break
         name, hold, reading, value = found
-        members = list(block.experiments)
-        at = block.names.index(name)
-        members[at] = gross_errors.without(members[at], hold, reading)
+        members = [gross_errors.without(e, hold, reading) if e.name == name else e for e in block.experiments]
         block = fitted(members, block.effects, block.spec, rng, scales=block.scales)
         struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
     return block, struck
