@@ -61,13 +61,15 @@ def alternatives(
         if not swapped or (is_fitted and swapped <= set(undecided)):
             weights[acting] = weights.get(acting, 0.0) + weight
     weights.setdefault(names, 0.0)
-    kept = [names, *_others(weights, names)]
-    total = sum(weights[k] for k in kept)
-    if total <= 0.0 or len(kept) == 1:
+    others = _others(weights, names)
+    total = sum(weights[key] for key in (names, *others))
+    if total <= 0.0 or not others:
         return []
-    blocks = [final]
-    blocks += [fits.of(key)[i] for key in kept[1:]]
-    return [Alternative(block, remains, weights[key] / total) for block, key in zip(blocks, kept, strict=True)]
+    out = [Alternative(final, remains, weights[names] / total)]
+    for key in others:
+        block = fits.of(key)[i]
+        out.append(Alternative(block, remains, weights[key] / total))
+    return out
 
 
 def _others(weights: Mapping[Key, float], names: Key) -> list[Key]:

@@ -1,8 +1,7 @@
 """Gross errors: single readings that no effect explains, excluded before the tests that follow."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from wirebayes.discovery.refit import occam
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import GrossError
+from wirebayes.model.problem import Problem
 from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
 
@@ -24,15 +24,7 @@ def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | No
     """
     samples = block.target.problem.samples
     cells = [(at, j, r) for at, s in enumerate(samples) for j, r in np.argwhere(s.protocol.mask)]
-
-    def columns(problem: Any, at: int, tension: Array, slopes: Array) -> Array:
-        out = np.zeros((*tension.shape, len(cells)))
-        for i, (of_sample, j, r) in enumerate(cells):
-            if of_sample == at:
-                out[j, r, :, i] = 1.0
-        return out
-
-    x = expand(block.target, block.z, [], columns=columns)
+    x = expand(block.target, block.z, [], columns=_one_reading_each(cells))
     effects = scan(x).effects[0]
     best = int(np.argmax(effects))
     value = float(effects[best]) + occam(False) - np.log(len(cells))
@@ -41,6 +33,19 @@ def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | No
     at, j, r = cells[best]
     number = int(samples[at].protocol.number[j])
     return samples[at].name, number, int(r), value
+
+
+def _one_reading_each(cells: Sequence[tuple[int, int, int]]) -> Callable[[Problem, int, Array, Array], Array]:
+    """What makes the columns (see `expand`) that move one reading each: sample, row of the hold, reading."""
+
+    def columns(problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
+        out = np.zeros((*tension.shape, len(cells)))
+        for i, (of_sample, j, r) in enumerate(cells):
+            if of_sample == at:
+                out[j, r, :, i] = 1.0
+        return out
+
+    return columns
 
 
 def without(experiment: Experiment, hold: int, reading: int) -> Experiment:

@@ -80,16 +80,22 @@ def ladders(
         on = sorted({b for c in here for b in c.blocks})
         starts: list[_LadderEnds] = []
         for numbers in shapes:
-            strength = {k: float(np.sqrt(sum(data[b].norm[0, k] ** 2 for b in on))) for k in numbers}
+            strength = {k: _strength(k, [data[b] for b in on]) for k in numbers}
             visible = [k for k in numbers if strength[k] > 0]
             if visible:
                 # Of a one-sided form the probe that lies in the middle of the ladder.
-                middle = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
-                starts += _both_signs(trials[middle], strength[middle], [blocks[b] for b in on])
+                k = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
+                starts += _both_signs(trials[k], strength[k], [blocks[b] for b in on])
         if starts:
             probes = tuple(s.probe for s in starts)
             out.append(AmplitudePath(probes, _rungs(starts), here))
     return out
+
+
+def _strength(k: int, data: Sequence[Scan]) -> float:
+    """δ of one unit of a probe's amplitude in the readings of some blocks."""
+    square = sum(scan.norm[0, k] ** 2 for scan in data)
+    return float(np.sqrt(square))
 
 
 def _lasting_forms(trials: Sequence[Probe]) -> list[list[list[int]]]:

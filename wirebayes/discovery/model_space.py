@@ -151,17 +151,22 @@ def log_weights(
     beside = []
     for s in sets:
         smooth = -np.inf if s.remainder is None else over_subsets(s.remainder)[0]
-        if not s.names:
+        if s.names:
+            alone = _log_prior_in_families(s, kinds, families) + s.log_bayes
+            remainder = np.logaddexp(smooth, other.get(s.key, -np.inf))
+            without.append(alone)
+            beside.append(alone + np.log(MORE) + remainder)
+        else:
             without.append(-np.inf)  # nothing at all: the global test has excluded it
             beside.append(np.log(UNKNOWN_WEIGHT) + smooth)
-            continue
-        sizes = [len(family_of(name, families)) for name in s.names]
-        members = sum(np.log(size) for size in sizes)
-        alone = log_prior(len(s.names), kinds) - members + s.log_bayes
-        remainder = np.logaddexp(smooth, other.get(s.key, -np.inf))
-        without.append(alone)
-        beside.append(alone + np.log(MORE) + remainder)
     return np.array(without), np.array(beside)
+
+
+def _log_prior_in_families(s: EffectSet, kinds: int, families: Sequence[Family]) -> float:
+    """Log weight of a set of so many kinds of effect, shared among the members of its families."""
+    sizes = [len(family_of(name, families)) for name in s.names]
+    members = sum(np.log(size) for size in sizes)
+    return float(log_prior(len(s.names), kinds) - members)
 
 
 def posterior(

@@ -1,6 +1,6 @@
 """From screened candidates to effects: refit the promising ones and sum the evidence of their forms."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -228,20 +228,31 @@ class _Summed:
 
 def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int) -> NameEvidence:
     """Add up the forms of every name: its variants equally, its blocks by `over_subsets`."""
-    most: dict[str, float] = {}
-    for r in found.values():
-        most[r.effect.name] = max(most.get(r.effect.name, -np.inf), r.log_bayes)
+    most = _best_of_each_name(found.values())
     variants: dict[str, list[_Summed]] = {}
     for form in forms:
         name = form.effect.name
-        variants.setdefault(name, []).append(_over_blocks(form, found, most.get(name, np.inf), blocks))
-    log_bayes, winners, presence = {}, {}, {}
+        summed = _over_blocks(form, found, most.get(name, np.inf), blocks)
+        variants.setdefault(name, []).append(summed)
+    log_bayes = {}
+    presence = {}
+    winners = {}
     for name, each in variants.items():
         log_bayes[name], presence[name] = _over_variants(each)
         refitted = [variant for variant in each if variant.refits]
         if refitted:
-            winners[name] = max(refitted, key=lambda variant: variant.log_bayes).refits
+            best = max(refitted, key=lambda variant: variant.log_bayes)
+            winners[name] = best.refits
     return NameEvidence(log_bayes, winners, presence)
+
+
+def _best_of_each_name(refits: Iterable[Refit]) -> dict[str, float]:
+    """The largest log Bayes factor with which each name was refitted."""
+    most: dict[str, float] = {}
+    for r in refits:
+        known = most.get(r.effect.name, -np.inf)
+        most[r.effect.name] = max(known, r.log_bayes)
+    return most
 
 
 def _over_blocks(form: _Form, found: Mapping[_Place, Refit], most: float, blocks: int) -> _Summed:

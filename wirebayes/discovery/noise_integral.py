@@ -116,16 +116,24 @@ def _beside_parameters(x: Expansion, shrink: Array) -> tuple[Array, "Functions"]
     columns = np.concatenate([x.parameters, residual, x.signatures, x.flexible], axis=2)
     levels = np.swapaxes(x.left, 1, 2) @ columns
     gram = _with_parameters(x, columns, levels, shrink)
+    log_volume, taken = _eliminated(gram)
+    return log_volume, Functions(columns[..., p:], taken, levels[..., p:])
+
+
+def _eliminated(gram: Array) -> tuple[Array, Array]:
+    """Of inner products (n, k, p, c) of p parameters: their log volume, and what they take of the other columns.
+
+    That is in coordinates in which it is a sum of squares.
+    """
+    p = gram.shape[2]
     factor = cholesky(gram[..., :p])
     regular = np.isfinite(factor).all(axis=(2, 3))
     factor[~regular] = np.eye(p)
-    # What the parameters take of each column, in coordinates in which it is a sum of squares.
     taken = np.linalg.inv(factor) @ gram[..., p:]
     taken[~regular] = 0.0
     diagonal = np.einsum("nkpp->nkp", factor)
     log_volume = np.log(diagonal).sum(axis=2)
-    functions = Functions(columns[..., p:], taken, levels[..., p:])
-    return np.where(regular, log_volume, np.inf), functions
+    return np.where(regular, log_volume, np.inf), taken
 
 
 def _with_parameters(x: Expansion, columns: Array, levels: Array, shrink: Array) -> Array:

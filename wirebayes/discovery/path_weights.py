@@ -107,10 +107,7 @@ def _weigh_few(x: Tangent, signature: Array, near: Array, far: Array, degrees: i
     amplitude = np.divide(free.along, free.square, out=np.zeros_like(free.square), where=free.square > 0)
     amplitude = np.clip(amplitude, near[:, None], far[:, None])
     left = free.left(amplitude, x.least)
-    moved_whole = np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2)
-    log_volume = -0.5 * moved_whole.sum(axis=2) - free.log_volume
-    height = log_volume - 0.5 * degrees * np.log(left)
-    height = np.where(free.regular, height, -np.inf)
+    height = _heights(x, free, left, degrees)
     k = np.argmax(height, axis=1)
     best = np.arange(len(height)), k
     left_best = left[best]
@@ -125,6 +122,14 @@ def _weigh_few(x: Tangent, signature: Array, near: Array, far: Array, degrees: i
         ratio=RATIOS[k],
         promise=0.5 * degrees * np.log(left_best / after),
     )
+
+
+def _heights(x: Tangent, free: _Free, left: Array, degrees: int) -> Array:
+    """(n, k) log density at each noise ratio, with sums of squares that are left (n, k)."""
+    moved_whole = np.log1p(RATIOS[:, None] * x.singular[:, None] ** 2)
+    log_volume = -0.5 * moved_whole.sum(axis=2) - free.log_volume
+    height = log_volume - 0.5 * degrees * np.log(left)
+    return np.where(free.regular, height, -np.inf)
 
 
 def _columns(x: Tangent, signature: Array) -> tuple[Array, Bools]:

@@ -151,20 +151,26 @@ def _of_hold(problem: Problem, sample: Sample, j: int) -> Pattern:
 
 def _covariates(problem: Problem) -> list[tuple[str, list[Array], int]]:
     """Name, values (H, R) for each sample scaled to about one, and the highest power."""
+    samples = problem.samples
     out: list[tuple[str, list[Array], int]] = []
     for name, degrees in _HIGHEST_POWER.items():
-        values = [np.broadcast_to(COVARIATES[name](s), s.protocol.time_s.shape) for s in problem.samples]
-        if name == "time in hold":
-            scales = [max(0.1 * s.typical_hold_s, 1e-9) for s in problem.samples]
-            values = [np.log1p(time / scale) for time, scale in zip(values, scales, strict=True)]
-        masks = [s.protocol.mask for s in problem.samples]
-        read = np.concatenate([v[mask] for v, mask in zip(values, masks, strict=True)])
+        values = [_values(name, sample) for sample in samples]
+        read = np.concatenate([v[s.protocol.mask] for v, s in zip(values, samples, strict=True)])
         middle = read.mean()
         spread = read.std()
         if spread > 1e-9 * (1.0 + abs(middle)):
             scaled = [(v - middle) / spread for v in values]
             out.append((name, scaled, degrees))
     return out
+
+
+def _values(name: str, sample: Sample) -> Array:
+    """(H, R) a covariate of a sample; the time in a hold by its logarithm."""
+    values = np.broadcast_to(COVARIATES[name](sample), sample.protocol.time_s.shape)
+    if name != "time in hold":
+        return values
+    scale = max(0.1 * sample.typical_hold_s, 1e-9)
+    return np.asarray(np.log1p(values / scale))
 
 
 def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names: str) -> list[Disagreement]:
@@ -182,16 +188,20 @@ def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names
     out: list[Disagreement] = []
     for covariate in dict.fromkeys(p.covariate for p in listed):
         columns = [skip + i for i, p in enumerate(listed) if p.covariate == covariate]
-        here = data.effects[0, columns]
-        chance = null.effects[:, columns].max(axis=1)
-        as_large = (chance >= here.max()).sum()
-        p = float((1 + as_large) / (1 + len(chance)))
-        best = columns[int(np.argmax(here))]
+        best = columns[int(np.argmax(data.effects[0, columns]))]
         pattern = listed[best - skip]
-        amplitude = float(data.amplitude[0, best])
-        sentence = _sentence(pattern, amplitude, p, names)
+        p = _p_value(columns, data, null)
+        sentence = _sentence(pattern, float(data.amplitude[0, best]), p, names)
         out.append({"covariate": covariate, "hold": pattern.hold, "p": p, "sentence": sentence})
     return sorted(out, key=lambda item: item["p"])
+
+
+def _p_value(columns: list[int], data: Scan, null: Scan) -> float:
+    """Share of simulations in which the best of some columns explains as much, the data counted with them."""
+    here = data.effects[0, columns].max()
+    chance = null.effects[:, columns].max(axis=1)
+    as_large = (chance >= here).sum()
+    return float((1 + as_large) / (1 + len(chance)))
 
 
 def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:

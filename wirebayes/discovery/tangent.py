@@ -220,17 +220,24 @@ def tangent_of(target: LogPosterior, around: Around, points: Sequence[Point]) ->
     k = block_diagonal([p.by_setting for p in points])
     beyond = ~(np.abs(k) < LARGEST_SLOPE).all(axis=(1, 2))  # what the model cannot compute has no tangent
     k[beyond] = 1.0
-    # K's size is what ρ measures: give it a typical column of length one. It has none where the wire is slack
-    # throughout: then no setting error moves any reading.
-    ratio = (k**2).sum(axis=(1, 2)) / k.shape[2]
-    length = np.sqrt(np.where(ratio > 0, ratio, 1.0))
-    left, singular = _directions(k / length[:, None, None])
+    left, singular, ratio = _of_typical_length_one(k)
     prior, gradient, precision = _prior(target, around)
     residual = np.concatenate([p.residual for p in points], axis=1)
     residual[beyond] = np.nan
     parameters = np.concatenate([p.parameters for p in points], axis=1)
     floor = np.min([p.floor for p in points], axis=0)
     return Tangent(residual, parameters, left, singular, ratio, gradient, precision, floor, prior)
+
+
+def _of_typical_length_one(k: Array) -> tuple[Array, Array, Array]:
+    """Left singular vectors and values of K with a typical column of length one, and its size, which ρ measures.
+
+    It has none where the wire is slack throughout: then no setting error moves any reading.
+    """
+    square = (k**2).sum(axis=(1, 2)) / k.shape[2]
+    length = np.sqrt(np.where(square > 0, square, 1.0))
+    left, singular = _directions(k / length[:, None, None])
+    return left, singular, square
 
 
 def _directions(k: Array) -> tuple[Array, Array]:

@@ -103,20 +103,20 @@ def _leading(single: Array, groups: list[Ints]) -> Ints:
 
 def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
     """(n, k, j, m) of the sum of squares by some signatures with each one; -inf where an amplitude has no meaning."""
-    b = found.along[:, :, None, :]
-    c = found.square[:, :, None, :]
+    along = found.along[:, :, None, :]
+    square = found.square[:, :, None, :]
     own = first[:, None, :]
-    b_first = np.take_along_axis(found.along, own, axis=2)[..., None]
-    c_first = np.take_along_axis(found.square, own, axis=2)[..., None]
+    along_first = np.take_along_axis(found.along, own, axis=2)[..., None]
+    square_first = np.take_along_axis(found.square, own, axis=2)[..., None]
     cross = found.form.of(first).products(found.form, found.shrink)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        determinant = c_first * c - cross**2
-        a_first = (c * b_first - cross * b) / determinant
-        a = (c_first * b - cross * b_first) / determinant
-        explained = a_first * b_first + a * b
-        apart = determinant > LEAST_LEFT * c_first * c
+        determinant = square_first * square - cross**2
+        a_first = (square * along_first - cross * along) / determinant
+        a = (square_first * along - cross * along_first) / determinant
+        explained = a_first * along_first + a * along
+        possible = determinant > LEAST_LEFT * square_first * square
     any_sign_first = ~x.one_sided[first][:, None, :, None]
-    possible = apart & np.isfinite(explained)
+    possible &= np.isfinite(explained)
     possible &= (a_first >= 0.0) | any_sign_first
     possible &= (a >= 0.0) | ~x.one_sided
     return np.where(possible, explained, -np.inf)

@@ -231,10 +231,16 @@ def _families(decision: Decision, block: int) -> list[FamilyEvidence]:
     ranked = sorted(found.families, key=lambda family: -together[family])
     out = []
     for family in dict.fromkeys([*accepted, *ranked]):
-        known = [name for name in family if name in found.inclusion]
-        members = largest_first({name: float(found.inclusion[name][block]) for name in known})
-        out.append(FamilyEvidence(members, together[family], decision.gains.get(family)))
+        members = _members(found, family, block)
+        gain = decision.gains.get(family)
+        out.append(FamilyEvidence(members, together[family], gain))
     return out
+
+
+def _members(found: ModelPosterior, family: Family, block: int) -> dict[str, float]:
+    """Probability of each name of a family in a material, the most probable first."""
+    known = [name for name in family if name in found.inclusion]
+    return largest_first({name: float(found.inclusion[name][block]) for name in known})
 
 
 def accepted_effects(decision: Decision, found: Evidence, block: int) -> list[Accepted]:

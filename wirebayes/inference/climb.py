@@ -351,12 +351,8 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
     """
     n, d = z.shape
     i, j = np.triu_indices(d, 1)
-    moves = _differences(d, sides)
-    points = z[:, None] + moves * h[:, None]
-    found = density(points.reshape(-1, d), np.repeat(rows, len(moves)))
-    found = found.reshape(n, -1)
+    found = _beside(density, z, rows, value, _differences(d, sides) * h[:, None])
     centre = value[:, None]
-    found = np.where(np.isfinite(found), found, centre - _NO_DENSITY)
     plus = found[:, :d]
     minus = found[:, d : 2 * d]
     both_plus, both_minus = np.split(found[:, 2 * d :], [len(i)], axis=1)
@@ -371,6 +367,15 @@ def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array
     hessian[:, diagonal, diagonal] = (plus + minus - 2.0 * centre) / h**2
     gradient = (plus - minus) / (2.0 * h)
     return gradient, hessian
+
+
+def _beside(density: Density, z: Array, rows: Array, value: Array, moves: Array) -> Array:
+    """(n, m) densities at moves (n, m, d) from places (n, d); far below the place's own (n,) where there is none."""
+    n, m, d = moves.shape
+    points = z[:, None] + moves
+    found = density(points.reshape(-1, d), np.repeat(rows, m))
+    found = found.reshape(n, m)
+    return np.where(np.isfinite(found), found, value[:, None] - _NO_DENSITY)
 
 
 @cache
