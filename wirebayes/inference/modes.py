@@ -177,7 +177,15 @@ class _SideBySide:
         def residuals(z: Array, rows: Ints) -> tuple[Array, Array]:
             return self.residuals(z, of[rows])
 
-        end = climb(density, np.vstack(begin), residuals, of=of, known=before, reach=REACH, curvature_at_end=False)
+        end = climb(
+            density,
+            np.vstack(begin),
+            None if self.residuals is None else residuals,
+            of=of,
+            known=before,
+            reach=REACH,
+            curvature_at_end=False,
+        )
         found = [distinct([end.rows(of == i)]) for i in range(self.n)]
         of = self._numbers([modes.z for modes in found])
         every = curved(self.density, together(found), of)
