@@ -124,14 +124,21 @@ def _joined(table: RawTable, parts: _Parts) -> RawTable:
     first, *others = parts.columns
     rows = []
     for row in table.rows:
-        texts = [row.cell(first), *(_two_digits(row.cell(i)) for i in others)]
         cells = [*row.cells]
+        texts = [row.cell(first)]
+        for i in others:
+            texts.append(_two_digits(row.cell(i)))
+            if i < len(cells):
+                cells[i] = ""
         cells[first] = parts.joint.join(texts) + parts.rest
-        rows.append(replace(row, cells=tuple("" if i in others else cell for i, cell in enumerate(cells))))
-    names = [parts.name if i == first else "" if i in others else name for i, name in enumerate(table.header)]
-    units = ["" if i in parts.columns else unit for i, unit in enumerate(table.units)]
+        rows.append(replace(row, cells=tuple(cells)))
+    names, units = [*table.header], [*table.units]
+    for i in parts.columns:
+        names[i] = units[i] = ""
+    names[first] = parts.name
+    what = parts.name.partition(" ")[0]
     of_parts = ", ".join(table.header[i] for i in parts.columns)
-    sheet = replace(table.sheet, described=f"{table.sheet.described}, {parts.name.partition(' ')[0]} from {of_parts}")
+    sheet = replace(table.sheet, described=f"{table.sheet.described}, {what} from {of_parts}")
     return replace(table, sheet=sheet, header=tuple(names), units=tuple(units), rows=tuple(rows))
 
 

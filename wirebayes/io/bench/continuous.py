@@ -35,16 +35,32 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
     x, time = readings.setting, readings.time_s
     found_holds = _found(readings)
     lefts = _lefts(found_holds)
-    turns = [_last_turn(x, left, p) for left, p in zip(lefts, found_holds, strict=True)]
+    turns = [_last_turn(x, left, hold) for left, hold in zip(lefts, found_holds, strict=True)]
     moves, zeros = _moves_to(x, time, found_holds, turns)
     cycles = _cycles(readings, lefts, turns, zeros)
-    rows = [_after_move(time, p, move) for p, move in zip(found_holds, moves, strict=True)]
-    since = [time[r] - zero for r, zero in zip(rows, zeros, strict=True)]
-    ends = _lengths(zeros, cycles, float(time[found_holds[-1].left - 1]))
-    notes = [*resets, *_notes(readings, found_holds, float(np.median(moves))), *(c.sentence for c in cycles)]
-    slow = _slow(np.array(moves), np.array([time[p.end - 1] - time[p.begin] for p in found_holds]))
-    levels = [level_of(x[r]) for r in rows]
-    return Cut(rows, list(range(1, len(rows) + 1)), levels, since, ends, True, notes, time, slow, cycles=cycles)
+    rows: list[Ints] = []
+    since: list[Floats] = []
+    for hold, move, zero in zip(found_holds, moves, zeros, strict=True):
+        kept = _after_move(time, hold, move)
+        rows.append(kept)
+        since.append(time[kept] - zero)
+    last_read_s = float(time[found_holds[-1].left - 1])
+    durations = [time[hold.end - 1] - time[hold.begin] for hold in found_holds]
+    usual_move_s = float(np.median(moves))
+    notes = [*resets, *_notes(readings, found_holds, usual_move_s)]
+    notes += [each.sentence for each in cycles]
+    return Cut(
+        rows=rows,
+        number=list(range(1, len(rows) + 1)),
+        setting=[level_of(x[kept]) for kept in rows],
+        time_s=since,
+        end_s=_lengths(zeros, cycles, last_read_s),
+        of_test=True,
+        notes=notes,
+        clock_s=time,
+        warnings=_slow(np.array(moves), np.array(durations)),
+        cycles=cycles,
+    )
 
 
 def _found(readings: Readings) -> Sequence[Plateau]:
@@ -194,18 +210,29 @@ def _too_few(readings: Readings, found_holds: Sequence[Plateau], kept: int) -> I
     other = "tension" if role == "displacement" else "displacement"
     expected = f"{role}s that are held while {other} is read"
     if len(found_holds) == 1 and kept >= COVERED * rows:
-        hold = found_holds[0]
-        before, after = hold.begin, rows - hold.left
-        if max(before, after) >= FEWEST:
-            row, where = (hold.begin, "from here on") if before >= after else (hold.left, "up to here")
-            passed = f"{before} readings before" if before >= after else f"{after} readings after"
-            found = f"one {role} that is held, {where}; the {passed} were taken for a move"
+        passed = _taken_for_a_move(readings, found_holds[0])
+        if passed is not None:
+            row, found = passed
             expected += "; if those are a hold, number the holds in a column, without the readings of the move"
             return readings.complain(row, role, found, expected)
     share = f"{100.0 * kept / rows:.0f} % of the readings"
     found = f"a {role} that stays in {share}, {counted(len(found_holds), 'time')}"
-    row = found_holds[0].end if found_holds and found_holds[0].end < rows else 0
+    row = 0
+    if found_holds and found_holds[0].end < rows:
+        row = found_holds[0].end
     return readings.complain(row, role, found, f"{expected} (or a column of hold numbers)")
+
+
+def _taken_for_a_move(readings: Readings, hold: Plateau) -> tuple[int, str] | None:
+    """The longer stretch beside the only hold, by its row and in words; None where neither could be a hold."""
+    before = hold.begin
+    after = len(readings.time_s) - hold.left
+    if max(before, after) < FEWEST:
+        return None
+    held = f"one {readings.role} that is held"
+    if before >= after:
+        return hold.begin, f"{held}, from here on; the {before} readings before were taken for a move"
+    return hold.left, f"{held}, up to here; the {after} readings after were taken for a move"
 
 
 def _moved(x: Floats, time: Floats, left: int, hold: Plateau) -> float:

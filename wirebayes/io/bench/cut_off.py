@@ -18,18 +18,28 @@ def without_cut_line(rows: Sequence[SheetRow]) -> tuple[tuple[SheetRow, ...], bo
     rows : sequence of SheetRow
         Of a file whose last line has no end.
     """
+    rows = tuple(rows)
     above = [row.cells for row in rows[-1 - _SHOWN : -1] if not row.comment and row.may_be_a_reading]
+    if len(above) < _FEWEST or not is_value(rows[-1].cells[0]):
+        return rows, False
+    if _is_cut(rows[-1].cells, above):
+        return rows[:-1], True
+    return rows, False
+
+
+def _is_cut(last: Sequence[str], above: Sequence[Sequence[str]]) -> bool:
+    """Whether a line has fewer cells than all above it, or fewer digits in its last cell."""
     widths = {len(cells) for cells in above}
-    if len(above) < _FEWEST or len(widths) > 1 or not is_value(rows[-1].cells[0]):
-        return tuple(rows), False
+    if len(widths) > 1:
+        return False
     (width,) = widths
-    last = rows[-1].cells
+    if len(last) != width:
+        return len(last) < width
     digits = {_decimals(cells[-1]) for cells in above}
-    is_short = len(last) < width
-    if len(last) == width and len(digits) == 1:
-        usual, own = digits.pop(), _decimals(last[-1])
-        is_short = usual > 0 and own < usual and "e" not in last[-1].lower()
-    return (tuple(rows[:-1]), True) if is_short else (tuple(rows), False)
+    if len(digits) > 1:
+        return False
+    (usual,) = digits
+    return usual > 0 and _decimals(last[-1]) < usual and "e" not in last[-1].lower()
 
 
 def _decimals(cell: str) -> int:

@@ -58,20 +58,29 @@ def glitches(setting: Floats, read: Floats) -> Ints:
     -------
     (g,) array of int
     """
+    none = np.empty(0, dtype=np.int64)
     if len(setting) < 3:
-        return np.empty(0, dtype=np.int64)
-    before, own, after = setting[:-2], setting[1:-1], setting[2:]
-    off = np.abs(own - 0.5 * (before + after))
-    back = np.abs(after - before) <= _BACK * off
-    suspect = 1 + np.flatnonzero(back & (off > _SCATTERS * np.median(np.abs(np.diff(setting)))))
+        return none
+    off = _off_neighbours(setting)
+    back = np.abs(setting[2:] - setting[:-2]) <= _BACK * off
+    usual_step = np.median(np.abs(np.diff(setting)))
+    alone = back & (off > _SCATTERS * usual_step)
+    suspect = 1 + np.flatnonzero(alone)
     others = np.setdiff1d(np.arange(len(setting)), suspect)
     span = float(np.ptp(setting[others]))
     if not len(suspect) or span == 0.0:
-        return suspect[:0]
+        return none
     stiffness = float(np.ptp(read[others])) / span
-    moved = np.abs(read[suspect] - 0.5 * (read[suspect - 1] + read[suspect + 1]))
-    far = off[suspect - 1] > _OFF * span
-    return suspect[far & (moved < _FOLLOWS * stiffness * off[suspect - 1])]
+    off, moved = off[alone], _off_neighbours(read)[alone]
+    far = off > _OFF * span
+    stays = moved < _FOLLOWS * stiffness * off
+    return suspect[far & stays]
+
+
+def _off_neighbours(values: Floats) -> Floats:
+    """(r - 2,) how far each value but the first and the last is from the middle of the two beside it."""
+    middle = 0.5 * (values[:-2] + values[2:])
+    return np.abs(values[1:-1] - middle)
 
 
 def _misprint(readings: Readings, row: int) -> Exception:

@@ -207,18 +207,26 @@ def _check_resets(readings: Readings, groups: Sequence[Rows]) -> None:
 
     One that falls to times between two earlier holds was not started again: the rows of that hold stand elsewhere.
     """
-    spans = [(readings.time_s[rows[0]], readings.time_s[rows[-1]]) for rows in groups]
-    for j, (begin, end) in enumerate(spans):
-        earlier = pairwise(spans[:j])
-        if any(before[1] < begin and end < after[0] for before, after in earlier):
-            found = f"{begin:g} s after {spans[j - 1][1]:g} s, which is between two holds above"
-            raise readings.complain(int(groups[j][0]), "time", found, "rows in the order of time, the oldest first")
-    for before, after in zip(groups, groups[1:], strict=False):
-        x, row = readings.setting, int(after[0])
-        same_hold = x[row] == x[before[-1]] and readings.hold is None
-        if same_hold and readings.time_s[row] < readings.time_s[before[-1]]:
-            found = f"{readings.time_s[row]:g} s after {readings.time_s[before[-1]]:g} s at {x[row]:g} {readings.unit}"
+    _check_order_of_holds(readings, groups)
+    for before, after in pairwise(groups):
+        last, row = int(before[-1]), int(after[0])
+        setting, time = readings.setting, readings.time_s
+        same_hold = setting[row] == setting[last] and readings.hold is None
+        if same_hold and time[row] < time[last]:
+            found = f"{time[row]:g} s after {time[last]:g} s at {setting[row]:g} {readings.unit}"
             raise readings.complain(row, "time", found, "times that rise in a hold; shift those from here on")
+
+
+def _check_order_of_holds(readings: Readings, groups: Sequence[Rows]) -> None:
+    """Refuse a hold whose times lie between those of two earlier ones."""
+    time = readings.time_s
+    for j, rows in enumerate(groups):
+        begin, end = time[rows[0]], time[rows[-1]]
+        for before, after in pairwise(groups[:j]):
+            if time[before[-1]] < begin and end < time[after[0]]:
+                above = time[groups[j - 1][-1]]
+                found = f"{begin:g} s after {above:g} s, which is between two holds above"
+                raise readings.complain(int(rows[0]), "time", found, "rows in the order of time, the oldest first")
 
 
 def _ends(times: list[Floats], zeros: list[float]) -> tuple[list[float | None], list[int]]:
@@ -274,25 +282,37 @@ def _since(readings: Readings, times: list[Floats], stated: TimeSince | None) ->
         return stated
     if readings.of_day:
         return "test"
-    runs_on = [bool(after[0] >= before[-1]) for before, after in zip(times, times[1:], strict=False)]
+    runs_on = [bool(after[0] >= before[-1]) for before, after in pairwise(times)]
     if len(times) == 1 and _begins_late(times[0]):
         raise _which_zero(readings, 0, f"{times[0][0]:g} s at the first reading of the only hold")
     if not any(runs_on):
         return "hold"
-    resets = [j + 1 for j, on in enumerate(runs_on) if not on]
-    pieces = [times[begin:end] for begin, end in zip([0, *resets], [*resets, len(times)], strict=True)]
-    by_chance = comb(len(runs_on), len(resets)) * np.prod([times_run_on(piece) for piece in pieces])
-    if by_chance < BY_CHANCE:
+    resets = [j for j, on in enumerate(runs_on, start=1) if not on]
+    if _run_on_by_chance(times, resets) < BY_CHANCE:
         return "test"
     if 2 * len(resets) >= len(runs_on):
         return "hold"
-    at = next(j for j, on in enumerate(runs_on) if on)
-    row = sum(len(of_hold) for of_hold in times[: at + 1])
-    ordinal = (
-        "the second hold, after {:g} s in the first" if at == 0 else f"hold {at + 2}, after {{:g}} s in the one before"
-    )
-    found = f"{times[at + 1][0]:g} s at the first reading of {ordinal.format(times[at][-1])}"
-    raise _which_zero(readings, row, found)
+    border = runs_on.index(True)
+    raise _unclear_at(readings, times, border)
+
+
+def _run_on_by_chance(times: list[Floats], resets: Sequence[int]) -> float:
+    """How likely times of holds run on over all borders but so many: those of each piece, and where resets are."""
+    begins = [0, *resets]
+    ends = [*resets, len(times)]
+    of_pieces = [times_run_on(times[begin:end]) for begin, end in zip(begins, ends, strict=True)]
+    return float(comb(len(times) - 1, len(resets)) * np.prod(of_pieces))
+
+
+def _unclear_at(readings: Readings, times: list[Floats], border: int) -> Undecided:
+    """The question what times count from, at the first border over which they run on."""
+    last_s = times[border][-1]
+    first_s = times[border + 1][0]
+    ordinal = f"hold {border + 2}, after {last_s:g} s in the one before"
+    if border == 0:
+        ordinal = f"the second hold, after {last_s:g} s in the first"
+    row = sum(len(of_hold) for of_hold in times[: border + 1])
+    return _which_zero(readings, row, f"{first_s:g} s at the first reading of {ordinal}")
 
 
 def _begins_late(of_hold: Floats) -> bool:

@@ -39,24 +39,39 @@ def sheet_of_measurement(path: Path, lines: list[str], encoding: str = "utf-8") 
     if not heads:
         raise InputError(f"{path}, line {len(lines)}: found no line {_TIMES}, expected a table of channels below it")
     header, *others = heads
-    rows = [SheetRow(header + 1, _filled(split[header])), _units(split, header)]
     for head in others:
         if split[head] != split[header]:
-            found = f"the channels {', '.join(filter(None, split[head]))}"
-            raise InputError(f"{path}, line {head + 1}: found {found}, expected those of line {header + 1}")
+            channels = ", ".join(filter(None, split[head]))
+            where = f"{path}, line {head + 1}"
+            raise InputError(f"{where}: found the channels {channels}, expected those of line {header + 1}")
+    named = SheetRow(header + 1, _filled(split[header]))
+    rows = [named, _units(split, header), *_readings(split, header)]
+    filled = tuple(row for row in rows if row.cells)
+    return Sheet(path, filled, described="LabVIEW measurement", encoding=encoding)
+
+
+def _readings(split: list[list[str]], header: int) -> list[SheetRow]:
+    """The readings of all segments below the header."""
     clocks = _clocks(split)
-    for number, cells in enumerate(split[header + 1 :], start=header + 2):
-        first = next((cell for cell in cells if cell), "")
-        if is_value(first):  # the preamble of another segment begins with words
-            time = clocks.get(number - 1, "") if cells[0] == "" else cells[0]
-            rows.append(SheetRow(number, _filled([time, *cells[1:]])))
-    return Sheet(path, tuple(row for row in rows if row.cells), described="LabVIEW measurement", encoding=encoding)
+    rows = []
+    for i in range(header + 1, len(split)):
+        time, *channels = split[i]
+        first = next(filter(None, split[i]), "")
+        if not is_value(first):  # the preamble of another segment begins with words
+            continue
+        if time == "":
+            time = clocks.get(i, "")
+        rows.append(SheetRow(i + 1, _filled([time, *channels])))
+    return rows
 
 
 def _clocks(split: list[list[str]]) -> dict[int, str]:
     """The time of each line of readings, where their preamble says when they begin and how far apart they are."""
     comma = any(cells[0] == "Decimal_Separator" and "," in "".join(cells[1:]) for cells in split)
-    times, begin, step, head = dict[int, str](), set[str](), set[str](), 0
+    sign = "comma" if comma else "point"
+    times = dict[int, str]()
+    begin, step = set[str](), set[str]()
+    head = 0
     for i, cells in enumerate(split):
         if cells[0] == "X0":
             begin = set(filter(None, cells[1:]))
@@ -65,7 +80,8 @@ def _clocks(split: list[list[str]]) -> dict[int, str]:
         elif cells[0] == _END or cells[0].startswith(_TIMES):
             head = i
         elif len(begin) == len(step) == 1:
-            first, apart = (plain_number(text, "comma" if comma else "point") for (text,) in (begin, step))
+            first = plain_number(*begin, sign)
+            apart = plain_number(*step, sign)
             if first and apart:
                 time = f"{float(first) + (i - head - 1) * float(apart):.6f}"
                 times[i] = time.replace(".", ",") if comma else time
@@ -74,26 +90,31 @@ def _clocks(split: list[list[str]]) -> dict[int, str]:
 
 def _is_head(split: list[list[str]], i: int) -> bool:
     """Whether a line stands below the second end of a header, in files whose times have another name."""
-    return i > 0 and split[i - 1][0] == _END and not is_value(split[i][0]) and len([c for c in split[i] if c]) > 1
+    if i == 0 or split[i - 1][0] != _END or is_value(split[i][0]):
+        return False
+    filled = [cell for cell in split[i] if cell]
+    return len(filled) > 1
 
 
 def _units(split: list[list[str]], header: int) -> SheetRow:
     """The row of units that the preamble of the channels states: one for each of them, times before or between."""
     names = split[header]
-    labels, dimensions, line = list[str](), list[str](), header
+    labels, dimensions = list[str](), list[str]()
+    line = header
     for i, cells in enumerate(split[:header]):
         if cells[0] == "Y_Unit_Label":
             labels, line = cells[1:], i
         elif cells[0] == "X_Dimension":
             dimensions = cells[1:]
-    seconds = "s" if dimensions and all(d in ("", "Time") for d in dimensions) else ""
+    are_times = bool(dimensions) and set(dimensions) <= {"", "Time"}
     units, channel = list[str](), 0
     for name in names:
         if name.startswith(_TIMES):
-            units.append(seconds)
-        else:
-            units.append(labels[channel] if channel < len(labels) and name != "Comment" else "")
-            channel += 1
+            units.append("s" if are_times else "")
+            continue
+        has_label = channel < len(labels) and name != "Comment"
+        units.append(labels[channel] if has_label else "")
+        channel += 1
     return SheetRow(line + 1, _filled(units))
 
 

@@ -42,9 +42,12 @@ def _parts(table: RawTable, column: int) -> int:
     """How many of what a column counts make a second; 0 where it counts something else."""
     header, under = table.header[column].strip(), table.units[column]
     unit = name_and_unit(header, "time")[1]
-    last = re.split(r"[\s._/()\[\]]+", header.rstrip(")] "))[-1]
-    called = (under, unit.text if unit else "", last)
-    return next((parts for text in called for parts, names in _UNITS.items() if text.lower() in names), 0)
+    words = re.split(r"[\s._/()\[\]]+", header.rstrip(")] "))
+    for text in (under, unit.text if unit else "", words[-1]):
+        for parts, names in _UNITS.items():
+            if text.lower() in names:
+                return parts
+    return 0
 
 
 def _count(table: RawTable, first: int, second: int, parts: int) -> bool:
@@ -59,15 +62,26 @@ def _count(table: RawTable, first: int, second: int, parts: int) -> bool:
 
 def _joined(table: RawTable, first: int, parts: int) -> RawTable:
     """The table with seconds and their fraction in the first of the two columns."""
-    sign = "," if any(_WITH_COMMA.fullmatch(cell) for row in table.rows for cell in row.cells) else "."
+    second = first + 1
+    sign = _decimal_sign(table)
     rows = []
     for row in table.rows:
-        fraction = int(row.cell(first + 1)) * (10**_DIGITS // parts)
+        fraction = int(row.cell(second)) * (10**_DIGITS // parts)
         cells = [*row.cells]
-        cells[first : first + 2] = [f"{row.cell(first)}{sign}{fraction:0{_DIGITS}d}", ""]
+        cells[first] = f"{row.cell(first)}{sign}{fraction:0{_DIGITS}d}"
+        cells[second] = ""
         rows.append(replace(row, cells=tuple(cells)))
     header, units = [*table.header], [*table.units]
-    described = f"{table.sheet.described}, time from {header[first]} and {header[first + 1]}"
-    header[first : first + 2], units[first : first + 2] = ["time (s)", ""], ["", ""]
+    described = f"{table.sheet.described}, time from {header[first]} and {header[second]}"
+    header[first], header[second] = "time (s)", ""
+    units[first] = units[second] = ""
     sheet = replace(table.sheet, described=described)
     return replace(table, sheet=sheet, header=tuple(header), units=tuple(units), rows=tuple(rows))
+
+
+def _decimal_sign(table: RawTable) -> str:
+    """A comma where a number of the table has one."""
+    for row in table.rows:
+        if any(map(_WITH_COMMA.fullmatch, row.cells)):
+            return ","
+    return "."

@@ -64,21 +64,42 @@ def plateaus(x: Floats, time: Floats, step: float, shortest: float = SHORTEST_SH
     if noise == 0.0:
         return []
     pieces = _joined(_split(x / noise), x, noise)
+    durations = [time[end - 1] - time[begin] for begin, end in pieces]
     # seen over readings, most are of long holds: moves have few
-    length = np.array([time[end - 1] - time[begin] for begin, end in pieces])
-    usual = float(np.median(np.repeat(length, [end - begin for begin, end in pieces])))
+    counts = [end - begin for begin, end in pieces]
+    usual = float(np.median(np.repeat(durations, counts)))
     found = []
-    level = np.array([np.median(x[begin:end]) for begin, end in pieces])
-    gaps = np.pad(np.abs(np.diff(level)), 1, mode="edge") if len(pieces) > 1 else np.zeros(2)
-    beside = 0.5 * (gaps[:-1] + gaps[1:])
-    for (begin, end), lasts, apart in zip(pieces, length, beside, strict=True):
-        if end - begin < FEWEST or _drift(x[begin:end]) > min(LEAN * noise, STAIRS * apart):
+    for piece, lasts, apart in zip(pieces, durations, _steps_beside(x, pieces), strict=True):
+        begin, end = piece
+        if end - begin < FEWEST:
             continue
-        begin, end = _trimmed(x, begin, end, scatter)
-        left, end = end, end - _hidden(x, begin, end, scatter) if end - begin > LONG * EDGE else end
-        if end - begin >= FEWEST and lasts >= shortest * usual:
-            found.append(Plateau(begin, end, float(np.median(x[begin:end])), left))
+        if _drift(x[begin:end]) > min(LEAN * noise, STAIRS * apart):
+            continue
+        hold = _at_rest(x, piece, scatter)
+        if hold is not None and lasts >= shortest * usual:
+            found.append(hold)
     return found
+
+
+def _steps_beside(x: Floats, pieces: list[tuple[int, int]]) -> Floats:
+    """How far the level of each piece is from those beside it, in the mean; zero for an only piece."""
+    if len(pieces) == 1:
+        return np.zeros(1)
+    levels = [np.median(x[begin:end]) for begin, end in pieces]
+    steps = np.abs(np.diff(levels))
+    padded = np.pad(steps, 1, mode="edge")
+    return 0.5 * (padded[:-1] + padded[1:])
+
+
+def _at_rest(x: Floats, piece: tuple[int, int], scatter: float) -> Plateau | None:
+    """The hold in a piece, without the ends of the moves beside it, seen or hidden in the noise; None if little is."""
+    begin, left = _trimmed(x, *piece, scatter)
+    end = left
+    if left - begin > LONG * EDGE:
+        end -= _hidden(x, begin, left, scatter)
+    if end - begin < FEWEST:
+        return None
+    return Plateau(begin, end, float(np.median(x[begin:end])), left)
 
 
 def scatter_of(x: Floats, step: float) -> float:
@@ -100,11 +121,13 @@ def _split(x: Floats) -> list[int]:
     bounds, todo = {0, n}, [(0, n)]
     while todo:
         begin, end = todo.pop()
-        if end - begin < 2:
+        count = end - begin
+        if count < 2:
             continue
-        left = np.arange(1, end - begin)
-        away = total[begin + 1 : end] - total[begin] - left * (total[end] - total[begin]) / (end - begin)
-        gain = away**2 * (end - begin) / (left * (end - begin - left))
+        left = np.arange(1, count)
+        rise = total[end] - total[begin]
+        away = total[begin + 1 : end] - total[begin] - left * rise / count
+        gain = away**2 * count / (left * (count - left))
         best = int(gain.argmax())
         if gain[best] > worth:
             middle = begin + 1 + best

@@ -17,22 +17,36 @@ def joined_at_resets(readings: Readings) -> tuple[Readings, list[str]]:
         The setting does not go on.
     """
     resets = np.flatnonzero(restarts(readings))
-    x, time = readings.setting, readings.time_s
+    x, time = readings.setting, readings.time_s.copy()
     pieces = np.split(np.arange(len(x)), resets)
     if not len(resets) or not is_continuous(pieces) or not wanders(x, pieces):
         return readings, []
-    interval = float(np.median(np.diff(time)[np.diff(time) > 0]))
-    time, notes = time.copy(), []
-    for row in resets:
-        before, after = x[max(0, row - EDGE) : row], x[row : row + EDGE]
-        if abs(np.median(after) - np.median(before)) > SAME_LEVEL * noise_of(x, readings.step):
+    steps = np.diff(time)
+    interval = float(np.median(steps[steps > 0]))
+    notes = []
+    for row in resets.tolist():
+        if not _goes_on(readings, row):
             found = f"{time[row]:g} s after {time[row - 1]:g} s, and {x[row]:g} {readings.unit} after {x[row - 1]:g}"
             expected = "a recording in one piece: shift the times from here on, or import each piece for itself"
-            raise readings.complain(int(row), "time", found, expected)
-        place = str(readings.complain(int(row), "time", "", "")).partition(": found")[0].partition(", ")[2]
+            raise readings.complain(row, "time", found, expected)
         notes.append(
-            f"time starts again at {place.partition(',')[0]}, where the {readings.role} goes on: the pieces are joined "
+            f"time starts again at {_line(readings, row)}, where the {readings.role} goes on: the pieces are joined "
             "as if the recording had not paused"
         )
         time[row:] += time[row - 1] + interval - time[row]
     return replace(readings, time_s=time), notes
+
+
+def _goes_on(readings: Readings, row: int) -> bool:
+    """Whether the setting after a reset is that before it."""
+    x = readings.setting
+    before = np.median(x[max(0, row - EDGE) : row])
+    after = np.median(x[row : row + EDGE])
+    return bool(abs(after - before) <= SAME_LEVEL * noise_of(x, readings.step))
+
+
+def _line(readings: Readings, row: int) -> str:
+    """The line of the file that a reading stands in."""
+    complaint = str(readings.complain(row, "time", "", ""))
+    place = complaint.partition(": found")[0].partition(", ")[2]
+    return place.partition(",")[0]

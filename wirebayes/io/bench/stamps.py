@@ -1,5 +1,7 @@
 """Clocks too coarse for their rate: readings that share a time stamp are spread over the time to the next one."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from wirebayes.io.bench.table import RawTable
@@ -20,7 +22,8 @@ def is_coarse(table: RawTable, column: int) -> bool:
     column counts what the stamps leave out.
     """
     cells = table.column(column)
-    begins = _runs(np.array([i > 0 and cell != cells[i - 1] for i, cell in enumerate(cells)], dtype=bool))
+    changes = [False, *(cell != before for before, cell in pairwise(cells))]
+    begins = _runs(np.array(changes[: len(cells)], dtype=bool))
     counts = np.diff(begins)[1:]  # the first and the last may be cut off
     if len(counts) < FEWEST:
         return False
@@ -54,14 +57,28 @@ def spread(time_s: Floats) -> tuple[Floats, list[str]]:
     begins = _runs(np.concatenate([[False], np.diff(time_s) != 0]))
     counts = np.diff(np.append(begins, len(time_s)))
     steps = np.diff(time_s[begins])
-    rising = steps[steps > 0]  # it falls where a hold begins at 0 again
-    tick = next((t for t in TICKS_S if np.isclose(rising, t, rtol=1e-4).sum() >= RISING_SHARE * len(rising)), None)
+    tick = _tick(steps)
     if tick is None:
         return time_s, []
     usual = float(np.mean(counts[1:-1]))
-    followed = np.append(np.isclose(steps, tick, rtol=1e-4), False)
+    followed = np.append(_are(steps, tick), False)
     # a stamp after which the recording pauses or ends may lack readings at its end
-    places = np.where(followed, counts, np.maximum(counts, round(usual)))
+    complete = np.maximum(counts, round(usual))
+    places = np.where(followed, counts, complete)
     within = np.arange(len(time_s)) - np.repeat(begins, counts)
+    since_stamp = tick * within / np.repeat(places, counts)
     note = f"each time stamp, of {tick:g} s, is that of {usual:.2g} readings: they are spread evenly up to the next one"
-    return time_s + tick * within / np.repeat(places, counts), [note]
+    return time_s + since_stamp, [note]
+
+
+def _tick(steps_s: Floats) -> float | None:
+    """What a clock counts by whose stamps follow each other after these steps; None where they mostly do not by one."""
+    rising = steps_s[steps_s > 0]  # it falls where a hold begins at 0 again
+    for tick in TICKS_S:
+        if _are(rising, tick).sum() >= RISING_SHARE * len(rising):
+            return tick
+    return None
+
+
+def _are(steps_s: Floats, tick_s: float) -> Bools:
+    return np.isclose(steps_s, tick_s, rtol=1e-4)

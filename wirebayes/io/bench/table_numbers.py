@@ -143,21 +143,26 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
         What the user decided.
     """
     columns = _of_sample(table, understand(table, choices.mapping), about)
-    not_read = next((row.line for row in table.rows if not row.cell(columns["displacement"].index)), None)
+    not_read = _first_not_read(table, columns["displacement"])
     table, notes = complete_rows(table, columns, choices.drop_breaks)
-    not_read = not_read if not_read in {row.line for row in table.rows} else None  # below the readings
+    if not_read not in {row.line for row in table.rows}:  # below the readings
+        not_read = None
     numbers = {role: column for role, column in columns.items() if not _is_of_clocks(table, column)}
-    decimal = decimal_sign(table, [column.index for column in numbers.values()], choices.decimal)
-    check_signs(table, [column.index for column in numbers.values()], decimal)
+    indices = [column.index for column in numbers.values()]
+    decimal = decimal_sign(table, indices, choices.decimal)
+    check_signs(table, indices, decimal)
     table, left_out = without_marks(table, numbers, decimal, choices.drop_breaks)
     if not table.rows:
         found = "no row with a time, a displacement and a tension, all of them numbers"
         raise InputError(f"{table.sheet.path}: found {found}, expected readings")
     notes = [*_whose(table, columns), _read_as(table, columns, decimal), *_by_units_alone(columns), *notes, *left_out]
-    texts: dict[Role, list[str]] = {
-        role: _numbers(table, column, decimal) for role, column in numbers.items() if role != "hold"
-    }
-    values: dict[Role, Floats] = {role: _converted(columns[role], text) for role, text in texts.items()}
+    texts: dict[Role, list[str]] = {}
+    values: dict[Role, Floats] = {}
+    for role, column in numbers.items():
+        if role != "hold":
+            texts[role] = _numbers(table, column, decimal)
+    for role, text in texts.items():
+        values[role] = _converted(columns[role], text)
     of_holds = choices.time_since == "hold"
     values["time"], of_day = _times(table, columns["time"], values.get("time"), notes, durations=of_holds)
     _check_sizes(table, columns, values)
@@ -166,6 +171,14 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
     recorded = Recorded(table, columns, texts, values, hold, of_day, numbering, not_read)
     return _from_zero_on(recorded, notes)
+
+
+def _first_not_read(table: RawTable, displacement: Column) -> int | None:
+    """The first line without a displacement."""
+    for row in table.rows:
+        if not row.cell(displacement.index):
+            return row.line
+    return None
 
 
 def _from_zero_on(recorded: Recorded, notes: list[str]) -> tuple[Recorded, list[str]]:
@@ -214,16 +227,27 @@ def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> 
     for role, column in columns.items():
         if table.turned and role == "hold":
             continue  # the table's own
-        stated = column.unit is None or column.unit.text in (UNITS[role], *re.split(r"[\s()\[\]/_,]+", column.header))
-        unit = "" if stated or column.unit is None else f" in {column.unit.text}"
-        how = " (sign turned)" if column.unit and column.unit.factor < 0 else ""
-        how += " (its weight)" if column.unit and column.unit.is_mass else ""
-        clocks = column.unit.clock if column.unit else None
-        how += f" ({clock.CALLED[clocks.leading_s]})" if clocks and clocks.leading_s else ""
-        how += f" (times the {_SIZE[role]})" if column.unit and column.unit.of_sample else ""
-        parts.append(f"{role} from {column.header!r}{unit}{how}")
+        parts.append(f"{role} from {column.header!r}{_unit_as_read(column)}")
     comma = ", decimal comma" if decimal == "comma" else ""
     return f"{table.sheet.described}{comma}; {listed(parts)}"
+
+
+def _unit_as_read(column: Column) -> str:
+    """A column's unit where its header does not state it, and what is made of its numbers."""
+    unit = column.unit
+    if unit is None:
+        return ""
+    in_header = re.split(r"[\s()\[\]/_,]+", column.header)
+    said = "" if unit.text in (UNITS[column.role], *in_header) else f" in {unit.text}"
+    if unit.factor < 0:
+        said += " (sign turned)"
+    if unit.is_mass:
+        said += " (its weight)"
+    if unit.clock and unit.clock.leading_s:
+        said += f" ({clock.CALLED[unit.clock.leading_s]})"
+    if unit.of_sample:
+        said += f" (times the {_SIZE[column.role]})"
+    return said
 
 
 def _by_units_alone(columns: Mapping[Role, Column]) -> list[str]:
@@ -237,23 +261,31 @@ def _by_units_alone(columns: Mapping[Role, Column]) -> list[str]:
 
 
 def _numbers(table: RawTable, column: Column, decimal: Decimal) -> list[str]:
+    in_inches = column.unit is not None and abs(column.unit.factor) == INCH
     out = []
     for row in table.rows:
-        number = plain_number(row.cell(column.index), decimal)
-        if number is None and column.unit is not None and abs(column.unit.factor) == INCH:
-            number = of_fraction(row.cell(column.index))
+        cell = row.cell(column.index)
+        number = plain_number(cell, decimal)
+        if number is None and in_inches:
+            number = of_fraction(cell)
         if number is None:
-            sign = "comma" if decimal == "comma" else "point"
-            expected = f"a number (decimal {sign}, as elsewhere in the file)"
-            if not any(c.isdigit() for c in row.cell(column.index)):  # NaN, n/a, #N/A, a dash
-                expected += WHERE_MISSING
-            elif quantity_unit(_AFTER_NUMBER.sub("", row.cell(column.index)), column.role):
-                expected = "a number alone, and its unit in the header"
-            if column.role == "time" and clock.looks_like_a_moment(row.cell(column.index)):
-                expected = clock.UNDERSTOOD
-            raise table.complain(row.line, column.index, shown(row.cell(column.index)), expected)
+            expected = _expected_number(cell, column.role, decimal)
+            raise table.complain(row.line, column.index, shown(cell), expected)
         out.append(number)
     return out
+
+
+def _expected_number(cell: str, role: Role, decimal: Decimal) -> str:
+    """What should stand in place of a cell that is no number."""
+    if role == "time" and clock.looks_like_a_moment(cell):
+        return clock.UNDERSTOOD
+    sign = "comma" if decimal == "comma" else "point"
+    expected = f"a number (decimal {sign}, as elsewhere in the file)"
+    if not any(c.isdigit() for c in cell):  # NaN, n/a, #N/A, a dash
+        return expected + WHERE_MISSING
+    if quantity_unit(_AFTER_NUMBER.sub("", cell), role):
+        return "a number alone, and its unit in the header"
+    return expected
 
 
 def _converted(column: Column, texts: list[str]) -> Floats:
@@ -296,13 +328,25 @@ def _hold_numbers(
     if column is None:
         return None, []
     cells = table.column(column.index)
-    plain = [plain_number(cell, decimal) for cell in cells]
-    if all(number is not None and float(number).is_integer() and 0 <= float(number) < MOST_HOLDS for number in plain):
-        return np.array([int(float(number or 0)) for number in plain], dtype=np.int64), []
-    odd = next((row for row in table.rows if is_number(row.cell(column.index))), None)
-    if odd is not None:
-        raise table.complain(odd.line, column.index, shown(odd.cell(column.index)), "a whole number for each hold")
+    plain = [_plain_hold(cell, decimal) for cell in cells]
+    if None not in plain:
+        return np.array(plain, dtype=np.int64), []
+    for row in table.rows:
+        cell = row.cell(column.index)
+        if is_number(cell):
+            raise table.complain(row.line, column.index, shown(cell), "a whole number for each hold")
     names = list(dict.fromkeys(cells))
-    number_of = {name: i + 1 for i, name in enumerate(names)}
+    number_of = {name: i for i, name in enumerate(names, start=1)}
     numbers = np.array([number_of[cell] for cell in cells], dtype=np.int64)
     return numbers, [f"holds numbered in order, {names[0]} to {names[-1]}"]
+
+
+def _plain_hold(cell: str, decimal: Decimal) -> int | None:
+    """The number of a hold in a cell; None where it is none."""
+    text = plain_number(cell, decimal)
+    if text is None:
+        return None
+    number = float(text)
+    if not number.is_integer() or not 0 <= number < MOST_HOLDS:
+        return None
+    return int(number)

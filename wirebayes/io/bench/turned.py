@@ -62,40 +62,56 @@ def row_for_each_reading(table: RawTable) -> RawTable:
     across = _across(table)
     if across is None:
         return _one_below_the_other(table)
+    by_row = across.role == "time"
+    roles: tuple[Role, ...] = ("displacement", "tension") if by_row else ("time",)
     others = [i for i, name in enumerate(table.header) if name and i not in across.values]
-    roles: tuple[Role, ...] = ("displacement", "tension") if across.role == "time" else ("time",)
     beside = [(i, role) for i in others for role in roles if is_of(table, i, role)]
     if len(beside) != 1:
         return table
     column, role = beside[0]
     read: Role = "displacement" if "tension" in (across.role, role) else "tension"
-    by_row = across.role == "time"
     rows = _by_row(table, across, column) if by_row else _by_column(table, across, column)
     name, unit = _name_of_cells(table, across, read)
     header = ("hold", table.header[column], f"{across.role} [{across.unit}]", name)
     units = ("", table.units[column], across.unit, unit)
-    described = f"{table.sheet.described}, a {'hold in each row' if by_row else 'hold in each column'}"
-    sheet = replace(table.sheet, described=described)
+    where = "row" if by_row else "column"
+    sheet = replace(table.sheet, described=f"{table.sheet.described}, a hold in each {where}")
     return RawTable(sheet, header, units, tuple(rows), table.header_line, turned=True)
 
 
 def _one_below_the_other(table: RawTable) -> RawTable:
     """Holds that stand side by side under what was set in them, below each other; else the table itself."""
     columns = _under_labels(table)
+    if len(columns) < 2 or not all(map(may_state_a_setting, columns)):
+        return table
     names = {tuple((table.header[i], table.units[i]) for i in own) for own in columns.values()}
-    if len(columns) < 2 or len(names) > 1 or not all(map(may_state_a_setting, columns)):
+    if len(names) > 1:
         return table
     header, units = zip(*names.pop(), strict=True)
     missing = lacking(replace(table, header=header, units=units), ())
-    found = [_MEASURE.fullmatch(label) for label in columns]
-    settings = [(measure["number"], measure["unit"]) for measure in found if measure]
-    one_unit = in_one_unit(settings, missing[0]) if len(missing) == 1 and len(settings) == len(columns) else None
-    if one_unit is None:
+    if len(missing) != 1:
         return table
-    rows = _rows_under(table, [*columns.values()], one_unit[1])
+    set_role = missing[0]
+    settings = _settings_of(list(columns), set_role)
+    if settings is None:
+        return table
+    unit, numbers = settings
+    rows = _rows_under(table, [*columns.values()], numbers)
     sheet = replace(table.sheet, described=f"{table.sheet.described}, holds side by side")
-    all_names, all_units = ("hold", missing[0], *header), ("", one_unit[0], *units)
+    all_names = ("hold", set_role, *header)
+    all_units = ("", unit, *units)
     return RawTable(sheet, all_names, all_units, rows, table.header_line, turned=True)
+
+
+def _settings_of(labels: list[str], role: Role) -> tuple[str, list[str]] | None:
+    """The unit and the numbers of settings in labels; None where a label has none of the quantity."""
+    settings = []
+    for label in labels:
+        measure = _MEASURE.fullmatch(label)
+        if measure is None:
+            return None
+        settings.append((measure["number"], measure["unit"]))
+    return in_one_unit(settings, role)
 
 
 def _under_labels(table: RawTable) -> dict[str, list[int]]:
@@ -124,20 +140,33 @@ def _across(table: RawTable) -> _Across | None:
     found: dict[tuple[Role, str], dict[int, tuple[str, str]]] = {}
     for i, name in enumerate(table.header):
         measure = _MEASURE.fullmatch(name)
-        role = None if measure is None else next((r for r in _ALONG if quantity_unit(measure["unit"], r)), None)
+        role = None if measure is None else _along_header(measure["unit"])
         if measure is None or role is None:
             continue
-        left = _AT.sub("", _EMPTY.sub("", f"{measure['before']} {measure['after']}"))
-        cells = " ".join(left.split()).strip("@=,;: ")
-        found.setdefault((role, cells), {})[i] = measure["number"], measure["unit"]
-    alike = max(found, key=lambda key: len(found[key]), default=None)
-    one_unit = None if alike is None else in_one_unit([*found[alike].values()], alike[0])
-    if alike is None or one_unit is None:
+        left = _EMPTY.sub("", f"{measure['before']} {measure['after']}")
+        cells = " ".join(_AT.sub("", left).split()).strip("@=,;: ")
+        of_kind = found.setdefault((role, cells), {})
+        of_kind[i] = measure["number"], measure["unit"]
+    if not found:
+        return None
+    role, cells = max(found, key=lambda kind: len(found[kind]))
+    measures = found[role, cells]
+    one_unit = in_one_unit([*measures.values()], role)
+    if one_unit is None:
         return None
     unit, numbers = one_unit
     if len(set(numbers)) < max(FEWEST, len(numbers)):
         return None
-    return _Across(alike[0], unit, dict(zip(found[alike], numbers, strict=True)), alike[1])
+    values = dict(zip(measures, numbers, strict=True))
+    return _Across(role, unit, values, cells)
+
+
+def _along_header(unit: str) -> Role | None:
+    """The quantity of a unit that may run along the header."""
+    for role in _ALONG:
+        if quantity_unit(unit, role):
+            return role
+    return None
 
 
 def _name_of_cells(table: RawTable, across: _Across, read: Role) -> tuple[str, str]:

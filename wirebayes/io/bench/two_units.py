@@ -28,21 +28,28 @@ def finest_of_same(table: RawTable, likely: Sequence[int], role: Role) -> list[i
     role : str
         The quantity.
     """
-    found = [_converted(table, i, role) for i in likely]
-    columns = [each for each in found if each is not None]
-    if len(columns) < len(likely) or len({factor for _, _, factor in columns}) < len(columns):
+    columns = []
+    for index in likely:
+        column = _converted(table, index, role)
+        if column is None:
+            return [*likely]
+        columns.append(column)
+    factors = {factor for _, _, factor in columns}
+    if len(factors) < len(columns):
         return [*likely]
     first, step, _ = columns[0]
+    steps = [own for _, own, _ in columns]
     names = {name_and_unit(table.header[i], role)[0].strip().lower() for i in likely}
-    if len(names) > 1 and max(own for _, own, _ in columns) > FINE * np.ptp(first):
+    if len(names) > 1 and max(steps) > FINE * np.ptp(first):
         return [*likely]
-    alike = all(
-        (np.abs(values - first) <= ROUNDED * (own + step) + SAME_UNIT * np.abs(first)).all()
-        for values, own, _ in columns
-    )
-    if not alike or len(set(first)) < FEWEST:
+    if len(set(first)) < FEWEST:
         return [*likely]
-    return [likely[int(np.argmin([own for _, own, _ in columns]))]]
+    for values, own, _ in columns:
+        rounding = ROUNDED * (own + step) + SAME_UNIT * np.abs(first)
+        if not (np.abs(values - first) <= rounding).all():
+            return [*likely]
+    finest = int(np.argmin(steps))
+    return [likely[finest]]
 
 
 def _converted(table: RawTable, column: int, role: Role) -> tuple[Floats, float, float] | None:
