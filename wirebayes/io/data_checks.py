@@ -197,11 +197,15 @@ def outlier(readings: CheckedTest) -> str:
     long_enough = [j for j, row in enumerate(each) if len(row) >= 3]
     if not long_enough:
         return ""
+    places: list[tuple[int, int]] = []
+    for j in long_enough:
+        places += [(j, i) for i in range(len(each[j]))]
     distance = np.concatenate([_apart(each, j) for j in long_enough])
     worst = int(distance.argmax())
-    hold, at = [(j, i) for j in long_enough for i in range(len(each[j]))][worst]
+    hold, at = places[worst]
     usual = max(float(np.quantile(np.delete(distance, worst), 0.9)), readings.noise)
-    if distance[worst] <= max(ISOLATED * usual, GROSS * np.ptp(_others(each, hold, at))):
+    span = np.ptp(_others(each, hold, at))
+    if distance[worst] <= max(ISOLATED * usual, GROSS * span):
         return ""
     return (
         f"the reading of {each[hold][at]:.5g} {unit} in hold {readings.number[hold]} at "
@@ -229,38 +233,43 @@ def _others(each: Sequence[Floats], j: int, at: int) -> Floats:
 
 def rising(readings: CheckedTest) -> str:
     """Tension that rises within holds on loading, where creep lets it fall."""
-    place, each, noise = readings.setting, readings.each, readings.noise
-
-    def is_loading(j: int) -> bool:
+    each, noise = readings.each, readings.noise
+    loading = []
+    for j, row in enumerate(each):
         # a hold that begins below the end of the one before has creep to give back
-        return j == 0 or bool(place[j] > place[:j].max() and each[j][0] > each[j - 1][-1])
-
-    taut = [j for j, row in enumerate(each) if len(row) > 1 and row[0] > FLAT * noise]
-    loading = [each[j] for j in taut if is_loading(j)]
+        goes_up = j == 0 or (_is_furthest(readings.setting, j) and row[0] > each[j - 1][-1])
+        is_taut = len(row) > 1 and row[0] > FLAT * noise
+        if goes_up and is_taut:
+            loading.append(row)
     if len(loading) < RISING_HOLDS:
         return ""
     rise = np.array([row[-1] - row[0] for row in loading])
-    if (rise > 0).mean() < RISING_SHARE or np.median(rise) <= RISE * noise:
+    rises = rise > 0
+    if rises.mean() < RISING_SHARE or np.median(rise) <= RISE * noise:
         return ""
     return (
-        f"tension rises within {int((rise > 0).sum())} of {len(rise)} holds on loading, by {np.median(rise):.3g} N in "
+        f"tension rises within {int(rises.sum())} of {len(rise)} holds on loading, by {np.median(rise):.3g} N in "
         "the middle, while a held wire relaxes: check that time_s runs forward, and the sensor and the room for drift"
     )
 
 
+def _is_furthest(setting: Floats, j: int) -> bool:
+    """Whether the setting of a hold is above those of all before it."""
+    return j == 0 or bool(setting[j] > setting[:j].max())
+
+
 def creeping_back(readings: CheckedTest) -> str:
     """Displacement that falls within holds of ever larger weights, under which a wire creeps on."""
-    weights, noise = readings.setting, readings.noise
-    loading = [
-        row for j, row in enumerate(readings.each) if len(row) > 1 and (j == 0 or weights[j] > weights[:j].max())
-    ]
+    each, noise = readings.each, readings.noise
+    loading = [row for j, row in enumerate(each) if len(row) > 1 and _is_furthest(readings.setting, j)]
     if len(loading) < SHRINKING_HOLDS:
         return ""
     fall = np.array([row[0] - row[-1] for row in loading])
-    if (fall > 0).mean() < RISING_SHARE or np.median(fall) <= RISE * noise:
+    falls = fall > 0
+    if falls.mean() < RISING_SHARE or np.median(fall) <= RISE * noise:
         return ""
     return (
-        f"the displacement falls within {int((fall > 0).sum())} of {len(fall)} holds under ever larger weights, by "
+        f"the displacement falls within {int(falls.sum())} of {len(fall)} holds under ever larger weights, by "
         f"{np.median(fall):.3g} mm in the middle, while a loaded wire creeps on: check that displacement and tension "
         "are not interchanged, that time_s runs forward, and the gauge and the room for drift"
     )
@@ -297,12 +306,16 @@ def _jump(row: Floats, time_s: Floats, noise: float) -> int | None:
     speed = sizes / np.diff(time_s)
     for i in range(1, len(change) - 1):
         beside = [i - 1, i + 1]
-        large = sizes[i] > max(ISOLATED * noise, JUMP * sizes[beside].max())
-        against = (change.sum() - change[i]) * way[i] <= FLAT * noise
+        if sizes[i] <= max(ISOLATED * noise, JUMP * sizes[beside].max()):
+            continue
+        others = change.sum() - change[i]
+        against = others * way[i] <= FLAT * noise
         # after a burst of readings a pause shows more change than they do, and is no faster
-        out_of_course = speed[i] > (1.0 if against else FASTER) * speed[beside].max()
-        stays = ((row[i + 1 :] - row[i]) * way[i] > JUMP_STAYS * sizes[i]).all()
-        if large and out_of_course and stays:
+        faster = 1.0 if against else FASTER
+        if speed[i] <= faster * speed[beside].max():
+            continue
+        later = (row[i + 1 :] - row[i]) * way[i]
+        if (later > JUMP_STAYS * sizes[i]).all():
             return i
     return None
 

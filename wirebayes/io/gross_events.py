@@ -142,11 +142,15 @@ def readings_left(protocol: Protocol, readings: Floats, events: Sequence[Event])
     first = np.argsort(~kept, axis=1, kind="stable")  # what is kept moves to the front of its hold
 
     def moved(values: Floats) -> Floats:
-        return np.take_along_axis(np.where(kept, values, 0.0), first, axis=1)
+        left = np.where(kept, values, 0.0)
+        return np.take_along_axis(left, first, axis=1)
 
-    warming = None if protocol.warming_K is None else moved(protocol.warming_K)
+    warming = None
+    if protocol.warming_K is not None:
+        warming = moved(protocol.warming_K)
     mask = np.take_along_axis(kept, first, axis=1)
-    return replace(protocol, time_s=moved(protocol.time_s), mask=mask, warming_K=warming), moved(readings)
+    shorter = replace(protocol, time_s=moved(protocol.time_s), mask=mask, warming_K=warming)
+    return shorter, moved(readings)
 
 
 def without_gross_events(experiment: Experiment, events: Sequence[Event]) -> Experiment:
@@ -158,17 +162,20 @@ def without_gross_events(experiment: Experiment, events: Sequence[Event]) -> Exp
     ----------
     events : sequence of Event
     """
-    dropped = np.unique(np.concatenate([np.empty(0, np.int64), *(event.readings for event in events)]))
+    dropped = {int(reading) for event in events for reading in event.readings}
     holds: list[Hold] = []
     begin = 0
     for hold in experiment.holds:
-        own = np.arange(begin, begin + hold.time_s.size)
-        begin += hold.time_s.size
-        holds.append(hold.of_readings(~np.isin(own, dropped)))
+        end = begin + hold.time_s.size
+        kept = [reading not in dropped for reading in range(begin, end)]
+        holds.append(hold.of_readings(np.array(kept, dtype=bool)))
+        begin = end
     while holds and not holds[-1].recorded:
         holds.pop()
-    if holds and begin - 1 in dropped:  # how long the last one was as it should be, its last reading says
-        holds[-1] = replace(holds[-1], duration_s=float(holds[-1].time_s[-1]))
+    last_reading = begin - 1
+    if holds and last_reading in dropped:  # how long the last one was as it should be, its last reading says
+        last = holds[-1]
+        holds[-1] = replace(last, duration_s=float(last.time_s[-1]))
     return replace(experiment, holds=tuple(holds))
 
 
@@ -177,20 +184,38 @@ def _falls(test: _Test) -> list[Event]:
 
     A wire that is unloaded may go slack, so it counts only within a hold or where the wire was stretched further.
     """
-    read, events = test.read, list[Event]()
+    read = test.read
+    events = list[Event]()
     least = max(SUBSTANTIAL * float(read.max()), MOVED * test.noise)
     i = 1
     while i < len(read):
-        before = float(read[i - 1])
-        stretched = test.hold[i] == test.hold[i - 1] or test.setting[i] > test.setting[i - 1]
-        if before < least or not stretched or abs(read[i]) > NOTHING * before or not _held_before(test, i):
+        if not _falls_at(test, i, least):
             i += 1
             continue
-        nothing = np.abs(read[i:]) <= NOTHING * before
-        end = i + (len(nothing) if nothing.all() else int(np.argmin(nothing)))
-        events.append(_fall(test, i, end))
-        i = len(read) if events[-1].kind != "dropout" else end
+        end = _end_of_fall(read, i)
+        event = _fall(test, i, end)
+        events.append(event)
+        if event.kind != "dropout":
+            break
+        i = end
     return events
+
+
+def _falls_at(test: _Test, i: int, least: float) -> bool:
+    """Whether a tension of at least so much falls to nothing at a reading, and unloading does not explain it."""
+    before = float(test.read[i - 1])
+    if before < least or abs(test.read[i]) > NOTHING * before:
+        return False
+    same_hold = test.hold[i] == test.hold[i - 1]
+    stretched = test.setting[i] > test.setting[i - 1]
+    return bool(same_hold or stretched) and _held_before(test, i)
+
+
+def _end_of_fall(read: Floats, begin: int) -> int:
+    """The first reading after a fall that is something again; the number of readings where none is."""
+    before = float(read[begin - 1])
+    something = np.flatnonzero(np.abs(read[begin:]) > NOTHING * before)
+    return begin + int(something[0]) if len(something) else len(read)
 
 
 def _held_before(test: _Test, i: int) -> bool:
@@ -199,8 +224,11 @@ def _held_before(test: _Test, i: int) -> bool:
     sudden = test.time_s[i] <= SUDDEN * test.time_s[i - 1]
     if len(own) > 1 and sudden:
         return bool(own[-1] >= KEPT * own[0])
-    earlier = [test.read[test.hold == h] for h in np.unique(test.hold[test.hold < test.hold[i]])]
-    kept = [row[-1] / row[0] for row in earlier if len(row) > 1 and row[0] > 0]
+    kept = []
+    for hold in np.unique(test.hold[test.hold < test.hold[i]]):
+        row = test.read[test.hold == hold]
+        if len(row) > 1 and row[0] > 0:
+            kept.append(row[-1] / row[0])
     return len(kept) >= FEWEST and min(kept) >= KEPT_IN_ALL
 
 
@@ -228,25 +256,39 @@ def _jumps(test: _Test) -> list[Event]:
     What a further weight adds is taken from the holds before. A hold with less weight than the one before may give back
     what it likes, and the first two holds have nothing to compare with.
     """
-    read, weight = test.read, test.setting
     for i in np.flatnonzero(test.hold >= 2).tolist():
         begins = test.hold[i] != test.hold[i - 1]
         sudden = begins or test.time_s[i] <= SUDDEN * test.time_s[i - 1]
         if not sudden:
             continue
-        before, hung = np.ptp(read[:i]), np.ptp(weight[:i])
-        added = before / hung * (weight[i] - weight[i - 1]) if hung > 0.0 else 0.0
-        jump = read[i] - read[i - 1] - added
-        if jump < 0.0 and weight[i] < weight[test.hold < test.hold[i]][-1]:
+        jump = _beyond_weight(test, i)
+        weight_before = test.setting[test.hold < test.hold[i]][-1]
+        if jump < 0.0 and test.setting[i] < weight_before:
             continue
-        stayed = bool(((read[i:] - read[i - 1]) * np.sign(jump) >= STAYED * abs(jump)).all())
-        if abs(jump) > max(JUMP * before, MOVED * test.noise) and stayed:
+        before = np.ptp(test.read[:i])
+        if abs(jump) > max(JUMP * before, MOVED * test.noise) and _stays_away(test.read, i, jump):
             text = (
                 f"displacement jumps by {jump:.3g} mm in {test.place(i)} and stays there: did the wire break or slip? "
                 "leave these readings out"
             )
-            return [Event("break", text, np.arange(i, len(read)))]
+            return [Event("break", text, np.arange(i, len(test.read)))]
     return []
+
+
+def _beyond_weight(test: _Test, i: int) -> float:
+    """By how much a displacement changes to a reading beyond what a further weight adds, by the readings before."""
+    read, weight = test.read, test.setting
+    before, hung = np.ptp(read[:i]), np.ptp(weight[:i])
+    added = 0.0
+    if hung > 0.0:
+        added = before / hung * (weight[i] - weight[i - 1])
+    return float(read[i] - read[i - 1] - added)
+
+
+def _stays_away(read: Floats, i: int, jump: float) -> bool:
+    """Whether no later reading comes back over a jump."""
+    way = (read[i:] - read[i - 1]) * np.sign(jump)
+    return bool((way >= STAYED * abs(jump)).all())
 
 
 def _limits(test: _Test, resolution: float) -> list[Event]:
@@ -254,12 +296,14 @@ def _limits(test: _Test, resolution: float) -> list[Event]:
     events = []
     set_what = "displacement" if test.unit == "N" else "tension"
     step = max(resolution, test.noise)
-    for kind, value, word in (("saturation", test.read.max(), "largest"), ("clipped", test.read.min(), "smallest")):
+    largest, smallest = test.read.max(), test.read.min()
+    nothing = max(NOTHING * float(np.abs(test.read).max()), MOVED * step)
+    for kind, value, word in (("saturation", largest, "largest"), ("clipped", smallest, "smallest")):
         at = np.flatnonzero(test.read == value)
+        if len(at) < AT_LIMIT or value <= nothing:  # a slack wire rightly reads nothing, or a little less
+            continue
         expected = _slope_beside(test, at) * float(np.ptp(test.setting[at]))
-        # a slack wire rightly reads nothing, or a little less
-        slack = value <= max(NOTHING * float(np.abs(test.read).max()), MOVED * step)
-        if len(at) < AT_LIMIT or slack or expected <= MOVED * step:
+        if expected <= MOVED * step:
             continue
         text = (
             f"{len(at)} readings in {test.holds(at)} all read {value:g} {test.unit}, the {word} of the test, while the "

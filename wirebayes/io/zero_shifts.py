@@ -56,7 +56,11 @@ class _Moves:
 
 def zero_shift(readings: CheckedTest) -> str:
     """The step between two holds that stands out most from what the moves beside it add, in a sentence."""
-    found = [shift for way in (1.0, -1.0) if (shift := _shift(_moves(readings, way), readings.noise)) is not None]
+    found = []
+    for way in (1.0, -1.0):
+        shift = _shift(_moves(readings, way), readings.noise)
+        if shift is not None:
+            found.append(shift)
     if not found:
         return ""
     _, hold, step, expected = max(found)
@@ -71,24 +75,32 @@ def zero_shift(readings: CheckedTest) -> str:
 
 def _moves(readings: CheckedTest, way: float) -> _Moves:
     """The moves of one way; a move after a reversal shows friction, and one of a slack wire nothing."""
-    each, protocol = readings.each, readings.protocol
+    each, forces = readings.each, readings.protocol.control == "displacement"
     first = np.array([row[0] for row in each])
     last = np.array([row[-1] for row in each])
     # where there is a single reading, that one
-    second = np.array([row[:2][-1] for row in each])
-    last_but_one = np.array([row[-2:][0] for row in each])
+    second = np.array([row[min(1, len(row) - 1)] for row in each])
+    last_but_one = np.array([row[max(-2, -len(row))] for row in each])
     moved = np.diff(readings.setting)
-    middle = readings.setting[:-1] + 0.5 * moved
-    this_way = np.sign(moved) == way
-    used = this_way & np.concatenate([[True], this_way[:-1]])
-    used &= np.diff(np.flatnonzero(protocol.recorded)) == 1
-    used &= ~_late(readings)[1:]
-    if protocol.control == "displacement":
-        used &= np.minimum(first[1:], last[:-1]) > slack_below(readings)
+    used = _of_one_way(readings, moved, way)
+    if forces:
+        weakest = np.minimum(first[1:], last[:-1])
+        used &= weakest > slack_below(readings)
     at = np.flatnonzero(used)
     added = first[1:] - last[:-1]
     inner = second[1:] - last_but_one[:-1]
+    middle = readings.setting[:-1] + 0.5 * moved
     return _Moves(at + 1, added[at], inner[at], moved[at], middle[at])
+
+
+def _of_one_way(readings: CheckedTest, moved: Floats, way: float) -> Bools:
+    """Moves of one way that follow another such, between recorded holds of which the latter is read in time."""
+    this_way = np.sign(moved) == way
+    after_such = np.concatenate([[True], this_way[:-1]])
+    numbers = np.flatnonzero(readings.protocol.recorded)
+    adjoining = np.diff(numbers) == 1
+    late = _late(readings)[1:]
+    return np.asarray(this_way & after_such & adjoining & ~late)
 
 
 def slack_below(readings: CheckedTest) -> float:
@@ -109,21 +121,36 @@ def _shift(moves: _Moves, noise: float) -> tuple[float, int, float, float] | Non
     if len(moves.hold) < FEWEST:
         return None
     off, inner = moves.off(moves.added), moves.off(moves.inner)
-    sizes, expected = np.abs(off), moves.added - off
+    sizes = np.abs(off)
+    expected = moves.added - off
     scatter = _scatter(moves.added, sizes, noise)
     usual = float(np.median(np.abs(moves.added)))
     large = sizes > OF_A_MOVE * np.maximum(usual, np.abs(expected))
     found = []
-    for i in np.flatnonzero(large):
-        size, sign = sizes[i], np.sign(off[i])
+    for i in np.flatnonzero(large).tolist():
         others = float(np.quantile(np.delete(sizes, i), 0.9))
-        excess = float(size / max(others, scatter))
-        beside = np.abs(moves.hold - moves.hold[i]) == 1
-        taken_back = (-sign * off[beside]).max(initial=0.0)
-        stays = taken_back <= TAKEN_BACK * size and sign * inner[i] >= BESIDE * size
-        if excess > STANDS_OUT and stays:
+        excess = float(sizes[i] / max(others, scatter))
+        if excess > STANDS_OUT and _stays(moves.hold, off, inner, i):
             found.append((excess, int(moves.hold[i]), float(moves.added[i]), float(expected[i])))
     return max(found, default=None)
+
+
+def _stays(holds: Ints, off: Floats, inner: Floats, i: int) -> bool:
+    """Whether a step is neither taken back by the moves beside it nor one of a single reading.
+
+    Parameters
+    ----------
+    holds : (m,) array of int
+        To which the moves lead.
+    off, inner : (m,) array
+        What each adds beyond the course, by the readings beside it and by those one further on.
+    i : int
+        The move.
+    """
+    size, sign = abs(off[i]), np.sign(off[i])
+    beside = np.abs(holds - holds[i]) == 1
+    taken_back = (-sign * off[beside]).max(initial=0.0)
+    return bool(taken_back <= TAKEN_BACK * size and sign * inner[i] >= BESIDE * size)
 
 
 def _scatter(added: Floats, sizes: Floats, noise: float) -> float:

@@ -4,6 +4,7 @@ Every block has such a line, and the lines are alike but for their numbers.
 """
 
 import re
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -81,30 +82,50 @@ def _blocks(table: RawTable) -> list[_Block]:
 
 def _with_column(table: RawTable, blocks: Sequence[_Block], name: str, said: Callable[[str], Said]) -> RawTable:
     """The table with a column of what one line above each block says; itself where none or several do."""
-    each: list[Said] = [{key: found for line in block.above for key, found in said(line).items()} for block in blocks]
-    alike = [key for key in each[0] if len({found[key][1] for found in each if key in found}) == 1]
-    varied = [key for key in alike if all(key in found for found in each) and len({found[key] for found in each}) > 1]
-    of_quantity = [key for key in varied if any(map(speaks_of_a_quantity, re.findall(r"[^\W\d_]+", key)))]
-    chosen = of_quantity if len(varied) > 1 else varied
-    if len(chosen) != 1:
+    each = [_said_above(block, said) for block in blocks]
+    key = _telling(each)
+    if key is None:
         return table
-    values = [found[chosen[0]] for found in each]
-    width = len(table.header)
+    values = [found[key] for found in each]
+    begins = [block.begin for block in blocks]
     rows = []
     for row in table.rows:
-        block = max((i for i, b in enumerate(blocks) if b.begin <= row.line), default=0)
-        cells = *(row.cell(i) for i in range(width)), values[block][0] if row.may_be_a_reading else ""
-        rows.append(replace(row, cells=cells))
+        cells = [row.cell(i) for i in range(len(table.header))]
+        block = max(bisect_right(begins, row.line) - 1, 0)
+        cells.append(values[block][0] if row.may_be_a_reading else "")
+        rows.append(replace(row, cells=tuple(cells)))
     first, last = (" ".join(filter(None, value)) for value in (values[0], values[-1]))
     described = f"{table.sheet.described}, the {name} of each block from the line above it ({first} to {last})"
+    unit = values[0][1]
     return replace(
         table,
         sheet=replace(table.sheet, described=described),
         header=(*table.header, name),
-        units=(*table.units, values[0][1]),
+        units=(*table.units, unit),
         rows=tuple(rows),
         above=(*table.above, "") if table.above else (),
     )
+
+
+def _said_above(block: _Block, said: Callable[[str], Said]) -> Said:
+    """What the lines above a block say."""
+    found: Said = {}
+    for line in block.above:
+        found |= said(line)
+    return found
+
+
+def _telling(each: Sequence[Said]) -> str | None:
+    """The only line above all blocks that says different things in one unit; a quantity's before others."""
+    varied = []
+    for key in each[0]:
+        found = [of_block[key] for of_block in each if key in of_block]
+        units = {unit for _, unit in found}
+        if len(found) == len(each) and len(units) == 1 and len(set(found)) > 1:
+            varied.append(key)
+    if len(varied) > 1:
+        varied = [key for key in varied if any(map(speaks_of_a_quantity, re.findall(r"[^\W\d_]+", key)))]
+    return varied[0] if len(varied) == 1 else None
 
 
 def may_state_a_setting(title: str) -> bool:

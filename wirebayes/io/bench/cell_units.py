@@ -10,12 +10,13 @@ from decimal import Decimal
 from functools import cache
 
 from wirebayes.io.bench.compound_times import is_spelt
-from wirebayes.io.bench.quantities import ROLES, Role, quantity_unit
+from wirebayes.io.bench.quantities import ROLES, Role, Unit, quantity_unit
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_measured, is_number, of_fraction
 from wirebayes.io.bench.words import speaks_of
 
 FEWEST = 3  # cells with a unit: one row of them may be the ranges of sensors, or times that run along a header
 _AT_END = 100  # lines, more than what programs write below readings
+_TWO_SIGNS = re.compile(r"[.,].*[.,]|/")
 _MEASURE = re.compile(r"([+\-\u2212]?\d[\d.,'\u2019\s/\-]*(?:[eE][+-]?\d+)?)(?<!\s)\s*([^\W\d_].*|[°%‰].*)")
 _APART = re.compile(r"(?<!\S)([+\-\u2212]?\d[\d.,]*)\s+([^\W\d_][^\s\d]*|[°%‰][^\s\d]*)(?!\S)")
 
@@ -42,27 +43,28 @@ def with_units_apart(sheet: Sheet) -> Sheet:
     # a column of cells with units has them at its end, too: most long files are known by a glance there
     if not any(_measure(cell) for row in sheet.rows[-_AT_END:] for cell in row.cells):
         return sheet
-    readings = [i for i, row in enumerate(sheet.rows) if not row.comment and is_measured([*map(bare, row.filled)])]
+    readings = [row for row in sheet.rows if not row.comment and is_measured([*map(bare, row.filled)])]
     if not readings:
         return sheet
-    first = readings[0]
+    first = sheet.rows.index(readings[0])
     head = sheet.rows[first - 1] if first else SheetRow(1, ())
-    width = max(len(sheet.rows[i].cells) for i in readings)
+    width = max(len(row.cells) for row in readings)
     units = [""] * width
     numbers = dict[int, dict[str, str]]()
     for column in range(width):
         if speaks_of(head.cell(column), "hold"):
             continue
-        found = _numbers([sheet.rows[i].cell(column) for i in readings])
+        found = _numbers([row.cell(column) for row in readings])
         if found is not None:
             units[column], numbers[column] = found
     if not numbers:
         return sheet
-    above = list(sheet.rows[:first])
+    rows = list(sheet.rows[:first])
     if not _bears(head, units):
-        above.append(SheetRow(sheet.rows[first].line, tuple(f"[{unit}]" if unit else "" for unit in units)))
-    below = [_with_numbers(row, numbers) for row in sheet.rows[first:]]
-    return replace(sheet, rows=(*above, *below), described=f"{sheet.described}, units in the cells")
+        in_brackets = [f"[{unit}]" if unit else "" for unit in units]
+        rows.append(SheetRow(readings[0].line, tuple(in_brackets)))
+    rows += [_with_numbers(row, numbers) for row in sheet.rows[first:]]
+    return replace(sheet, rows=tuple(rows), described=f"{sheet.described}, units in the cells")
 
 
 def _bears(head: SheetRow, units: Sequence[str]) -> bool:
@@ -101,22 +103,32 @@ def in_one_unit(measures: Sequence[tuple[str, str]], role: Role) -> tuple[str, l
         The quantity.
     """
     names = list(dict.fromkeys(name for _, name in measures))
-    units = {name: unit for name in names if (unit := quantity_unit(name, role))}
-    if len(units) < len(names):
-        return None
+    units: dict[str, Unit] = {}
+    for name in names:
+        unit = quantity_unit(name, role)
+        if unit is None:
+            return None
+        units[name] = unit
     if len(names) == 1:
         return names[0], [number for number, _ in measures]
-    alike = len({unit.of_sample for unit in units.values()}) == 1 and not any(unit.offset for unit in units.values())
-    if not alike or any(re.search(r"[.,].*[.,]|/", number) for number, _ in measures):
+    if not _are_multiples(list(units.values())) or any(_TWO_SIGNS.search(number) for number, _ in measures):
         return None
     smallest = min(names, key=lambda name: units[name].factor)
     sign = "," if any("," in number for number, _ in measures) else "."
     numbers = []
     for number, name in measures:
         times = Decimal(f"{units[name].factor / units[smallest].factor:.12g}")
-        value = times * Decimal("".join(number.split()).replace("\u2212", "-").replace(",", "."))
+        plain = "".join(number.split()).replace("\u2212", "-").replace(",", ".")
+        value = times * Decimal(plain)
         numbers.append(f"{value:f}".replace(".", sign))
     return smallest, numbers
+
+
+def _are_multiples(units: Sequence[Unit]) -> bool:
+    """Whether each of some units is so many of another: none has its own zero, and all or none are the sample's."""
+    if any(unit.offset for unit in units):
+        return False
+    return len({unit.of_sample for unit in units}) == 1
 
 
 def _measure(cell: str) -> tuple[str, str] | None:

@@ -86,30 +86,36 @@ def seconds(
         A cell is no clock; `Undecided` where ``a:b`` may be minutes or hours.
     """
     if any(map(is_spelt, table.column(column))):
-        values = _spelt(table, column)
-        # durations are counted from zero, and may be longer than a day
-        on_the_wall = values[0] >= _HOUR and values.max() < _DAY
-        midnights = np.cumsum(_days_begin(values, of_day=False) & on_the_wall)
-        return values + _DAY * midnights, False, _passed("midnight", midnights)
+        return _of_spelt(_spelt(table, column))
     moments = _moments(table, column, unit)
     # what follows a date or stands before AM is of the day, and leaves no doubt
     of_clock = [m["date"] is None and m["half"] is None for m in moments]
     short = next((i for i, m in enumerate(moments) if of_clock[i] and m["third"] is None), None)
-    leading = 3600.0 if short is None else _leading(table, column, unit, moments, short)
-    values = np.array([_value(m, leading if bare else 3600.0) for m, bare in zip(moments, of_clock, strict=True)])
+    leading = _HOUR if short is None else _leading(table, column, unit, moments, short)
+    each = [_value(m, leading if bare else _HOUR) for m, bare in zip(moments, of_clock, strict=True)]
+    values = np.array(each)
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
         return (days - days[0]) + values, True, []
     if durations and all(of_clock):
         return values, False, []
     if leading == _MINUTE and _minutes_go_round(values):
-        hours = np.cumsum(np.diff(values, prepend=values[0]) < 0.0)
+        falls = np.diff(values, prepend=values[0]) < 0.0
+        hours = np.cumsum(falls)
         return values + _HOUR * hours, False, _passed("the hour", hours)
     if all(of_clock):
         _check_hours_go_beyond_twelve(table, column, values)
     of_day = short is None and (not of_clock[0] or values[0] >= _HOUR)
     midnights = np.cumsum(_days_begin(values, of_day))
     return values + _DAY * midnights, of_day, _passed("midnight", midnights)
+
+
+def _of_spelt(values: Floats) -> tuple[Floats, bool, list[str]]:
+    """What `seconds` returns of times in two units or more: durations from zero, or a clock on the wall."""
+    on_the_wall = values[0] >= _HOUR and values.max() < _DAY
+    begins = _days_begin(values, of_day=False)
+    midnights = np.cumsum(begins & on_the_wall)
+    return values + _DAY * midnights, False, _passed("midnight", midnights)
 
 
 def _passed(what: str, rounds: Array) -> list[str]:
@@ -182,18 +188,27 @@ def _moments(table: RawTable, column: int, unit: Unit | None) -> list[re.Match[s
     moments: list[re.Match[str]] = []
     for row, cell in zip(table.rows, cells, strict=True):
         found = moment(cell)
-        if found is None or found["first"] is None or (found["half"] and not 1 <= int(found["first"]) <= 12):
-            raise table.complain(row.line, column, shown(row.cell(column)), UNDERSTOOD)
-        if max(int(found["second"]), int(found["third"] or 0)) >= 60:
-            raise table.complain(
-                row.line, column, shown(row.cell(column)), "minutes and seconds below 60 after the first number"
-            )
+        expected = UNDERSTOOD
+        if found is not None:
+            first = moments[0] if moments else found
+            expected = _expected_in_place_of(found, first)
+        if found is None or expected:
+            raise table.complain(row.line, column, shown(row.cell(column)), expected)
         moments.append(found)
-        for part, called in (("date", "a date"), ("zone", "an offset from UTC")):
-            if (found[part] is None) != (moments[0][part] is None):
-                expected = f"a time with{'out' * (moments[0][part] is None)} {called}, as in the lines before"
-                raise table.complain(row.line, column, shown(row.cell(column)), expected)
     return moments
+
+
+def _expected_in_place_of(found: re.Match[str], first: re.Match[str]) -> str:
+    """What should stand in place of a moment, beside the first one; empty where nothing is wrong with it."""
+    if found["first"] is None or (found["half"] and not 1 <= int(found["first"]) <= 12):
+        return UNDERSTOOD
+    if max(int(found["second"]), int(found["third"] or 0)) >= 60:
+        return "minutes and seconds below 60 after the first number"
+    for part, called in (("date", "a date"), ("zone", "an offset from UTC")):
+        if (found[part] is None) != (first[part] is None):
+            without = "out" if first[part] is None else ""
+            return f"a time with{without} {called}, as in the lines before"
+    return ""
 
 
 def _with_colons(cell: str, joint: str) -> str:
@@ -246,18 +261,25 @@ def _leading(table: RawTable, column: int, unit: Unit | None, moments: Sequence[
     if unit is not None and unit.clock is not None and unit.clock.leading_s is not None:
         return unit.clock.leading_s
     if any(m["fraction"] for m in moments if m["third"] is None):
-        return 60.0
-    falls = {leading: sum(np.diff([_value(m, leading) for m in moments]) < 0.0) for leading in CALLED}
+        return _MINUTE
+    falls = {leading: _falls(moments, leading) for leading in CALLED}
     fewest = min(falls, key=lambda leading: falls[leading])
-    if any(falls[leading] > falls[fewest] for leading in CALLED):
+    if max(falls.values()) > falls[fewest]:
         return fewest
+    row = table.rows[short]
+    place = f"{table.sheet.path}, {table.place(row.line, column)}"
     name = table.header[column]
     raise Undecided(
-        f"{table.sheet.path}, {table.place(table.rows[short].line, column)}: found "
-        f"{table.rows[short].cell(column)!r}, which is minutes and seconds or hours and minutes",
+        f"{place}: found {row.cell(column)!r}, which is minutes and seconds or hours and minutes",
         "which",
         {f"--map {name}=time [{_WRITTEN[leading]}]": called for leading, called in CALLED.items()},
     )
+
+
+def _falls(moments: Sequence[re.Match[str]], leading: float) -> int:
+    """How often times fall whose first part counts so many seconds."""
+    times = [_value(m, leading) for m in moments]
+    return int(np.sum(np.diff(times) < 0.0))
 
 
 def _days(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> Floats:
@@ -265,21 +287,31 @@ def _days(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> Flo
     day_first = _day_first(table, column, moments)
     days = []
     for row, found in zip(table.rows, moments, strict=True):
-        text = found["date"]
-        parts = [text[:4], text[4:6], text[6:]] if found["compact"] else re.split(r"[-./ ]+", text)
-        if found["named"]:
-            parts[1] = str(MONTHS[parts[1][:3].lower()])
-        numbers = [int(part) for part in parts]
-        if found["named"] or (found["year_last"] and (day_first or "." in text)):
-            numbers = numbers[::-1]
-        elif found["year_last"]:
-            numbers = [numbers[2], numbers[0], numbers[1]]
-        year, month, day = numbers
+        year, month, day = _date_parts(found, day_first)
+        full_year = year if year > 99 else 2000 + year
         try:
-            days.append(date(year if year > 99 else 2000 + year, month, day).toordinal() * _DAY)
+            days.append(date(full_year, month, day).toordinal() * _DAY)
         except ValueError:
-            raise table.complain(row.line, column, repr(text), "a date such as 2024-05-31") from None
+            raise table.complain(row.line, column, repr(found["date"]), "a date such as 2024-05-31") from None
     return np.array(days)
+
+
+def _date_parts(found: re.Match[str], day_first: bool) -> list[int]:
+    """Year, month and day of a date."""
+    text = found["date"]
+    if found["compact"]:
+        return [int(text[:4]), int(text[4:6]), int(text[6:])]
+    parts = re.split(r"[-./ ]+", text)
+    if found["named"]:
+        day, name, year = parts
+        return [int(year), MONTHS[name[:3].lower()], int(day)]
+    numbers = [int(part) for part in parts]
+    if not found["year_last"]:
+        return numbers
+    if day_first or "." in text:
+        return numbers[::-1]
+    month, day_of_month, last = numbers
+    return [last, month, day_of_month]
 
 
 def _day_first(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> bool:
@@ -288,15 +320,19 @@ def _day_first(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -
     Dates between points are written in countries that begin with the day. Where nothing decides and there are several
     dates, the time between them is not known.
     """
-    dates = {m["date"]: i for i, m in reversed([*enumerate(moments)]) if m["year_last"] and "." not in m["date"]}
-    parts = {text: [int(part) for part in re.split(r"[-/]", text)[:2]] for text in dates}
+    rows: dict[str, int] = {}
+    for i, found in enumerate(moments):
+        if found["year_last"] and "." not in found["date"]:
+            rows.setdefault(found["date"], i)
+    parts = {text: [int(part) for part in re.split(r"[-/]", text)[:2]] for text in rows}
     if any(second > _LAST_MONTH for _, second in parts.values()):
         return False
     if any(first > _LAST_MONTH for first, _ in parts.values()):
         return True
-    unclear = [text for text, (first, second) in parts.items() if first != second]
-    if unclear and len(dates) > 1:
-        row = min(dates[text] for text in unclear)
-        found = f"{moments[row]['date']!r}, which may begin with the day or with the month"
-        raise table.complain(table.rows[row].line, column, found, "a date such as 2024-05-31, or readings of one day")
+    unclear = [rows[text] for text, (first, second) in parts.items() if first != second]
+    if unclear and len(rows) > 1:
+        row = min(unclear)
+        found_date = f"{moments[row]['date']!r}, which may begin with the day or with the month"
+        expected = "a date such as 2024-05-31, or readings of one day"
+        raise table.complain(table.rows[row].line, column, found_date, expected)
     return True

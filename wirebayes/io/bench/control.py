@@ -113,31 +113,47 @@ def trend_by_chance(groups: Sequence[Rows], values: Floats) -> float:
     """
     along, squares, left, free = [], [], 0.0, 0
     for rows in groups:
-        blocks = np.array([part.mean() for part in np.array_split(values[rows], min(len(rows), BLOCKS))])
+        blocks = _block_means(values[rows])
         place = np.log1p(np.arange(len(blocks)))
         place -= place.mean()
         away = blocks - blocks.mean()
-        along.append(float(place @ away))
-        squares.append(float(place @ place))
-        left += float(away @ away) - along[-1] ** 2 / squares[-1]
+        slope, square = float(place @ away), float(place @ place)
+        left += float(away @ away) - slope**2 / square
         free += len(blocks) - 2
+        along.append(slope)
+        squares.append(square)
     explained = np.array(along) ** 2 / np.array(squares)
-    if not explained.any():
+    total = float(explained.sum())
+    if total == 0.0:
         return 1.0
-    variance = max(left, ROUNDING * float(explained.sum())) / free
-    one_way = 2.0 * float(stdtr(free, -abs(sum(along)) / np.sqrt(sum(squares) * variance)))
+    variance = max(left, ROUNDING * total) / free
+    error = np.sqrt(sum(squares) * variance)
+    one_way = 2.0 * float(stdtr(free, -abs(sum(along)) / error))
     either = float(fdtrc(len(groups), free, explained.mean() / variance))
     return min(1.0, 2.0 * min(one_way, either))
+
+
+def _block_means(values: Floats) -> Floats:
+    """Means of neighbouring readings of a hold, of which there are no more than `BLOCKS`."""
+    count = min(len(values), BLOCKS)
+    return np.array([block.mean() for block in np.array_split(values, count)])
 
 
 def drift(groups: Sequence[Rows], values: Floats) -> float:
     """By how much of a step values drift in a hold, counted along the step that led to it, on average."""
     levels = np.array([np.median(values[rows]) for rows in groups])
-    steps = np.diff(levels, prepend=0.0 if len(groups) == 1 else levels[0] - np.sign(levels[-1] - levels[0]))
-    size = float(np.median(np.abs(steps[1:]))) if len(groups) > 1 else abs(float(levels[0]))
-    changes = [
-        np.mean(values[rows[-third:]]) - np.mean(values[rows[:third]])
-        for rows in groups
-        for third in (max(1, len(rows) // THIRD),)
-    ]
-    return abs(float(np.mean(np.sign(steps) * changes))) / size if size else 0.0
+    if len(groups) == 1:
+        steps, size = levels, abs(float(levels[0]))
+    else:
+        before_first = levels[0] - np.sign(levels[-1] - levels[0])
+        steps = np.diff(levels, prepend=before_first)
+        size = float(np.median(np.abs(steps[1:])))
+    if not size:
+        return 0.0
+    changes = []
+    for rows in groups:
+        third = max(1, len(rows) // THIRD)
+        begin, end = np.mean(values[rows[:third]]), np.mean(values[rows[-third:]])
+        changes.append(end - begin)
+    along = np.sign(steps) * changes
+    return abs(float(np.mean(along))) / size

@@ -5,6 +5,7 @@ from pathlib import Path
 from wirebayes.errors import InputError
 from wirebayes.io.bench.numerals import plain_number
 from wirebayes.io.bench.sheet import Sheet, SheetRow, is_value
+from wirebayes.io.bench.undecided import Decimal
 
 _SIGNATURE = "LabVIEW Measurement"
 _END = "***End_of_Header***"
@@ -68,7 +69,7 @@ def _readings(split: list[list[str]], header: int) -> list[SheetRow]:
 def _clocks(split: list[list[str]]) -> dict[int, str]:
     """The time of each line of readings, where their preamble says when they begin and how far apart they are."""
     comma = any(cells[0] == "Decimal_Separator" and "," in "".join(cells[1:]) for cells in split)
-    sign = "comma" if comma else "point"
+    sign: Decimal = "comma" if comma else "point"
     times = dict[int, str]()
     begin, step = set[str](), set[str]()
     head = 0
@@ -80,8 +81,9 @@ def _clocks(split: list[list[str]]) -> dict[int, str]:
         elif cells[0] == _END or cells[0].startswith(_TIMES):
             head = i
         elif len(begin) == len(step) == 1:
-            first = plain_number(*begin, sign)
-            apart = plain_number(*step, sign)
+            (first_text,), (apart_text,) = begin, step
+            first = plain_number(first_text, sign)
+            apart = plain_number(apart_text, sign)
             if first and apart:
                 time = f"{float(first) + (i - head - 1) * float(apart):.6f}"
                 times[i] = time.replace(".", ",") if comma else time

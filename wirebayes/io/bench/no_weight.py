@@ -33,19 +33,27 @@ def without_weight(holds: Cut, tension_N: Floats) -> Cut:
     if not any(free) or not loaded:
         return holds
     first, end = loaded[0], loaded[-1] + 1
-    rests = [i for i in range(first, end) if free[i]]
+    kept = slice(first, end)
     nothing = NEXT_TO_NOTHING * min(holds.setting[i] for i in loaded)
-    setting = [nothing if is_free else level for is_free, level in zip(free, holds.setting, strict=True)]
+    setting = [*holds.setting]
+    rests = []
+    for i in range(first, end):
+        if free[i]:
+            setting[i] = nothing
+            rests.append(holds.number[i])
+    last_number = holds.number[end - 1]
+    cycles = [each for each in holds.cycles if each.before_hold <= last_number]
+    notes = _notes(first, len(free) - end, rests)
     return replace(
         holds,
-        rows=holds.rows[first:end],
-        number=holds.number[first:end],
-        setting=setting[first:end],
-        time_s=holds.time_s[first:end],
-        end_s=holds.end_s[first:end],
-        notes=[*holds.notes, *_notes(first, len(free) - end, [holds.number[i] for i in rests])],
-        unread=frozenset(holds.number[i] for i in rests),
-        cycles=tuple(cycles for cycles in holds.cycles if cycles.before_hold <= holds.number[end - 1]),
+        rows=holds.rows[kept],
+        number=holds.number[kept],
+        setting=setting[kept],
+        time_s=holds.time_s[kept],
+        end_s=holds.end_s[kept],
+        notes=holds.notes + notes,
+        unread=frozenset(rests),
+        cycles=tuple(cycles),
     )
 
 

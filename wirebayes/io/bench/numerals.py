@@ -8,8 +8,6 @@ hour and a half, and ``14.06`` a day.
 import re
 from collections.abc import Sequence
 
-import numpy as np
-
 from wirebayes.io.bench.sheet import is_number
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Decimal, Undecided
@@ -23,7 +21,8 @@ _COUNT = re.compile(
 )
 _SELDOM = 0.1  # of the cells of a column: a misprint is no habit
 _BEYOND = 10.0  # times the largest of the other numbers, which readings do not grow by from one to the next
-_SIGNS: dict[Decimal, str] = {"point": ".", "comma": ","}
+_SIGNS: dict[Decimal, str] = {"comma": ",", "point": "."}
+_OTHER: dict[Decimal, Decimal] = {"comma": "point", "point": "comma"}
 
 
 def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None = None) -> Decimal:
@@ -43,20 +42,25 @@ def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None
     """
     if stated is not None:
         return stated
-    cells = [(row.line, column, row.cell(column)) for row in table.rows for column in columns]
-    signed = [(line, column, cell) for line, column, cell in cells if is_number(cell) and ("," in cell or "." in cell)]
-    if any(_proves(cell, "comma") for _, _, cell in signed):
-        return "comma"
-    if any(_proves(cell, "point") for _, _, cell in signed):
-        return "point"
+    signed = []
+    for row in table.rows:
+        for column in columns:
+            cell = row.cell(column)
+            if ("," in cell or "." in cell) and is_number(cell):
+                signed.append((row.line, column, cell))
+    for sign in _SIGNS:
+        if any(_proves(cell, sign) for _, _, cell in signed):
+            return sign
     # what is left could be grouped thousands: trusted only for a point that no habit of commas makes doubtful
     semicolons = "semicolon" in table.sheet.described
     doubtful = next((found for found in signed if "," in found[2] or semicolons), None)
-    if doubtful is None or table.sheet.lettered and "," not in doubtful[2]:
+    if doubtful is None:
         return "point"
     line, column, cell = doubtful
-    sign: Decimal = "comma" if "," in cell else "point"
-    other: Decimal = "point" if sign == "comma" else "comma"
+    if table.sheet.lettered and "," not in cell:
+        return "point"
+    sign = "comma" if "," in cell else "point"
+    other = _OTHER[sign]
     whole, fraction = plain_number(cell, other), plain_number(cell, sign)
     raise Undecided(
         f"{table.sheet.path}, {table.place(line, column)}: found {cell!r}, which is {fraction} or {whole}",
@@ -80,24 +84,39 @@ def check_signs(table: RawTable, columns: Sequence[int], decimal: Decimal) -> No
     ------
     InputError
     """
-    other: Decimal = "point" if decimal == "comma" else "comma"
-    either = re.compile(_EITHER.format(sign=re.escape(_SIGNS[other])))
+    other = _SIGNS[_OTHER[decimal]]
     for column in columns:
         cells = table.column(column)
-        if not any(_SIGNS[other] in cell for cell in cells):
+        if not any(other in cell for cell in cells):
             continue  # as in most long files
-        grouped = [i for i, cell in enumerate(cells) if either.fullmatch(cell)]
-        others = [cell for cell in cells if not either.fullmatch(cell)]
-        with_fraction = sum(_SIGNS[decimal] in cell for cell in others)
-        if not 0 < len(grouped) < _SELDOM * len(cells) or 2 * with_fraction < len(others):
-            continue
-        numbers = [float(number) for cell in others if (number := plain_number(cell, decimal)) is not None]
-        largest = float(np.abs(numbers).max(initial=0.0))
-        for i in grouped:
-            whole, fraction = (abs(float(plain_number(cells[i], sign) or 0.0)) for sign in (decimal, other))
-            if whole > _BEYOND * largest >= _BEYOND * fraction:
-                expected = f"the decimal {decimal}, as elsewhere in the file"
-                raise table.complain(table.rows[i].line, column, repr(cells[i]), expected)
+        row = _far_beyond(cells, decimal)
+        if row is not None:
+            expected = f"the decimal {decimal}, as elsewhere in the file"
+            raise table.complain(table.rows[row].line, column, repr(cells[row]), expected)
+
+
+def _far_beyond(cells: Sequence[str], decimal: Decimal) -> int | None:
+    """The first of some seldom numbers with the other sign that is too large as thousands, and not as a fraction."""
+    other = _OTHER[decimal]
+    either = re.compile(_EITHER.format(sign=re.escape(_SIGNS[other])))
+    grouped = [i for i, cell in enumerate(cells) if either.fullmatch(cell)]
+    others = [cell for cell in cells if not either.fullmatch(cell)]
+    with_fraction = sum(_SIGNS[decimal] in cell for cell in others)
+    if not 0 < len(grouped) < _SELDOM * len(cells) or 2 * with_fraction < len(others):
+        return None
+    sizes = [_size(cell, decimal) for cell in others]
+    limit = _BEYOND * max(sizes, default=0.0)
+    for i in grouped:
+        whole, fraction = _size(cells[i], decimal), _size(cells[i], other)
+        if whole > limit >= _BEYOND * fraction:
+            return i
+    return None
+
+
+def _size(cell: str, decimal: Decimal) -> float:
+    """How large the number in a cell is; zero where there is none."""
+    number = plain_number(cell, decimal)
+    return 0.0 if number is None else abs(float(number))
 
 
 def is_count(cell: str) -> bool:
@@ -107,7 +126,7 @@ def is_count(cell: str) -> bool:
 
 def _proves(cell: str, decimal: Decimal) -> bool:
     """Whether a number can be read with this decimal sign only."""
-    sign, other = _SIGNS[decimal], _SIGNS["point" if decimal == "comma" else "comma"]
+    sign, other = _SIGNS[decimal], _SIGNS[_OTHER[decimal]]
     if sign in cell and other in cell:
         return cell.rindex(sign) > cell.rindex(other)
     if cell.count(other) > 1:  # 1.234.567
@@ -120,10 +139,15 @@ def plain_number(cell: str, decimal: Decimal) -> str | None:
     if not is_number(cell):
         return None
     text = _OTHER_GROUPS.sub("", cell.replace("\u2212", "-"))
-    sign, other = _SIGNS[decimal], _SIGNS["point" if decimal == "comma" else "comma"]
+    sign, other = _SIGNS[decimal], _SIGNS[_OTHER[decimal]]
     if other in text:
         whole, _, fraction = text.partition(sign)
-        if other in fraction or not re.fullmatch(_GROUPED.format(sign=re.escape(other)), whole):
+        grouped = _GROUPED.format(sign=re.escape(other))
+        if other in fraction or not re.fullmatch(grouped, whole):
             return None
-        text = whole.replace(other, "") + (sign + fraction if fraction else "")
-    return None if text.count(sign) > 1 else text.replace(sign, ".")
+        text = whole.replace(other, "")
+        if fraction:
+            text += sign + fraction
+    if text.count(sign) > 1:
+        return None
+    return text.replace(sign, ".")
