@@ -332,17 +332,22 @@ def _check_sign(table: CsvTable, holds: Sequence[Hold]) -> None:
     tension = np.concatenate([hold.tension_N for hold in holds])
     means = np.array([hold.tension_N.mean() for hold in holds])
     place = np.array([hold.displacement_mm for hold in holds])
-    if len(holds) < 3 or np.ptp(place) == 0 or np.ptp(means) == 0 or -tension.min() < PUSH * max(tension.max(), 0.0):
+    if len(holds) < 3 or np.ptp(place) == 0 or np.ptp(means) == 0:
         return
-    within = np.sqrt(np.mean([hold.tension_N.var() for hold in holds]))
+    largest_pull = max(tension.max(), 0.0)
+    if -tension.min() < PUSH * largest_pull:
+        return
+    variances = [hold.tension_N.var() for hold in holds]
+    within = np.sqrt(np.mean(variances))
     follows = float(np.corrcoef(place, means)[0, 1])
-    if abs(follows) > FOLLOWS and np.ptp(means) > PUSH * within:
-        row = int(tension.argmin())
-        change = "change the sign of tension_N" if follows < 0 else "undo the zeroing of tension_N"
-        if follows > 0 and place.max() <= 0:  # a machine that counts compression positive
-            change = "change the signs of displacement_mm and of tension_N"
-        expected = f"a pull counted positive: {change} (a slack wire reads 0 N)"
-        raise table.complain(row, "tension_N", table.cell(row, "tension_N"), expected)
+    if abs(follows) <= FOLLOWS or np.ptp(means) <= PUSH * within:
+        return
+    change = "change the sign of tension_N" if follows < 0 else "undo the zeroing of tension_N"
+    if follows > 0 and place.max() <= 0:  # a machine that counts compression positive
+        change = "change the signs of displacement_mm and of tension_N"
+    row = int(tension.argmin())
+    expected = f"a pull counted positive: {change} (a slack wire reads 0 N)"
+    raise table.complain(row, "tension_N", table.cell(row, "tension_N"), expected)
 
 
 PUSH = 5.0  # times the pull, and times the readings' spread in a hold: far beyond a sensor's noise or offset

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -44,14 +45,14 @@ def check_direction(table: RawTable, column: Column, experiment: Experiment, map
         What the user says of columns.
     """
     holds = experiment.recorded_holds
-    place, pull = (
-        np.array(v) for v in zip(*((np.mean(h.displacement_mm), np.mean(h.tension_N)) for h in holds), strict=True)
-    )
+    place = np.array([np.mean(hold.displacement_mm) for hold in holds])
+    pull = np.array([np.mean(hold.tension_N) for hold in holds])
     if not falls(place, pull):
         return
+    first_line = table.rows[0].line
     as_it_stands = f"{column.header}={column.role} [{UNITS[column.role]}]"
     if experiment.control == "force" and as_it_stands not in mapping and _step_down(experiment):
-        where = f"{table.sheet.path}, {table.place(table.rows[0].line, column.index)}"
+        where = f"{table.sheet.path}, {table.place(first_line, column.index)}"
         found = f"found displacements that fall from {place.max():g} to {place.min():g} mm as the weights rise"
         answers = {_turned(column): "it counts down", f"--map {as_it_stands}": "as it stands"}
         raise Undecided(f"{where}: {found}", "how it counts", answers)
@@ -59,15 +60,17 @@ def check_direction(table: RawTable, column: Column, experiment: Experiment, map
         return
     found = f"displacements down to {place.min():g} mm, the further down the more tension"
     expected = f"what lengthens the wire counted up; change the sign with {quoted(_turned(column))}"
-    raise table.complain(table.rows[0].line, column.index, found, expected)
+    raise table.complain(first_line, column.index, found, expected)
 
 
 def _step_down(experiment: Experiment) -> bool:
     """Whether displacements jump down at every larger weight, and up at every smaller one."""
-    holds = experiment.recorded_holds
-    jumps = np.array([b.displacement_mm[0] - a.displacement_mm[-1] for a, b in zip(holds, holds[1:], strict=False)])
-    moves = np.array([b.setting - a.setting for a, b in zip(holds, holds[1:], strict=False)])
-    return bool((jumps * moves <= 0.0).all())
+    for before, after in pairwise(experiment.recorded_holds):
+        jump = after.displacement_mm[0] - before.displacement_mm[-1]
+        move = after.setting - before.setting
+        if jump * move > 0.0:
+            return False
+    return True
 
 
 def _turned(column: Column) -> str:
@@ -166,7 +169,9 @@ def toml_of(experiment: Experiment, comments: Sequence[str] = (), unrecorded: Se
         Holds without a record.
     """
     lines = [f"# {comment}" for comment in comments]
-    lines += ["[[experiment]]", f"name = {_string(experiment.name)}", f"material = {_string(experiment.material)}"]
+    lines.append("[[experiment]]")
+    lines.append(f"name = {_string(experiment.name)}")
+    lines.append(f"material = {_string(experiment.material)}")
     lines.append(f"length_mm = {experiment.length_mm!r}")
     if experiment.control != "displacement":
         lines.append(f"control = {_string(experiment.control)}")
@@ -174,9 +179,15 @@ def toml_of(experiment: Experiment, comments: Sequence[str] = (), unrecorded: Se
         lines.append(f"{RESOLUTION[experiment.control]} = {experiment.resolution!r}")
     lines.append(f"readings = {_string(experiment.name + '.csv')}")
     if unrecorded:
-        entries = (", ".join(f"{key} = {value!r}" for key, value in entry.items()) for entry in unrecorded)
-        lines.append(f"unrecorded_holds = [{', '.join(f'{{ {entry} }}' for entry in entries)}]")
+        entries = ", ".join(map(_toml_of_entry, unrecorded))
+        lines.append(f"unrecorded_holds = [{entries}]")
     return "\n".join(lines) + "\n"
+
+
+def _toml_of_entry(entry: Entry) -> str:
+    """A hold without a record, as a table in a line."""
+    values = ", ".join(f"{key} = {value!r}" for key, value in entry.items())
+    return f"{{ {values} }}"
 
 
 def _string(text: str) -> str:

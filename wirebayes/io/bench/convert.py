@@ -152,15 +152,15 @@ def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted
     table = with_joined_parts(with_whole_seconds(table, choices.mapping), choices.mapping)
     table = with_dates(table, choices.time_since)
     tables = specimen_tables(table, choices.mapping, choices.specimens)
-    if len(tables) > 1:
-        names = _names_of([each.specimen for each, _ in tables], about)
-        of_each = [replace(about, name=name) for name in names]
-        return [
-            _convert(*recorded_in(each, own, said := replace(choices, mapping=mapping)), own, said)
-            for (each, mapping), own in zip(tables, of_each, strict=True)
-        ]
-    ((each, mapping),) = tables
-    return _one_below_another(each, about, replace(choices, mapping=mapping))
+    if len(tables) == 1:
+        ((only, mapping),) = tables
+        return _one_below_another(only, about, replace(choices, mapping=mapping))
+    names = _names_of([each.specimen for each, _ in tables], about)
+    made = []
+    for (each, mapping), name in zip(tables, names, strict=True):
+        said = replace(choices, mapping=mapping)
+        made.append(_of_specimen(each, replace(about, name=name), said))
+    return made
 
 
 def _one_below_another(table: RawTable, about: About, choices: Choices) -> list[Converted]:
@@ -170,8 +170,13 @@ def _one_below_another(table: RawTable, about: About, choices: Choices) -> list[
     if len(tables) == 1:
         return [_convert(recorded, notes, about, choices)]
     names = _names_of([each.specimen for each in tables], about)
-    of_each = [replace(about, name=name) for name in names]
-    return [_convert(*recorded_in(each, own, choices), own, choices) for each, own in zip(tables, of_each, strict=True)]
+    return [_of_specimen(each, replace(about, name=name), choices) for each, name in zip(tables, names, strict=True)]
+
+
+def _of_specimen(table: RawTable, about: About, choices: Choices) -> Converted:
+    """The experiment of a table that holds one specimen."""
+    recorded, notes = recorded_in(table, about, choices)
+    return _convert(recorded, notes, about, choices)
 
 
 def _names_of(specimens: Sequence[str], about: About) -> list[str]:
@@ -195,12 +200,17 @@ def _convert(recorded: Recorded, notes: list[str], about: About, choices: Choice
     holds = cut(recorded.readings(control), choices.time_since)
     if control == "force":
         holds = without_weight(holds, values["tension"])
-    holds, thin = _thin(holds)
-    notes += left_out + _what_was_set(control) + recorded.numbering + holds.notes + thin + _missing_holds(holds)
-    resolution = _resolution(columns[READS[control]], recorded.texts[READS[control]])
+    holds, thinned = _thin(holds)
+    read = READS[control]
+    resolution = _resolution(columns[read], recorded.texts[read])
+    notes += left_out
+    notes += _what_was_set(control)
+    notes += recorded.numbering
+    notes += holds.notes
+    notes += thinned
+    notes += _missing_holds(holds)
     if resolution:
-        read, unit = READS[control], UNITS[READS[control]]
-        notes.append(f"{read}s are written in steps of {resolution:.3g} {unit}: that is their resolution")
+        notes.append(f"{read}s are written in steps of {resolution:.3g} {UNITS[read]}: that is their resolution")
     header = (*REQUIRED, *(OPTIONAL if "temperature" in values else ()))
     rows, origin = _rows(holds, values, control)
     unrecorded = entries_of(holds.cycles, control)
@@ -222,16 +232,19 @@ def _control(recorded: Recorded) -> Control:
     """What was set, as the readings show it."""
     unit = recorded.columns["tension"].unit
     is_mass = unit is not None and unit.is_mass
-    by_tension, by_displacement = (stretches(recorded.readings(control)) for control in ("force", "displacement"))
-    x = recorded.values["displacement"]
+    by_tension = stretches(recorded.readings("force"))
+    by_displacement = stretches(recorded.readings("displacement"))
+    x, tension = recorded.values["displacement"], recorded.values["tension"]
     exact = len(by_displacement) > 1 and all(np.ptp(x[rows]) == 0.0 for rows in by_displacement)
-    if (exact and not is_mass) or len(by_tension) < min(2, len(by_displacement)):
+    if exact and not is_mass:
+        return "displacement"
+    if len(by_tension) < min(2, len(by_displacement)):
         return "displacement"
     place = f"{recorded.table.sheet.path}, line {recorded.table.header_line}"
-    if not by_tension:
-        pairs = stretches(recorded.readings("force"), fewest=2)
-        return recognised_of_pairs(pairs, x, recorded.values["tension"], is_mass, place)
-    return recognised(by_tension, x, recorded.values["tension"], is_mass, place)
+    if by_tension:
+        return recognised(by_tension, x, tension, is_mass, place)
+    pairs = stretches(recorded.readings("force"), fewest=2)
+    return recognised_of_pairs(pairs, x, tension, is_mass, place)
 
 
 _NOT_READ = (

@@ -68,24 +68,28 @@ def dated(table: RawTable) -> RawTable:
     table : RawTable
     """
     named = [i for i, name in enumerate(table.header) if name]
-    dates = [i for i in named if _are_dates(table, i)]
-    days = [i for i in named if not dates and _are_days(table, i)]
     clocks = [i for i in named if _are_clocks(table, i)]
-    if len(dates + days) != 1 or len(clocks) != 1:
+    dates = [i for i in named if _are_dates(table, i)]
+    are_days = not dates
+    if are_days:
+        dates = [i for i in named if _are_days(table, i)]
+    if len(dates) != 1 or len(clocks) != 1:
         return table
-    (of_date,), (of_clock,) = dates + days, clocks
+    (of_date,), (of_clock,) = dates, clocks
     rows, last = [], ""
     for row in table.rows:
         last = row.cell(of_date).removesuffix(_MIDNIGHT).strip() or last
-        of_row = str(_FIRST_DAY + timedelta(days=int(last))) if days else last
         cells = list(row.cells)
-        if row.cell(of_clock):
-            cells[of_clock] = f"{of_row} {row.cell(of_clock)}"
+        clock = row.cell(of_clock)
+        of_row = str(_FIRST_DAY + timedelta(days=int(last))) if are_days else last
+        if clock:
+            cells[of_clock] = f"{of_row} {clock}"
         rows.append(replace(row, cells=tuple(cells)))
-    header = tuple("" if i == of_date else name for i, name in enumerate(table.header))
-    described = f"{table.sheet.described}, {'days' if days else 'dates'} from {table.header[of_date]!r}"
-    sheet = replace(table.sheet, described=described)
-    return replace(table, sheet=sheet, header=header, rows=tuple(rows))
+    header = [*table.header]
+    header[of_date] = ""
+    what = "days" if are_days else "dates"
+    sheet = replace(table.sheet, described=f"{table.sheet.described}, {what} from {table.header[of_date]!r}")
+    return replace(table, sheet=sheet, header=tuple(header), rows=tuple(rows))
 
 
 def _are_dates(table: RawTable, column: int) -> bool:

@@ -44,6 +44,7 @@ def check_itself(table: RawTable, index: int, role: Role, unit: Unit) -> None:
     header = table.header[index]
     name = name_and_unit(header, role)[0]
     map_to = f"--map {header}={role}"
+    as_it_is = f"{map_to} [{unit.text}]"
     place = f"{table.sheet.path}, {table.place(table.header_line, index)}"
     found = _FACTOR.search(name)
     if found is not None:
@@ -51,18 +52,18 @@ def check_itself(table: RawTable, index: int, role: Role, unit: Unit) -> None:
         answers = {
             f"{map_to} [{times:g} {unit.text}]": f"one is {times:g} {unit.text}",
             f"{map_to} [{1 / times:g} {unit.text}]": f"{times:g} are one {unit.text}",
-            f"{map_to} [{unit.text}]": f"it is in {unit.text} already",
+            as_it_is: f"it is in {unit.text} already",
         }
         raise Undecided(f"{place}: found {found[0].strip()!r} beside the name", "what it means", answers)
     doubtful = words_in(name) & _WORDS.get(role, set())
     if doubtful:
-        word = min(doubtful)
-        answers = {f"{map_to} [{unit.text}]": f"it is the {role}, whatever its name"}
-        raise Undecided(f"{place}: found {word!r} in the name", f"that it is the {role} itself", answers)
+        found_word = f"found {min(doubtful)!r} in the name"
+        answers = {as_it_is: f"it is the {role}, whatever its name"}
+        raise Undecided(f"{place}: {found_word}", f"that it is the {role} itself", answers)
     if role in ("displacement", "tension") and _are_signed(table, index):
         cell = next(cell for cell in table.column(index) if cell.startswith("+"))
-        answers = {f"{map_to} [{unit.text}]": f"it is the {role} itself, and no change of it"}
         found_sign = f"found {cell}, with a sign as before a change, and in no other column"
+        answers = {as_it_is: f"it is the {role} itself, and no change of it"}
         raise Undecided(f"{place}: {found_sign}", f"that it is the {role}", answers)
 
 

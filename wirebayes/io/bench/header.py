@@ -67,23 +67,35 @@ def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
     in_brackets = unit_in_header(_IN.sub("", bracket[2]), role) if bracket else None
     if bracket and in_brackets:
         return bracket[1], in_brackets
-    for inside in _BRACKET.finditer(header):  # Force (N) run 1
-        unit = unit_in_header(inside[1].strip(), role)
-        if unit and inside.start() and not _OPERATOR.match(header[inside.end() :]):
-            return f"{header[: inside.start()].strip()} {header[inside.end() :].strip()}".strip(), unit
+    found = _unit_in_a_bracket(header, role)
+    if found is not None:
+        return found
     if bracket and not any(unit_in_header(bracket[2], other) for other in ROLES):  # Force, N (serial number 7)
         name, unit = name_and_unit(bracket[1], role)
         if unit:
             return f"{name} ({bracket[2]})", unit
     for sign in _BEFORE_UNIT.finditer(header):
         unit = unit_in_header(header[sign.end() :], role)
-        if unit and sign.start() and not _DIVIDED.search(header[: sign.start()]):
-            return header[: sign.start()], unit
-    whole = announced(header) if role == "time" else None
-    if whole:
-        return header, Unit(header, clock=whole)
-    first = _UNIT_FIRST.match(header) if role == "time" else None
+        name = header[: sign.start()]
+        if unit and name and not _DIVIDED.search(name):
+            return name, unit
+    if role != "time":
+        return header, None
+    clock = announced(header)
+    if clock:
+        return header, Unit(header, clock=clock)
+    first = _UNIT_FIRST.match(header)
     return header, quantity_unit(first[1], role) if first else None
+
+
+def _unit_in_a_bracket(header: str, role: Role) -> tuple[str, Unit] | None:
+    """A header without the first of its brackets that holds a unit, and the unit: ``Force (N) run 1``."""
+    for inside in _BRACKET.finditer(header):
+        unit = unit_in_header(inside[1].strip(), role)
+        before, behind = header[: inside.start()], header[inside.end() :]
+        if unit and before and not _OPERATOR.match(behind):
+            return f"{before.strip()} {behind.strip()}".strip(), unit
+    return None
 
 
 def is_of(table: RawTable, index: int, role: Role) -> bool:

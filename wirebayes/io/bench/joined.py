@@ -72,14 +72,19 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
         found = f"a list, and files in the order {_names(given)}"
         raise InputError(f"--each-file: found {found}, expected both in the order of their {by}: {names}")
     first = tables[0]
-    header, units = (*_without_numbers(first), HOLD), (*first.units, "")
+    header, units = [*_without_numbers(first), HOLD], [*first.units, ""]
+    of_files = [[str(number)] for number in range(1, len(tables) + 1)]
     if role:
-        header, units = (*header, role), (*units, settings[0][1])
-        notes.append(f"the {role} of each hold from {source}: {listed([' '.join(each) for each in settings])}")
-    of_files = [(str(i + 1), settings[i][0]) if role else (str(i + 1),) for i in range(len(tables))]
+        header.append(role)
+        units.append(settings[0][1])
+        for of_file, (number, _) in zip(of_files, settings, strict=True):
+            of_file.append(number)
+        listed_settings = listed([" ".join(each) for each in settings])
+        notes.append(f"the {role} of each hold from {source}: {listed_settings}")
     rows, pieces = _rows(tables, of_files)
     sheet = replace(first.sheet, path=path_of_all([table.sheet.path for table in tables]))
-    return replace(first, sheet=sheet, header=header, units=units, rows=rows, pieces=pieces), notes
+    joined = replace(first, sheet=sheet, header=tuple(header), units=tuple(units), rows=rows, pieces=pieces)
+    return joined, notes
 
 
 def _names(tables: Sequence[RawTable]) -> str:
@@ -89,14 +94,18 @@ def _names(tables: Sequence[RawTable]) -> str:
 def _in_order(tables: Sequence[RawTable]) -> tuple[list[RawTable], str]:
     """The tables as the holds followed each other, and by what of them that is known."""
     tables = sorted(tables, key=lambda table: _as_people_count(table.sheet.path))
-    moments = [begun for table in tables if (begun := _first_moment(dated(table))) is not None]
-    if len(moments) < len(tables):
-        return tables, "names"
-    return [tables[i] for i in np.argsort(moments, kind="stable")], "dates"
+    moments = []
+    for table in tables:
+        begun = _first_moment(dated(table))
+        if begun is None:
+            return tables, "names"
+        moments.append(begun)
+    in_order = np.argsort(moments, kind="stable")
+    return [tables[i] for i in in_order], "dates"
 
 
 def _rows(
-    tables: Sequence[RawTable], of_files: Sequence[tuple[str, ...]]
+    tables: Sequence[RawTable], of_files: Sequence[Sequence[str]]
 ) -> tuple[tuple[SheetRow, ...], tuple[tuple[int, str], ...]]:
     """The rows of all files with more cells, those of their file, and the line after which each file begins."""
     rows: list[SheetRow] = []
@@ -124,13 +133,25 @@ def name_settings(paths: Sequence[Path]) -> list[tuple[str, str]]:
     ----------
     paths : sequence of Path
     """
-    found = [_MEASURE.findall(path.stem) for path in paths]
-    known = [Counter((n, u) for n, u in each if any(quantity_unit(u, role) for role in _SETTINGS)) for each in found]
+    known = [_measures_of_settings(path.stem) for path in paths]
     shared = reduce(and_, known)
-    own = [[*(each - shared).elements()] for each in known]
-    if any(len(each) != 1 for each in own) or len({each[0][1] for each in own}) > 1:
-        return []
-    return [each[0] for each in own]
+    settings = []
+    for each in known:
+        own = [*(each - shared).elements()]
+        if len(own) != 1:
+            return []
+        settings += own
+    units = {unit for _, unit in settings}
+    return settings if len(units) <= 1 else []
+
+
+def _measures_of_settings(text: str) -> Counter[tuple[str, str]]:
+    """Numbers and units in a text that may be those of settings, and how often each stands there."""
+    known: Counter[tuple[str, str]] = Counter()
+    for number, unit in _MEASURE.findall(text):
+        if any(quantity_unit(unit, role) for role in _SETTINGS):
+            known[number, unit] += 1
+    return known
 
 
 def lacking(table: RawTable, mapping: Sequence[str]) -> list[Role]:
@@ -142,12 +163,12 @@ def lacking(table: RawTable, mapping: Sequence[str]) -> list[Role]:
     mapping : sequence of str
     """
     said = {text.rpartition("=")[2].split(" ")[0] for text in mapping}
-    columns = range(len(table.header))
-    return [
-        role
-        for role in _SETTINGS
-        if role not in said and not any(is_of(table, i, role) or is_called_of_sample(table, i, role) for i in columns)
-    ]
+    lacks: list[Role] = []
+    for role in _SETTINGS:
+        of_role = (is_of(table, i, role) or is_called_of_sample(table, i, role) for i in range(len(table.header)))
+        if role not in said and not any(of_role):
+            lacks.append(role)
+    return lacks
 
 
 def _settings(
@@ -155,28 +176,35 @@ def _settings(
 ) -> tuple[list[tuple[str, str]], Role | None, str]:
     """What was set in each file, where no column says it: number and unit; the quantity; and who says so."""
     missing = lacking(tables[0], mapping)
+    paths = [table.sheet.path for table in tables]
     stated = [] if each_file == HOLD else _stated(each_file, len(tables))
     if not missing and stated:
-        found = f"{each_file!r} and columns of displacement and tension in {tables[0].sheet.path.name}"
+        found = f"{each_file!r} and columns of displacement and tension in {paths[0].name}"
         raise InputError(f"--each-file: found {found}, expected {HOLD}")
     if len(missing) != 1:
         return [], None, ""
     (role,) = missing
-    settings = stated or name_settings([table.sheet.path for table in tables])
+    settings = stated or name_settings(paths)
     if not settings or not quantity_unit(settings[0][1], role):
         example = "1 mm, 2 mm, …" if role == "displacement" else "5 kg, 10 kg, …"
-        paths = [table.sheet.path for table in tables]
         found = f"found no {role} in the columns or in the names of the files"
-        expected = f'--each-file "{example}", one for each of {listed([path.name for path in paths])}'
+        files = listed([path.name for path in paths])
+        expected = f'--each-file "{example}", one for each of {files}'
         raise InputError(f"{path_of_all(paths)}: {found}, expected {expected}")
-    return settings, role, "--each-file" if stated else "the names of the files"
+    source = "--each-file" if stated else "the names of the files"
+    return settings, role, source
 
 
 def _stated(each_file: str, count: int) -> list[tuple[str, str]]:
     """Settings that a user lists."""
-    found = [re.fullmatch(r"\s*([-+]?\d+(?:\.\d+)?)\s*(\S+)\s*", each) for each in each_file.split(",")]
-    settings = [(match[1], match[2]) for match in found if match]
-    if len(settings) < len(found) or len(settings) != count or len({unit for _, unit in settings}) > 1:
+    settings = []
+    for each in each_file.split(","):
+        match = re.fullmatch(r"\s*([-+]?\d+(?:\.\d+)?)\s*(\S+)\s*", each)
+        if match:
+            settings.append((match[1], match[2]))
+    units = {unit for _, unit in settings}
+    unread = each_file.count(",") + 1 - len(settings)
+    if unread or len(settings) != count or len(units) > 1:
         expected = f"{HOLD}, {TEST} or what was set in each of the {count} files, in one unit, as 1 mm, 2 mm"
         raise InputError(f"--each-file: found {each_file!r}, expected {expected}")
     return settings

@@ -60,21 +60,31 @@ def sheet_of_keyed(path: Path, lines: Sequence[str], encoding: str) -> Sheet:
     InputError
         A key has two units.
     """
-    units: dict[str, str] = {}
     read = [_pairs(line) for line in lines]
-    for number, pairs in enumerate(read, start=1):
-        for key, _, unit in pairs:
-            if units.setdefault(key, unit) != unit:
-                found = f"{key} in {unit or 'no unit'}"
-                raise InputError(f"{path}, line {number}: found {found}, expected {units[key] or 'none'} as before")
+    units = _units_of_keys(path, read)
     header = tuple(f"{key} [{unit}]" if unit else key for key, unit in units.items())
     rows = []
-    first = next(number for number, pairs in enumerate(read, start=1) if pairs)
+    headed = False
     for number, (line, pairs) in enumerate(zip(lines, read, strict=True), start=1):
-        if number == first:
+        if pairs and not headed:
             rows.append(SheetRow(number, header))
-        values = {key: value for key, value, _ in pairs}
-        cells = tuple(values.get(key, "") for key in units) if pairs else (line.strip(),)
+            headed = True
+        cells: tuple[str, ...] = (line.strip(),)
+        if pairs:
+            values = {key: value for key, value, _ in pairs}
+            cells = tuple(values.get(key, "") for key in units)
         if any(cells):
             rows.append(SheetRow(number, cells))
     return Sheet(path, tuple(rows), described="a name before each value", encoding=encoding)
+
+
+def _units_of_keys(path: Path, read: Sequence[list[tuple[str, str, str]]]) -> dict[str, str]:
+    """The unit of each key, empty where it has none."""
+    units: dict[str, str] = {}
+    for number, pairs in enumerate(read, start=1):
+        for key, _, unit in pairs:
+            known = units.setdefault(key, unit)
+            if known != unit:
+                found = f"{key} in {unit or 'no unit'}"
+                raise InputError(f"{path}, line {number}: found {found}, expected {known or 'none'} as before")
+    return units

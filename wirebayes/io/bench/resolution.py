@@ -28,16 +28,22 @@ def evident_step(numbers: Sequence[str]) -> float | None:
         In their unit; None where it is not evident.
     """
     values = {Decimal(text).normalize() for text in numbers}
-    if len(values) < FEWEST or any(len(value.as_tuple().digits) > MOST_DIGITS for value in values):
+    if len(values) < FEWEST:
         return None
-    places = max(-int(value.as_tuple().exponent) for value in values)
+    parts = [value.as_tuple() for value in values]
+    if max(len(part.digits) for part in parts) > MOST_DIGITS:
+        return None
+    places = max(-int(part.exponent) for part in parts)
     unit = Decimal(1).scaleb(-places)
     whole = [int(value / unit) for value in values]
     common = max(math.gcd(*whole), 1)
-    coarse = common if common ** -len(values) < BY_CHANCE else 1
+    by_chance = common ** -len(values)
+    coarse = common if by_chance < BY_CHANCE else 1
     step = float(unit * coarse)
-    if step > COARSEST * float(max(values) - min(values)):
+    span = float(max(values) - min(values))
+    if step > COARSEST * span:
         return None
     # one number of steps in ten ends in a zero: many more mean that the last place is not the display's
-    last = sum(number // coarse % 10 != 0 for number in whole) / len(whole)
-    return step if last >= 0.5 else None
+    steps = [number // coarse for number in whole]
+    with_last_digit = sum(count % 10 != 0 for count in steps)
+    return step if with_last_digit / len(steps) >= 0.5 else None

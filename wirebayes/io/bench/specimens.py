@@ -82,17 +82,30 @@ def specimen_tables(
         table.check_names()
         return [(table, tuple(mapping))]
     marks = _specimens(table, marked)
-    if len(marks) > 1 and stated is None and not marked.certain and _read_alike(table, marked, marks):
-        answers = {
-            "--specimens several": "specimens of their own",
-            "--specimens one": "one specimen, read by several sensors",
-        }
-        names = " and ".join(dict.fromkeys(table.header[i] for mark in marks[:2] for i in marked.own(mark)[:1]))
-        found = f"found {names} with nearly the same numbers, and the columns beside them too"
-        raise Undecided(f"{table.sheet.path}, line {table.header_line}: {found}", "what they are of", answers)
-    of_one = {mark for text in mapping if (mark := _meant(marked, text)) in marks and _role(text) != IGNORE}
-    tables = [_table_of(table, marked, mark, marks) for mark in marks if not of_one or mark in of_one]
+    in_doubt = len(marks) > 1 and stated is None and not marked.certain
+    if in_doubt and _read_alike(table, marked, marks):
+        raise _sensors_or_specimens(table, marked, marks)
+    wanted = _wanted(marked, marks, mapping)
+    tables = [_table_of(table, marked, mark, marks) for mark in wanted]
     return [(each, _mapping_of(marked, mark, tables, mapping)) for mark, each in tables]
+
+
+def _sensors_or_specimens(table: RawTable, marked: _Marked, marks: Sequence[str]) -> Undecided:
+    """The question whether columns with nearly the same numbers are of one specimen."""
+    answers = {
+        "--specimens several": "specimens of their own",
+        "--specimens one": "one specimen, read by several sensors",
+    }
+    names = dict.fromkeys(table.header[i] for mark in marks[:2] for i in marked.own(mark)[:1])
+    found = f"found {' and '.join(names)} with nearly the same numbers, and the columns beside them too"
+    return Undecided(f"{table.sheet.path}, line {table.header_line}: {found}", "what they are of", answers)
+
+
+def _wanted(marked: _Marked, marks: Sequence[str], mapping: Sequence[str]) -> list[str]:
+    """The specimens whose columns a user names to be read; all of them where the user names none."""
+    named = {_meant(marked, text) for text in mapping if _role(text) != IGNORE}
+    wanted = [mark for mark in marks if mark in named]
+    return wanted or list(marks)
 
 
 def _marked(table: RawTable, mapping: Sequence[str], by_words: bool) -> _Marked | None:
@@ -115,16 +128,17 @@ def _by_row_above(table: RawTable) -> _Marked | None:
     """Marks that stand in the row above the header, each over its first column or over all of them."""
     if len({label for label in table.above if label}) < 2:
         return None
-    mark, last = [], ""
+    marks, last = [], ""
     for label in table.above:
         last = label or last
-        mark.append(last)
-    pairs = [(m, name) for m, name in zip(mark, table.header, strict=True) if name]
-    names = [name for _, name in pairs]
-    if len(set(pairs)) < len(pairs) or len(set(names)) == len(names):
+        marks.append(last)
+    columns = list(zip(marks, table.header, strict=True))
+    named = [(mark, name) for mark, name in columns if name]
+    names = {name for _, name in named}
+    if len(set(named)) < len(named) or len(names) == len(named):
         return None
-    full = tuple(f"{m} {name}".strip() for m, name in zip(mark, table.header, strict=True))
-    return _Marked(tuple(mark), table.header, full, certain=True)
+    full = tuple(f"{mark} {name}".strip() for mark, name in columns)
+    return _Marked(tuple(marks), table.header, full, certain=True)
 
 
 def _by_repetition(table: RawTable) -> _Marked | None:
@@ -246,18 +260,18 @@ def _mapping_of(
 ) -> tuple[str, ...]:
     """What a user says, as far as it is of this specimen, with the names of its table."""
     own = next(each for m, each in tables if m == mark)
+    of_all = {name for _, each in tables for name in each.header}
     out = []
     for text in mapping:
+        header, _, rest = text.rpartition("=")
+        header = header.strip()
         column = _column_meant(marked, text)
-        if column is not None and marked.mark[column]:
-            if marked.mark[column] == mark and own.header[column]:
-                header, _, rest = text.rpartition("=")
-                added = header.strip().removeprefix(marked.full[column])
-                out.append(f"{own.header[column]}{added}={rest}")
-            continue
-        elsewhere = any(text.rpartition("=")[0].strip() in each.header for _, each in tables)
-        if text.rpartition("=")[0].strip() in own.header or not elsewhere:
-            out.append(text)
+        if column is None or not marked.mark[column]:
+            if header in own.header or header not in of_all:
+                out.append(text)
+        elif marked.mark[column] == mark and own.header[column]:
+            added = header.removeprefix(marked.full[column])
+            out.append(f"{own.header[column]}{added}={rest}")
     return tuple(out)
 
 

@@ -48,41 +48,54 @@ def tests_of_specimens(recorded: Recorded, mapping: Sequence[str], stated: Speci
     Undecided
     """
     table = recorded.table
+    if stated == "one":
+        return [table]
     said = ignored(table, mapping) | {column.index for column in recorded.columns.values()}
-    left = [i for i, name in enumerate(table.header) if name and i not in said and any(table.column(i))]
-    for index in left if stated != "one" else []:
+    for index, header in enumerate(table.header):
+        if not header or index in said:
+            continue
         labels = _filled(table.column(index))
-        changes = np.array([i for i in range(1, len(labels)) if labels[i] != labels[i - 1]], dtype=np.int64)
+        changes = _changes(labels)
         names = [labels[i] for i in (0, *changes)]
         if not len(changes) or len(set(names)) < len(names):
             continue
-        are_named = any(map(speaks_of_specimens, (table.header[index], *names)))
+        are_named = any(map(speaks_of_specimens, (header, *names)))
         is_repeated = _begins_again(recorded, changes)
         times_restart = _restart(recorded.values["time"], changes)
         if are_named and is_repeated:
             return _tables(table, index, changes, names)
-        if times_restart and (are_named or (is_repeated and _are_words(names))):
-            if stated == "several":
-                return _tables(table, index, changes, names)
-            raise _which(table, index, int(changes[0]), names, is_repeated)
-    return _by_hold_numbers(recorded, stated) if stated != "one" else [table]
+        may_be_names = are_named or (is_repeated and _are_words(names))
+        if not times_restart or not may_be_names:
+            continue
+        if stated == "several":
+            return _tables(table, index, changes, names)
+        raise _which(table, index, int(changes[0]), names, is_repeated)
+    return _by_hold_numbers(recorded, stated)
+
+
+def _changes(labels: Sequence[str]) -> Ints:
+    """The rows in which a label is another than in the row before."""
+    rows = [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
+    return np.array(rows, dtype=np.int64)
 
 
 def _by_hold_numbers(recorded: Recorded, stated: Specimens | None) -> list[RawTable]:
     """The table of each specimen, where the numbers of holds begin again with times and with what is set."""
-    table, time = recorded.table, recorded.values["time"]
+    table = recorded.table
     if recorded.hold is None:
         return [table]
     index = recorded.columns["hold"].index
-    changes = np.flatnonzero(np.diff(recorded.hold) < 0) + 1
     labels = table.column(index)
-    are_numbers = all(map(is_number, labels))  # words name levels
-    if not len(changes) or not are_numbers or not (time[changes] < time[changes - 1]).all():
+    if not all(map(is_number, labels)):  # words name levels
         return [table]
-    if not _begins_again(recorded, changes):
+    changes = np.flatnonzero(np.diff(recorded.hold) < 0) + 1
+    time = recorded.values["time"]
+    times_fall = time[changes] < time[changes - 1]
+    if not len(changes) or not times_fall.all() or not _begins_again(recorded, changes):
         return [table]
     if stated == "several":
-        return _split(table, changes, [str(i + 1) for i in range(len(changes) + 1)])
+        names = [str(number) for number in range(1, len(changes) + 2)]
+        return _split(table, changes, names)
     row = int(changes[0])
     raise _which(table, index, row, labels[row - 1 : row + 1], is_repeated=True)
 

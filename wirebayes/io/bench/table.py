@@ -118,21 +118,26 @@ def find_table(sheet: Sheet) -> RawTable:
     if first is None:
         line = rows[0].line if rows else 1
         raise InputError(f"{sheet.path}, line {line}: found no rows of numbers, expected a header and readings")
+    shown = rows[first : first + _SHOWN]
     above, units = _above_readings(rows[:first])
-    if not above or not _is_header(above[-1]) or _is_title(above[-1], rows[first : first + _SHOWN]):
+    if not above or not _is_header(above[-1]) or _is_title(above[-1], shown):
         return _without_header(sheet, first)
     head = above[-1]
     _check_names_are_short(sheet, head)
-    width = max(len(head.cells), *(len(row.cells) for row in rows[first : first + _SHOWN]))
-    every = range(width)
-    header = tuple(head.cell(column) for column in every)
-    padded = tuple(units[column] if column < len(units) else "" for column in every)
-    names = tuple(above[-2].cell(column) for column in every) if len(above) > 1 else ()
+    width = max(len(row.cells) for row in (head, *shown))
+    header = _padded(head.cells, width)
+    names = _padded(above[-2].cells, width) if len(above) > 1 else ()
     body = tuple(row for row in rows[first:] if not row.comment)
     _check_width(sheet, head, body, width)
     _check_gaps(sheet, head, body)
     _check_headers_repeat(sheet, rows[:first], head, body)
-    return RawTable(sheet, header, padded, body, head.line, names)
+    return RawTable(sheet, header, _padded(units, width), body, head.line, names)
+
+
+def _padded(cells: Sequence[str], width: int) -> tuple[str, ...]:
+    """So many cells, empty ones at the end."""
+    missing = max(width - len(cells), 0)
+    return (*cells[:width], *[""] * missing)
 
 
 def _above_readings(rows: Sequence[SheetRow]) -> tuple[list[SheetRow], tuple[str, ...]]:
