@@ -139,20 +139,24 @@ def falls(setting: Floats, readings: Floats) -> bool:
 
 def unresponsive_tension(readings: CheckedTest) -> str:
     """Tension that does not follow the displacement, or follows it the wrong way."""
-    means, place = readings.means, readings.setting
-    if np.ptp(place) == 0 and len(place) > 1:
+    means, place, noise = readings.means, readings.setting, readings.noise
+    span = np.ptp(place)
+    if span == 0 and len(place) > 1:
         return "all holds have the same displacement_mm: without a step the stiffness cannot be known"
-    if max(row.max() for row in readings.each) <= FLAT * readings.noise:
+    largest = max(row.max() for row in readings.each)
+    if largest <= FLAT * noise:
         return (
-            f"no reading stands out from the scatter within the holds ({readings.noise:.2g} N): the wire was slack "
+            f"no reading stands out from the scatter within the holds ({noise:.2g} N): the wire was slack "
             "throughout, or rows of other tests are mixed in"
         )
-    if len(means) > 1 and np.ptp(means) <= FLAT * readings.noise:
+    if len(means) > 1 and np.ptp(means) <= FLAT * noise:
         return (
-            f"tension stays at {means.mean():.4g} N while the displacement changes by {np.ptp(place):g} mm: "
+            f"tension stays at {means.mean():.4g} N while the displacement changes by {span:g} mm: "
             "check that tension_N is this wire's, and the wire's clamps"
         )
-    jumps = np.array([b[0] - a[-1] for a, b in zip(readings.each, readings.each[1:], strict=False)])
+    begins = np.array([row[0] for row in readings.each])
+    ends = np.array([row[-1] for row in readings.each])
+    jumps = begins[1:] - ends[:-1]
     moves = np.diff(place)
     if (jumps * moves).sum() < 0 and len(means) > 2 and falls(place, means):
         return "tension falls as the displacement rises: check the sign of displacement_mm and of tension_N"

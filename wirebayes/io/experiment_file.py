@@ -210,20 +210,22 @@ def _readings_path(keys: Keys) -> Path:
 def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float, control: Control) -> tuple[Hold, ...]:
     """Insert the unrecorded holds, each before the first recorded hold whose number reaches its `before_hold`."""
     entries = keys.elements("unrecorded_holds", f"a list of {{ before_hold, {SET[control]}, duration_s }}")
-    recorded = [(place, int(hold.number)) for place, hold in enumerate(holds) if hold.number is not None]
-    last = recorded[-1][1]
-    placed: dict[int, list[Hold]] = {}
+    numbers = [hold.number for hold in holds if hold.number is not None]
+    where = str(keys.table.get("readings", "the readings"))
+    before: dict[int, list[Hold]] = {}
+    known = None
     for index, entry in enumerate(entries):
-        before, unrecorded = _unrecorded(
-            entry, last, str(keys.table.get("readings", "the readings")), length_mm, control
-        )
-        if index and entry.table == entries[index - 1].table:
+        before_hold, unrecorded = _unrecorded(entry, int(numbers[-1]), where, length_mm, control)
+        if entry.table == known:
             raise keys.complain(f"unrecorded_holds[{index}]", "the hold before it once more", "each hold once")
-        place = next(place for place, number in recorded if number >= before)
-        placed.setdefault(place, []).append(unrecorded)
-    ordered = []
-    for place, hold in enumerate(holds):
-        ordered += [*placed.get(place, []), hold]
+        known = entry.table
+        next_number = next(number for number in numbers if number >= before_hold)
+        before.setdefault(next_number, []).append(unrecorded)
+    ordered: list[Hold] = []
+    for hold in holds:
+        if hold.number is not None:
+            ordered += before.get(hold.number, [])
+        ordered.append(hold)
     return in_sequence(tuple(ordered))
 
 

@@ -158,34 +158,43 @@ def _planned(keys: Keys, index: int) -> PlannedTest:
     of_settings, step, of_resolution = _SET[control]
     keys.only((*_KEYS, of_settings, step, of_resolution))
     name = keys.string("name", "a name", f"protocol-{index + 1}")
-    expected = f"a length above 0 mm, from {SHORTEST:.0e} to {LARGEST['displacement_mm']:.0e} mm"
-    length = keys.number("length_mm", expected, least=SHORTEST, most=LARGEST["displacement_mm"])
+    longest = LARGEST["displacement_mm"]
+    expected = f"a length above 0 mm, from {SHORTEST:.0e} to {longest:.0e} mm"
+    length = keys.number("length_mm", expected, least=SHORTEST, most=longest)
     resolution = 0.01
     if of_resolution in keys.table:
-        unit = READ_UNIT[control]
-        resolution = keys.number(of_resolution, f"a step of 0 {unit} or more", least=0.0, most=LARGEST[READ[control]])
+        expected = f"a step of 0 {READ_UNIT[control]} or more"
+        resolution = keys.number(of_resolution, expected, least=0.0, most=LARGEST[READ[control]])
     path = _weights(keys) if control == "force" else _displacements(keys, length)
     if "unload" in keys.table:
-        expected = f"a whole number of holds on the way back, 0 to {len(path) - 1}"
-        back = keys.whole("unload", expected, 0, len(path) - 1)
+        most = len(path) - 1
+        back = keys.whole("unload", f"a whole number of holds on the way back, 0 to {most}", 0, most)
         path += path[-2 : -2 - back : -1]
     times = _times(keys)
-    if len(path) * len(times) < LEAST_READINGS:
-        raise keys.complain(
-            "times_s" if "times_s" in keys.table else "readings", f"{len(path)} holds of {len(times)}", ENOUGH
-        )
-    if len(path) * len(times) > MOST_READINGS:
-        raise keys.complain(
-            "times_s" if "times_s" in keys.table else "readings",
-            f"{len(path) * len(times)} readings in all",
-            f"at most {MOST_READINGS}",
-        )
-    warmth: list[float] = []
-    if "temperatures_C" in keys.table:
-        warmth = keys.numbers("temperatures_C", "a list of temperatures above -273.15 °C")
-        if not warmth or min(warmth) <= -273.15:
-            raise keys.complain("temperatures_C", shown(warmth), "a list of temperatures above -273.15 °C")
+    _check_count(keys, len(path), len(times))
+    warmth = _warmth(keys)
     return PlannedTest(name, length, control, tuple(path), resolution, tuple(times), tuple(warmth))
+
+
+def _check_count(keys: Keys, holds: int, times: int) -> None:
+    """Refuse fewer readings than a fit needs, or more than it can hold."""
+    key = "times_s" if "times_s" in keys.table else "readings"
+    count = holds * times
+    if count < LEAST_READINGS:
+        raise keys.complain(key, f"{holds} holds of {times}", ENOUGH)
+    if count > MOST_READINGS:
+        raise keys.complain(key, f"{count} readings in all", f"at most {MOST_READINGS}")
+
+
+def _warmth(keys: Keys) -> list[float]:
+    """The temperatures at which the test is to be made; none where they are not said."""
+    if "temperatures_C" not in keys.table:
+        return []
+    expected = "a list of temperatures above -273.15 °C"
+    warmth = keys.numbers("temperatures_C", expected)
+    if not warmth or min(warmth) <= -273.15:
+        raise keys.complain("temperatures_C", shown(warmth), expected)
+    return warmth
 
 
 def _displacements(keys: Keys, length: float) -> list[float]:
@@ -208,9 +217,7 @@ def _settings(keys: Keys, control: Control, expected: str) -> tuple[list[float],
     """What is set in each hold on the way up, listed or as steps, and the key that says it."""
     of_settings, of_step, _ = _SET[control]
     if of_settings in keys.table:
-        for other in (of_step, "holds"):
-            if other in keys.table:
-                raise keys.complain(other, f"{other} beside {of_settings}", "one way to say it")
+        _check_said_once(keys, of_settings, (of_step, "holds"))
         return keys.numbers(of_settings, expected), of_settings
     unit = SET_UNIT[control]
     step = keys.number(of_step, f"a step other than 0 {unit}, or {of_settings}")
@@ -220,22 +227,28 @@ def _settings(keys: Keys, control: Control, expected: str) -> tuple[list[float],
     return [step * (i + 1) for i in range(count)], of_step
 
 
+def _check_said_once(keys: Keys, key: str, others: Sequence[str]) -> None:
+    """Refuse a key beside those that say the same in another way."""
+    for other in others:
+        if other in keys.table:
+            raise keys.complain(other, f"{other} beside {key}", "one way to say it")
+
+
 def _times(keys: Keys) -> list[float]:
+    longest = LARGEST["time_s"]
     if "times_s" in keys.table:
-        for other in ("hold_s", "readings"):
-            if other in keys.table:
-                raise keys.complain(other, f"{other} beside times_s", "one way to say it")
+        _check_said_once(keys, "times_s", ("hold_s", "readings"))
         expected = "a list of rising times from 0 s on"
         times = keys.numbers("times_s", expected)
-        if not times or times[0] < 0 or times[-1] > LARGEST["time_s"] or (np.diff(times) <= 0).any():
+        if not times or times[0] < 0 or times[-1] > longest or (np.diff(times) <= 0).any():
             raise keys.complain("times_s", shown(keys.table["times_s"]), expected)
         return times
-    expected = f"how long each hold lasts, above 0 s and at most {LARGEST['time_s']:.0e} s, or times_s"
-    duration = keys.number("hold_s", expected, above=0.0, most=LARGEST["time_s"])
+    expected = f"how long each hold lasts, above 0 s and at most {longest:.0e} s, or times_s"
+    duration = keys.number("hold_s", expected, above=0.0, most=longest)
     count = 5  # the paper's
     if "readings" in keys.table:
         count = keys.whole("readings", "a whole number of readings in a hold, 2 or more", 2, MOST_READINGS)
-    return [float(t) for t in np.linspace(0.0, duration, count)]
+    return np.linspace(0.0, duration, count).tolist()
 
 
 def _guess(top: Keys) -> dict[str, Any]:

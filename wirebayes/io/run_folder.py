@@ -310,9 +310,11 @@ def differences(found: Any, wanted: Any, key: str = "") -> list[str]:
     if isinstance(wanted, dict) and wanted and found == _ABSENT:
         found = {}
     if isinstance(found, dict) and isinstance(wanted, dict):
-        keys = [*wanted, *(name for name in found if name not in wanted)]
-        parts = [differences(_value(found, name), _value(wanted, name), _below(key, name)) for name in keys]
-        return [phrase for part in parts for phrase in part]
+        phrases = []
+        for name in dict.fromkeys([*wanted, *found]):
+            below = _below(key, name)
+            phrases += differences(_value(found, name), _value(wanted, name), below)
+        return phrases
     if found == wanted:
         return []
     if _is_checksum(found) and _is_checksum(wanted):

@@ -20,7 +20,7 @@ from wirebayes.io.bench.header import (
 from wirebayes.io.bench.multiples import multiple_of_unit, unit_in_header
 from wirebayes.io.bench.numerals import is_count
 from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, quantity_unit
-from wirebayes.io.bench.sheet import is_number
+from wirebayes.io.bench.sheet import SheetRow, is_number
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.two_clocks import best_clock, clock_of, parting
 from wirebayes.io.bench.two_units import finest_of_same
@@ -31,6 +31,7 @@ from wirebayes.sentences import listed
 from wirebayes.strict.hint import hint
 
 IGNORE = "ignore"
+_SAYABLE = (*ROLES, IGNORE)
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
 
 
@@ -139,17 +140,23 @@ def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
     of_wire = [i for i in likely if not is_of_sample(table, i, role)]  # a force before a stress
     different = _without_copies(table, of_wire or likely)
     if len(different) > 1 and role == "tension":
-        varying = [i for i in different if len(set(table.column(i))) > 1]  # beside a breaking load, or a preload
-        different = varying if len(varying) == 1 else different
+        different = _only_varying(table, different)
     if len(different) > 1:
         different = _without_errors(table, different, role)
     if len(different) > 1 and role in ("tension", "displacement"):
         different = finest_of_same(table, different, role)
     if len(different) == 1:
-        return _column(table, different[0], role, None)
+        (only,) = different
+        return _column(table, only, role, None)
     if role == "time":
         return _one_clock(table, different)
     raise _several(table, different, role)
+
+
+def _only_varying(table: RawTable, likely: list[int]) -> list[int]:
+    """The only column that changes, beside a breaking load or a preload; all columns where it is not the only one."""
+    varying = [i for i in likely if len(set(table.column(i))) > 1]
+    return varying if len(varying) == 1 else likely
 
 
 def _without_copies(table: RawTable, likely: Sequence[int]) -> list[int]:
@@ -197,16 +204,20 @@ def _mapped(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str
     out: dict[int, tuple[int, str, str]] = {}
     for text in mapping:
         header, equals, rest = text.rpartition("=")
+        if not equals:
+            raise _no_mapping(text, "")
         role, _, unit = rest.strip().partition(" ")
         header, unit = header.strip(), unit.strip("[]() ")
-        names = [*ROLES, IGNORE]
-        if not equals or role not in names or (unit and role in (IGNORE, "hold")):
-            meant = hint(role, names) if equals else ""
-            expected = f"HEADER=COLUMN or HEADER=COLUMN [UNIT], COLUMN one of {', '.join(names)}"
-            raise InputError(f"--map: found {text!r}{meant}, expected {expected}")
+        if role not in _SAYABLE or (unit and role in (IGNORE, "hold")):
+            raise _no_mapping(text, hint(role, _SAYABLE))
         index, unit_in_header = _named(table, header, role)
         out[index] = index, role, unit or unit_in_header
     return list(out.values())
+
+
+def _no_mapping(text: str, meant: str) -> InputError:
+    expected = f"HEADER=COLUMN or HEADER=COLUMN [UNIT], COLUMN one of {', '.join(_SAYABLE)}"
+    return InputError(f"--map: found {text!r}{meant}, expected {expected}")
 
 
 def _named(table: RawTable, header: str, role: str) -> tuple[int, str]:
@@ -226,30 +237,36 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
     header = table.header[index]
     if role == "hold":
         return Column(role, index, header, None)
-    moments = role == "time" and has_moments(table, index)
     from_header = name_and_unit(header, role)[1]
-    if from_header is None and stated is not None and not speaks_of(header, role):
-        from_header = quantity_unit(header, role)  # --map "kg=tension": the name is nothing but a unit
-    row_text = table.units[index]
-    from_row = unit_in_header(row_text, role) if row_text else None
     if stated:
         unit = quantity_unit(stated, role) or multiple_of_unit(stated, role)
         if unit is None:
             raise InputError(f"--map: found the unit {stated!r} for {header}, expected one of {role}{_units(role)}")
         return Column(role, index, header, unit)
+    if from_header is None and stated is not None and not speaks_of(header, role):
+        from_header = quantity_unit(header, role)  # --map "kg=tension": the name is nothing but a unit
+    moments = role == "time" and has_moments(table, index)
+    row_text = table.units[index]
+    from_row = unit_in_header(row_text, role) if row_text else None
     if row_text not in NO_UNIT and from_row is None and not moments:
         raise table.complain(table.header_line + 1, index, f"the unit {row_text!r}", f"one of {role}{_units(role)}")
-    if from_header and from_row and (from_header.factor, from_header.offset) != (from_row.factor, from_row.offset):
+    if from_header and from_row and not _are_alike(from_header, from_row):
         found = f"the units {from_header.text} in the header and {from_row.text} under it"
         raise table.complain(table.header_line, index, found, "one unit")
     unit = from_row or from_header
-    if unit is None and not moments:
-        raise _no_unit(table, index, role)
-    if unit is not None and unit.multiple != 1.0:
+    if unit is None:
+        if not moments:
+            raise _no_unit(table, index, role)
+        return Column(role, index, header, None)
+    if unit.multiple != 1.0:
         _check_counts(table, index, role, unit)
-    if unit is not None:
-        check_itself(table, index, role, unit)
+    check_itself(table, index, role, unit)
     return Column(role, index, header, unit)
+
+
+def _are_alike(unit: Unit, other: Unit) -> bool:
+    """Whether numbers mean the same in two units."""
+    return unit.factor == other.factor and unit.offset == other.offset
 
 
 def _by_unit_alone(table: RawTable, index: int, role: Role) -> Column:
@@ -282,18 +299,24 @@ def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
 
 def _check_counts(table: RawTable, index: int, role: Role, unit: Unit) -> None:
     """Ask what a graduation in the header means where numbers are no counts of it: it may be the step of the gauge."""
-    numbers = (row for row in table.rows if is_number(row.cell(index)))
-    row = next((row for row in numbers if not is_count(row.cell(index))), None)
-    if row is None:
+    odd = _first_no_count(table, index)
+    if odd is None:
         return
-    place = f"{table.sheet.path}, {table.place(row.line, index)}"
+    place = f"{table.sheet.path}, {table.place(odd.line, index)}"
     whole = re.sub(r"[\d.,/·×*\s]", "", unit.text)
     map_to = f"--map {table.header[index]}={role}"
-    raise Undecided(
-        f"{place}: found {row.cell(index)!r} under {unit.text!r}, which may be the unit or the step of the gauge",
-        "which",
-        {f"{map_to} [{whole}]": f"{unit.text} is the step", f"{map_to} [{unit.text}]": f"{unit.text} is the unit"},
-    )
+    found = f"found {odd.cell(index)!r} under {unit.text!r}, which may be the unit or the step of the gauge"
+    answers = {f"{map_to} [{whole}]": f"{unit.text} is the step", f"{map_to} [{unit.text}]": f"{unit.text} is the unit"}
+    raise Undecided(f"{place}: {found}", "which", answers)
+
+
+def _first_no_count(table: RawTable, index: int) -> SheetRow | None:
+    """The first row with a number in a column that is no count."""
+    for row in table.rows:
+        cell = row.cell(index)
+        if is_number(cell) and not is_count(cell):
+            return row
+    return None
 
 
 def _usual(table: RawTable, index: int, role: Role) -> tuple[str, ...]:
@@ -331,25 +354,35 @@ def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missin
     for index in free:
         if last_named(table.header[index]) == role:
             _column(table, index, role, None)  # its unit is another quantity's, which is said
-    names = [name for name in table.header if name]
-    encoding = table.sheet.encoding
-    hint = ""
-    if encoding not in ("utf-8", "utf-8-sig") and not " ".join(names).isascii():
-        hint = f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"
     place = f"{table.sheet.path}, line {table.header_line}: found no column of"
+    names = [name for name in table.header if name]
+    in_doubt = _encoding_in_doubt(table, names)
     if table.nameless:
         place = f"{table.sheet.path}, line {table.header_line}: found numbers without a header, and no column of"
         names = [f"{name} ({cell})" for name, cell in zip(names, table.rows[0].cells, strict=False)]
-    options = [_option(table, unread, missed) for missed in missing]
-    about_units = " (a unit only where the header has no unit)" if any("HEADER=" in text for text in options) else ""
-    if table.nameless:
-        options = [option.replace("HEADER=", "N=") for option in options]
-        about_units = ", N the number of the column"
-    how = f"; say which with {' '.join(options)}{about_units}"
-    if not unread and missing == ["displacement"]:  # a record of tension over time
-        how = "; to a hold at one displacement add a column with it, the same in every row"
+    how = _how_to_say(table, unread, missing)
     wanted = "one of each" if more else "one"
-    message = f"{place} {listed(missing, 'or')} among {', '.join(names)}, expected {wanted}{how}{hint}"
+    message = f"{place} {listed(missing, 'or')} among {', '.join(names)}, expected {wanted}{how}{in_doubt}"
     answers = {f"--map {table.header[i]}={role}": table.header[i] for i in unread}
     others = [_missing(table, free, unread, more)] if more else []
     return Undecided(f"{place} {role}", f"which column is the {role}", answers, others, message)
+
+
+def _how_to_say(table: RawTable, unread: Sequence[int], missing: Sequence[Role]) -> str:
+    """How a user says which columns the missing quantities are."""
+    if not unread and missing == ["displacement"]:  # a record of tension over time
+        return "; to a hold at one displacement add a column with it, the same in every row"
+    options = " ".join(_option(table, unread, role) for role in missing)
+    if table.nameless:
+        options = options.replace("HEADER=", "N=")
+        return f"; say which with {options}, N the number of the column"
+    about_units = " (a unit only where the header has no unit)" if "HEADER=" in options else ""
+    return f"; say which with {options}{about_units}"
+
+
+def _encoding_in_doubt(table: RawTable, names: Sequence[str]) -> str:
+    """That names may look wrong, for they were read by a code page; empty where there is no doubt."""
+    encoding = table.sheet.encoding
+    if encoding in ("utf-8", "utf-8-sig") or " ".join(names).isascii():
+        return ""
+    return f"; the file is not UTF-8 and was read as {encoding.upper()}: if names look wrong, save it as UTF-8"

@@ -37,28 +37,32 @@ def complete_rows(
     rows, below = _without_what_is_below(table, indices)
     rows, words = _without_words(rows, columns)
     weights_once = _weights_are_written_once(rows, columns)
+    what = "weight" if weights_once else "displacement"
     written_once: tuple[Role, ...] = ("hold", "tension") if weights_once else ("hold", "displacement")
     filled = _filled(rows, table, [columns[role].index for role in written_once if role in columns])
     missing = {row.line for row in filled if drop_breaks and _is_missing(row, columns)}
     read = [row for row in filled if row.line not in missing]
     kept = _without_repetitions(read, table, columns["time"].index)
-    gaps = sum(a.cells[i] != b.cell(i) for a, b in zip(filled, rows, strict=True) for i in indices)
+    gaps = _count_filled(filled, rows, indices)
     notes = []
     if below:
         notes.append(f"{counted(below, 'line')} under the readings left out")
     if words:
         notes.append(f"{_lines_of(words, table)} left out: words or statistics in place of readings")
     if missing:
-        notes.append(
-            f"left out: {counted(len(missing), 'row')} without a reading, from line {table.line_text(min(missing))} on"
-        )
+        first = table.line_text(min(missing))
+        notes.append(f"left out: {counted(len(missing), 'row')} without a reading, from line {first} on")
     if gaps:
-        of = "weight" if weights_once else "displacement"
-        notes.append(f"{gaps} empty cells of hold or {of} filled with the value above them")
+        notes.append(f"{gaps} empty cells of hold or {what} filled with the value above them")
     if len(kept) < len(read):
         notes.append(f"rows that repeat the row above left out: {len(read) - len(kept)}")
     _check_no_cell_is_empty(kept, table, columns)
     return replace(table, rows=tuple(kept)), notes
+
+
+def _count_filled(filled: list[SheetRow], rows: list[SheetRow], indices: list[int]) -> int:
+    """How many cells were filled."""
+    return sum(after.cells[i] != row.cell(i) for after, row in zip(filled, rows, strict=True) for i in indices)
 
 
 def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[SheetRow], int]:

@@ -47,13 +47,16 @@ def recognised(by_tension: Sequence[Rows], displacement: Floats, tension: Floats
     """
     if not by_tension:
         return "displacement"
-    creeps, relaxes = (trend_by_chance(by_tension, values) for values in (displacement, tension))
+    creeps = trend_by_chance(by_tension, displacement)
+    relaxes = trend_by_chance(by_tension, tension)
     constant = all(np.ptp(tension[rows]) == 0.0 for rows in by_tension)
-    if constant and np.ptp(displacement[by_tension[0]]) > 0 and (is_mass or creeps < BY_CHANCE_CONSTANT):
+    moves = np.ptp(displacement[by_tension[0]]) > 0
+    if constant and moves and (is_mass or creeps < BY_CHANCE_CONSTANT):
         return "force"
     if creeps > BY_CHANCE:
         return "displacement"
-    of_displacement, of_tension = (drift(by_tension, values) for values in (displacement, tension))
+    of_displacement = drift(by_tension, displacement)
+    of_tension = drift(by_tension, tension)
     if of_displacement > MORE * of_tension:
         return "force"
     if of_tension > MORE * of_displacement or relaxes > BY_CHANCE or of_displacement < SEEN:

@@ -267,23 +267,32 @@ def _rows(holds: Cut, values: Mapping[Any, Floats], control: Control) -> tuple[l
     rows: list[list[Any]] = []
     origin: list[int] = []
     read = values[READS[control]]
-    for of_hold, number, level, times, end in zip(
-        holds.rows, holds.number, holds.setting, holds.time_s, holds.end_s, strict=True
-    ):
-        readings: list[tuple[float, float | None, int]] = [
-            (_tidy(time), float(read[row]), int(row)) for row, time in zip(of_hold, times, strict=True)
-        ]
-        last_s, _, last = readings[-1]
-        if number in holds.unread:
-            readings = [(max(last_s, _tidy(end or 0.0)), None, last)]
-        elif end is not None and _tidy(end) > last_s:
-            readings.append((_tidy(end), None, last))
-        for time, value, row in readings:
-            x, tension = (level, value) if control == "displacement" else (value, level)
-            temperature = None if value is None or "temperature" not in values else float(values["temperature"][row])
-            rows.append([number, x, time, tension, temperature][: 5 if "temperature" in values else 4])
+    warmth = values.get("temperature")
+    for hold in range(len(holds.rows)):
+        number, level = holds.number[hold], holds.setting[hold]
+        for time, row, is_read in _rows_of_hold(holds, hold):
+            value = float(read[row]) if is_read else None
+            cells = [level, time, value] if control == "displacement" else [value, time, level]
+            rows.append([number, *cells])
+            if warmth is not None:
+                rows[-1].append(float(warmth[row]) if is_read else None)
             origin.append(row)
     return rows, origin
+
+
+def _rows_of_hold(holds: Cut, hold: int) -> list[tuple[float, int, bool]]:
+    """Time and row of the table of each reading of a hold, and of its end if that is later; and whether it is read."""
+    times = [_tidy(time) for time in holds.time_s[hold]]
+    rows = [int(row) for row in holds.rows[hold]]
+    end = holds.end_s[hold]
+    last_s, last = times[-1], rows[-1]
+    end_s = last_s if end is None else _tidy(end)
+    if holds.number[hold] in holds.unread:
+        return [(max(last_s, end_s), last, False)]
+    readings = [(time, row, True) for time, row in zip(times, rows, strict=True)]
+    if end_s > last_s:
+        readings.append((end_s, last, False))
+    return readings
 
 
 def _sheet(path: Path, choices: Choices) -> Sheet:

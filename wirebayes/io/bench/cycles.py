@@ -28,19 +28,29 @@ def cycles_before(readings: Readings, before_hold: int, left: int, turn: int, en
     end_s : float
         When that move was half made: until then the wire counts as where it turned.
     """
-    x, time = readings.setting[left : turn + 1], readings.time_s[left : turn + 1]
+    x = readings.setting[left : turn + 1]
     low, high = float(x.min()), float(x.max())
-    begin = max(int((np.abs(x - x[0]) > DEPARTS * (high - low)).argmax()) - 1, 0)
-    setting = _equivalent(readings, left + begin, turn, end_s)
+    begin = left + _departure(x)
+    begin_s = float(readings.time_s[begin])
+    setting = _equivalent(readings, begin, turn, end_s)
     if readings.role == "tension":
         setting = max(setting, NEXT_TO_NOTHING * high)
-    begin_s = float(time[begin])
+    unit = readings.unit
+    lasts = lasting(end_s - begin_s)
     sentence = (
-        f"before hold {before_hold} the {readings.role} went to and fro between {low:.4g} and {high:.4g} "
-        f"{readings.unit} for {lasting(end_s - begin_s)}: what the wire crept meanwhile is that of a hold without "
-        f"readings at {setting:.4g} {readings.unit}, where it pulls as in the mean of the cycles"
+        f"before hold {before_hold} the {readings.role} went to and fro between {low:.4g} and {high:.4g} {unit} for "
+        f"{lasts}: what the wire crept meanwhile is that of a hold without readings at {setting:.4g} {unit}, where it "
+        "pulls as in the mean of the cycles"
     )
-    return Cycles(before_hold, float(f"{setting:.6g}"), begin_s, end_s, sentence)
+    rounded = float(f"{setting:.6g}")
+    return Cycles(before_hold, rounded, begin_s, end_s, sentence)
+
+
+def _departure(x: Floats) -> int:
+    """The last reading at which the wire is still where it was at the first one."""
+    away = np.abs(x - x[0])
+    departed = int((away > DEPARTS * np.ptp(x)).argmax())
+    return max(departed - 1, 0)
 
 
 def _equivalent(readings: Readings, begin: int, turn: int, end_s: float) -> float:

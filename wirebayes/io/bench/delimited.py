@@ -58,21 +58,31 @@ def sheet_of_text(path: Path, text: str, encoding: str = "utf-8") -> Sheet:
     if serial_monitor.is_log(lines):
         sent, arrivals = serial_monitor.without_stamps(lines)
         end = "\n" if text.endswith("\n") else ""
-        return serial_monitor.with_arrivals(sheet_of_text(path, "\n".join(sent) + end, encoding), arrivals)
+        inner = sheet_of_text(path, "\n".join(sent) + end, encoding)
+        return serial_monitor.with_arrivals(inner, arrivals)
     if keyed_lines.are_keyed(lines):
         return keyed_lines.sheet_of_keyed(path, lines, encoding)
     _check_lengths(path, lines)
     stated = _SEPARATOR.fullmatch(lines[0])
     if stated:
         lines[0] = ""
-    sample = [line for line in lines if line.strip() and not _COMMENT.match(line)][:_LOOKED_AT]
-    candidates = [stated[1]] if stated else list(_NAMES)
-    scores = {sign: _score(sample, sign) for sign in candidates}
+        sign = stated[1]
+    else:
+        sign = _best_sign(path, lines)
+    is_finished = text[-1:] in _ENDS
+    return _sheet_of_cells(path, lines, sign, is_finished=is_finished, encoding=encoding)
+
+
+def _best_sign(path: Path, lines: list[str]) -> str:
+    """The sign between cells that splits lines best."""
+    filled = [line for line in lines if line.strip() and not _COMMENT.match(line)]
+    sample = filled[:_LOOKED_AT]
+    scores = {sign: _score(sample, sign) for sign in _NAMES}
     best = max(scores, key=lambda sign: scores[sign])
-    if not stated and scores[best][0] <= 0.0:
+    if scores[best][0] <= 0.0:
         line = next((i for i, content in enumerate(lines, start=1) if content.strip()), 1)
         raise InputError(f"{path}, line {line}: found no columns of numbers, expected {_wanted(sample)}")
-    return _sheet_of_cells(path, lines, best, is_finished=text[-1:] in _ENDS, encoding=encoding)
+    return best
 
 
 def _sheet_of_cells(path: Path, lines: list[str], sign: str, *, is_finished: bool, encoding: str) -> Sheet:

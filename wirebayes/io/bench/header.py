@@ -120,23 +120,31 @@ def may_be(table: RawTable, index: int, role: Role) -> bool:
     """
     header = table.header[index]
     row_unit = table.units[index]
-    units: dict[Role, Unit] = {}
-    for other in ROLES:
-        found = (unit_in_header(row_unit, other) if row_unit else None) or name_and_unit(header, other)[1]
-        if found:
-            units[other] = found
-    if not units and _has_foreign_unit(header, row_unit):
-        return False
-    if role == "hold":
-        return not units and speaks_of(header, role)
-    name = name_and_unit(header, role)[0] if role in units else header
+    units = _units_of(header, row_unit)
     if units and role not in units:
         return False
-    if not units and any(speaks_of(header, other) for other in ROLES if other != role) and role != "time":
-        return last_named(header) == role
-    if role in units and units[role].of_sample and words_in(name) & set(SAMPLE_WORDS[role]):
-        return True
-    return speaks_of(name, role) or (role in units and plain_letters(name) in LETTERS.get(role, ()))
+    if not units and _has_foreign_unit(header, row_unit):
+        return False
+    if not units and role not in ("hold", "time"):
+        of_others = [speaks_of(header, other) for other in ROLES if other != role]
+        if any(of_others):
+            return last_named(header) == role
+    if role not in units:
+        return speaks_of(header, role)
+    name = name_and_unit(header, role)[0]
+    of_sample = units[role].of_sample and not words_in(name).isdisjoint(SAMPLE_WORDS[role])
+    return of_sample or speaks_of(name, role) or plain_letters(name) in LETTERS.get(role, ())
+
+
+def _units_of(header: str, row_unit: str) -> dict[Role, Unit]:
+    """The unit of a column by each quantity that has it, in a row of units or in the header."""
+    units: dict[Role, Unit] = {}
+    for role in ROLES:
+        in_row = unit_in_header(row_unit, role) if row_unit else None
+        unit = in_row or name_and_unit(header, role)[1]
+        if unit:
+            units[role] = unit
+    return units
 
 
 def is_of_rig(table: RawTable, index: int, role: Role) -> bool:

@@ -72,19 +72,16 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
         found = f"a list, and files in the order {_names(given)}"
         raise InputError(f"--each-file: found {found}, expected both in the order of their {by}: {names}")
     first = tables[0]
-    header, units = [*_without_numbers(first), HOLD], [*first.units, ""]
-    of_files = [[str(number)] for number in range(1, len(tables) + 1)]
+    header, units = (*_without_numbers(first), HOLD), (*first.units, "")
+    of_files: list[tuple[str, ...]] = [(str(number),) for number in range(1, len(tables) + 1)]
     if role:
-        header.append(role)
-        units.append(settings[0][1])
-        for of_file, (number, _) in zip(of_files, settings, strict=True):
-            of_file.append(number)
-        listed_settings = listed([" ".join(each) for each in settings])
-        notes.append(f"the {role} of each hold from {source}: {listed_settings}")
+        header, units = (*header, role), (*units, settings[0][1])
+        of_files = [(str(number), setting[0]) for number, setting in enumerate(settings, start=1)]
+        told = listed([" ".join(setting) for setting in settings])
+        notes.append(f"the {role} of each hold from {source}: {told}")
     rows, pieces = _rows(tables, of_files)
     sheet = replace(first.sheet, path=path_of_all([table.sheet.path for table in tables]))
-    joined = replace(first, sheet=sheet, header=tuple(header), units=tuple(units), rows=rows, pieces=pieces)
-    return joined, notes
+    return replace(first, sheet=sheet, header=header, units=units, rows=rows, pieces=pieces), notes
 
 
 def _names(tables: Sequence[RawTable]) -> str:
@@ -105,7 +102,7 @@ def _in_order(tables: Sequence[RawTable]) -> tuple[list[RawTable], str]:
 
 
 def _rows(
-    tables: Sequence[RawTable], of_files: Sequence[Sequence[str]]
+    tables: Sequence[RawTable], of_files: Sequence[tuple[str, ...]]
 ) -> tuple[tuple[SheetRow, ...], tuple[tuple[int, str], ...]]:
     """The rows of all files with more cells, those of their file, and the line after which each file begins."""
     rows: list[SheetRow] = []

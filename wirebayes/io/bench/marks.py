@@ -49,23 +49,31 @@ def without_marks(
     for role, column in columns.items():
         if role in ("hold", "time"):
             continue
-        cells = table.column(column.index)
-        if not any("999" in cell or "e" in cell.lower() for cell in cells):
-            continue
-        marked = stand_for_none([plain_number(cell, decimal) for cell in cells])
+        marked = _marked(table.column(column.index), decimal)
         if marked.any() and (role == "temperature" or not drop_breaks):
             row = table.rows[int(marked.argmax())]
-            found = f"{shown(row.cell(column.index))}, far beyond all other numbers"
-            where = WHERE_MISSING if role != "temperature" else ""
-            raise table.complain(row.line, column.index, found, f"a number that was read{where}")
+            cell = shown(row.cell(column.index))
+            expected = "a number that was read"
+            if role != "temperature":
+                expected += WHERE_MISSING
+            raise table.complain(row.line, column.index, f"{cell}, far beyond all other numbers", expected)
         left_out |= marked
     if not left_out.any():
         return table, []
-    kept = tuple(row for row, gone in zip(table.rows, left_out, strict=True) if not gone)
+    kept = [row for row, gone in zip(table.rows, left_out, strict=True) if not gone]
+    first = table.rows[int(left_out.argmax())]
+    line = table.line_text(first.line)
     rows = counted(int(left_out.sum()), "row")
-    line = table.line_text(table.rows[int(left_out.argmax())].line)
     note = f"left out: {rows} in which a number such as 9999 stands for none, from line {line} on"
-    return replace(table, rows=kept), [note]
+    return replace(table, rows=tuple(kept)), [note]
+
+
+def _marked(cells: list[str], decimal: Decimal) -> Bools:
+    """Which cells of a column hold a number that stands for none."""
+    if not any("999" in cell or "e" in cell.lower() for cell in cells):
+        return np.zeros(len(cells), dtype=bool)
+    numbers = [plain_number(cell, decimal) for cell in cells]
+    return stand_for_none(numbers)
 
 
 def stand_for_none(numbers: list[str | None]) -> Bools:

@@ -39,12 +39,14 @@ def with_arrivals(sheet: Sheet, arrivals: Sequence[str]) -> Sheet:
         return replace(sheet, described=f"{sheet.described}, times of arrival not read")
     head = next(row.cells for row in sheet.rows if row.line == table.header_line)
     width = len(table.header)
-    rows = [
-        _with_last(row, width, ARRIVAL if row.cells == head else arrivals[row.line - 1])
-        if row.cells == head or is_value(row.filled[0])
-        else row
-        for row in sheet.rows
-    ]
+    rows = []
+    for row in sheet.rows:
+        if row.cells == head:
+            row = _with_last(row, width, ARRIVAL)
+        elif is_value(row.filled[0]):
+            arrival = arrivals[row.line - 1]
+            row = _with_last(row, width, arrival)
+        rows.append(row)
     return replace(sheet, rows=tuple(rows))
 
 

@@ -214,20 +214,27 @@ def _specimens(table: RawTable, marked: _Marked) -> list[str]:
 def _read_alike(table: RawTable, marked: _Marked, marks: Sequence[str]) -> bool:
     """Whether two specimens' numbers agree as those of two sensors do: nearly, and not exactly as what is set does."""
     named = replace(table, header=marked.name)
-    alike = {}
     for role in _BOTH:
-        columns = [
-            next((i for i in marked.own(m) if marked.name[i] and is_of(named, i, role)), None) for m in marks[:2]
-        ]
+        columns = [_first_of(named, marked.own(mark), role) for mark in marks[:2]]
         if None in columns:
             return False
-        a, b = (_plain_numbers(table, int(i or 0)) for i in columns)
+        a, b = (_plain_numbers(table, column) for column in columns if column is not None)
         both = np.isfinite(a) & np.isfinite(b)
         if both.sum() < FEWEST:
             return False
-        apart = np.abs(a - b)[both]
-        alike[role] = bool(0.0 < np.quantile(apart, 0.9) <= SAME_WIRE * np.ptp(a[both]))
-    return all(alike.values())
+        apart = float(np.quantile(np.abs(a - b)[both], 0.9))
+        span = float(np.ptp(a[both]))
+        if not 0.0 < apart <= SAME_WIRE * span:
+            return False
+    return True
+
+
+def _first_of(table: RawTable, columns: Sequence[int], role: Role) -> int | None:
+    """The first of some columns that is of a quantity."""
+    for i in columns:
+        if table.header[i] and is_of(table, i, role):
+            return i
+    return None
 
 
 def _plain_numbers(table: RawTable, column: int) -> Floats:

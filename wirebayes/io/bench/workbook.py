@@ -33,28 +33,34 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Shee
     chosen : str, optional
         Name of a sheet; left out, the only one with readings is taken.
     """
+    rows = _rows_of_sheets(path, raw)
+    if chosen is not None:
+        if chosen not in rows:
+            names = ", ".join(rows)
+            raise InputError(f"{path}: found no sheet {chosen!r}{hint(chosen, list(rows))}, expected one of {names}")
+        return Sheet(path, rows[chosen], lettered=True, described=f"sheet {chosen}")
+    full = [name for name, found in rows.items() if sum(map(_measured, found)) > 1]
+    if not full:
+        raise InputError(f"{path}: found no sheet with columns of numbers, expected a header and readings")
+    if len(full) > 1:
+        answers = {f"--sheet {name}": f"the readings of sheet {name}" for name in full}
+        raise Undecided(f"{path}: found readings in {len(full)} sheets", "which one to read", answers)
+    (only,) = full
+    return Sheet(path, rows[only], lettered=True, described=f"sheet {only}")
+
+
+def _rows_of_sheets(path: Path, raw: bytes) -> dict[str, tuple[SheetRow, ...]]:
+    """The rows of each sheet of a workbook."""
     import openpyxl
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of styles and extensions that do not concern cells
             book = openpyxl.load_workbook(io.BytesIO(raw), read_only=True, data_only=True)
-            rows = {sheet.title: _rows(sheet) for sheet in book.worksheets}
+            return {sheet.title: _rows(sheet) for sheet in book.worksheets}
     except Exception as error:  # whatever a damaged archive raises
         found = f"no workbook that can be opened ({type(error).__name__})"
         raise InputError(f"{path}: found {found}, expected xlsx or text; save it as CSV") from error
-    if chosen is not None:
-        if chosen not in rows:
-            names = ", ".join(rows)
-            raise InputError(f"{path}: found no sheet {chosen!r}{hint(chosen, list(rows))}, expected one of {names}")
-        return Sheet(path, rows[chosen], lettered=True, described=f"sheet {chosen}")
-    full = [name for name, found in rows.items() if sum(_measured(row) for row in found) > 1]
-    if not full:
-        raise InputError(f"{path}: found no sheet with columns of numbers, expected a header and readings")
-    if len(full) > 1:
-        answers = {f"--sheet {name}": f"the readings of sheet {name}" for name in full}
-        raise Undecided(f"{path}: found readings in {len(full)} sheets", "which one to read", answers)
-    return Sheet(path, rows[full[0]], lettered=True, described=f"sheet {full[0]}")
 
 
 def _measured(row: SheetRow) -> bool:
@@ -67,16 +73,21 @@ def _rows(sheet: Any) -> tuple[SheetRow, ...]:
         texts = [_text(cell) for cell in cells]
         while texts and not texts[-1]:
             texts.pop()
-        if texts:
-            comment = texts[0].startswith("#") and not texts[0].startswith("#N")  # "#N/A" is Excel's, not a person's
-            out.append(SheetRow(line, (texts[0].lstrip("# "), *texts[1:]) if comment else tuple(texts), comment))
+        if not texts:
+            continue
+        comment = texts[0].startswith("#") and not texts[0].startswith("#N")  # "#N/A" is Excel's, not a person's
+        if comment:
+            texts[0] = texts[0].lstrip("# ")
+        out.append(SheetRow(line, tuple(texts), comment))
     return tuple(out)
 
 
 def _text(cell: Any) -> str:
     value = cell.value
-    if value is None or isinstance(value, bool):
-        return "" if value is None else str(value)
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(value)
     if isinstance(value, int | float):
         return f"{value:.15g}"  # what Excel keeps; more are the binary's
     if isinstance(value, time) and "s" not in str(cell.number_format):
