@@ -16,6 +16,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.check import EffectSize, ParameterRange
 from wirebayes.json_files.hold_ends import HoldEnds
+from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.notice import Notice
@@ -71,17 +72,28 @@ def preview(experiment: Experiment, kinds: Kinds, rng: Generator) -> Preview:
     prior_draws = problem.prior.rvs(4000, rng)
     before = problem.theta_in(NATURAL, prior_draws)
     problem = problem.in_units(NATURAL)
-    sample = problem.samples[0]
-    parameters = {}
-    for i, name in enumerate(problem.names):
-        unit = unit_of(name, (), [sample.protocol.control])
-        parameters[name] = _range(theta[:, i], before[:, i], unit)
     best = np.array(list(block.best.values()))
     ends = hold_ends.cost(problem, best, theta.std(axis=0, ddof=1))
+    parameters = _parameters(problem, theta, before)
+    return Preview(parameters, _effects(block, kinds, rng), _warnings(problem, theta, before), ends)
+
+
+def _parameters(problem: Problem, theta: Array, before: Array) -> dict[str, ParameterRange]:
+    """Each parameter's range by draws (n, d) after and before the test."""
+    control = problem.samples[0].protocol.control
+    out = {}
+    for i, name in enumerate(problem.names):
+        unit = unit_of(name, (), [control])
+        out[name] = _range(theta[:, i], before[:, i], unit)
+    return out
+
+
+def _warnings(problem: Problem, theta: Array, before: Array) -> list[Notice]:
+    """What is suspicious about draws (n, d) after the test, beside those before it."""
+    sample = problem.samples[0]
     own = problem.parameters(theta, sample)
     prior = problem.parameters(before, sample)
-    warnings = of_posterior(own, prior, sample)
-    return Preview(parameters, _effects(block, kinds, rng), warnings, ends)
+    return of_posterior(own, prior, sample)
 
 
 def _range(draws: Array, before: Array, unit: str) -> ParameterRange:

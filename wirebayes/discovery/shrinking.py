@@ -159,24 +159,29 @@ def _beside_discrepancy(
     bases: Sequence[LaplaceFit], train: Sequence[int], rng: Generator, parallel_map: ParallelMap
 ) -> list[_Smooth]:
     """A smooth discrepancy beside the effects of each base, its size what they leave over in the holds trained on."""
-    n = len(train)
     # everything is handed over before anything is waited for
     handed_over = []
     for base in bases:
         first = [e.train(k) for e, k in zip(base.experiments, train, strict=True)]
         experiments = [*base.experiments, *first]
-        added = parallel_map(with_discrepancy, repeat(base), experiments, rng.spawn(2 * n))
-        handed_over.append((base, added, rng.spawn(n)))
+        added = parallel_map(with_discrepancy, repeat(base), experiments, rng.spawn(len(experiments)))
+        handed_over.append((base, added, rng.spawn(len(train))))
     fitting = []
     for base, added, generators in handed_over:
         effects = list(added)
+        whole = effects[: len(train)]
         singly = [(e,) for e in base.experiments]
         one_scale = partial(fitted, scales=base.scales)
-        fits = parallel_map(one_scale, singly, effects[:n], repeat(base.spec), generators)
-        each = zip(singly, train, effects[n:], strict=True)
-        trained = [_Trained(alone, (k,), extra, base) for alone, k, extra in each]
+        fits = parallel_map(one_scale, singly, whole, repeat(base.spec), generators)
+        trained = _each_trained(base, train, effects[len(train) :])
         fitting.append((fits, trained))
     return [_Smooth(list(fits), trained) for fits, trained in fitting]
+
+
+def _each_trained(base: LaplaceFit, train: Sequence[int], effects: Sequence[tuple[Effect, ...]]) -> list[_Trained]:
+    """Each experiment of a block by itself, with effects of its own."""
+    each = zip(base.experiments, train, effects, strict=True)
+    return [_Trained((e,), (k,), own, base) for e, k, own in each]
 
 
 @dataclass(frozen=True)

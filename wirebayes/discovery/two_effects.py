@@ -57,9 +57,14 @@ def log_bayes_of_each_pair(x: Expansion) -> Array:
     pairs = np.stack([log_sum(value[:, group], axis=1) for group in groups], axis=1)
     alone = single[0] + _log_shares(x, groups)
     np.fill_diagonal(pairs, [log_sum(alone[group]) for group in groups])
-    left = np.maximum(found.rss, first_row.least[:, None])
-    nothing = log_sum(found.shared - 0.5 * x.degrees * np.log(left), axis=1)
-    return pairs - nothing[0]
+    return pairs - _log_evidence_of_none(first_row, found)[0]
+
+
+def _log_evidence_of_none(x: Expansion, found: Projected) -> Array:
+    """(n,) without any effect."""
+    left = np.maximum(found.rss, x.least[:, None])
+    by_ratio = found.shared - 0.5 * x.degrees * np.log(left)
+    return log_sum(by_ratio, axis=1)
 
 
 def _forms_of_each(x: Expansion) -> list[Ints]:
