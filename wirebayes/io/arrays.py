@@ -89,19 +89,26 @@ def from_arrays(
     columns: Any = hold
     if not is_table(hold):
         given = {"hold": hold, "displacement_mm": displacement_mm, "time_s": time_s, "tension_N": tension_N}
-        columns = {column: values for column, values in given.items() if values is not None}
+        columns = _stated(given)
     elif any(values is not None for values in (displacement_mm, time_s, tension_N)):
         raise InputError(f"{SOURCE}: found a table and single columns, expected one or the other")
     if temperature_C is not None:
-        columns = {column: columns[column] for column in names_of(columns)} | {"temperature_C": temperature_C}
+        columns = {column: columns[column] for column in names_of(columns)}
+        columns["temperature_C"] = temperature_C
     about: dict[str, Any] = {"name": name, "material": material, "length_mm": length_mm, "control": control}
-    stated = {"resolution_N": resolution_N or None, "resolution_mm": resolution_mm or None, "preload_mm": preload_mm}
-    about |= {key: value for key, value in stated.items() if value is not None}
+    resolutions = {"resolution_N": resolution_N or None, "resolution_mm": resolution_mm or None}
+    about |= _stated({**resolutions, "preload_mm": preload_mm})
     if unrecorded_holds is not None and len(unrecorded_holds):
         about["unrecorded_holds"] = [dict(each) for each in unrecorded_holds]
-    keys = _Arguments(SOURCE, "", None, _plain(about), name if isinstance(name, str) else "")
+    experiment_name = name if isinstance(name, str) else ""
+    keys = _Arguments(SOURCE, "", None, _plain(about), experiment_name)
     empty = (READ.get(control, ""), "temperature_C")
     return experiment_of(keys, lambda: table_of(columns, SOURCE, REQUIRED, OPTIONAL, may_be_empty=empty))
+
+
+def _stated(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of some arguments that are not left out."""
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def protocol_of_columns(columns: Any, control: Control = "displacement") -> CsvTable:

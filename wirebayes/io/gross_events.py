@@ -103,8 +103,9 @@ def of_readings(protocol: Protocol, readings: Floats, resolution: float) -> list
         return []
     each = [row[mask] for row, mask in zip(readings, protocol.mask, strict=True) if mask.any()]
     forces = protocol.control == "displacement"
+    _, recorded_hold = np.unique(rows, return_inverse=True)
     test = _Test(
-        np.unique(rows, return_inverse=True)[1],
+        recorded_hold,
         protocol.number[rows],
         protocol.setting[rows],
         protocol.time_s[protocol.mask],
@@ -115,8 +116,10 @@ def of_readings(protocol: Protocol, readings: Floats, resolution: float) -> list
     )
     # an elongation that returns to zero is a recovery, not a fall to nothing
     found = _falls(test) if forces else _jumps(test)
-    away = [i for event in found for i in event.readings]
-    found += [event for event in _limits(test, resolution) if not np.isin(event.readings, away).all()]
+    away = {int(i) for event in found for i in event.readings}
+    for event in _limits(test, resolution):
+        if not away.issuperset(event.readings.tolist()):
+            found.append(event)
     return sorted(found, key=lambda event: int(event.readings[0]))
 
 

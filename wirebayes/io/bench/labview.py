@@ -33,9 +33,7 @@ def sheet_of_measurement(path: Path, lines: list[str], encoding: str = "utf-8") 
     InputError
         There is no table of channels, or a later segment has other ones.
     """
-    stated = next((line for line in lines if line.startswith("Separator")), "Separator\tTab")
-    sign = "," if "comma" in stated.lower() else "\t"
-    split = [[cell.strip() for cell in line.split(sign)] for line in lines]
+    split = _split(lines)
     heads = [i for i, cells in enumerate(split) if cells[0].startswith(_TIMES) or _is_head(split, i)]
     if not heads:
         raise InputError(f"{path}, line {len(lines)}: found no line {_TIMES}, expected a table of channels below it")
@@ -49,6 +47,13 @@ def sheet_of_measurement(path: Path, lines: list[str], encoding: str = "utf-8") 
     rows = [named, _units(split, header), *_readings(split, header)]
     filled = tuple(row for row in rows if row.cells)
     return Sheet(path, filled, described="LabVIEW measurement", encoding=encoding)
+
+
+def _split(lines: list[str]) -> list[list[str]]:
+    """The cells of lines, between the signs that the file states."""
+    stated = next((line for line in lines if line.startswith("Separator")), "")
+    sign = "," if "comma" in stated.lower() else "\t"
+    return [[cell.strip() for cell in line.split(sign)] for line in lines]
 
 
 def _readings(split: list[list[str]], header: int) -> list[SheetRow]:

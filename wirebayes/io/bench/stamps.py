@@ -1,7 +1,5 @@
 """Clocks too coarse for their rate: readings that share a time stamp are spread over the time to the next one."""
 
-from itertools import pairwise
-
 import numpy as np
 
 from wirebayes.io.bench.table import RawTable
@@ -22,8 +20,7 @@ def is_coarse(table: RawTable, column: int) -> bool:
     column counts what the stamps leave out.
     """
     cells = table.column(column)
-    changes = [False, *(cell != before for before, cell in pairwise(cells))]
-    begins = _runs(np.array(changes[: len(cells)], dtype=bool))
+    begins = _begins(cells)
     counts = np.diff(begins)[1:]  # the first and the last may be cut off
     if len(counts) < FEWEST:
         return False
@@ -33,6 +30,12 @@ def is_coarse(table: RawTable, column: int) -> bool:
         return False
     others = [table.column(i) for i in range(len(table.header)) if i != column]
     return not any(_takes_turns(other, begins) for other in others)
+
+
+def _begins(cells: list[str]) -> Ints:
+    """The rows with another stamp than the one before, and the first."""
+    changes = [i for i in range(1, len(cells)) if cells[i] != cells[i - 1]]
+    return np.array([0, *changes])
 
 
 def _runs(changes: Bools) -> Ints:
