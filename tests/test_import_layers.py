@@ -8,7 +8,7 @@ from analyses.project import measures
 
 ROOT = Path(wirebayes.__file__).parent
 LAYERS: list[set[str]] = [
-    {"_version", "errors", "notice", "progress"},
+    {"_version", "errors", "progress", "result_warnings"},
     {"numeric"},
     {"json_files"},
     {"sentences"},
@@ -29,7 +29,7 @@ LAYERS: list[set[str]] = [
     {"app"},
     {"cli"},
 ]
-NEUTRAL = {"errors", "notice", "progress", "json_files", "numeric", "sentences", "strict"}
+NEUTRAL = {"errors", "progress", "result_warnings", "json_files", "numeric", "sentences", "strict"}
 ROBOT_MAY_USE = NEUTRAL | {"wire", "robot"}
 MAY_USE_ROBOT = {"report", "paper", "views", "commands", "app", "cli", "__init__"}
 

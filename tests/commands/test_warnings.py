@@ -11,10 +11,10 @@ import pytest
 
 import wirebayes as wb
 from wirebayes.cli.answer import conclude
-from wirebayes.notice import KINDS, Notice, NoticeJson, from_json, to_json
 from wirebayes.report.blocks import Notices, Page, Section
 from wirebayes.report.page import render
 from wirebayes.report.pages.fit import _cautions
+from wirebayes.result_warnings import KINDS, Notice, NoticeJson, from_json, to_json
 from wirebayes.views.result import Result
 
 ROOT = Path(__file__).parents[2]

@@ -2,9 +2,9 @@
 
 from wirebayes import sentences
 from wirebayes.answers import headline, terminal
-from wirebayes.notice import Notice
 from wirebayes.report.blocks import Notices, Page, Section, Table, Text
 from wirebayes.report.page import render
+from wirebayes.result_warnings import Notice
 
 SUMMARY = {
     "experiment": "kite",

@@ -8,7 +8,7 @@ import pytest
 import wirebayes as wb
 from wirebayes.effects import effect_named
 from wirebayes.model.build import build
-from wirebayes.notice import Notice
+from wirebayes.result_warnings import Notice
 from wirebayes.results import hold_ends
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 from wirebayes.wire.effect import Effect

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.robot.lines import STRONGER, line_about
-from wirebayes.notice import Notice
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.description import GivenWire
 from wirebayes.robot.mechanics.rotation import matrix

@@ -16,7 +16,7 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.plain import plain
 from wirebayes.model.prior import wire_defaults
 from wirebayes.model.scales import Scales
-from wirebayes.notice import Notice
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.history.unknowns import Uncertain, unknowns
 from wirebayes.robot.mechanics import draws, sag, schema
 from wirebayes.robot.mechanics.description import GivenWire

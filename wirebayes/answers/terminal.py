@@ -14,7 +14,7 @@ from wirebayes.json_files.plan import JudgedProtocol
 from wirebayes.json_files.read_units import error_grows, read_value, unit_read
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.json_files.values import Quantiles
-from wirebayes.notice import warns_of
+from wirebayes.result_warnings import warns_of
 from wirebayes.sentences import (
     counted,
     likely,

@@ -33,9 +33,9 @@ from wirebayes.io.run_folder import check_run, open_run, read_json, write_bytes,
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.model.build import build
 from wirebayes.model.sample import MATERIAL, SAMPLE
-from wirebayes.notice import Notice, NoticeJson, from_json, notices_by_part, to_json
 from wirebayes.processes.workers import as_finished, computing, executor
 from wirebayes.progress import Progress, silent
+from wirebayes.result_warnings import Notice, NoticeJson, from_json, notices_by_part, to_json
 from wirebayes.results.outliers import outliers
 from wirebayes.strict.files import PathLike
 from wirebayes.views.batch import Batch

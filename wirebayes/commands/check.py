@@ -14,9 +14,9 @@ from wirebayes.io.run_folder import open_run, write_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson, HoldUnderstood, Understood
 from wirebayes.json_files.read_units import in_unit
 from wirebayes.model.build import build
-from wirebayes.notice import notices_by_part, to_json
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
+from wirebayes.result_warnings import notices_by_part, to_json
 from wirebayes.results.hold_ends import hold_ends_notice
 from wirebayes.strict.files import PathLike
 from wirebayes.views.check import CHECKED, Check

@@ -27,9 +27,9 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.run_folder import open_run, read_json, stored_results, write_json
 from wirebayes.json_files.comparison import ComparedModels, ComparisonJson, ModelJson
 from wirebayes.model.sample import Likelihood
-from wirebayes.notice import Notice, notices_by_part
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
+from wirebayes.result_warnings import Notice, notices_by_part
 from wirebayes.sentences import counted
 from wirebayes.strict.files import PathLike
 from wirebayes.views.comparison import Comparison

@@ -28,10 +28,10 @@ from wirebayes.json_files.discovery import IntervalJson, ParameterReport
 from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.model.build import build
 from wirebayes.model.spec import ModelSpec
-from wirebayes.notice import from_json, notices_by_part, to_json
 from wirebayes.processes.copies import loaded_meanwhile, prepared_copy
 from wirebayes.processes.workers import computing, give_way, workers
 from wirebayes.progress import Progress, silent
+from wirebayes.result_warnings import from_json, notices_by_part, to_json
 from wirebayes.results.jobs import Job, begin, run
 from wirebayes.results.mixture import write_mixture
 from wirebayes.results.read_back import load_posterior

@@ -7,7 +7,7 @@ from wirebayes.commands.wires import RobotLike, Wires, configuration, draws_for,
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.export import ExportSummary
-from wirebayes.notice import Notice, to_json
+from wirebayes.result_warnings import Notice, to_json
 from wirebayes.robot.export import files
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws, doubts

@@ -19,7 +19,7 @@ from wirebayes.io.bench.undecided import Choices, Decimal, Specimens, TimeSince,
 from wirebayes.io.readings import READ
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportedExperiment, ImportJson
-from wirebayes.notice import notices_by_part, to_json
+from wirebayes.result_warnings import notices_by_part, to_json
 from wirebayes.sentences import listed
 from wirebayes.strict.files import PathLike, read_bytes
 from wirebayes.views.imported_tests import IMPORTED, ImportedTests

@@ -11,11 +11,11 @@ from wirebayes.json_files.plan import JudgedProtocol, PlanJson, RobotDrift
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.sample import MATERIAL, SAMPLE
 from wirebayes.model.spec import ModelSpec
-from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.planning.guess import GuessedWire
 from wirebayes.planning.ranking import Judged, too_long
 from wirebayes.planning.widths import HOUR_S
+from wirebayes.result_warnings import Notice, to_json
 from wirebayes.results.contraction import interval
 from wirebayes.robot.mechanics import draws as robot_draws
 from wirebayes.robot.mechanics.description import Robot

@@ -10,7 +10,6 @@ from wirebayes.errors import InputError
 from wirebayes.io.arrays import protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
-from wirebayes.notice import to_json
 from wirebayes.prediction.request import request_of
 from wirebayes.prediction.table import (
     Prediction,
@@ -20,6 +19,7 @@ from wirebayes.prediction.table import (
     mixture_table,
     unlikely_readings,
 )
+from wirebayes.result_warnings import to_json
 from wirebayes.results import read_back
 from wirebayes.results.mixture import members_of
 from wirebayes.results.read_back import Stored

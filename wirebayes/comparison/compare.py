@@ -27,12 +27,12 @@ from wirebayes.json_files.comparison import (
     PredictionScores,
 )
 from wirebayes.json_files.read_units import in_unit
-from wirebayes.notice import Notice, from_json, notices_by_part, to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.held_out import HeldOutPrediction, Scores, held_out, two_thirds
 from wirebayes.prediction.leave_one_hold_out import LeftOutHolds, smoothed_leave_one_hold_out, standard_error
 from wirebayes.processes.workers import workers
 from wirebayes.progress import Progress, silent
+from wirebayes.result_warnings import Notice, from_json, notices_by_part, to_json
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect
 

@@ -11,8 +11,8 @@ from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import GrossError
 from wirebayes.model.problem import Problem
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
+from wirebayes.result_warnings import Notice
 
 MOST = 0.05  # share of readings that may be called gross errors
 

@@ -25,9 +25,9 @@ from wirebayes.inference.laplace_fit import fitted
 from wirebayes.io.run_folder import write_json
 from wirebayes.json_files.discovery import GrossError
 from wirebayes.json_files.summary import ModelCheckResult, SummaryJson
-from wirebayes.notice import Notice, from_json, to_json
 from wirebayes.processes.workers import ParallelMap, give_way, workers
 from wirebayes.progress import Progress
+from wirebayes.result_warnings import Notice, from_json, to_json
 from wirebayes.results.jobs import Job
 from wirebayes.sentences import p_in_words, spoken
 

@@ -19,8 +19,8 @@ from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.model.problem import Problem
 from wirebayes.model.scales import NATURAL
 from wirebayes.model.spec import PLAIN_SPEC
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
+from wirebayes.result_warnings import Notice
 from wirebayes.results import hold_ends
 from wirebayes.results.contraction import contraction, source
 from wirebayes.results.parameters import unit_of

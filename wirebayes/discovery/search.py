@@ -43,9 +43,9 @@ from wirebayes.json_files.discovery import (
 )
 from wirebayes.json_files.read_units import in_unit
 from wirebayes.model.scales import scales_of
-from wirebayes.notice import Notice, notices_by_part, to_json
 from wirebayes.processes.workers import ParallelMap
 from wirebayes.progress import Progress, silent
+from wirebayes.result_warnings import Notice, notices_by_part, to_json
 from wirebayes.sentences import counted
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, EventEffect, Kinds

@@ -13,8 +13,8 @@ from wirebayes.io.checked_test import CheckedTest
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import READ, times_run_on
 from wirebayes.io.zero_shifts import slack_below, zero_shift
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.sentences import some_of
 from wirebayes.wire.protocol import Control, Protocol
 

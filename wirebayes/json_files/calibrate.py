@@ -3,8 +3,8 @@
 from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.values import MeanAndSd, Numbers
-from wirebayes.notice import Warned
 from wirebayes.numeric.typing import Array
+from wirebayes.result_warnings import Warned
 
 
 class CalibrationPrior(TypedDict):

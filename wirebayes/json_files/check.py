@@ -4,7 +4,7 @@ from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.values import Quantiles
-from wirebayes.notice import Warned
+from wirebayes.result_warnings import Warned
 
 
 class HoldUnderstood(TypedDict):

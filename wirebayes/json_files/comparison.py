@@ -3,7 +3,7 @@
 from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.values import Integers, Numbers
-from wirebayes.notice import Warned
+from wirebayes.result_warnings import Warned
 
 
 class LeaveOneHoldOut(TypedDict):

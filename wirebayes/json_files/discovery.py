@@ -2,7 +2,7 @@
 
 from typing import Literal, NotRequired, TypedDict
 
-from wirebayes.notice import Warned
+from wirebayes.result_warnings import Warned
 
 Verdict = Literal["nothing-missing", "named", "ambiguous", "partial", "unknown"]
 

@@ -1,6 +1,6 @@
 """What `export` prints with ``--json``; the creep table is ``creep-table.csv``."""
 
-from wirebayes.notice import Warned
+from wirebayes.result_warnings import Warned
 
 
 class ExportSummary(Warned):

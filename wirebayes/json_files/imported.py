@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from wirebayes.notice import Warned
+from wirebayes.result_warnings import Warned
 
 
 class ImportedExperiment(Warned):

@@ -4,7 +4,7 @@ from typing import TypedDict
 
 from wirebayes.json_files.discovery import DetectableAmplitude
 from wirebayes.json_files.values import Statistics
-from wirebayes.notice import Warned
+from wirebayes.result_warnings import Warned
 
 
 class ExpectedWidth(TypedDict):

@@ -4,7 +4,7 @@ from typing import NotRequired, TypedDict
 
 from wirebayes.json_files.calibrate import PoseNow
 from wirebayes.json_files.values import Band, Numbers, Quantiles
-from wirebayes.notice import Warned
+from wirebayes.result_warnings import Warned
 
 
 class Specimens(TypedDict):

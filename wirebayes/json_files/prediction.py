@@ -1,6 +1,6 @@
 """What ``predict --json`` prints."""
 
-from wirebayes.notice import Warned
+from wirebayes.result_warnings import Warned
 
 
 class PredictionJson(Warned):

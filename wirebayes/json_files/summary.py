@@ -5,7 +5,7 @@ from typing import NotRequired, TypedDict
 from wirebayes.json_files.discovery import GrossError
 from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.values import Numbers, Statistics
-from wirebayes.notice import Warned
+from wirebayes.result_warnings import Warned
 
 # a hold of the paper, and what a robot on the wire works through
 CREEP_TIMES_S = {"creep_2min_mm": 120.0, "creep_1h_mm": 3600.0, "creep_1day_mm": 86400.0}

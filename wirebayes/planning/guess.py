@@ -16,9 +16,9 @@ from wirebayes.model.prior import from_table, possible
 from wirebayes.model.sample import MATERIAL, SAMPLE
 from wirebayes.model.scales import NATURAL, TYPICAL_K1_N, planned_scales
 from wirebayes.model.spec import ModelSpec
-from wirebayes.notice import Notice
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
+from wirebayes.result_warnings import Notice
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,11 @@ from wirebayes.inference.fit import seed_of
 from wirebayes.io.readings import READ, SET, Hold
 from wirebayes.io.run_folder import read_json, writable, write_csv, write_json
 from wirebayes.json_files.prediction import PredictionJson
-from wirebayes.notice import Notice
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
 from wirebayes.prediction.predictive import draw_predictive
 from wirebayes.prediction.request import ProtocolRequest
+from wirebayes.result_warnings import Notice
 from wirebayes.results.read_back import Stored
 from wirebayes.strict.files import PathLike
 from wirebayes.wire.control import READ_UNIT, SET_UNIT

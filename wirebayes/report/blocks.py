@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 from wirebayes.io.run_folder import write_bytes
 from wirebayes.json_files.plain import plain
 from wirebayes.json_files.scene import SceneJson
-from wirebayes.notice import Notice, Warned, from_json
 from wirebayes.processes.copies import in_copies
+from wirebayes.result_warnings import Notice, Warned, from_json
 from wirebayes.sentences import number as number
 from wirebayes.sentences import span as span
 from wirebayes.sentences import unit_text as unit_text

@@ -19,8 +19,8 @@ from wirebayes.model.column_units import unit_of_column
 from wirebayes.model.linear_amplitudes import integrated
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
+from wirebayes.result_warnings import Notice
 from wirebayes.sentences import lasting, listed, number, unit_text
 from wirebayes.wire.protocol import Protocol
 

@@ -15,8 +15,8 @@ from wirebayes.io.zero_shifts import slack_below
 from wirebayes.model.build import FINEST
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.results.prior_influence import leaning
 from wirebayes.sentences import short, some_of
 from wirebayes.wire.control import READ_UNIT, SET_UNIT

@@ -8,9 +8,9 @@ import numpy as np
 
 from wirebayes.model.prior import Prior
 from wirebayes.model.sample import NOISES, SAMPLE
-from wirebayes.notice import Notice
 from wirebayes.numeric.distributions import HalfNormal, LogitNormal, LogNormal, Normal, log_density_of, ours
 from wirebayes.numeric.typing import Array
+from wirebayes.result_warnings import Notice
 from wirebayes.sentences import listed
 
 WIDER = 2.0  # times as wide: a prior that two people may well disagree about

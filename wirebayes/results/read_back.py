@@ -19,8 +19,8 @@ from wirebayes.io.run_folder import read_json, stored_results
 from wirebayes.model.prior import Prior
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, Sample, at_length
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array
+from wirebayes.result_warnings import Notice
 from wirebayes.results import netcdf
 from wirebayes.results.content import READING, SETTING
 from wirebayes.results.netcdf import Group

@@ -8,8 +8,8 @@ from wirebayes.json_files.hold_ends import HoldEnds
 from wirebayes.json_files.summary import CREEP_TIMES_S, Derived, Mixed, Parameter, SummaryJson
 from wirebayes.json_files.values import Statistics
 from wirebayes.model.sample import Sample
-from wirebayes.notice import Notice, NoticeJson, to_json
 from wirebayes.numeric.typing import Array
+from wirebayes.result_warnings import Notice, NoticeJson, to_json
 from wirebayes.results import hold_ends, posterior_checks
 from wirebayes.results.contraction import interval
 from wirebayes.results.identifiability import extrapolation, identifiability

@@ -11,8 +11,8 @@ from wirebayes.errors import InputError
 from wirebayes.io.next_hold import NEXT_HOLD
 from wirebayes.io.run_folder import CONFIGURATION, stored_results
 from wirebayes.json_files.summary import SummaryJson
-from wirebayes.notice import Notice, NoticeJson, from_json, to_json
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice, NoticeJson, from_json, to_json
 from wirebayes.results import read_back
 from wirebayes.results.read_back import Stored
 from wirebayes.sentences import unit_text

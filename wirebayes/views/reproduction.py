@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, read_json
-from wirebayes.notice import Notice
+from wirebayes.result_warnings import Notice
 from wirebayes.results import read_back
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from wirebayes.answers.lines import for_terminal
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION, check_run, read_json, stored_results, write_bytes
 from wirebayes.json_files.values import Quantiles
-from wirebayes.notice import Notice, Warned, from_json
+from wirebayes.result_warnings import Notice, Warned, from_json
 from wirebayes.strict.files import PathLike
 
 Content = TypeVar("Content")  # what the JSON file of a result holds

@@ -11,8 +11,8 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench.cycles import cycles_before
 from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
 from wirebayes.io.bench.recorded import BEGUN_BEFORE, CONTINUOUS, PAUSE, Cut, Cycles, Readings, level_of
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats, Ints
+from wirebayes.result_warnings import Notice
 from wirebayes.sentences import counted
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts

@@ -40,8 +40,8 @@ from wirebayes.io.bench.unit_names import with_units_beside
 from wirebayes.io.bench.words import known_words
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import OPTIONAL, REQUIRED
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.sentences import listed
 from wirebayes.wire.protocol import Control
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import UNITS
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Array, Bools, Floats, Ints
+from wirebayes.result_warnings import Notice
 
 Complain = Callable[[int, str, str, str], InputError]  # row, role, found, expected
 Rows = Ints

@@ -9,7 +9,6 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.check import CheckedExperiment, CheckJson
 from wirebayes.json_files.imported import ImportedExperiment, ImportJson
 from wirebayes.json_files.read_units import read_value
-from wirebayes.notice import warns_of
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -31,6 +30,7 @@ from wirebayes.report.blocks import (
 )
 from wirebayes.report.cells import NONE, unit_or_dash
 from wirebayes.report.glossary import SYMBOLS, meaning
+from wirebayes.result_warnings import warns_of
 from wirebayes.sentences import counted, spoken
 
 _FILES = (

@@ -11,7 +11,6 @@ from wirebayes.answers.headline import USE, fit_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.model.sample import Sample
-from wirebayes.notice import warns_of
 from wirebayes.numeric.typing import Array
 from wirebayes.prediction.predictive import PredictionRequest, draw_predictive
 from wirebayes.report import figures
@@ -37,6 +36,7 @@ from wirebayes.report.cells import NONE, median_and_interval, percent, unit_or_d
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.corner import corner
 from wirebayes.report.pictures.curve import through_the_readings
+from wirebayes.result_warnings import warns_of
 from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.parameters import unit_of
 from wirebayes.results.read_back import Stored, load_with_priors

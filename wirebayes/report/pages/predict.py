@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 
 from wirebayes.io.readings import READ, SET
 from wirebayes.io.run_folder import check_file, write_text
-from wirebayes.notice import Warned
 from wirebayes.prediction.table import Prediction
 from wirebayes.report.blocks import (
     Block,
@@ -24,6 +23,7 @@ from wirebayes.report.blocks import (
     files_beside,
     span,
 )
+from wirebayes.result_warnings import Warned
 from wirebayes.sentences import counted, number_within, quantity
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control

@@ -9,11 +9,11 @@ import numpy as np
 
 from wirebayes.json_files.pose_history import ClockJson, DriftOverTime, HistoryReadings, PoseHistoryJson
 from wirebayes.json_files.values import Band, Statistic
-from wirebayes.notice import to_json
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.means import mean_of_finite
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.progress import Progress, silent
+from wirebayes.result_warnings import to_json
 from wirebayes.robot.history import commanded, corrections
 from wirebayes.robot.history.balanced import balanced, turned_rows
 from wirebayes.robot.history.corrections import Target

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wirebayes.notice import Notice
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot

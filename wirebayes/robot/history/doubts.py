@@ -3,8 +3,8 @@
 import numpy as np
 
 from wirebayes.json_files.pose_history import PoseHistoryJson
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.estimate import Estimate
 from wirebayes.robot.history.follow import Track

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Bools, Floats, Indices
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.statics import geometry

@@ -10,8 +10,8 @@ References
 
 import numpy as np
 
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.sentences import counted, short

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from wirebayes.errors import shown
-from wirebayes.notice import Notice
 from wirebayes.numeric.batches import batch_last
 from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws, lines_of

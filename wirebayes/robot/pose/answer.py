@@ -16,8 +16,8 @@ from wirebayes.json_files.pose import (
     Workspace,
 )
 from wirebayes.json_files.values import Band
-from wirebayes.notice import Notice, NoticeJson, to_json
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice, NoticeJson, to_json
 from wirebayes.robot.mechanics import draws, drums, sag, statics
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Drums, Robot

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.json_files.pose import OrientationFound
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot

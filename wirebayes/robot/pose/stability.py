@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from wirebayes.json_files.pose import FallsReport, Times
-from wirebayes.notice import Notice
 from wirebayes.numeric.typing import Bools, Floats, Ints
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.motion.course import Course, Falls
 from wirebayes.robot.pose.request import band_over_draws
 

@@ -13,9 +13,9 @@ from wirebayes.json_files.calibrate import (
     NamedEstimates,
     Observed,
 )
-from wirebayes.notice import Notice, to_json
 from wirebayes.numeric.typing import Floats
 from wirebayes.progress import Progress, silent
+from wirebayes.result_warnings import Notice, to_json
 from wirebayes.robot.mechanics import rotation
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import doubts

@@ -11,9 +11,9 @@ from itertools import combinations
 import numpy as np
 
 from wirebayes.errors import InputError
-from wirebayes.notice import Notice
 from wirebayes.numeric.batches import batch_last
 from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.winches import lengths

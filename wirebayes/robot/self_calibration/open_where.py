@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.special import betainc
 
-from wirebayes.notice import Notice
 from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.residuals import USUAL, leverage
 from wirebayes.robot.self_calibration.session import Session

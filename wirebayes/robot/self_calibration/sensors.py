@@ -11,10 +11,10 @@ import numpy as np
 from scipy.special import chdtrc
 
 from wirebayes.json_files.calibrate import SensorsAtFault
-from wirebayes.notice import Notice
 from wirebayes.numeric.linear_algebra import inv, solve
 from wirebayes.numeric.typing import Floats
 from wirebayes.progress import ShareDone
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.self_calibration.equations import Holds
 from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance

@@ -4,9 +4,9 @@ import numpy as np
 from scipy.special import chdtrc
 
 from wirebayes.json_files.calibrate import Interval
-from wirebayes.notice import Notice
 from wirebayes.numeric.linear_algebra import solve
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 
 # Of a session with nothing wrong one in a hundred is called unusable: a warning that is heeded costs another session,
 # lengths that are wrong cost a crash.
