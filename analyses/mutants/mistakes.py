@@ -206,8 +206,8 @@ NAMED = [
     (DISCOVERY + "power.py", "> threshold) >= 0.8)", "> threshold) >= 0.5)"),
     (DISCOVERY + "held_out.py", "    log_weight = np.minimum(log_weight, ceiling)\n", ""),
     (MODEL + "likelihoods.py", " + resolution * resolution / 12.0", ""),
-    (MODEL + "problem.py", "return out if ratio == 1.0 else", "return out if True else"),
-    (SAMPLER + "moves.py", "scale = 2.38 /", "scale = 0.238 /"),
+    (MODEL + "problem.py", "if ratio == 1.0:", "if True:"),
+    (SAMPLER + "moves.py", "usual = 2.38 /", "usual = 0.238 /"),
 ]
 
 

@@ -17,8 +17,8 @@ class Check(Result[CheckJson]):
 
     Examples
     --------
-    >>> checked.messages
-    ()
+    >>> [warning.kind for warning in checked.warnings]
+    ['slack']
     """
 
     _content: ClassVar[str] = CHECKED
