@@ -24,6 +24,19 @@ def test_peers_sample_the_same_posterior(wire, likelihood):
     assert model.difference(np, problem, 0) < 1e-8
 
 
+def test_peers_in_natural_parameters_have_the_prior_of_the_package():
+    """Coordinates of draws from the prior are standard normal, and lead back to the draws."""
+    problem = build([paper.experiments()[2]])
+    problem = problem.in_units(problem.own_units)
+    draws = problem.prior.rvs(4000, np.random.default_rng(0))
+    for i, (name, kind, middle, sd) in enumerate(model.prior_terms(problem)):
+        coordinate = model.coordinate_of(draws[:, i], kind)
+        assert name == problem.names[i]
+        assert np.allclose(model.value_of(np, coordinate, kind), draws[:, i], rtol=1e-12)
+        score = (coordinate - middle) / sd
+        assert abs(score.mean()) < 0.08 and abs(score.std() - 1.0) < 0.06  # five standard errors
+
+
 def test_numpy_is_compared_with_compiled_code_by_effect_and_batch(monkeypatch, capsys):
     monkeypatch.setattr(cost, "BATCHES", (2, 4))
     monkeypatch.setattr(cost, "REPEATS", 1)

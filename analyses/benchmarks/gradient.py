@@ -38,12 +38,13 @@ def _log_density(problem, target):
 
 
 def _log_parameters(problem):
-    """log posterior in the parameters' logarithms: what a library's own transformation of natural parameters makes."""
+    """log posterior where every prior is normal: what a library's own transformation of natural parameters makes."""
     terms, likelihood = model.prior_terms(problem), model.log_likelihood(jnp, problem)
 
     def density(v):
-        theta = {n: jnp.exp(v[i]) if positive else v[i] for i, (n, positive, *_) in enumerate(terms)}
-        return sum(-0.5 * ((v[i] - m) / s) ** 2 for i, (_, _, m, s) in enumerate(terms)) + likelihood(theta)
+        theta = {name: model.value_of(jnp, v[i], kind) for i, (name, kind, *_) in enumerate(terms)}
+        log_prior = sum(-0.5 * ((v[i] - m) / s) ** 2 for i, (_, _, m, s) in enumerate(terms))
+        return log_prior + likelihood(theta)
 
     return density
 
@@ -51,8 +52,10 @@ def _log_parameters(problem):
 def _values(problem, target, x, natural):
     """What is judged, from (..., d) draws in the coordinates that were sampled."""
     if natural:
-        return x
-    theta = target.coordinates.to_natural(x.reshape(-1, x.shape[-1]).copy()).reshape(x.shape)
+        kinds = [kind for _, kind, *_ in model.prior_terms(problem)]
+        theta = np.stack([model.value_of(np, x[..., i], kind) for i, kind in enumerate(kinds)], axis=-1)
+    else:
+        theta = target.coordinates.to_natural(x.reshape(-1, x.shape[-1]).copy()).reshape(x.shape)
     return looked_at(problem, theta)
 
 
@@ -68,7 +71,7 @@ def numpyro_nuts(problem, seed, seconds, natural=True):
 
         def wire():
             theta = {
-                n: numpyro.sample(n, (dist.LogNormal if positive else dist.Normal)(m, s)) for n, positive, m, s in terms
+                name: model.value_of(jnp, numpyro.sample(name, dist.Normal(m, s)), kind) for name, kind, m, s in terms
             }
             numpyro.factor("readings", likelihood(theta))
 
@@ -96,9 +99,8 @@ def numpyro_nuts(problem, seed, seconds, natural=True):
         _settled(costs, "sample")
         mcmc.post_warmup_state = mcmc.last_state
         divergences += int(np.asarray(mcmc.get_extra_fields()["diverging"]).sum())
-        blocks.append(looked_at(problem, np.stack([draws[n] for n in problem.names], -1)) if natural else draws)
-    x = np.concatenate(blocks, axis=1)[:, :, None]
-    values = x if natural else _values(problem, target, x, False)
+        blocks.append(np.stack([draws[name] for name in problem.names], -1) if natural else draws)
+    values = _values(problem, target, np.concatenate(blocks, axis=1)[:, :, None], natural)
     return judged(costs, values, divergences=divergences), values
 
 
@@ -112,7 +114,11 @@ def _starts(target, seed, n):
 def _begin(problem, target, costs, seed, n, natural):
     with costs.part("start"):
         z = _starts(target, seed, n)
-    return looked_at(problem, target.coordinates.to_natural(z)) if natural else z
+    if not natural:
+        return z
+    theta = target.coordinates.to_natural(z)
+    kinds = [kind for _, kind, *_ in model.prior_terms(problem)]
+    return np.column_stack([model.coordinate_of(theta[:, i], kind) for i, kind in enumerate(kinds)])
 
 
 def blackjax_nuts(problem, seed, seconds, natural=False):
@@ -213,7 +219,7 @@ def nutpie_run(problem, seed, seconds, natural=True):
     with costs.part("compile"):
         with pm.Model() as wire:
             if natural:
-                theta = {n: pm.LogNormal(n, m, s) if positive else pm.Normal(n, m, s) for n, positive, m, s in terms}
+                theta = {name: model.value_of(pt, pm.Normal(name, m, s), kind) for name, kind, m, s in terms}
                 pm.Potential("readings", likelihood(theta))
             else:
                 z = pm.Flat("z", shape=len(terms), initval=_starts(target, seed, 1)[0])
@@ -240,8 +246,6 @@ def nutpie_run(problem, seed, seconds, natural=True):
     for book, spent in ((costs.cpu, fresh.cpu), (costs.wall, fresh.wall)):
         book["burn"], book["sample"] = share * spent["sample"], (1.0 - share) * spent["sample"]
     posterior = tree.posterior
-    if natural:
-        values = looked_at(problem, np.stack([posterior[n].values for n in problem.names], -1))[:, :, None]
-    else:
-        values = _values(problem, target, posterior["z"].values[:, :, None], False)
+    x = np.stack([posterior[name].values for name in problem.names], -1) if natural else posterior["z"].values
+    values = _values(problem, target, x[:, :, None], natural)
     return judged(costs, values, divergences=int(tree.sample_stats.diverging.values.sum())), values

@@ -146,13 +146,23 @@ def prior_terms(problem):
     return out
 
 
-def _value(xp, coordinate, kind):
+def value_of(xp, coordinate, kind):
+    """A parameter by its coordinate, which has a normal prior; `kind` as `prior_terms` has it."""
     if kind == "itself":
         return coordinate
     if kind == "log":
         return xp.exp(coordinate)
     odds = xp.exp(coordinate)
     return odds / (1.0 + odds / kind)
+
+
+def coordinate_of(value, kind):
+    """The inverse of `value_of`, of numpy arrays."""
+    if kind == "itself":
+        return value
+    if kind == "log":
+        return np.log(value)
+    return np.log(value / (1.0 - value / kind))
 
 
 def log_likelihood(xp, problem):
@@ -189,7 +199,7 @@ def natural(xp, problem, coordinates):
         softened = xp.logaddexp(0.0, v["B"] - ridge.log_step) if "k1" in ridge.shifted else 0.0
         v["k1"] = v["k1"] + softened
         v["B"] = v["B"] - creep - v["k1"] + ridge.log_length
-        theta = {name: _value(xp, v[name], coordinate) for name, coordinate, *_ in terms}
+        theta = {name: value_of(xp, v[name], coordinate) for name, coordinate, *_ in terms}
         volume = 0.0
         for slack in slack_edges:  # the benchmark's wires have no threshold of creep
             near = (v["preload"] - slack.at) / slack.width

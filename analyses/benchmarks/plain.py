@@ -93,16 +93,16 @@ def dynesty_run(problem, seed, seconds, sample="auto"):
     import jax.numpy as jnp
     from scipy.special import ndtri
 
-    from analyses.benchmarks.model import log_likelihood, prior_terms
+    from analyses.benchmarks.model import log_likelihood, prior_terms, value_of
 
     costs, names, terms = Costs(), problem.names, prior_terms(problem)
     function = jax.jit(lambda theta: log_likelihood(jnp, problem)(dict(zip(names, theta, strict=True))))
-    positive = np.array([t[1] for t in terms])
     centre, scale = np.array([t[2] for t in terms]), np.array([t[3] for t in terms])
 
     def transform(cube):
-        v = centre + scale * ndtri(cube)
-        return np.where(positive, np.exp(v), v)
+        coordinates = centre + scale * ndtri(cube)
+        kinds = (kind for _, kind, *_ in terms)
+        return np.array([value_of(np, one, kind) for one, kind in zip(coordinates, kinds, strict=True)])
 
     def value(theta):
         x = float(function(theta))
