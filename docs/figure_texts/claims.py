@@ -1,0 +1,116 @@
+"""What is claimed of all of it: the table of the page on trust, and the four figures of the README."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+from figure_texts.tables import percent, table_row
+
+DOCS = Path(__file__).parents[1]
+
+
+_OF_NO_GROUP = "an accepted name that is of no hidden effect's group"
+
+
+def table_of_claims(kept: dict[str, Any]) -> str:
+    """A table of what is claimed and what was found, with the study behind it."""
+    found = {name: study["result"] for name, study in kept.items()}
+    coverage, scales, clean = found["coverage"], found["any_scale"]["all"], found["clean_any_scale"]["all"]["check"]
+    robots, agreement = found["robot_calibration"]["shares"]["all"], found["robot_agreement"]
+    taut, slack = (found["any_protocol"]["shares"][group] for group in ("taut throughout", "slack in a hold"))
+    every_scale = [share for name, share in scales.items() if name != "tests"]
+    wires = found["real_wires"]["first holds to the rest"]
+    errors = "; ".join(
+        f"{name}: {wire['plain_rmse_N']:.3f} to {wire['final_rmse_N']:.3f} N" for name, wire in wires.items()
+    )
+    rows = [
+        (
+            "90 % intervals of parameters hold the truth",
+            f"{percent(coverage['interval_coverage'])} of {coverage['intervals']}, on {coverage['wires']} wires",
+            "intervals-study",
+        ),
+        (
+            "so they do at any scale, from thread to mooring rope",
+            f"{percent(min(every_scale))} to {percent(max(every_scale))}, by parameter, of {scales['tests']} tests",
+            "intervals-study",
+        ),
+        (
+            "so they do whatever the protocol, as long as the wire stays taut",
+            f"{percent(taut['all'])}, of {taut['tests']} tests; {percent(slack['all'])} where it is slack in a hold",
+            "intervals-study",
+        ),
+        (
+            "90 % bands hold the readings of later holds",
+            f"{percent(coverage['held_out_coverage'])} of {coverage['held_out_readings']}",
+            "intervals-study",
+        ),
+        (
+            "the check of a right model fails in 4 %",
+            f"{100 * clean['value']:.1f} % [{100 * clean['low']:.1f}, {100 * clean['high']:.1f}] of {clean['n']} tests",
+            "check-study",
+        ),
+        (
+            "``discover`` names an effect of its catalogue, of δ = 10, rightly",
+            f"{share_in_table('discover-hidden.inc', 'top-ranked effect in the true group, δ = 10')} files in which "
+            "it sees something",
+            "discover-study",
+        ),
+        (
+            "an accepted name is wrong in at most 10 %",
+            f"{share_in_table('discover-hidden.inc', _OF_NO_GROUP)} names",
+            "discover-study",
+        ),
+        (
+            "both of two effects at once are named",
+            f"{share_in_table('discover-hidden.inc', 'two effects: both accepted')} files; an ideal judge: "
+            f"{share_in_table('discover-hidden.inc', 'an ideal judge who has to estimate the noise: both')}",
+            "discover-study",
+        ),
+        (
+            "an effect in no catalogue is not given a name",
+            f"{share_in_table('discover-hidden.inc', 'effect in no catalogue: unknown or its group')} files",
+            "discover-study",
+        ),
+        ("with what is named, the error on the paper's later holds falls", errors, "models-study"),
+        (
+            "a robot's poses agree with independent solvers",
+            f"{agreement['cases']} equilibria within {agreement['largest_m']:.0e} m",
+            "robot-study",
+        ),
+        (
+            "90 % intervals of calibrated wire lengths hold the truth",
+            f"{percent(robots['lengths'])}, on {robots['robots']} drawn robots",
+            "robot-study",
+        ),
+    ]
+    lines = [".. list-table::", "   :header-rows: 1", "   :widths: 42 44 14", "", *table_row("claim", "found", "study")]
+    for claim, result, study in rows:
+        lines += table_row(claim, result, f":doc:`{study.removesuffix('-study')} <{study}>`")
+    return "\n".join(lines) + "\n"
+
+
+def share_in_table(file: str, row: str) -> str:
+    """What a pooled table found, in the row of that name."""
+    table = (DOCS / file).read_text(encoding="utf-8")
+    found = re.search(rf"\* - {re.escape(row)}\n.*\n\s+- (.*)", table)
+    assert found is not None, row
+    return found[1].strip("*").replace("**", "")
+
+
+def readme_figures(kept: dict[str, Any]) -> str:
+    """The README's list."""
+    coverage, robots = kept["coverage"]["result"], kept["robot_agreement"]["result"]
+    inside, later = (100 * coverage[f"{of}_coverage"] for of in ("interval", "held_out"))
+    wire = kept["real_wires"]["result"]["first holds to the rest"]["roc-line-1m"]
+    alarms = share_in_table("discover-clean.inc", "false alarms on clean files")
+    wires = f"{coverage['intervals']} intervals of 90 % from {coverage['wires']} simulated wires"
+    return (
+        f"- [Intervals](docs/intervals-study.rst): of {wires}, {inside:.0f} % contain the truth;\n"
+        f"  {later:.0f} % of the readings of later holds lie in their bands.\n"
+        f"- [False alarms](docs/discover-study.rst): `discover` suspects an effect in {alarms} files that\n"
+        "  have none; 4 % are intended.\n"
+        "- [Real wires](docs/models-study.rst): what `discover` named lowers the error on held-out holds of the\n"
+        f"  paper's thin line from {wire['plain_rmse_N']:.3f} to {wire['final_rmse_N']:.3f} N.\n"
+        f"- [Robots](docs/robot-study.rst): {robots['cases']} random equilibria agree with MuJoCo, or a minimiser of\n"
+        f"  the energy, within {robots['largest_m']:.0e} m.\n"
+    )

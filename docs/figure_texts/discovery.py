@@ -1,0 +1,114 @@
+"""Studies of what `discover` finds and names."""
+
+from collections import Counter
+from statistics import median
+from typing import Any
+
+from figure_texts.tables import run_of, table_head, table_row, version_of
+
+
+def false_alarms_at_any_scale(kept: dict[str, Any]) -> str:
+    """A paragraph and a table on false alarms of tests of any scale."""
+    found = kept["result"]
+    kinds = {"all": "all tests", "steps": "steps", "weights": "weights", "rests": "with recorded rests"}
+    verdicts = ", ".join(f"*{verdict}* {count}" for verdict, count in found["verdicts"].items()) or "none"
+    named = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in found["named"].items())
+    searched, alpha = found["searched"], 100 * found["alpha"]
+    names = f"names accepted: {named}" if named else "no name was accepted"
+    lines = [
+        f"{run_of(kept)}, at a level of {alpha:.0f} %. Where the check failed,",
+        f"``discover`` said: {verdicts}; {names}. In {searched['same_p']} of {searched['tests']} tests that both",
+        "were asked, the two had the same p. If p is uniform, values as uneven have a probability of",
+        f"{found['uniform_p']:.2f} (Kolmogorov-Smirnov).",
+        "",
+        *table_head(
+            "tests",
+            "number",
+            "the check fails, % [90 % interval]",
+            "upper bound, 95 %",
+            "``discover`` finds something missing, %",
+            "upper bound, 95 %",
+        ),
+    ]
+    for kind, words in kinds.items():
+        alarms = found[kind]
+        rates = [cell for of in ("check", "discover") for cell in _rate(alarms[of])]
+        lines += table_row(words, alarms["tests"], *rates)
+    return "\n".join(lines) + "\n"
+
+
+def _rate(rate: dict[str, float]) -> list[str]:
+    """A share with its interval, and its upper bound, %."""
+    value, low, high, upper = (100 * rate[key] for key in ("value", "low", "high", "upper_95"))
+    return [f"{value:.1f} [{low:.1f}, {high:.1f}]", f"{upper:.1f} %"]
+
+
+def alarms_in_short(scores: dict[str, Any]) -> dict[str, Any]:
+    """Of answers to files without an effect: alarms by protocol, their verdicts and names, and the time."""
+    rows = scores["api"]["rows"]
+    alarms = [row for row in rows if row["any_alarm"]]
+    protocols = sorted({row["protocol"] for row in rows})
+    return {
+        "files": len(rows),
+        "alarms": len(alarms),
+        "by_protocol": {p: sum(row["protocol"] == p for row in alarms) for p in protocols},
+        "files_a_protocol": len(rows) // len(protocols),
+        "verdicts": dict(Counter(row["verdict"] for row in alarms).most_common()),
+        "named": [[row["protocol"], row["accepted"]] for row in alarms if row["verdict"] == "named"],
+        "median_seconds": median(row["seconds"] for row in rows),
+    }
+
+
+def false_alarms(kept: dict[str, Any]) -> str:
+    """A paragraph on which files without an effect raise an alarm, and what is then said."""
+    found = kept["result"]
+    counts = found["by_protocol"]
+    most = max(counts, key=counts.__getitem__)
+    others = [count for protocol, count in counts.items() if protocol != most]
+    verdicts = ", ".join(f"*{verdict}* in {count}" for verdict, count in found["verdicts"].items())
+    names = "; ".join(
+        f"{' and '.join(accepted).replace('_', ' ')} in a file of the protocol *{protocol.replace('_', ' ')}*"
+        for protocol, accepted in found["named"]
+    )
+    return (
+        f"By protocol {min(others)} to {max(others)} of {found['files_a_protocol']} files raise an alarm, with "
+        f"*{most.replace('_', ' ')}* {counts[most]}. Of the {found['alarms']} alarms the verdict is {verdicts}. "
+        f"Named: {names or 'nothing'}. A file takes {found['median_seconds']:.1f} s (median). {version_of(kept)}.\n"
+    )
+
+
+def hidden_in_short(scores: dict[str, Any]) -> dict[str, Any]:
+    """How many files with hidden effects were answered, and how long one takes."""
+    rows = scores["api"]["rows"]
+    return {"files": len(rows), "median_seconds": median(row["seconds"] for row in rows)}
+
+
+def hidden_effects(kept: dict[str, Any]) -> str:
+    """Two sentences on the files that the table is of."""
+    found = kept["result"]
+    return (
+        f"{found['files']} files of one test each, their truth sealed until all had been answered; a file takes "
+        f"{found['median_seconds']:.1f} s (median). {version_of(kept)}.\n"
+    )
+
+
+def papers_wires(kept: dict[str, Any]) -> str:
+    """A table of the paper's wires."""
+    lines = [f"{run_of(kept)}:", ""]
+    lines += table_head("wire", "verdict", "accepted", "rms of later holds, N", "in the 90 % band")
+    for name, wire in kept["result"]["first holds to the rest"].items():
+        rms = f"{wire['plain_rmse_N']:.3f} → {wire['final_rmse_N']:.3f}"
+        inside = f"{100 * wire['plain_inside_90']:.0f} → {100 * wire['final_inside_90']:.0f} %"
+        lines += table_row(name, wire["verdict"], _spoken(wire["accepted"]), rms, inside)
+    for title, words in {"all holds": "All holds, each wire by itself", "all four": "The four judged together"}.items():
+        lines += ["", f"{words}:", "", *table_head("wire", "verdict", "accepted", "families established", "remainder")]
+        for name, wire in kept["result"][title].items():
+            families = [f"{family['name']} ({family['inclusion']:.2f})" for family in wire["families"]]
+            accepted, established = _spoken(wire["accepted"]), _spoken(families)
+            lines += table_row(name, wire["verdict"], accepted, established, f"{wire['remainder']:.2f}")
+    return "\n".join(lines) + "\n"
+
+
+def _spoken(names: list[str]) -> str:
+    """Names of effects as people say them."""
+    return ", ".join(names).replace("_", " ") or "–"
