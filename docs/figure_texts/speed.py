@@ -62,7 +62,7 @@ def draws_an_evaluation(kept: dict[str, Any]) -> str:
         cells = (", ".join(f"{value:.2f}" for value in by_key[key]) for key in (*keys, "ess_of_means_per_evaluation"))
         lines += table_row(case, *cells)
     each = found["with_effects"].values()
-    medians, least = (", ".join(f"{wire[of]:.2f}" for wire in each) for of in ("median", "least"))
+    medians, least = (", ".join(f"{wire[of]:.2g}" for wire in each) for of in ("median", "least"))
     lines += [
         "",
         f"With single effects it is, all counted, {medians} in the median of the catalogue on the four wires, and",
