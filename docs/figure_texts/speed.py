@@ -26,40 +26,53 @@ def seconds_of_commands(kept: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+_GROWTHS = ("readings", "holds", "experiments")  # what the cost of an evaluation grows with
+_DRAWS = {
+    "ess_per_kept_evaluation": "after burn-in",
+    "ess_per_evaluation": "all counted",
+    "ess_of_means_per_kept_evaluation": "means, after burn-in",
+    "ess_of_means_per_evaluation": "means, all counted",
+}
+
+
 def cost_in_short(found: dict[str, Any]) -> dict[str, Any]:
     """Of the costs of evaluations and draws: what the texts say."""
-    growths = [found[size] for size in ("readings", "holds", "experiments")]
+    first_and_last, peaks = {}, []
+    for of in _GROWTHS:
+        rows = found[of]
+        first_and_last[of] = [[row["size"], row["us"]] for row in (rows[0], rows[-1])]
+        peaks += [row["peak_bytes"] for row in rows]
+    draws = {}
+    for case, by_key in found["draws"].items():
+        draws[case] = {key: [min(of), median(of), max(of)] for key, of in by_key.items()}
+    with_effects = {}
+    for wire, by_effect in found["with_effects"].items():
+        an_evaluation = [ess for ess, _ in by_effect.values()]
+        with_effects[wire] = {"median": median(an_evaluation), "least": min(an_evaluation)}
     return {
-        "first_and_last": {
-            size: [[row["size"], row["us"]] for row in (found[size][0], found[size][-1])]
-            for size in ("readings", "holds", "experiments")
-        },
-        "most_megabytes": max(row["peak_bytes"] for rows in growths for row in rows) / 1e6,
+        "first_and_last": first_and_last,
+        "most_megabytes": max(peaks) / 1e6,
         "effects": found["effects"],
         "against_numpy": found["against_numpy"],
         "share": found["share"],
-        "draws": {
-            case: {key: [min(of), median(of), max(of)] for key, of in by_key.items()}
-            for case, by_key in found["draws"].items()
-        },
-        "with_effects": {
-            wire: {"median": median(ess for ess, _ in by_effect.values()), "least": min(by_effect.values())[0]}
-            for wire, by_effect in found["with_effects"].items()
-        },
+        "draws": draws,
+        "with_effects": with_effects,
     }
 
 
 def draws_an_evaluation(kept: dict[str, Any]) -> str:
     """A table of effective draws an evaluation of the paper's wires, and a sentence on models with an effect."""
     found = kept["result"]
-    keys = ("ess_per_kept_evaluation", "ess_per_evaluation", "ess_of_means_per_kept_evaluation")
     lines = [
         f"{run_of(kept)}, twenty seeds, smallest, median and largest:",
         "",
-        *table_head("posterior", "after burn-in", "all counted", "means, after burn-in", "means, all counted"),
+        *table_head("posterior", *_DRAWS.values()),
     ]
     for case, by_key in found["draws"].items():
-        cells = (", ".join(f"{value:.2f}" for value in by_key[key]) for key in (*keys, "ess_of_means_per_evaluation"))
+        cells = []
+        for key in _DRAWS:
+            least, middle, most = by_key[key]
+            cells.append(f"{least:.2f}, {middle:.2f}, {most:.2f}")
         lines += table_row(case, *cells)
     each = found["with_effects"].values()
     medians, least = (", ".join(f"{wire[of]:.2g}" for wire in each) for of in ("median", "least"))
@@ -76,8 +89,7 @@ def cost_of_an_evaluation(kept: dict[str, Any]) -> str:
     found = kept["result"]
     ends = found["first_and_last"]
     readings, holds, experiments = (
-        " and ".join(f"{three_digits(us)} µs for {size}" for size, us in ends[of])
-        for of in ("readings", "holds", "experiments")
+        " and ".join(f"{three_digits(us)} µs for {size}" for size, us in ends[of]) for of in _GROWTHS
     )
     ratios = {name.replace("_", " "): ratio for name, ratio in found["effects"].items() if name != "none"}
     dearest = sorted(ratios, key=ratios.__getitem__, reverse=True)[:3]

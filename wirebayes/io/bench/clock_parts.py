@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from wirebayes.io.bench.compound_times import HOURS, MINUTES, SECONDS
-from wirebayes.io.bench.header import NO_UNIT, name_and_unit
+from wirebayes.io.bench.header import NO_UNIT, header_meant, name_and_unit
 from wirebayes.io.bench.quantities import quantity_unit
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.words import plain_letters
@@ -55,7 +55,7 @@ def with_joined_parts(table: RawTable, mapping: Sequence[str]) -> RawTable:
     mapping : sequence of str
         What the user says of columns: those that it names stay as they are.
     """
-    said = {text.rpartition("=")[0].strip() for text in mapping}
+    said = set(map(header_meant, mapping))
     free = [i for i, name in enumerate(table.header) if name and name not in said]
     for parts in (_of_date(table, free), _of_clock(table, free)):
         table = table if parts is None else _joined(table, parts)

@@ -58,6 +58,11 @@ def is_copy(table: RawTable, column: int, other: int) -> bool:
     return units[0] == units[1] and table.column(column) == table.column(other)
 
 
+def header_meant(mapping: str) -> str:
+    """The header of a user's ``HEADER=COLUMN``."""
+    return mapping.rpartition("=")[0].strip()
+
+
 def name_and_unit(header: str, role: Role) -> tuple[str, Unit | None]:
     """A header without its unit, and the unit: in brackets, after a slash, a comma, ``in``, ``_``, a point or a space.
 

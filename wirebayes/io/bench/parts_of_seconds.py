@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from wirebayes.io.bench.header import name_and_unit
+from wirebayes.io.bench.header import header_meant, name_and_unit
 from wirebayes.io.bench.table import RawTable
 
 _UNITS = {  # parts of a second in one, by what programs call them
@@ -27,7 +27,7 @@ def with_whole_seconds(table: RawTable, mapping: Sequence[str]) -> RawTable:
     mapping : sequence of str
         What the user says of columns: those that it names stay as they are.
     """
-    said = {text.rpartition("=")[0].strip() for text in mapping}
+    said = set(map(header_meant, mapping))
     for first in range(len(table.header) - 1):
         second = first + 1
         if not said.isdisjoint(table.header[first : second + 1]):

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.io.bench.columns import IGNORE
-from wirebayes.io.bench.header import is_of, name_and_unit
+from wirebayes.io.bench.header import header_meant, is_of, name_and_unit
 from wirebayes.io.bench.quantities import ROLES, Role
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Specimens, Undecided
@@ -284,7 +284,7 @@ def _mapping_of(
 
 def _column_meant(marked: _Marked, text: str) -> int | None:
     """The column that a user means by its whole name, perhaps with a unit that the file leaves out."""
-    header = text.rpartition("=")[0].strip()
+    header = header_meant(text)
     for name in (header, _unit_apart(header)[0]):
         if name and name in marked.full and name not in marked.name:
             return marked.full.index(name)
