@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from wirebayes._version import __version__
+from wirebayes.cli.streams import open_standard_streams
 from wirebayes.errors import InputError
 from wirebayes.processes.interrupt import watch
 
@@ -139,16 +140,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if arguments is None:
         arguments = sys.argv[1:]
+        open_standard_streams()
         watch(arguments)
         from wirebayes.processes.workers import SELDOM
 
         gc.set_threshold(*SELDOM)
         # The end of the process frees all at once; Python would free each object before it, for half a second.
         atexit.register(gc.freeze)
-    arguments = list(arguments)
+    try:
+        code = _exit_code(list(arguments))
+        sys.stdout.flush()  # here, where a full disk is an error like others
+    except InputError as error:
+        print(_one_line(str(error)), file=sys.stderr)
+        return 2
+    return code
+
+
+def _exit_code(arguments: list[str]) -> int:
     called = next((word for word in _typed(arguments) if not word.startswith("-")), None)
     if called is None and arguments in (["-h"], ["--help"]):
-        _print(overview(shutil.get_terminal_size().columns))  # typer alone takes twice as long to load as all else
+        print(overview(shutil.get_terminal_size().columns))  # typer alone takes twice as long to load as all else
         return 0
 
     import typer  # only now: Ctrl-C is welcome during imports, too
@@ -158,20 +169,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     one_thread_each()  # small matrices: more threads only fight over them
     try:
         typer.main.get_command(_application(called)).main(args=arguments, prog_name="wirebayes")
-    except InputError as error:
-        print(_one_line(str(error)), file=sys.stderr)
-        return 2
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else int(stop.code is not None)
     return 0
-
-
-def _print(text: str) -> None:
-    """Print and flush; a reader that has seen enough, as ``head`` has, ends it without a traceback."""
-    try:
-        print(text, flush=True)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for the flush at the end of the process
 
 
 _ABOUT = "A Bayesian toolkit for wires that creep: posteriors, missing effects, robot drift."

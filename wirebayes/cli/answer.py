@@ -1,5 +1,6 @@
 """What a command says at its end: the answer in a few lines, where the results lie, and what to do next."""
 
+import codecs
 import json
 import sys
 from collections.abc import Callable, Collection, Iterator
@@ -79,7 +80,7 @@ def print_answer(
     """
     shown = not (as_json or quiet)
     if as_json:
-        print(json.dumps(plain(result.summary()), indent=2, ensure_ascii=False, allow_nan=False))
+        print_json(result.summary())
     if shown:
         print(result, flush=True)  # before the warnings, which go another way
     unsaid = [message for message in result.messages if message not in said]
@@ -87,6 +88,12 @@ def print_answer(
         print(line, file=sys.stderr, flush=True)
     if shown:
         print("\n".join([*(_where(result) if kept else []), *next_lines(result.next_step(given))]))
+
+
+def print_json(content: object) -> None:
+    """Print JSON; letters that the encoding of standard output lacks are written in ASCII, by JSON's own codes."""
+    has_all_letters = codecs.lookup(sys.stdout.encoding).name == "utf-8"
+    print(json.dumps(plain(content), indent=2, ensure_ascii=not has_all_letters, allow_nan=False))
 
 
 def _where(result: Result[Any]) -> list[str]:

@@ -1,6 +1,5 @@
 """`wirebayes predict`: the readings a posterior expects of a protocol."""
 
-import json
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
@@ -53,8 +52,8 @@ def predict_command(
     in tension_N conditions its hold and those after it.
     """
     from wirebayes.answers.lines import for_terminal
+    from wirebayes.cli.answer import print_json
     from wirebayes.commands.predict import predict as run
-    from wirebayes.json_files.plain import plain
     from wirebayes.report.pages.predict import in_a_sentence, write_beside
 
     table = protocol.with_name(f"{protocol.stem}-predicted.csv") if output is None else output
@@ -70,7 +69,7 @@ def predict_command(
     )
     page = write_beside(predicted, table)
     if as_json:
-        typer.echo(json.dumps(plain(predicted.summary()), indent=2, ensure_ascii=False, allow_nan=False))
+        print_json(predicted.summary())
     elif not quiet:
         typer.echo("\n".join(for_terminal([in_a_sentence(predicted)])))
     warnings = [f"warning: {warning}" for warning in predicted.attrs.get("warnings", [])]

@@ -78,8 +78,8 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, content: str) -> None:
-    """Write a whole UTF-8 text file with line feeds, or nothing."""
-    write_bytes(path, content.encode("utf-8"))
+    """Write a whole UTF-8 text file with line feeds, or nothing; bytes of file names that are no UTF-8 as codes."""
+    write_bytes(path, content.encode("utf-8", "backslashreplace"))
 
 
 def write_json(path: Path, content: Any) -> None:

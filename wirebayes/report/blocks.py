@@ -376,7 +376,7 @@ def files_beside(folder: Path, contents: Sequence[tuple[str, str]], title: str =
     for name, holds in contents:
         for path in sorted(folder.glob(name))[:_MOST_LINKS]:
             file = path.relative_to(folder).as_posix()
-            found.append((quote(file), holds))
+            found.append((quote(file, errors="surrogateescape"), holds))
     return Section(title, [Links(found)])
 
 

@@ -59,7 +59,7 @@ def page_of_folder(folder: Path) -> Page:
 def _way(start: Path, folder: Path) -> str:
     """What stands before the links of a page in one folder to files in another."""
     between = Path(os.path.relpath(folder.resolve(), start.resolve())).as_posix()
-    return "" if between == "." else f"{quote(between)}/"
+    return "" if between == "." else quote(between, errors="surrogateescape") + "/"
 
 
 def render(page: Page, files_in: str = "") -> str:
