@@ -189,6 +189,29 @@ def test_a_copy_that_is_ended_while_it_begins_says_nothing(tmp_path: Path) -> No
     assert done.returncode == 128 + TERM
 
 
+@pytest.mark.parametrize(
+    ("begun", "said"),
+    [
+        ("pass", "no results were kept"),
+        ("(run.directory / 'a.csv').touch()", "run the same command again to go on"),
+        ("with open_run('o/in', {}) as inner: inner.finish()", "run the same command again to go on"),
+        ("run.finish()", "the results are complete"),
+    ],
+)
+def test_what_was_kept_in_a_folder_that_no_argument_names(begun: str, said: str, tmp_path: Path) -> None:
+    code = (
+        "import os, signal\n"
+        "from wirebayes.io.run_folder import open_run\n"
+        "from wirebayes.processes.interrupt import watch\n"
+        "watch(['fit', 'o.toml'])\n"
+        "with open_run('o', {}) as run:\n"
+        f"    {begun}\n"
+        "    os.kill(os.getpid(), signal.SIGTERM)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stderr == f"terminated; {said}\n"
+
+
 @pytest.mark.slow
 def test_an_interrupted_fit_goes_on_to_the_same_bytes(tmp_path: Path) -> None:
     out, whole = tmp_path / "out", tmp_path / "whole"

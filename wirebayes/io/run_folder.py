@@ -21,7 +21,7 @@ from typing import Any, Literal
 from wirebayes._version import __version__
 from wirebayes.errors import InputError
 from wirebayes.json_files.plain import plain
-from wirebayes.processes.interrupt import unfinished
+from wirebayes.processes.interrupt import results_in, unfinished
 from wirebayes.processes.lock import LOCK, locked
 from wirebayes.strict.files import read_bytes
 
@@ -245,6 +245,7 @@ def open_run(directory: str | Path, configuration: Mapping[str, Any]) -> Iterato
     directory = Path(directory)
     wanted = plain(configuration)
     if check_run(directory, wanted) == "done":
+        results_in(directory)
         yield Run(directory, "done")
         return
     with writable(directory):
@@ -253,6 +254,7 @@ def open_run(directory: str | Path, configuration: Mapping[str, Any]) -> Iterato
             state = check_run(directory, wanted)  # it may have been finished a moment ago
             if state == "new":
                 write_json(directory / CONFIGURATION, wanted)
+            results_in(directory)
             clear_leftovers(directory)
             yield Run(directory, state)
 

@@ -19,6 +19,7 @@ _OURS = ("configuration.json", ".lock")  # every run begins with these
 _PATIENCE_S = 2.0  # for a worker to tidy up, before it is killed
 
 _unfinished: set[Path] = set()
+_results: Path | None = None  # the folder of the command's results
 _held_back = False
 _arrived: list[int] = []
 
@@ -29,12 +30,11 @@ def watch(arguments: Sequence[str]) -> None:
     Parameters
     ----------
     arguments : sequence of str
-        Of the command line: they say where results may lie from which the same command goes on.
+        Of the command line: until `results_in` is called, they say where results of an earlier run may lie.
     """
 
     def last_words(number: int) -> str:
-        kept = "run the same command again to go on" if _begun(arguments) else "no results were kept"
-        return f"{_WORDS[signal.Signals(number)]}; {kept}\n"
+        return f"{_WORDS[signal.Signals(number)]}; {_kept(arguments)}\n"
 
     _handle(signal.SIGINT, last_words)
     _handle(signal.SIGTERM, last_words)
@@ -84,6 +84,12 @@ def unfinished(path: Path) -> Iterator[None]:
         _unfinished.discard(path)
 
 
+def results_in(folder: Path) -> None:
+    """Say where a command's results lie, for its last words; folders within it come later and do not count."""
+    global _results
+    _results = _results or folder
+
+
 def _handle(which: signal.Signals, last_words) -> None:  # type: ignore[no-untyped-def]
     def handler(number: int, frame: FrameType | None) -> None:
         if _held_back:
@@ -114,10 +120,18 @@ def _leave(number: int, words: str) -> NoReturn:
     os._exit(128 + number)
 
 
-def _begun(arguments: Sequence[str]) -> bool:
-    """Whether the folder of results holds anything that the same command would not do again."""
+def _kept(arguments: Sequence[str]) -> str:
+    """What there is of results."""
+    folder = _results or _named_output(arguments)
+    if folder is None or not (folder / "configuration.json").is_file():
+        return "no results were kept"
+    if (folder / "complete.json").exists():
+        return "the results are complete" if _results else "no results were kept"
+    if any(path.is_file() and path.name not in _OURS for path in folder.rglob("*")):
+        return "run the same command again to go on"
+    return "no results were kept"
+
+
+def _named_output(arguments: Sequence[str]) -> Path | None:
     words = [part for word in arguments for part in (word.split("=", 1) if word.startswith("--output=") else [word])]
-    folder = next((Path(after) for word, after in zip(words, words[1:], strict=False) if word == "--output"), None)
-    if folder is None or not (folder / "configuration.json").is_file() or (folder / "complete.json").exists():
-        return False
-    return any(path.is_file() and path.name not in _OURS for path in folder.rglob("*"))
+    return next((Path(after) for word, after in zip(words, words[1:], strict=False) if word == "--output"), None)
