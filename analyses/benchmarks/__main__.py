@@ -4,34 +4,21 @@
 
 Every peer gets the same data, prior and likelihood; before anything is timed its model is compared with the package's.
 A peer that did not finish, diverged or has R-hat above 1.01 is printed as not converged and gets no ratio. wirebayes is
-run anew beside each peer, so that a busy machine slows both.
+run anew beside each peer, so that a busy machine slows both. Each case has a process of its own: what XLA has compiled
+for one stays in memory until its process ends.
 """
 
 import argparse
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product
+from multiprocessing import get_context
 
-import jax.numpy as jnp
 import numpy as np
 
-from analyses.benchmarks import gradient, measure, model, parsed, plain
+from analyses.benchmarks import measure, parsed
+from analyses.benchmarks.peers import PEERS, beside_each_peer
 from wirebayes.io.paper import experiments
 from wirebayes.io.run_folder import write_json
-from wirebayes.model.build import build
-from wirebayes.model.spec import ModelSpec
-
-PEERS = {
-    "NumPyro NUTS, natural": lambda p, s, t: gradient.numpyro_nuts(p, s, t, True),
-    "NumPyro NUTS, our coordinates": lambda p, s, t: gradient.numpyro_nuts(p, s, t, False),
-    "compiled NUTS, natural": lambda p, s, t: gradient.blackjax_nuts(p, s, t, True),
-    "compiled NUTS, our coordinates": lambda p, s, t: gradient.blackjax_nuts(p, s, t, False),
-    "ChEES-HMC, natural": lambda p, s, t: gradient.chees(p, s, t, True),
-    "ChEES-HMC, our coordinates": lambda p, s, t: gradient.chees(p, s, t, False),
-    "emcee stretch, natural": lambda p, s, t: plain.stretch(p, s, t, True),
-    "emcee stretch, our coordinates": lambda p, s, t: plain.stretch(p, s, t, False),
-    "dynesty, unit cube": plain.dynesty_run,
-    "dynesty with random walks, unit cube": lambda p, s, t: plain.dynesty_run(p, s, t, "rwalk"),
-    "nutpie, natural": lambda p, s, t: gradient.nutpie_run(p, s, t, True),
-    "nutpie, our coordinates": lambda p, s, t: gradient.nutpie_run(p, s, t, False),
-}
 
 
 def main():
@@ -44,18 +31,11 @@ def main():
     parser.add_argument("--peers", nargs="*", help="words that the names of wanted peers begin with")
     parser.add_argument("--seed", type=int, default=0)
     options = parsed(parser)
+    wires = [experiment.name for experiment in experiments() if not options.wires or experiment.name in options.wires]
     cases = []
-    for experiment in experiments():
-        if options.wires and experiment.name not in options.wires:
-            continue
-        for likelihood in options.likelihoods:
-            cases.append(
-                run(
-                    build([experiment], spec=ModelSpec(likelihood=likelihood)),
-                    f"{experiment.name}, {likelihood}",
-                    options,
-                )
-            )
+    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as alone:
+        for wire, likelihood in product(wires, options.likelihoods):
+            cases.append(alone.submit(beside_each_peer, wire, likelihood, options).result())
             write_json(
                 options.output / "samplers.json",
                 {"wanted_ess": measure.WANTED, "minutes": options.minutes, "cases": cases},
@@ -71,65 +51,6 @@ def main():
         if tried:
             cells = f"{np.median(ratios):8.1f} {min(ratios):8.1f}" if ratios else "not converged"
             print(f"  {name:36s} {cells}   ({len(ratios)} of {tried} converged)")
-
-
-def run(problem, title, options):
-    # in a test's own units the priors of B and k2 depend on no exponent: independent priors, as the peers have them
-    problem = problem.in_units(problem.own_units)
-    difference = model.difference(jnp, problem, options.seed)
-    print(f"\n{title}: log density differs from the peers' by {difference:.1e} at most", flush=True)
-    if difference > 1e-8:
-        raise SystemExit("the peers' model is not the package's")
-    out = {"case": title, "log_density_difference": difference, "ours": [], "peers": {}}
-    print(f"  {'':36s} {'all costs':>10s} {'sampling':>10s} {'ratio':>8s}  effective draws per processor second")
-    for name, peer in PEERS.items():
-        if options.peers and not any(name.startswith(word) for word in options.peers):
-            continue
-        mine, reference = plain.ours(problem, options.seed, 0.0)
-        out["ours"].append(mine)
-        try:
-            theirs, values = peer(problem, options.seed, 60.0 * options.minutes)
-        except Exception as error:  # a peer that cannot run is told, and the others go on
-            theirs = {"converged": False, "why": f"{type(error).__name__}: {error}"[:300]}
-        else:
-            theirs["agreement"] = measure.agreement(values, reference)
-            if theirs["converged"]:
-                for kind in ("all_costs_per_cpu_s", "all_costs_per_wall_s", "sampling_per_cpu_s"):
-                    key = {
-                        "all_costs_per_cpu_s": "ratio_all_costs_cpu",
-                        "all_costs_per_wall_s": "ratio_all_costs_wall",
-                        "sampling_per_cpu_s": "ratio_sampling_cpu",
-                    }[kind]
-                    theirs[key] = mine[kind] / theirs[kind]
-        out["peers"][name] = theirs
-        _tell(name, theirs)
-    _tell(
-        "wirebayes (median)",
-        {
-            k: float(np.median([m[k] for m in out["ours"]]))
-            for k in ("all_costs_per_cpu_s", "sampling_per_cpu_s", "ess_per_kept_evaluation", "ess_per_evaluation")
-        }
-        | {"converged": all(m["converged"] for m in out["ours"])},
-    )
-    return out
-
-
-def _tell(name, r):
-    if "why" in r:
-        line = f"could not be run: {r['why']}"
-    else:
-        line = f"{r['all_costs_per_cpu_s']:10.1f} {r['sampling_per_cpu_s']:10.1f}"
-        line += f" {r['ratio_all_costs_cpu']:8.1f}" if "ratio_all_costs_cpu" in r else " " * 9
-        if "agreement" in r:
-            line += f"  mean off {r['agreement']['mean_in_sd']:.3f} sd, log sd off {r['agreement']['log_sd']:.3f}"
-        if "ess_per_evaluation" in r:
-            line += f"  ESS per evaluation {r['ess_per_kept_evaluation']:.3f},"
-            line += f" burn-in counted {r['ess_per_evaluation']:.3f}"
-        if not r["converged"]:
-            line = (
-                f"not converged (divergences {r.get('divergences')}, R-hat {r.get('r_hat')}, ESS {r.get('ess', 0):.0f})"
-            )
-    print(f"  {name:36s} {line}", flush=True)
 
 
 if __name__ == "__main__":
