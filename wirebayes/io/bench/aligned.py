@@ -43,8 +43,10 @@ def with_gaps(lines: Sequence[str], split: Sequence[list[str]]) -> list[list[str
     if not short:
         return None
     stands = np.array([places[i] for i in full])
-    begin, end = stands[..., 0].min(axis=0), stands[..., 1].max(axis=0)
-    if (end[:-1] > begin[1:]).any():
+    begin = stands[..., 0].min(axis=0)
+    end = stands[..., 1].max(axis=0)
+    overlap = end[:-1] > begin[1:]
+    if overlap.any():
         return None
     out = list(split)
     for i in short:

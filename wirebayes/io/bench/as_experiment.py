@@ -49,17 +49,21 @@ def check_direction(table: RawTable, column: Column, experiment: Experiment, map
     pull = np.array([np.mean(hold.tension_N) for hold in holds])
     if not falls(place, pull):
         return
+    lowest = f"{place.min():g} mm"
+    highest = place.max()
     first_line = table.rows[0].line
+    turned = _turned(column)
     as_it_stands = f"{column.header}={column.role} [{UNITS[column.role]}]"
-    if experiment.control == "force" and as_it_stands not in mapping and _step_down(experiment):
-        where = f"{table.sheet.path}, {table.place(first_line, column.index)}"
-        found = f"found displacements that fall from {place.max():g} to {place.min():g} mm as the weights rise"
-        answers = {_turned(column): "it counts down", f"--map {as_it_stands}": "as it stands"}
+    by_weights = experiment.control == "force"
+    if by_weights and as_it_stands not in mapping and _step_down(experiment):
+        where = table.where(first_line, column.index)
+        found = f"found displacements that fall from {highest:g} to {lowest} as the weights rise"
+        answers = {turned: "it counts down", f"--map {as_it_stands}": "as it stands"}
         raise Undecided(f"{where}: {found}", "how it counts", answers)
-    if place.max() > 0:
+    if highest > 0:
         return
-    found = f"displacements down to {place.min():g} mm, the further down the more tension"
-    expected = f"what lengthens the wire counted up; change the sign with {quoted(_turned(column))}"
+    found = f"displacements down to {lowest}, the further down the more tension"
+    expected = f"what lengthens the wire counted up; change the sign with {quoted(turned)}"
     raise table.complain(first_line, column.index, found, expected)
 
 

@@ -88,23 +88,34 @@ def _with_column(table: RawTable, blocks: Sequence[_Block], name: str, said: Cal
         return table
     values = [found[key] for found in each]
     begins = [block.begin for block in blocks]
+    width = len(table.header)
     rows = []
     for row in table.rows:
-        cells = [row.cell(i) for i in range(len(table.header))]
-        block = max(bisect_right(begins, row.line) - 1, 0)
-        cells.append(values[block][0] if row.may_be_a_reading else "")
-        rows.append(replace(row, cells=tuple(cells)))
-    first, last = (" ".join(filter(None, value)) for value in (values[0], values[-1]))
-    described = f"{table.sheet.described}, the {name} of each block from the line above it ({first} to {last})"
-    unit = values[0][1]
+        cells = [row.cell(i) for i in range(width)]
+        value = ""
+        if row.may_be_a_reading:
+            block = max(bisect_right(begins, row.line) - 1, 0)
+            value, _ = values[block]
+        rows.append(replace(row, cells=(*cells, value)))
+    first = _in_a_word(values[0])
+    last = _in_a_word(values[-1])
+    _, unit = values[0]
+    above = table.above
+    if above:
+        above = (*above, "")
     return replace(
         table,
-        sheet=replace(table.sheet, described=described),
+        sheet=table.sheet.also(f"the {name} of each block from the line above it ({first} to {last})"),
         header=(*table.header, name),
         units=(*table.units, unit),
         rows=tuple(rows),
-        above=(*table.above, "") if table.above else (),
+        above=above,
     )
+
+
+def _in_a_word(value: tuple[str, str]) -> str:
+    """A number with its unit, where it has one."""
+    return " ".join(filter(None, value))
 
 
 def _said_above(block: _Block, said: Callable[[str], Said]) -> Said:
@@ -142,14 +153,24 @@ def _settings(line: str, role: Role) -> Said:
     said: Said = {}
     if not may_state_a_setting(line):
         return said
+    key = _without_numbers(line)
     for place, found in enumerate(_MEASURE.finditer(line)):
-        if quantity_unit(found[2], role) and not found[1].startswith("+"):  # a change is no setting
-            said[f"{place} {_without_numbers(line)}"] = found[1], found[2]
+        number, unit_text = found.groups()
+        if quantity_unit(unit_text, role) and not _is_change(number):
+            said[f"{place} {key}"] = number, unit_text
     last = _LAST.fullmatch(line)
-    unit = name_and_unit(last[1], role)[1] if last else None
-    if last and unit and not said and not last[2].startswith("+"):
-        said[_without_numbers(line)] = last[2], unit.text
+    if said or last is None:
+        return said
+    name, number = last.groups()
+    _, unit = name_and_unit(name, role)
+    if unit and not _is_change(number):
+        said[key] = number, unit.text
     return said
+
+
+def _is_change(number: str) -> bool:
+    """Whether a number with its sign is a change, which is no setting."""
+    return number.startswith("+")
 
 
 def _specimen(line: str) -> Said:

@@ -59,12 +59,14 @@ def with_units_apart(sheet: Sheet) -> Sheet:
             units[column], numbers[column] = found
     if not numbers:
         return sheet
-    rows = list(sheet.rows[:first])
+    above = sheet.rows[:first]
+    rows = list(above)
     if not _bears(head, units):
         in_brackets = [f"[{unit}]" if unit else "" for unit in units]
         rows.append(SheetRow(readings[0].line, tuple(in_brackets)))
-    rows += [_with_numbers(row, numbers) for row in sheet.rows[first:]]
-    return replace(sheet, rows=tuple(rows), described=f"{sheet.described}, units in the cells")
+    for row in sheet.rows[first:]:
+        rows.append(_with_numbers(row, numbers))
+    return replace(sheet.also("units in the cells"), rows=tuple(rows))
 
 
 def _bears(head: SheetRow, units: Sequence[str]) -> bool:
@@ -109,15 +111,20 @@ def in_one_unit(measures: Sequence[tuple[str, str]], role: Role) -> tuple[str, l
         if unit is None:
             return None
         units[name] = unit
+    given = [number for number, _ in measures]
     if len(names) == 1:
-        return names[0], [number for number, _ in measures]
-    if not _are_multiples(list(units.values())) or any(_TWO_SIGNS.search(number) for number, _ in measures):
+        return names[0], given
+    if not _are_multiples(list(units.values())):
+        return None
+    if any(map(_TWO_SIGNS.search, given)):
         return None
     smallest = min(names, key=lambda name: units[name].factor)
-    sign = "," if any("," in number for number, _ in measures) else "."
+    factor = units[smallest].factor
+    has_comma = any("," in number for number in given)
+    sign = "," if has_comma else "."
     numbers = []
     for number, name in measures:
-        times = Decimal(f"{units[name].factor / units[smallest].factor:.12g}")
+        times = Decimal(f"{units[name].factor / factor:.12g}")
         plain = "".join(number.split()).replace("\u2212", "-").replace(",", ".")
         value = times * Decimal(plain)
         numbers.append(f"{value:f}".replace(".", sign))

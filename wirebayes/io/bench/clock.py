@@ -90,9 +90,13 @@ def seconds(
     moments = _moments(table, column, unit)
     # what follows a date or stands before AM is of the day, and leaves no doubt
     of_clock = [m["date"] is None and m["half"] is None for m in moments]
-    short = next((i for i, m in enumerate(moments) if of_clock[i] and m["third"] is None), None)
-    leading = _HOUR if short is None else _leading(table, column, unit, moments, short)
-    each = [_value(m, leading if bare else _HOUR) for m, bare in zip(moments, of_clock, strict=True)]
+    short = _first_short(moments, of_clock)
+    leading = _HOUR
+    if short is not None:
+        leading = _leading(table, column, unit, moments, short)
+    each = []
+    for found, bare in zip(moments, of_clock, strict=True):
+        each.append(_value(found, leading if bare else _HOUR))
     values = np.array(each)
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
@@ -108,6 +112,14 @@ def seconds(
     of_day = short is None and (not of_clock[0] or values[0] >= _HOUR)
     midnights = np.cumsum(_days_begin(values, of_day))
     return values + _DAY * midnights, of_day, _passed("midnight", midnights)
+
+
+def _first_short(moments: Sequence[re.Match[str]], of_clock: Sequence[bool]) -> int | None:
+    """The first clock of two parts, ``a:b``, which may be minutes and seconds."""
+    for i, found in enumerate(moments):
+        if of_clock[i] and found["third"] is None:
+            return i
+    return None
 
 
 def _of_spelt(values: Floats) -> tuple[Floats, bool, list[str]]:
@@ -181,7 +193,9 @@ def _spelt(table: RawTable, column: int) -> Floats:
 
 def _moments(table: RawTable, column: int, unit: Unit | None) -> list[re.Match[str]]:
     """The parts of each cell; either all have a date, or none, and likewise an offset from UTC."""
-    joint = unit.clock.joint if unit is not None and unit.clock is not None else ":"
+    joint = ":"
+    if unit is not None and unit.clock is not None:
+        joint = unit.clock.joint
     cells = [_with_colons(cell, joint) for cell in table.column(column)]
     if unit is not None and all(map(is_number, cells)):
         raise _no_clock(table, column, unit)
@@ -193,7 +207,8 @@ def _moments(table: RawTable, column: int, unit: Unit | None) -> list[re.Match[s
             first = moments[0] if moments else found
             expected = _expected_in_place_of(found, first)
         if found is None or expected:
-            raise table.complain(row.line, column, shown(row.cell(column)), expected)
+            as_given = row.cell(column)
+            raise table.complain(row.line, column, shown(as_given), expected)
         moments.append(found)
     return moments
 
@@ -228,7 +243,7 @@ def _no_clock(table: RawTable, column: int, unit: Unit) -> Undecided:
     if leading and all(_with_colons(cell, ".") != cell for cell in table.column(column)):
         units = {_WRITTEN[leading].replace(":", "."): CALLED[leading], **units}
     return Undecided(
-        f"{table.sheet.path}, {table.place(first.line, column)}: found {first.cell(column)!r} under {unit.text!r}",
+        f"{table.where(first.line, column)}: found {first.cell(column)!r} under {unit.text!r}",
         "the unit of time",
         {f"--map {name}=time [{text}]": called for text, called in units.items()},
     )
@@ -258,8 +273,9 @@ def _leading(table: RawTable, column: int, unit: Unit | None, moments: Sequence[
 
     A fraction is one of seconds. Beside cells ``a:b:c`` one of the two makes times fall where the other does not.
     """
-    if unit is not None and unit.clock is not None and unit.clock.leading_s is not None:
-        return unit.clock.leading_s
+    stated = None if unit is None else unit.clock
+    if stated is not None and stated.leading_s is not None:
+        return stated.leading_s
     if any(m["fraction"] for m in moments if m["third"] is None):
         return _MINUTE
     falls = {leading: _falls(moments, leading) for leading in CALLED}
@@ -267,13 +283,14 @@ def _leading(table: RawTable, column: int, unit: Unit | None, moments: Sequence[
     if max(falls.values()) > falls[fewest]:
         return fewest
     row = table.rows[short]
-    place = f"{table.sheet.path}, {table.place(row.line, column)}"
-    name = table.header[column]
-    raise Undecided(
-        f"{place}: found {row.cell(column)!r}, which is minutes and seconds or hours and minutes",
-        "which",
-        {f"--map {name}=time [{_WRITTEN[leading]}]": called for leading, called in CALLED.items()},
-    )
+    cell = row.cell(column)
+    where = table.where(row.line, column)
+    found = f"found {cell!r}, which is minutes and seconds or hours and minutes"
+    map_to = f"--map {table.header[column]}=time"
+    answers = {}
+    for leading, called in CALLED.items():
+        answers[f"{map_to} [{_WRITTEN[leading]}]"] = called
+    raise Undecided(f"{where}: {found}", "which", answers)
 
 
 def _falls(moments: Sequence[re.Match[str]], leading: float) -> int:
@@ -300,18 +317,20 @@ def _date_parts(found: re.Match[str], day_first: bool) -> list[int]:
     """Year, month and day of a date."""
     text = found["date"]
     if found["compact"]:
-        return [int(text[:4]), int(text[4:6]), int(text[6:])]
+        year, month, day = text[:4], text[4:6], text[6:]
+        return [int(year), int(month), int(day)]
     parts = re.split(r"[-./ ]+", text)
     if found["named"]:
         day, name, year = parts
-        return [int(year), MONTHS[name[:3].lower()], int(day)]
+        month_number = MONTHS[name[:3].lower()]
+        return [int(year), month_number, int(day)]
     numbers = [int(part) for part in parts]
     if not found["year_last"]:
         return numbers
     if day_first or "." in text:
         return numbers[::-1]
-    month, day_of_month, last = numbers
-    return [last, month, day_of_month]
+    month, day, year = numbers
+    return [year, month, day]
 
 
 def _day_first(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> bool:
@@ -324,12 +343,18 @@ def _day_first(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -
     for i, found in enumerate(moments):
         if found["year_last"] and "." not in found["date"]:
             rows.setdefault(found["date"], i)
-    parts = {text: [int(part) for part in re.split(r"[-/]", text)[:2]] for text in rows}
-    if any(second > _LAST_MONTH for _, second in parts.values()):
+    unclear = []
+    first_numbers, second_numbers = [], []
+    for text, row in rows.items():
+        first, second = [int(part) for part in re.split(r"[-/]", text)[:2]]
+        first_numbers.append(first)
+        second_numbers.append(second)
+        if first != second:
+            unclear.append(row)
+    if max(second_numbers, default=0) > _LAST_MONTH:
         return False
-    if any(first > _LAST_MONTH for first, _ in parts.values()):
+    if max(first_numbers, default=0) > _LAST_MONTH:
         return True
-    unclear = [rows[text] for text, (first, second) in parts.items() if first != second]
     if unclear and len(rows) > 1:
         row = min(unclear)
         found_date = f"{moments[row]['date']!r}, which may begin with the day or with the month"

@@ -132,14 +132,16 @@ def _joined(table: RawTable, parts: _Parts) -> RawTable:
                 cells[i] = ""
         cells[first] = parts.joint.join(texts) + parts.rest
         rows.append(replace(row, cells=tuple(cells)))
-    names, units = [*table.header], [*table.units]
+    header = [*table.header]
+    units = [*table.units]
+    of_parts = ", ".join(header[i] for i in parts.columns)
     for i in parts.columns:
-        names[i] = units[i] = ""
-    names[first] = parts.name
+        header[i] = ""
+        units[i] = ""
+    header[first] = parts.name
     what = parts.name.partition(" ")[0]
-    of_parts = ", ".join(table.header[i] for i in parts.columns)
-    sheet = replace(table.sheet, described=f"{table.sheet.described}, {what} from {of_parts}")
-    return replace(table, sheet=sheet, header=tuple(names), units=tuple(units), rows=tuple(rows))
+    sheet = table.sheet.also(f"{what} from {of_parts}")
+    return replace(table, sheet=sheet, header=tuple(header), units=tuple(units), rows=tuple(rows))
 
 
 def _two_digits(cell: str) -> str:

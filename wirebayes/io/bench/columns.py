@@ -206,9 +206,11 @@ def _mapped(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str
         header, equals, rest = text.rpartition("=")
         if not equals:
             raise _no_mapping(text, "")
-        role, _, unit = rest.strip().partition(" ")
-        header, unit = header.strip(), unit.strip("[]() ")
-        if role not in _SAYABLE or (unit and role in (IGNORE, "hold")):
+        header = header.strip()
+        role, _, stated = rest.strip().partition(" ")
+        unit = stated.strip("[]() ")
+        bears_no_unit = role in (IGNORE, "hold")
+        if role not in _SAYABLE or (unit and bears_no_unit):
             raise _no_mapping(text, hint(role, _SAYABLE))
         index, unit_in_header = _named(table, header, role)
         out[index] = index, role, unit or unit_in_header
@@ -237,23 +239,14 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
     header = table.header[index]
     if role == "hold":
         return Column(role, index, header, None)
-    from_header = name_and_unit(header, role)[1]
     if stated:
         unit = quantity_unit(stated, role) or multiple_of_unit(stated, role)
         if unit is None:
-            raise InputError(f"--map: found the unit {stated!r} for {header}, expected one of {role}{_units(role)}")
+            expected = f"one of {role}{_units(role)}"
+            raise InputError(f"--map: found the unit {stated!r} for {header}, expected {expected}")
         return Column(role, index, header, unit)
-    if from_header is None and stated is not None and not speaks_of(header, role):
-        from_header = quantity_unit(header, role)  # --map "kg=tension": the name is nothing but a unit
     moments = role == "time" and has_moments(table, index)
-    row_text = table.units[index]
-    from_row = unit_in_header(row_text, role) if row_text else None
-    if row_text not in NO_UNIT and from_row is None and not moments:
-        raise table.complain(table.header_line + 1, index, f"the unit {row_text!r}", f"one of {role}{_units(role)}")
-    if from_header and from_row and not _are_alike(from_header, from_row):
-        found = f"the units {from_header.text} in the header and {from_row.text} under it"
-        raise table.complain(table.header_line, index, found, "one unit")
-    unit = from_row or from_header
+    unit = _unit_in_table(table, index, role, stated, moments)
     if unit is None:
         if not moments:
             raise _no_unit(table, index, role)
@@ -262,6 +255,23 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
         _check_counts(table, index, role, unit)
     check_itself(table, index, role, unit)
     return Column(role, index, header, unit)
+
+
+def _unit_in_table(table: RawTable, index: int, role: Role, stated: str | None, moments: bool) -> Unit | None:
+    """The unit in a column's header or in the row under it, which must not contradict each other."""
+    header = table.header[index]
+    from_header = name_and_unit(header, role)[1]
+    if from_header is None and stated is not None and not speaks_of(header, role):
+        from_header = quantity_unit(header, role)  # --map "kg=tension": the name is nothing but a unit
+    row_text = table.units[index]
+    from_row = unit_in_header(row_text, role) if row_text else None
+    if row_text not in NO_UNIT and from_row is None and not moments:
+        expected = f"one of {role}{_units(role)}"
+        raise table.complain(table.header_line + 1, index, f"the unit {row_text!r}", expected)
+    if from_header and from_row and not _are_alike(from_header, from_row):
+        found = f"the units {from_header.text} in the header and {from_row.text} under it"
+        raise table.complain(table.header_line, index, found, "one unit")
+    return from_row or from_header
 
 
 def _are_alike(unit: Unit, other: Unit) -> bool:
@@ -278,23 +288,22 @@ def _by_unit_alone(table: RawTable, index: int, role: Role) -> Column:
 def _no_unit(table: RawTable, index: int, role: Role) -> InputError:
     """What is wrong with a column that says no unit of its quantity: another unit, odd clocks, or none at all."""
     header = table.header[index]
+    usual = UNITS[role]
+    map_to = f"--map {header}={role}"
     bracket = UNIT_IN_BRACKETS.match(header)
-    if bracket and bracket[2] not in NO_UNIT and not bracket[2].isdigit():
-        return table.complain(
-            table.header_line,
-            index,
-            f"the unit {bracket[2]!r}",
-            f'one of {role}{_units(role)}; or --map "{header}={role} [{UNITS[role]}]" if that is what it means, '
-            f"or [0.5 {UNITS[role]}] if one {bracket[2]} is 0.5 {UNITS[role]}",
-        )
+    foreign = bracket[2] if bracket else ""
+    if foreign not in NO_UNIT and not foreign.isdigit():
+        found = f"the unit {foreign!r}"
+        as_usual = f'"{map_to} [{usual}]" if that is what it means'
+        expected = f"one of {role}{_units(role)}; or {as_usual}, or [0.5 {usual}] if one {foreign} is 0.5 {usual}"
+        return table.complain(table.header_line, index, found, expected)
     first = table.rows[0]
-    if role == "time" and looks_like_a_moment(first.cell(index)):
-        return table.complain(first.line, index, shown(first.cell(index)), UNDERSTOOD)
-    return Undecided(
-        f"{table.sheet.path}, {table.place(table.header_line, index)}: found no unit",
-        f"the unit of {role}",
-        {f"--map {header}={role} [{name}]": name for name in _usual(table, index, role)},
-    )
+    cell = first.cell(index)
+    if role == "time" and looks_like_a_moment(cell):
+        return table.complain(first.line, index, shown(cell), UNDERSTOOD)
+    where = table.where(table.header_line, index)
+    answers = {f"{map_to} [{name}]": name for name in _usual(table, index, role)}
+    return Undecided(f"{where}: found no unit", f"the unit of {role}", answers)
 
 
 def _check_counts(table: RawTable, index: int, role: Role, unit: Unit) -> None:
@@ -302,7 +311,7 @@ def _check_counts(table: RawTable, index: int, role: Role, unit: Unit) -> None:
     odd = _first_no_count(table, index)
     if odd is None:
         return
-    place = f"{table.sheet.path}, {table.place(odd.line, index)}"
+    place = table.where(odd.line, index)
     whole = re.sub(r"[\d.,/·×*\s]", "", unit.text)
     map_to = f"--map {table.header[index]}={role}"
     found = f"found {odd.cell(index)!r} under {unit.text!r}, which may be the unit or the step of the gauge"
@@ -354,17 +363,25 @@ def _missing(table: RawTable, free: Sequence[int], unread: Sequence[int], missin
     for index in free:
         if last_named(table.header[index]) == role:
             _column(table, index, role, None)  # its unit is another quantity's, which is said
-    place = f"{table.sheet.path}, line {table.header_line}: found no column of"
+    found = "found no column of"
     names = [name for name in table.header if name]
     in_doubt = _encoding_in_doubt(table, names)
     if table.nameless:
-        place = f"{table.sheet.path}, line {table.header_line}: found numbers without a header, and no column of"
-        names = [f"{name} ({cell})" for name, cell in zip(names, table.rows[0].cells, strict=False)]
+        found = "found numbers without a header, and no column of"
+        first_row = table.rows[0].cells
+        names = [f"{name} ({cell})" for name, cell in zip(names, first_row, strict=False)]
+    place = f"{table.sheet.path}, line {table.header_line}: {found}"
     how = _how_to_say(table, unread, missing)
     wanted = "one of each" if more else "one"
-    message = f"{place} {listed(missing, 'or')} among {', '.join(names)}, expected {wanted}{how}{in_doubt}"
-    answers = {f"--map {table.header[i]}={role}": table.header[i] for i in unread}
-    others = [_missing(table, free, unread, more)] if more else []
+    named = ", ".join(names)
+    message = f"{place} {listed(missing, 'or')} among {named}, expected {wanted}{how}{in_doubt}"
+    answers = {}
+    for i in unread:
+        header = table.header[i]
+        answers[f"--map {header}={role}"] = header
+    others = []
+    if more:
+        others.append(_missing(table, free, unread, more))
     return Undecided(f"{place} {role}", f"which column is the {role}", answers, others, message)
 
 

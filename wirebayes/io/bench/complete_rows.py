@@ -37,13 +37,15 @@ def complete_rows(
     rows, below = _without_what_is_below(table, indices)
     rows, words = _without_words(rows, columns)
     weights_once = _weights_are_written_once(rows, columns)
-    what = "weight" if weights_once else "displacement"
-    written_once: tuple[Role, ...] = ("hold", "tension") if weights_once else ("hold", "displacement")
-    filled = _filled(rows, table, [columns[role].index for role in written_once if role in columns])
+    what: Role = "tension" if weights_once else "displacement"
+    written_once = [columns[role].index for role in ("hold", what) if role in columns]
+    filled = _filled(rows, table, written_once)
     missing = {row.line for row in filled if drop_breaks and _is_missing(row, columns)}
     read = [row for row in filled if row.line not in missing]
     kept = _without_repetitions(read, table, columns["time"].index)
     gaps = _count_filled(filled, rows, indices)
+    repeated = len(read) - len(kept)
+
     notes = []
     if below:
         notes.append(f"{counted(below, 'line')} under the readings left out")
@@ -53,9 +55,10 @@ def complete_rows(
         first = table.line_text(min(missing))
         notes.append(f"left out: {counted(len(missing), 'row')} without a reading, from line {first} on")
     if gaps:
-        notes.append(f"{gaps} empty cells of hold or {what} filled with the value above them")
-    if len(kept) < len(read):
-        notes.append(f"rows that repeat the row above left out: {len(read) - len(kept)}")
+        called = "weight" if weights_once else what
+        notes.append(f"{gaps} empty cells of hold or {called} filled with the value above them")
+    if repeated:
+        notes.append(f"rows that repeat the row above left out: {repeated}")
     _check_no_cell_is_empty(kept, table, columns)
     return replace(table, rows=tuple(kept)), notes
 

@@ -40,21 +40,24 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
     cycles = _cycles(readings, lefts, turns, zeros)
     rows: list[Ints] = []
     since: list[Floats] = []
+    settings: list[float] = []
+    durations: list[float] = []
     for hold, move, zero in zip(found_holds, moves, zeros, strict=True):
         kept = _after_move(time, hold, move)
         rows.append(kept)
+        settings.append(level_of(x[kept]))
         since.append(time[kept] - zero)
-    last_read_s = float(time[found_holds[-1].left - 1])
-    durations = [time[hold.end - 1] - time[hold.begin] for hold in found_holds]
-    usual_move_s = float(np.median(moves))
-    notes = [*resets, *_notes(readings, found_holds, usual_move_s)]
-    notes += [each.sentence for each in cycles]
+        durations.append(time[hold.end - 1] - time[hold.begin])
+    last = found_holds[-1].left - 1
+    notes = [*resets, *_notes(readings, found_holds, float(np.median(moves)))]
+    for each in cycles:
+        notes.append(each.sentence)
     return Cut(
         rows=rows,
         number=list(range(1, len(rows) + 1)),
-        setting=[level_of(x[kept]) for kept in rows],
+        setting=settings,
         time_s=since,
-        end_s=_lengths(zeros, cycles, last_read_s),
+        end_s=_lengths(zeros, cycles, float(time[last])),
         of_test=True,
         notes=notes,
         clock_s=time,
@@ -215,12 +218,15 @@ def _too_few(readings: Readings, found_holds: Sequence[Plateau], kept: int) -> I
             row, found = passed
             expected += "; if those are a hold, number the holds in a column, without the readings of the move"
             return readings.complain(row, role, found, expected)
-    share = f"{100.0 * kept / rows:.0f} % of the readings"
-    found = f"a {role} that stays in {share}, {counted(len(found_holds), 'time')}"
+    percent = 100.0 * kept / rows
+    times = counted(len(found_holds), "time")
+    found = f"a {role} that stays in {percent:.0f} % of the readings, {times}"
+    expected += " (or a column of hold numbers)"
     row = 0
-    if found_holds and found_holds[0].end < rows:
-        row = found_holds[0].end
-    return readings.complain(row, role, found, f"{expected} (or a column of hold numbers)")
+    if found_holds:
+        end = found_holds[0].end
+        row = end if end < rows else 0
+    return readings.complain(row, role, found, expected)
 
 
 def _taken_for_a_move(readings: Readings, hold: Plateau) -> tuple[int, str] | None:
@@ -241,17 +247,31 @@ def _moved(x: Floats, time: Floats, left: int, hold: Plateau) -> float:
     Creep that follows each small part of a move adds up, to first order in the move's duration, to that of the whole
     move made at this moment.
     """
-    of_hold = time[hold.begin : hold.end]
-    paused = len(of_hold) < CONTINUOUS or time[hold.begin] - time[left] > PAUSE * float(np.median(np.diff(of_hold)))
-    if hold.begin == left or (hold.begin == left + 1 and paused):
-        return float(time[hold.begin])  # nothing was recorded on the way
+    begin_s = float(time[hold.begin])
+    if hold.begin == left:
+        return begin_s
+    if hold.begin == left + 1 and _paused(time, left, hold):
+        return begin_s  # nothing was recorded on the way
+    begun = _set_out_s(time, left, hold)
+    lasts = begin_s - begun
     on_the_way = x[left : hold.begin + 1].copy()
     on_the_way[-1] = hold.level
     whole = hold.level - on_the_way[0]
-    begun = _set_out_s(time, left, hold)
-    to_go = np.trapezoid(hold.level - on_the_way, np.concatenate([[begun], time[left + 1 : hold.begin + 1]]))
-    lasts = float(time[hold.begin]) - begun
-    return begun + (float(np.clip(to_go / whole, 0.0, lasts)) if whole else 0.5 * lasts)
+    moments = np.concatenate([[begun], time[left + 1 : hold.begin + 1]])
+    to_go = np.trapezoid(hold.level - on_the_way, moments)
+    if not whole:
+        return begun + 0.5 * lasts
+    mean_s = np.clip(to_go / whole, 0.0, lasts)
+    return begun + float(mean_s)
+
+
+def _paused(time: Floats, left: int, hold: Plateau) -> bool:
+    """Whether the recording paused before a hold, which may be read too seldom to say so."""
+    of_hold = time[hold.begin : hold.end]
+    if len(of_hold) < CONTINUOUS:
+        return True
+    interval = float(np.median(np.diff(of_hold)))
+    return bool(time[hold.begin] - time[left] > PAUSE * interval)
 
 
 def _after_move(time: Floats, hold: Plateau, move_s: float) -> Ints:

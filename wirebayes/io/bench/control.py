@@ -114,13 +114,15 @@ def trend_by_chance(groups: Sequence[Rows], values: Floats) -> float:
     float
         The smaller probability of two tests, times two: of trends that go one way, and of any in each hold.
     """
-    along, squares, left, free = [], [], 0.0, 0
+    along, squares = [], []
+    left, free = 0.0, 0
     for rows in groups:
         blocks = _block_means(values[rows])
         place = np.log1p(np.arange(len(blocks)))
         place -= place.mean()
         away = blocks - blocks.mean()
-        slope, square = float(place @ away), float(place @ place)
+        slope = float(place @ away)
+        square = float(place @ place)
         left += float(away @ away) - slope**2 / square
         free += len(blocks) - 2
         along.append(slope)
@@ -131,8 +133,10 @@ def trend_by_chance(groups: Sequence[Rows], values: Floats) -> float:
         return 1.0
     variance = max(left, ROUNDING * total) / free
     error = np.sqrt(sum(squares) * variance)
-    one_way = 2.0 * float(stdtr(free, -abs(sum(along)) / error))
-    either = float(fdtrc(len(groups), free, explained.mean() / variance))
+    student = abs(sum(along)) / error
+    one_way = 2.0 * float(stdtr(free, -student))
+    fisher = explained.mean() / variance
+    either = float(fdtrc(len(groups), free, fisher))
     return min(1.0, 2.0 * min(one_way, either))
 
 
@@ -146,7 +150,8 @@ def drift(groups: Sequence[Rows], values: Floats) -> float:
     """By how much of a step values drift in a hold, counted along the step that led to it, on average."""
     levels = np.array([np.median(values[rows]) for rows in groups])
     if len(groups) == 1:
-        steps, size = levels, abs(float(levels[0]))
+        steps = levels
+        size = abs(float(levels[0]))
     else:
         before_first = levels[0] - np.sign(levels[-1] - levels[0])
         steps = np.diff(levels, prepend=before_first)
@@ -156,7 +161,9 @@ def drift(groups: Sequence[Rows], values: Floats) -> float:
     changes = []
     for rows in groups:
         third = max(1, len(rows) // THIRD)
-        begin, end = np.mean(values[rows[:third]]), np.mean(values[rows[-third:]])
+        begin = np.mean(values[rows[:third]])
+        end = np.mean(values[rows[-third:]])
         changes.append(end - begin)
     along = np.sign(steps) * changes
-    return abs(float(np.mean(along))) / size
+    mean = float(np.mean(along))
+    return abs(mean) / size

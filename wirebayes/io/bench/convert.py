@@ -148,18 +148,22 @@ def lacks_a_setting(path: Path, choices: Choices) -> bool:
 
 def _of_table(table: RawTable, about: About, choices: Choices) -> list[Converted]:
     """The experiments of the specimens of a table."""
-    table = with_titles_as_columns(with_units_beside(table), choices.mapping)
-    table = with_joined_parts(with_whole_seconds(table, choices.mapping), choices.mapping)
+    table = with_units_beside(table)
+    table = with_titles_as_columns(table, choices.mapping)
+    table = with_whole_seconds(table, choices.mapping)
+    table = with_joined_parts(table, choices.mapping)
     table = with_dates(table, choices.time_since)
     tables = specimen_tables(table, choices.mapping, choices.specimens)
     if len(tables) == 1:
         ((only, mapping),) = tables
-        return _one_below_another(only, about, replace(choices, mapping=mapping))
+        choices = replace(choices, mapping=mapping)
+        return _one_below_another(only, about, choices)
     names = _names_of([each.specimen for each, _ in tables], about)
     made = []
     for (each, mapping), name in zip(tables, names, strict=True):
+        of_specimen = replace(about, name=name)
         said = replace(choices, mapping=mapping)
-        made.append(_of_specimen(each, replace(about, name=name), said))
+        made.append(_of_specimen(each, of_specimen, said))
     return made
 
 
@@ -191,18 +195,21 @@ def _names_of(specimens: Sequence[str], about: About) -> list[str]:
 def _convert(recorded: Recorded, notes: list[str], about: About, choices: Choices) -> Converted:
     """The experiment of one specimen, of which it is known what was recorded and, in sentences, understood."""
     control = choices.control or _control(recorded)
+    by_weights = control == "force"
     recorded, left_out = without_glitches(recorded, control, choices.drop_breaks)
     table, columns, values = recorded.table, recorded.columns, recorded.values
-    if control == "displacement" and choices.zero_mm is None:
+    of_displacement = columns["displacement"]
+    if not by_weights and choices.zero_mm is None:
         recorded.check_zero(about.length_mm)
-    if control == "force" and recorded.not_read is not None:  # a setting goes on, a reading does not
-        raise table.complain(recorded.not_read, columns["displacement"].index, "an empty cell", _NOT_READ)
+    if by_weights and recorded.not_read is not None:  # a setting goes on, a reading does not
+        raise table.complain(recorded.not_read, of_displacement.index, "an empty cell", _NOT_READ)
     holds = cut(recorded.readings(control), choices.time_since)
-    if control == "force":
+    if by_weights:
         holds = without_weight(holds, values["tension"])
     holds, thinned = _thin(holds)
     read = READS[control]
     resolution = _resolution(columns[read], recorded.texts[read])
+
     notes += left_out
     notes += _what_was_set(control)
     notes += recorded.numbering
@@ -210,12 +217,14 @@ def _convert(recorded: Recorded, notes: list[str], about: About, choices: Choice
     notes += thinned
     notes += _missing_holds(holds)
     if resolution:
-        notes.append(f"{read}s are written in steps of {resolution:.3g} {UNITS[read]}: that is their resolution")
-    header = (*REQUIRED, *(OPTIONAL if "temperature" in values else ()))
+        step = f"{resolution:.3g} {UNITS[read]}"
+        notes.append(f"{read}s are written in steps of {step}: that is their resolution")
+
+    header = (*REQUIRED, *OPTIONAL) if "temperature" in values else REQUIRED
     rows, origin = _rows(holds, values, control)
     unrecorded = entries_of(holds.cycles, control)
     experiment = as_experiment(table, columns, header, rows, origin, about, resolution, control, unrecorded)
-    check_direction(table, columns["displacement"], experiment, choices.mapping)
+    check_direction(table, of_displacement, experiment, choices.mapping)
     recording = _recording(holds, values) if holds.of_test else None
     return Converted(experiment, rows, header, notes, recording, holds.warnings, unrecorded)
 
@@ -234,13 +243,15 @@ def _control(recorded: Recorded) -> Control:
     is_mass = unit is not None and unit.is_mass
     by_tension = stretches(recorded.readings("force"))
     by_displacement = stretches(recorded.readings("displacement"))
-    x, tension = recorded.values["displacement"], recorded.values["tension"]
-    exact = len(by_displacement) > 1 and all(np.ptp(x[rows]) == 0.0 for rows in by_displacement)
-    if exact and not is_mass:
+    x = recorded.values["displacement"]
+    tension = recorded.values["tension"]
+    stays = all(np.ptp(x[rows]) == 0.0 for rows in by_displacement)
+    if stays and len(by_displacement) > 1 and not is_mass:
         return "displacement"
     if len(by_tension) < min(2, len(by_displacement)):
         return "displacement"
-    place = f"{recorded.table.sheet.path}, line {recorded.table.header_line}"
+    table = recorded.table
+    place = f"{table.sheet.path}, line {table.header_line}"
     if by_tension:
         return recognised(by_tension, x, tension, is_mass, place)
     pairs = stretches(recorded.readings("force"), fewest=2)
@@ -268,14 +279,16 @@ def _rows(holds: Cut, values: Mapping[Any, Floats], control: Control) -> tuple[l
     origin: list[int] = []
     read = values[READS[control]]
     warmth = values.get("temperature")
-    for hold in range(len(holds.rows)):
-        number, level = holds.number[hold], holds.setting[hold]
+    for hold, number in enumerate(holds.number):
+        level = holds.setting[hold]
         for time, row, is_read in _rows_of_hold(holds, hold):
             value = float(read[row]) if is_read else None
-            cells = [level, time, value] if control == "displacement" else [value, time, level]
-            rows.append([number, *cells])
+            cells = [level, time, value]
+            if control == "force":
+                cells.reverse()
             if warmth is not None:
-                rows[-1].append(float(warmth[row]) if is_read else None)
+                cells.append(float(warmth[row]) if is_read else None)
+            rows.append([number, *cells])
             origin.append(row)
     return rows, origin
 
@@ -284,12 +297,15 @@ def _rows_of_hold(holds: Cut, hold: int) -> list[tuple[float, int, bool]]:
     """Time and row of the table of each reading of a hold, and of its end if that is later; and whether it is read."""
     times = [_tidy(time) for time in holds.time_s[hold]]
     rows = [int(row) for row in holds.rows[hold]]
-    end = holds.end_s[hold]
     last_s, last = times[-1], rows[-1]
+    end = holds.end_s[hold]
     end_s = last_s if end is None else _tidy(end)
     if holds.number[hold] in holds.unread:
-        return [(max(last_s, end_s), last, False)]
-    readings = [(time, row, True) for time, row in zip(times, rows, strict=True)]
+        latest = max(last_s, end_s)
+        return [(latest, last, False)]
+    readings = []
+    for time, row in zip(times, rows, strict=True):
+        readings.append((time, row, True))
     if end_s > last_s:
         readings.append((end_s, last, False))
     return readings
@@ -308,12 +324,16 @@ def _sheet(path: Path, choices: Choices) -> Sheet:
 
 
 def _thin(holds: Cut) -> tuple[Cut, list[str]]:
-    kept = [kept_readings(times) for times in holds.time_s]
-    before, after = sum(map(len, holds.rows)), sum(map(len, kept))
+    rows, times = [], []
+    before, after = 0, 0
+    for of_hold, time_s in zip(holds.rows, holds.time_s, strict=True):
+        kept = kept_readings(time_s)
+        rows.append(of_hold[kept])
+        times.append(time_s[kept])
+        before += len(of_hold)
+        after += len(kept)
     if before == after:
         return holds, []
-    rows = [of_hold[k] for of_hold, k in zip(holds.rows, kept, strict=True)]
-    times = [of_hold[k] for of_hold, k in zip(holds.time_s, kept, strict=True)]
     note = (
         f"{after} of {before} readings kept: those of holds with more than {MOST} thinned to times spaced evenly in "
         "their logarithm"

@@ -29,16 +29,17 @@ def cycles_before(readings: Readings, before_hold: int, left: int, turn: int, en
         When that move was half made: until then the wire counts as where it turned.
     """
     x = readings.setting[left : turn + 1]
-    low, high = float(x.min()), float(x.max())
+    low = float(x.min())
+    high = float(x.max())
     begin = left + _departure(x)
     begin_s = float(readings.time_s[begin])
     setting = _equivalent(readings, begin, turn, end_s)
-    if readings.role == "tension":
+    role, unit = readings.role, readings.unit
+    if role == "tension":
         setting = max(setting, NEXT_TO_NOTHING * high)
-    unit = readings.unit
     lasts = lasting(end_s - begin_s)
     sentence = (
-        f"before hold {before_hold} the {readings.role} went to and fro between {low:.4g} and {high:.4g} {unit} for "
+        f"before hold {before_hold} the {role} went to and fro between {low:.4g} and {high:.4g} {unit} for "
         f"{lasts}: what the wire crept meanwhile is that of a hold without readings at {setting:.4g} {unit}, where it "
         "pulls as in the mean of the cycles"
     )

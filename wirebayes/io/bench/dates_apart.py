@@ -54,7 +54,7 @@ def _at_midnight(table: RawTable, column: int) -> RawTable:
         last = row.cell(column).removesuffix(_MIDNIGHT).strip() or last
         cells = [f"{last} 00:00" if i == column and any(row.filled) else cell for i, cell in enumerate(row.cells)]
         rows.append(replace(row, cells=tuple(cells)))
-    sheet = replace(table.sheet, described=f"{table.sheet.described}, dates without times")
+    sheet = table.sheet.also("dates without times")
     return replace(table, sheet=sheet, rows=tuple(rows))
 
 
@@ -75,20 +75,25 @@ def dated(table: RawTable) -> RawTable:
         dates = [i for i in named if _are_days(table, i)]
     if len(dates) != 1 or len(clocks) != 1:
         return table
-    (of_date,), (of_clock,) = dates, clocks
-    rows, last = [], ""
+    (of_date,) = dates
+    (of_clock,) = clocks
+    rows = []
+    last = ""
     for row in table.rows:
-        last = row.cell(of_date).removesuffix(_MIDNIGHT).strip() or last
+        date = row.cell(of_date).removesuffix(_MIDNIGHT).strip()
+        last = date or last
+        of_row = last
+        if are_days:
+            of_row = str(_FIRST_DAY + timedelta(days=int(last)))
         cells = list(row.cells)
         clock = row.cell(of_clock)
-        of_row = str(_FIRST_DAY + timedelta(days=int(last))) if are_days else last
         if clock:
             cells[of_clock] = f"{of_row} {clock}"
         rows.append(replace(row, cells=tuple(cells)))
     header = [*table.header]
-    header[of_date] = ""
     what = "days" if are_days else "dates"
-    sheet = replace(table.sheet, described=f"{table.sheet.described}, {what} from {table.header[of_date]!r}")
+    sheet = table.sheet.also(f"{what} from {header[of_date]!r}")
+    header[of_date] = ""
     return replace(table, sheet=sheet, header=tuple(header), rows=tuple(rows))
 
 

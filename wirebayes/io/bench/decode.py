@@ -61,11 +61,13 @@ def decode(path: Path, raw: bytes, known_words: Callable[[str], int]) -> tuple[s
     try:
         text = raw.decode(encoding)
     except UnicodeDecodeError as error:
-        line = raw[: error.start].count(b"\n") + 1
-        found = f"found a byte that is no {encoding.removesuffix('-sig').upper()}"
-        raise InputError(f"{path}, line {line}: {found}, expected a text file") from None
-    if "\0" in text:
-        line = text[: text.index("\0")].count("\n") + 1
+        before = raw[: error.start]
+        line = before.count(b"\n") + 1
+        called = encoding.removesuffix("-sig").upper()
+        raise InputError(f"{path}, line {line}: found a byte that is no {called}, expected a text file") from None
+    before_binary, is_binary, _ = text.partition("\0")
+    if is_binary:
+        line = before_binary.count("\n") + 1
         raise InputError(f"{path}, line {line}: found binary data, expected text (CSV) or a workbook (xlsx)")
     return text.translate(_FULL_WIDTH), encoding
 

@@ -162,13 +162,23 @@ def _bare_cell(cell: str) -> str:
 def _rows(lines: list[str], sign: str) -> tuple[tuple[SheetRow, ...], bool]:
     """The rows of lines, and whether columns of fixed width told which cells are empty."""
     comments = [_COMMENT.match(line) for line in lines]
-    contents = [line[found.end() :] if found else line for line, found in zip(lines, comments, strict=True)]
+    contents = []
+    for line, found in zip(lines, comments, strict=True):
+        contents.append(line[found.end() :] if found else line)
     split = [_cells(content, sign) for content in contents]
-    placed = with_gaps(contents, split) if sign == " " else None
+    placed = None
+    if sign == " ":
+        placed = with_gaps(contents, split)
     rows = []
     for number, (cells, comment) in enumerate(zip(placed or split, comments, strict=True), start=1):
         while cells and not cells[-1]:
             cells.pop()
-        if cells and not all(map(_UNDER_A_HEADER.fullmatch, cells[cells[0] == "" :])):
+        if cells and not _is_drawn(cells):
             rows.append(SheetRow(number, tuple(cells), bool(comment)))
     return tuple(rows), placed is not None
+
+
+def _is_drawn(cells: list[str]) -> bool:
+    """Whether a row is a line drawn under a header."""
+    begin = 1 if cells[0] == "" else 0
+    return all(map(_UNDER_A_HEADER.fullmatch, cells[begin:]))

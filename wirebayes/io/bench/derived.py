@@ -45,26 +45,27 @@ def check_itself(table: RawTable, index: int, role: Role, unit: Unit) -> None:
     name = name_and_unit(header, role)[0]
     map_to = f"--map {header}={role}"
     as_it_is = f"{map_to} [{unit.text}]"
-    place = f"{table.sheet.path}, {table.place(table.header_line, index)}"
+    where = table.where(table.header_line, index)
     found = _FACTOR.search(name)
     if found is not None:
         times = _factor_of(found)
+        beside_it = found[0].strip()
         answers = {
             f"{map_to} [{times:g} {unit.text}]": f"one is {times:g} {unit.text}",
             f"{map_to} [{1 / times:g} {unit.text}]": f"{times:g} are one {unit.text}",
             as_it_is: f"it is in {unit.text} already",
         }
-        raise Undecided(f"{place}: found {found[0].strip()!r} beside the name", "what it means", answers)
+        raise Undecided(f"{where}: found {beside_it!r} beside the name", "what it means", answers)
     doubtful = words_in(name) & _WORDS.get(role, set())
     if doubtful:
-        found_word = f"found {min(doubtful)!r} in the name"
+        word = min(doubtful)
         answers = {as_it_is: f"it is the {role}, whatever its name"}
-        raise Undecided(f"{place}: {found_word}", f"that it is the {role} itself", answers)
+        raise Undecided(f"{where}: found {word!r} in the name", f"that it is the {role} itself", answers)
     if role in ("displacement", "tension") and _are_signed(table, index):
         cell = next(cell for cell in table.column(index) if cell.startswith("+"))
         found_sign = f"found {cell}, with a sign as before a change, and in no other column"
         answers = {as_it_is: f"it is the {role} itself, and no change of it"}
-        raise Undecided(f"{place}: {found_sign}", f"that it is the {role}", answers)
+        raise Undecided(f"{where}: {found_sign}", f"that it is the {role}", answers)
 
 
 def _are_signed(table: RawTable, index: int) -> bool:

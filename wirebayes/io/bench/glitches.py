@@ -62,16 +62,20 @@ def glitches(setting: Floats, read: Floats) -> Ints:
     if len(setting) < 3:
         return none
     off = _off_neighbours(setting)
-    back = np.abs(setting[2:] - setting[:-2]) <= _BACK * off
+    apart = np.abs(setting[2:] - setting[:-2])
+    back = apart <= _BACK * off
     usual_step = np.median(np.abs(np.diff(setting)))
     alone = back & (off > _SCATTERS * usual_step)
     suspect = 1 + np.flatnonzero(alone)
+    if not len(suspect):
+        return none
     others = np.setdiff1d(np.arange(len(setting)), suspect)
     span = float(np.ptp(setting[others]))
-    if not len(suspect) or span == 0.0:
+    if span == 0.0:
         return none
     stiffness = float(np.ptp(read[others])) / span
-    off, moved = off[alone], _off_neighbours(read)[alone]
+    off = off[alone]
+    moved = _off_neighbours(read)[alone]
     far = off > _OFF * span
     stays = moved < _FOLLOWS * stiffness * off
     return suspect[far & stays]

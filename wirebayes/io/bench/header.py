@@ -128,17 +128,24 @@ def may_be(table: RawTable, index: int, role: Role) -> bool:
     units = _units_of(header, row_unit)
     if units and role not in units:
         return False
-    if not units and _has_foreign_unit(header, row_unit):
-        return False
-    if not units and role not in ("hold", "time"):
-        of_others = [speaks_of(header, other) for other in ROLES if other != role]
-        if any(of_others):
+    if not units:
+        if _has_foreign_unit(header, row_unit):
+            return False
+        if role not in ("hold", "time") and _speaks_of_others(header, role):
             return last_named(header) == role
     if role not in units:
         return speaks_of(header, role)
     name = name_and_unit(header, role)[0]
-    of_sample = units[role].of_sample and not words_in(name).isdisjoint(SAMPLE_WORDS[role])
-    return of_sample or speaks_of(name, role) or plain_letters(name) in LETTERS.get(role, ())
+    if speaks_of(name, role):
+        return True
+    if units[role].of_sample and not words_in(name).isdisjoint(SAMPLE_WORDS[role]):
+        return True
+    return plain_letters(name) in LETTERS.get(role, ())
+
+
+def _speaks_of_others(header: str, role: Role) -> bool:
+    """Whether a header has words of other quantities."""
+    return any(speaks_of(header, other) for other in ROLES if other != role)
 
 
 def _units_of(header: str, row_unit: str) -> dict[Role, Unit]:

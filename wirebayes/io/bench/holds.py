@@ -67,18 +67,27 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
             raise _wandering(readings, groups)
         resets = [*resets, f"hold numbers are not used: the {readings.role} changes within them"]
         return by_plateaus(readings, resets)
-    restart, change = restarts(readings), changes(x)
-    if restart.any():
-        groups = groups_between(restart | change)
-        if any(len(rows) == 1 for rows in groups) and len(groups) > 2 * (int(restart.sum()) + 1):
-            groups = groups_between(restart)  # a measured setting that scatters
-            if wanders(x, groups):
-                raise _wandering(readings, groups)
-        return _cut_into_groups(readings, groups, time_since, resets)
-    groups = groups_between(change)
-    if _are_holds(groups):
+    groups = _by_restarts_and_changes(readings)
+    if groups:
         return _cut_into_groups(readings, groups, time_since, resets)
     return by_plateaus(readings, resets)
+
+
+def _by_restarts_and_changes(readings: Readings) -> list[Rows]:
+    """Rows between restarts of time and changes of what is set; none where these make no holds."""
+    x = readings.setting
+    restart, change = restarts(readings), changes(x)
+    if not restart.any():
+        groups = groups_between(change)
+        return groups if _are_holds(groups) else []
+    groups = groups_between(restart | change)
+    shortest = min(map(len, groups))
+    most = 2 * (int(restart.sum()) + 1)
+    if shortest == 1 and len(groups) > most:
+        groups = groups_between(restart)  # a measured setting that scatters
+        if wanders(x, groups):
+            raise _wandering(readings, groups)
+    return groups
 
 
 def stretches(readings: Readings, fewest: int = FEWEST) -> list[Rows]:
@@ -87,16 +96,24 @@ def stretches(readings: Readings, fewest: int = FEWEST) -> list[Rows]:
     The same holds as those of `cut`, without their times: to see whether this is what was set.
     """
     x = readings.setting
-    restart, change = restarts(readings), changes(x)
-    candidates = [groups_between(changes(readings.hold))] if readings.hold is not None else []
-    candidates += [groups_between(restart)] if restart.any() else []
-    candidates += [groups] if _are_holds(groups := groups_between(change)) else []
+    candidates = []
+    if readings.hold is not None:
+        candidates.append(groups_between(changes(readings.hold)))
+    restart = restarts(readings)
+    if restart.any():
+        candidates.append(groups_between(restart))
+    by_setting = groups_between(changes(x))
+    if _are_holds(by_setting):
+        candidates.append(by_setting)
     for groups in candidates:
         if not wanders(x, groups):
             return [rows for rows in groups if len(rows) >= fewest]
-    found = plateaus(x, np.arange(len(x), dtype=float), readings.step)
-    rows = [np.arange(p.begin, p.end) for p in found]
-    return rows if sum(map(len, rows)) >= COVERED * len(x) else []
+    index = np.arange(len(x), dtype=float)
+    found = plateaus(x, index, readings.step)
+    covered = sum(p.end - p.begin for p in found)
+    if covered < COVERED * len(x):
+        return []
+    return [np.arange(p.begin, p.end) for p in found]
 
 
 def _are_holds(groups: Sequence[Rows]) -> bool:
@@ -138,7 +155,8 @@ def _cut_into_groups(
     readings: Readings, groups: list[Rows], time_since: TimeSince | None, resets: Sequence[str]
 ) -> Cut:
     """Holds whose rows are known."""
-    x, notes = readings.setting, list(resets)
+    x = readings.setting
+    notes = list(resets)
     times = [readings.time_s[rows] for rows in groups]
     _check_rising(readings, groups, times)
     of_test = _since(readings, times, time_since) == "test"
@@ -146,28 +164,38 @@ def _cut_into_groups(
     if of_test:
         _check_resets(readings, groups)
         zeros = _between_readings(times)
-        at_first = all(zero == of_hold[0] for zero, of_hold in zip(zeros, times, strict=True))
-        begins = "at its first reading" if at_first else "between the last reading before it and its first"
-        before = f"; {BEGUN_BEFORE}" if at_first else ""
-        notes.append(f"times of the whole test: each hold begins {begins} and lasts until the next begins{before}")
         ends, of_resets = _ends(times, zeros)
-        if of_resets:
-            holds = listed([str(i + 2) for i in of_resets])
-            notes.append(
-                f"time starts again at the beginning of hold {holds}: the hold before is taken to end as long after "
-                "its last reading as the others"
-            )
-        times = [of_hold - zero for of_hold, zero in zip(times, zeros, strict=True)]
+        notes += _how_times_count(times, zeros, of_resets)
+        for hold, zero in enumerate(zeros):
+            times[hold] = times[hold] - zero
         notes += _unread_ends(times, ends, readings.role)
     elif len(groups) > 1:
         notes.append(ENDS_UNKNOWN)
-    levels = [float(x[rows[0]]) for rows in groups]
     if any(np.ptp(x[rows]) > 0 for rows in groups):
         levels = [level_of(x[rows]) for rows in groups]
         notes.append(_scatter(readings, groups))
+    else:
+        levels = [float(x[rows[0]]) for rows in groups]
     number, numbering = _numbers(readings, groups, levels)
     notes += numbering
     return Cut(groups, number, levels, times, ends, of_test, notes, readings.time_s)
+
+
+def _how_times_count(times: list[Floats], zeros: list[float], resets: Sequence[int]) -> list[str]:
+    """What times of a whole test were taken to mean, in sentences."""
+    begins = "between the last reading before it and its first"
+    before = ""
+    if all(zero == of_hold[0] for zero, of_hold in zip(zeros, times, strict=True)):
+        begins = "at its first reading"
+        before = f"; {BEGUN_BEFORE}"
+    notes = [f"times of the whole test: each hold begins {begins} and lasts until the next begins{before}"]
+    if resets:
+        holds = listed([str(i + 2) for i in resets])
+        notes.append(
+            f"time starts again at the beginning of hold {holds}: the hold before is taken to end as long after "
+            "its last reading as the others"
+        )
+    return notes
 
 
 def _numbers(readings: Readings, groups: Sequence[Rows], levels: Sequence[float]) -> tuple[list[int], list[str]]:
@@ -235,30 +263,37 @@ def _ends(times: list[Floats], zeros: list[float]) -> tuple[list[float | None], 
     At a reset it is not known, and taken as long after the last reading as at the other borders.
     """
     borders = list(zip(times, zeros[1:], strict=False))
-    passed = [zero - before[-1] for before, zero in borders if zero >= before[-1]]
+    passed = []
+    for before, zero in borders:
+        if zero >= before[-1]:
+            passed.append(zero - before[-1])
     usual = float(np.median(passed)) if passed else 0.0
     ends: list[float | None] = []
     resets = []
     for j, (before, zero) in enumerate(borders):
+        end = zero
         if zero < before[-1]:
             resets.append(j)
-            zero = before[-1] + usual
-        ends.append(float(zero - zeros[j]))
-    return [*ends, None], resets
+            end = before[-1] + usual
+        ends.append(float(end - zeros[j]))
+    ends.append(None)
+    return ends, resets
 
 
 def _unread_ends(times: list[Floats], ends: Sequence[float | None], role: str) -> list[str]:
     """That holds go on long after their last readings, as rests do whose rows are not in the file."""
     unread: dict[int, float] = {}
-    for j, (of_hold, end) in enumerate(zip(times, ends, strict=True)):
+    for number, (of_hold, end) in enumerate(zip(times, ends, strict=True), start=1):
         after = 0.0 if end is None else unread_s(of_hold, end)
         if after:
-            unread[j + 1] = after
+            unread[number] = after
     if not unread:
         return []
-    which = f"hold{'s' * (len(unread) > 1)} {listed([str(number) for number in unread])}"
+    plural = "s" if len(unread) > 1 else ""
+    numbers = listed([str(number) for number in unread])
+    longest = lasting(max(unread.values()))
     return [
-        f"{which}: the next one begins up to {lasting(max(unread.values()))} after the last reading, and the {role} is "
+        f"hold{plural} {numbers}: the next one begins up to {longest} after the last reading, and the {role} is "
         "taken to stay until then; a rest in between is one of unrecorded_holds"
     ]
 

@@ -65,18 +65,19 @@ def one_table(tables: Sequence[RawTable], each_file: str, mapping: Sequence[str]
     _check_alike(tables)
     given = list(tables)
     tables, by = _in_order(given)
-    names = _names(tables)
-    notes = [f"holds of one test in the order of their {by}: {names}"]
+    order = f"the order of their {by}: {_names(tables)}"
+    notes = [f"holds of one test in {order}"]
     settings, role, source = _settings(tables, each_file, mapping)
     if each_file != HOLD and tables != given:  # which setting is whose may be meant either way
-        found = f"a list, and files in the order {_names(given)}"
-        raise InputError(f"--each-file: found {found}, expected both in the order of their {by}: {names}")
+        raise InputError(f"--each-file: found a list, and files in the order {_names(given)}, expected both in {order}")
     first = tables[0]
-    header, units = (*_without_numbers(first), HOLD), (*first.units, "")
+    header = (*_without_numbers(first), HOLD)
+    units = (*first.units, "")
     of_files: list[tuple[str, ...]] = [(str(number),) for number in range(1, len(tables) + 1)]
     if role:
-        header, units = (*header, role), (*units, settings[0][1])
-        of_files = [(str(number), setting[0]) for number, setting in enumerate(settings, start=1)]
+        header = (*header, role)
+        units = (*units, settings[0][1])
+        of_files = [(*cells, setting[0]) for cells, setting in zip(of_files, settings, strict=True)]
         told = listed([" ".join(setting) for setting in settings])
         notes.append(f"the {role} of each hold from {source}: {told}")
     rows, pieces = _rows(tables, of_files)
@@ -174,7 +175,9 @@ def _settings(
     """What was set in each file, where no column says it: number and unit; the quantity; and who says so."""
     missing = lacking(tables[0], mapping)
     paths = [table.sheet.path for table in tables]
-    stated = [] if each_file == HOLD else _stated(each_file, len(tables))
+    stated = []
+    if each_file != HOLD:
+        stated = _stated(each_file, len(tables))
     if not missing and stated:
         found = f"{each_file!r} and columns of displacement and tension in {paths[0].name}"
         raise InputError(f"--each-file: found {found}, expected {HOLD}")
@@ -194,14 +197,15 @@ def _settings(
 
 def _stated(each_file: str, count: int) -> list[tuple[str, str]]:
     """Settings that a user lists."""
+    parts = each_file.split(",")
     settings = []
-    for each in each_file.split(","):
-        match = re.fullmatch(r"\s*([-+]?\d+(?:\.\d+)?)\s*(\S+)\s*", each)
+    for part in parts:
+        match = re.fullmatch(r"\s*([-+]?\d+(?:\.\d+)?)\s*(\S+)\s*", part)
         if match:
-            settings.append((match[1], match[2]))
+            number, unit = match.groups()
+            settings.append((number, unit))
     units = {unit for _, unit in settings}
-    unread = each_file.count(",") + 1 - len(settings)
-    if unread or len(settings) != count or len(units) > 1:
+    if len(settings) != len(parts) or len(settings) != count or len(units) > 1:
         expected = f"{HOLD}, {TEST} or what was set in each of the {count} files, in one unit, as 1 mm, 2 mm"
         raise InputError(f"--each-file: found {each_file!r}, expected {expected}")
     return settings

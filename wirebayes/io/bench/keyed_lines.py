@@ -22,16 +22,22 @@ _AROUND = re.compile(r"^\s*-\s+(?=[{\"'\w])|[{}'\"]")  # of a list in YAML, of a
 def _pairs(line: str) -> list[tuple[str, str, str]]:
     """Key, value and unit of each pair of a line; none where the line is anything else."""
     line = _AROUND.sub("", line)
-    found, at = [], 0
+    found = []
+    at = 0
     while line[at:].strip(" \t,;|"):
         match = _PAIR.match(line, at)
         if match is None:
             return []
-        unit, at = match["unit"] or "", match.end()
+        at = match.end()
+        unit = match["unit"] or ""
         if unit and not any(quantity_unit(unit, role) for role in ROLES):
-            unit, at = "", match.start("unit")  # the next key begins there
+            unit = ""
+            at = match.start("unit")  # the next key begins there
         found.append((match["key"], match["value"], unit))
-    return found if len({key for key, _, _ in found}) == len(found) > 1 else []
+    keys = {key for key, _, _ in found}
+    if len(found) < 2 or len(keys) < len(found):
+        return []
+    return found
 
 
 def are_keyed(lines: Sequence[str]) -> bool:
@@ -69,12 +75,12 @@ def sheet_of_keyed(path: Path, lines: Sequence[str], encoding: str) -> Sheet:
         if pairs and not headed:
             rows.append(SheetRow(number, header))
             headed = True
-        cells: tuple[str, ...] = (line.strip(),)
+        cells = [line.strip()]
         if pairs:
             values = {key: value for key, value, _ in pairs}
-            cells = tuple(values.get(key, "") for key in units)
+            cells = [values.get(key, "") for key in units]
         if any(cells):
-            rows.append(SheetRow(number, cells))
+            rows.append(SheetRow(number, tuple(cells)))
     return Sheet(path, tuple(rows), described="a name before each value", encoding=encoding)
 
 

@@ -34,7 +34,10 @@ def sheet_of_measurement(path: Path, lines: list[str], encoding: str = "utf-8") 
         There is no table of channels, or a later segment has other ones.
     """
     split = _split(lines)
-    heads = [i for i, cells in enumerate(split) if cells[0].startswith(_TIMES) or _is_head(split, i)]
+    heads = []
+    for i, cells in enumerate(split):
+        if cells[0].startswith(_TIMES) or _is_head(split, i):
+            heads.append(i)
     if not heads:
         raise InputError(f"{path}, line {len(lines)}: found no line {_TIMES}, expected a table of channels below it")
     header, *others = heads
@@ -43,8 +46,9 @@ def sheet_of_measurement(path: Path, lines: list[str], encoding: str = "utf-8") 
             channels = ", ".join(filter(None, split[head]))
             where = f"{path}, line {head + 1}"
             raise InputError(f"{where}: found the channels {channels}, expected those of line {header + 1}")
-    named = SheetRow(header + 1, _filled(split[header]))
-    rows = [named, _units(split, header), *_readings(split, header)]
+    names = SheetRow(header + 1, _filled(split[header]))
+    units = _units(split, header)
+    rows = [names, units, *_readings(split, header)]
     filled = tuple(row for row in rows if row.cells)
     return Sheet(path, filled, described="LabVIEW measurement", encoding=encoding)
 
@@ -79,18 +83,22 @@ def _clocks(split: list[list[str]]) -> dict[int, str]:
     begin, step = set[str](), set[str]()
     head = 0
     for i, cells in enumerate(split):
-        if cells[0] == "X0":
-            begin = set(filter(None, cells[1:]))
-        elif cells[0] == "Delta_X":
-            step = set(filter(None, cells[1:]))
-        elif cells[0] == _END or cells[0].startswith(_TIMES):
+        key = cells[0]
+        stated = set(filter(None, cells[1:]))
+        if key == "X0":
+            begin = stated
+        elif key == "Delta_X":
+            step = stated
+        elif key == _END or key.startswith(_TIMES):
             head = i
         elif len(begin) == len(step) == 1:
-            (first_text,), (apart_text,) = begin, step
+            (first_text,) = begin
+            (apart_text,) = step
             first = plain_number(first_text, sign)
             apart = plain_number(apart_text, sign)
             if first and apart:
-                time = f"{float(first) + (i - head - 1) * float(apart):.6f}"
+                steps = i - head - 1
+                time = f"{float(first) + steps * float(apart):.6f}"
                 times[i] = time.replace(".", ",") if comma else time
     return times
 
@@ -109,12 +117,15 @@ def _units(split: list[list[str]], header: int) -> SheetRow:
     labels, dimensions = list[str](), list[str]()
     line = header
     for i, cells in enumerate(split[:header]):
-        if cells[0] == "Y_Unit_Label":
-            labels, line = cells[1:], i
-        elif cells[0] == "X_Dimension":
-            dimensions = cells[1:]
+        key, *stated = cells
+        if key == "Y_Unit_Label":
+            labels = stated
+            line = i
+        elif key == "X_Dimension":
+            dimensions = stated
     are_times = bool(dimensions) and set(dimensions) <= {"", "Time"}
-    units, channel = list[str](), 0
+    units = list[str]()
+    channel = 0
     for name in names:
         if name.startswith(_TIMES):
             units.append("s" if are_times else "")

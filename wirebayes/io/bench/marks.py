@@ -50,17 +50,21 @@ def without_marks(
         if role in ("hold", "time"):
             continue
         marked = _marked(table.column(column.index), decimal)
-        if marked.any() and (role == "temperature" or not drop_breaks):
+        may_be_empty = role != "temperature"
+        if marked.any() and not (may_be_empty and drop_breaks):
             row = table.rows[int(marked.argmax())]
             cell = shown(row.cell(column.index))
             expected = "a number that was read"
-            if role != "temperature":
+            if may_be_empty:
                 expected += WHERE_MISSING
             raise table.complain(row.line, column.index, f"{cell}, far beyond all other numbers", expected)
         left_out |= marked
     if not left_out.any():
         return table, []
-    kept = [row for row, gone in zip(table.rows, left_out, strict=True) if not gone]
+    kept = []
+    for row, gone in zip(table.rows, left_out, strict=True):
+        if not gone:
+            kept.append(row)
     first = table.rows[int(left_out.argmax())]
     line = table.line_text(first.line)
     rows = counted(int(left_out.sum()), "row")

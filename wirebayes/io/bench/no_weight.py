@@ -28,7 +28,9 @@ def without_weight(holds: Cut, tension_N: Floats) -> Cut:
     tension_N : (r,) array
         Of all rows: a measured tension that is zero but for its scatter is none.
     """
-    free = [_is_none(tension_N[rows], level) for rows, level in zip(holds.rows, holds.setting, strict=True)]
+    free = []
+    for rows, level in zip(holds.rows, holds.setting, strict=True):
+        free.append(_is_none(tension_N[rows], level))
     loaded = [i for i, is_free in enumerate(free) if not is_free]
     if not any(free) or not loaded:
         return holds

@@ -63,7 +63,7 @@ def decimal_sign(table: RawTable, columns: Sequence[int], stated: Decimal | None
     other = _OTHER[sign]
     whole, fraction = plain_number(cell, other), plain_number(cell, sign)
     raise Undecided(
-        f"{table.sheet.path}, {table.place(line, column)}: found {cell!r}, which is {fraction} or {whole}",
+        f"{table.where(line, column)}: found {cell!r}, which is {fraction} or {whole}",
         "which",
         {f"--decimal {sign}": f"{cell} is {fraction}", f"--decimal {other}": f"{cell} is {whole}"},
     )
@@ -99,15 +99,22 @@ def _far_beyond(cells: Sequence[str], decimal: Decimal) -> int | None:
     """The first of some seldom numbers with the other sign that is too large as thousands, and not as a fraction."""
     other = _OTHER[decimal]
     either = re.compile(_EITHER.format(sign=re.escape(_SIGNS[other])))
-    grouped = [i for i, cell in enumerate(cells) if either.fullmatch(cell)]
-    others = [cell for cell in cells if not either.fullmatch(cell)]
-    with_fraction = sum(_SIGNS[decimal] in cell for cell in others)
-    if not 0 < len(grouped) < _SELDOM * len(cells) or 2 * with_fraction < len(others):
+    grouped, others = [], []
+    for i, cell in enumerate(cells):
+        if either.fullmatch(cell):
+            grouped.append(i)
+        else:
+            others.append(cell)
+    if not 0 < len(grouped) < _SELDOM * len(cells):
         return None
-    sizes = [_size(cell, decimal) for cell in others]
-    limit = _BEYOND * max(sizes, default=0.0)
+    with_fraction = sum(_SIGNS[decimal] in cell for cell in others)
+    if 2 * with_fraction < len(others):
+        return None
+    largest = max((_size(cell, decimal) for cell in others), default=0.0)
+    limit = _BEYOND * largest
     for i in grouped:
-        whole, fraction = _size(cells[i], decimal), _size(cells[i], other)
+        whole = _size(cells[i], decimal)
+        fraction = _size(cells[i], other)
         if whole > limit >= _BEYOND * fraction:
             return i
     return None

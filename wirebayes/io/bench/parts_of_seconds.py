@@ -64,18 +64,21 @@ def _joined(table: RawTable, first: int, parts: int) -> RawTable:
     """The table with seconds and their fraction in the first of the two columns."""
     second = first + 1
     sign = _decimal_sign(table)
+    smallest_parts = 10**_DIGITS // parts
     rows = []
     for row in table.rows:
-        fraction = int(row.cell(second)) * (10**_DIGITS // parts)
+        fraction = int(row.cell(second)) * smallest_parts
         cells = [*row.cells]
         cells[first] = f"{row.cell(first)}{sign}{fraction:0{_DIGITS}d}"
         cells[second] = ""
         rows.append(replace(row, cells=tuple(cells)))
-    header, units = [*table.header], [*table.units]
-    described = f"{table.sheet.described}, time from {header[first]} and {header[second]}"
-    header[first], header[second] = "time (s)", ""
-    units[first] = units[second] = ""
-    sheet = replace(table.sheet, described=described)
+    header = [*table.header]
+    sheet = table.sheet.also(f"time from {header[first]} and {header[second]}")
+    header[first] = "time (s)"
+    header[second] = ""
+    units = [*table.units]
+    units[first] = ""
+    units[second] = ""
     return replace(table, sheet=sheet, header=tuple(header), units=tuple(units), rows=tuple(rows))
 
 

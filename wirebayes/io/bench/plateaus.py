@@ -60,20 +60,25 @@ def plateaus(x: Floats, time: Floats, step: float, shortest: float = SHORTEST_SH
     list of Plateau
         In order; empty where the displacement never stays.
     """
-    noise, scatter = noise_of(x, step), scatter_of(x, step)
+    noise = noise_of(x, step)
+    scatter = scatter_of(x, step)
     if noise == 0.0:
         return []
-    pieces = _joined(_split(x / noise), x, noise)
-    durations = [time[end - 1] - time[begin] for begin, end in pieces]
+    bounds = _split(x / noise)
+    pieces = _joined(bounds, x, noise)
+    durations, counts = [], []
+    for begin, end in pieces:
+        durations.append(time[end - 1] - time[begin])
+        counts.append(end - begin)
     # seen over readings, most are of long holds: moves have few
-    counts = [end - begin for begin, end in pieces]
     usual = float(np.median(np.repeat(durations, counts)))
     found = []
     for piece, lasts, apart in zip(pieces, durations, _steps_beside(x, pieces), strict=True):
         begin, end = piece
         if end - begin < FEWEST:
             continue
-        if _drift(x[begin:end]) > min(LEAN * noise, STAIRS * apart):
+        most_drift = min(LEAN * noise, STAIRS * apart)
+        if _drift(x[begin:end]) > most_drift:
             continue
         hold = _at_rest(x, piece, scatter)
         if hold is not None and lasts >= shortest * usual:
@@ -118,21 +123,25 @@ def _split(x: Floats) -> list[int]:
     n = len(x)
     total = np.concatenate([[0.0], np.cumsum(x - x.mean())])
     worth = PENALTY * np.log(n)
-    bounds, todo = {0, n}, [(0, n)]
+    bounds = {0, n}
+    todo = [(0, n)]
     while todo:
         begin, end = todo.pop()
         count = end - begin
         if count < 2:
             continue
         left = np.arange(1, count)
+        right = count - left
         rise = total[end] - total[begin]
-        away = total[begin + 1 : end] - total[begin] - left * rise / count
-        gain = away**2 * count / (left * (count - left))
+        risen = total[begin + 1 : end] - total[begin]
+        away = risen - left * rise / count
+        gain = away**2 * count / (left * right)
         best = int(gain.argmax())
         if gain[best] > worth:
             middle = begin + 1 + best
             bounds.add(middle)
-            todo += [(begin, middle), (middle, end)]
+            todo.append((begin, middle))
+            todo.append((middle, end))
     return sorted(bounds)
 
 

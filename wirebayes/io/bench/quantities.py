@@ -158,17 +158,19 @@ def _spelling(text: str) -> str:
 def _converted(name: str, role: Role) -> tuple[float, float, bool] | None:
     """Factor, offset, and whether it is a mass."""
     units = _registry()
+    target = units.parse_units(_PINT[role])
     for spelling in dict.fromkeys((name, name.lower())):
         try:
             unit = units.parse_units(spelling)
         except Exception:  # pint raises whatever its parser raises
             continue
-        target, is_mass = units.parse_units(_PINT[role]), False
-        if role == "tension" and unit.dimensionality == units.kilogram.dimensionality:
-            unit, is_mass = unit * units.standard_gravity, True
+        is_mass = role == "tension" and unit.dimensionality == units.kilogram.dimensionality
+        if is_mass:
+            unit = unit * units.standard_gravity
         if unit.dimensionality != target.dimensionality:
             continue
-        zero, one = (float(units.Quantity(v, unit).to(target).magnitude) for v in (0.0, 1.0))
+        zero = float(units.Quantity(0.0, unit).to(target).magnitude)
+        one = float(units.Quantity(1.0, unit).to(target).magnitude)
         return float(f"{one - zero:.12g}"), float(f"{zero:.12g}"), is_mass
     return None
 

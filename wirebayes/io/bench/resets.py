@@ -17,23 +17,26 @@ def joined_at_resets(readings: Readings) -> tuple[Readings, list[str]]:
         The setting does not go on.
     """
     resets = np.flatnonzero(restarts(readings))
+    if not len(resets):
+        return readings, []
     x, time = readings.setting, readings.time_s.copy()
     pieces = np.split(np.arange(len(x)), resets)
-    if not len(resets) or not is_continuous(pieces) or not wanders(x, pieces):
+    if not is_continuous(pieces) or not wanders(x, pieces):
         return readings, []
     steps = np.diff(time)
     interval = float(np.median(steps[steps > 0]))
     notes = []
     for row in resets.tolist():
+        before_s, begin_s = time[row - 1], time[row]
         if not _goes_on(readings, row):
-            found = f"{time[row]:g} s after {time[row - 1]:g} s, and {x[row]:g} {readings.unit} after {x[row - 1]:g}"
+            found = f"{begin_s:g} s after {before_s:g} s, and {x[row]:g} {readings.unit} after {x[row - 1]:g}"
             expected = "a recording in one piece: shift the times from here on, or import each piece for itself"
             raise readings.complain(row, "time", found, expected)
         notes.append(
             f"time starts again at {_line(readings, row)}, where the {readings.role} goes on: the pieces are joined "
             "as if the recording had not paused"
         )
-        time[row:] += time[row - 1] + interval - time[row]
+        time[row:] += before_s + interval - begin_s
     return replace(readings, time_s=time), notes
 
 

@@ -31,7 +31,8 @@ def evident_step(numbers: Sequence[str]) -> float | None:
     if len(values) < FEWEST:
         return None
     parts = [value.as_tuple() for value in values]
-    if max(len(part.digits) for part in parts) > MOST_DIGITS:
+    most_digits = max(len(part.digits) for part in parts)
+    if most_digits > MOST_DIGITS:
         return None
     places = max(-int(part.exponent) for part in parts)
     unit = Decimal(1).scaleb(-places)
@@ -46,4 +47,6 @@ def evident_step(numbers: Sequence[str]) -> float | None:
     # one number of steps in ten ends in a zero: many more mean that the last place is not the display's
     steps = [number // coarse for number in whole]
     with_last_digit = sum(count % 10 != 0 for count in steps)
-    return step if with_last_digit / len(steps) >= 0.5 else None
+    if with_last_digit / len(steps) < 0.5:
+        return None
+    return step

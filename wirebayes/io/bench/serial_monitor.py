@@ -36,7 +36,7 @@ def with_arrivals(sheet: Sheet, arrivals: Sequence[str]) -> Sheet:
     """
     table = find_table(sheet)
     if any(speaks_of(name, "time") for name in table.header):
-        return replace(sheet, described=f"{sheet.described}, times of arrival not read")
+        return sheet.also("times of arrival not read")
     head = next(row.cells for row in sheet.rows if row.line == table.header_line)
     width = len(table.header)
     rows = []
@@ -44,8 +44,7 @@ def with_arrivals(sheet: Sheet, arrivals: Sequence[str]) -> Sheet:
         if row.cells == head:
             row = _with_last(row, width, ARRIVAL)
         elif is_value(row.filled[0]):
-            arrival = arrivals[row.line - 1]
-            row = _with_last(row, width, arrival)
+            row = _with_last(row, width, arrivals[row.line - 1])
         rows.append(row)
     return replace(sheet, rows=tuple(rows))
 

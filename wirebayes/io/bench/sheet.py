@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -93,6 +93,10 @@ class Sheet:
     def column_name(self, column: int) -> str:
         """A column as people count it."""
         return letters(column) if self.lettered else str(column + 1)
+
+    def also(self, described: str) -> "Sheet":
+        """The sheet with one thing more to say of how it was read."""
+        return replace(self, described=f"{self.described}, {described}")
 
 
 def letters(column: int) -> str:

@@ -77,7 +77,9 @@ def specimen_tables(
         Two columns have one name and are not of two specimens; `Undecided` where two specimens read nearly the same.
     """
     table = with_quantities(table)
-    marked = None if stated == "one" else _marked(table, mapping, stated == "several")
+    marked = None
+    if stated != "one":
+        marked = _marked(table, mapping, stated == "several")
     if marked is None:
         table.check_names()
         return [(table, tuple(mapping))]
@@ -87,7 +89,11 @@ def specimen_tables(
         raise _sensors_or_specimens(table, marked, marks)
     wanted = _wanted(marked, marks, mapping)
     tables = [_table_of(table, marked, mark, marks) for mark in wanted]
-    return [(each, _mapping_of(marked, mark, tables, mapping)) for mark, each in tables]
+    with_mapping = []
+    for mark, each in tables:
+        own = _mapping_of(marked, mark, tables, mapping)
+        with_mapping.append((each, own))
+    return with_mapping
 
 
 def _sensors_or_specimens(table: RawTable, marked: _Marked, marks: Sequence[str]) -> Undecided:
@@ -117,28 +123,32 @@ def _marked(table: RawTable, mapping: Sequence[str], by_words: bool) -> _Marked 
         if way is None:
             continue
         way = replace(way, certain=way.certain or by_words)
-        if len(_specimens(table, way)) > 1:
-            ignored = [_column_meant(way, text) for text in mapping if _role(text) == IGNORE]
-            left = replace(way, name=tuple("" if i in ignored else name for i, name in enumerate(way.name)))
-            return left if _specimens(table, left) else None
+        if len(_specimens(table, way)) < 2:
+            continue
+        ignored = [_column_meant(way, text) for text in mapping if _role(text) == IGNORE]
+        names = ["" if i in ignored else name for i, name in enumerate(way.name)]
+        left = replace(way, name=tuple(names))
+        return left if _specimens(table, left) else None
     return None
 
 
 def _by_row_above(table: RawTable) -> _Marked | None:
     """Marks that stand in the row above the header, each over its first column or over all of them."""
-    if len({label for label in table.above if label}) < 2:
+    labels = {label for label in table.above if label}
+    if len(labels) < 2:
         return None
-    marks, last = [], ""
-    for label in table.above:
+    marks, named, full = [], [], []
+    last = ""
+    for label, name in zip(table.above, table.header, strict=True):
         last = label or last
         marks.append(last)
-    columns = list(zip(marks, table.header, strict=True))
-    named = [(mark, name) for mark, name in columns if name]
+        full.append(f"{last} {name}".strip())
+        if name:
+            named.append((last, name))
     names = {name for _, name in named}
     if len(set(named)) < len(named) or len(names) == len(named):
         return None
-    full = tuple(f"{mark} {name}".strip() for mark, name in columns)
-    return _Marked(tuple(marks), table.header, full, certain=True)
+    return _Marked(tuple(marks), table.header, tuple(full), certain=True)
 
 
 def _by_repetition(table: RawTable) -> _Marked | None:
@@ -222,9 +232,10 @@ def _read_alike(table: RawTable, marked: _Marked, marks: Sequence[str]) -> bool:
         both = np.isfinite(a) & np.isfinite(b)
         if both.sum() < FEWEST:
             return False
-        apart = float(np.quantile(np.abs(a - b)[both], 0.9))
+        differences = np.abs(a - b)[both]
+        apart = float(np.quantile(differences, 0.9))
         span = float(np.ptp(a[both]))
-        if not 0.0 < apart <= SAME_WIRE * span:
+        if apart <= 0.0 or apart > SAME_WIRE * span:
             return False
     return True
 
@@ -266,19 +277,20 @@ def _mapping_of(
     marked: _Marked, mark: str, tables: Sequence[tuple[str, RawTable]], mapping: Sequence[str]
 ) -> tuple[str, ...]:
     """What a user says, as far as it is of this specimen, with the names of its table."""
-    own = next(each for m, each in tables if m == mark)
+    own_header = next(each.header for m, each in tables if m == mark)
     of_all = {name for _, each in tables for name in each.header}
     out = []
     for text in mapping:
-        header, _, rest = text.rpartition("=")
-        header = header.strip()
+        before, _, meaning = text.rpartition("=")
+        header = before.strip()
         column = _column_meant(marked, text)
-        if column is None or not marked.mark[column]:
-            if header in own.header or header not in of_all:
+        of_specimen = "" if column is None else marked.mark[column]
+        if column is None or not of_specimen:
+            if header in own_header or header not in of_all:
                 out.append(text)
-        elif marked.mark[column] == mark and own.header[column]:
+        elif of_specimen == mark and own_header[column]:
             added = header.removeprefix(marked.full[column])
-            out.append(f"{own.header[column]}{added}={rest}")
+            out.append(f"{own_header[column]}{added}={meaning}")
     return tuple(out)
 
 

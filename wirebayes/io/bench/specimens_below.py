@@ -89,15 +89,18 @@ def _by_hold_numbers(recorded: Recorded, stated: Specimens | None) -> list[RawTa
     if not all(map(is_number, labels)):  # words name levels
         return [table]
     changes = np.flatnonzero(np.diff(recorded.hold) < 0) + 1
+    if not len(changes):
+        return [table]
     time = recorded.values["time"]
     times_fall = time[changes] < time[changes - 1]
-    if not len(changes) or not times_fall.all() or not _begins_again(recorded, changes):
+    if not times_fall.all() or not _begins_again(recorded, changes):
         return [table]
     if stated == "several":
         names = [str(number) for number in range(1, len(changes) + 2)]
         return _split(table, changes, names)
     row = int(changes[0])
-    raise _which(table, index, row, labels[row - 1 : row + 1], is_repeated=True)
+    around = labels[row - 1 : row + 1]
+    raise _which(table, index, row, around, is_repeated=True)
 
 
 def _tables(table: RawTable, index: int, changes: Ints, names: Sequence[str]) -> list[RawTable]:
@@ -151,8 +154,8 @@ def _are_words(names: Sequence[str]) -> bool:
 
 
 def _which(table: RawTable, index: int, row: int, names: Sequence[str], is_repeated: bool) -> Undecided:
-    place = table.place(table.rows[row].line, index)
+    where = table.where(table.rows[row].line, index)
     again = "what was set begins" if is_repeated else "times begin"
     found = f"found {shown(names[1])} after {shown(names[0])} where {again} again"
     answers = {"--specimens several": "specimens of their own", "--specimens one": "one specimen"}
-    return Undecided(f"{table.sheet.path}, {place}: {found}", "what they are of", answers)
+    return Undecided(f"{where}: {found}", "what they are of", answers)

@@ -25,11 +25,15 @@ def is_coarse(table: RawTable, column: int) -> bool:
     if len(counts) < FEWEST:
         return False
     usual = float(counts.mean())
-    alike = np.abs(counts - usual) <= max(1.0, ALIKE * usual)
-    if usual < OFTEN or alike.mean() < ALIKE_SHARE:
+    if usual < OFTEN:
         return False
-    others = [table.column(i) for i in range(len(table.header)) if i != column]
-    return not any(_takes_turns(other, begins) for other in others)
+    alike = np.abs(counts - usual) <= max(1.0, ALIKE * usual)
+    if alike.mean() < ALIKE_SHARE:
+        return False
+    for other in range(len(table.header)):
+        if other != column and _takes_turns(table.column(other), begins):
+            return False
+    return True
 
 
 def _begins(cells: list[str]) -> Ints:
@@ -57,18 +61,20 @@ def spread(time_s: Floats) -> tuple[Floats, list[str]]:
         As it was where stamps do not mostly follow each other by a clock's tick.
     notes : list of str
     """
-    begins = _runs(np.concatenate([[False], np.diff(time_s) != 0]))
-    counts = np.diff(np.append(begins, len(time_s)))
+    n = len(time_s)
+    is_new = np.concatenate([[False], np.diff(time_s) != 0])
+    begins = _runs(is_new)
     steps = np.diff(time_s[begins])
     tick = _tick(steps)
     if tick is None:
         return time_s, []
+    counts = np.diff(np.append(begins, n))
     usual = float(np.mean(counts[1:-1]))
     followed = np.append(_are(steps, tick), False)
     # a stamp after which the recording pauses or ends may lack readings at its end
     complete = np.maximum(counts, round(usual))
     places = np.where(followed, counts, complete)
-    within = np.arange(len(time_s)) - np.repeat(begins, counts)
+    within = np.arange(n) - np.repeat(begins, counts)
     since_stamp = tick * within / np.repeat(places, counts)
     note = f"each time stamp, of {tick:g} s, is that of {usual:.2g} readings: they are spread evenly up to the next one"
     return time_s + since_stamp, [note]

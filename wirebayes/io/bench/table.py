@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import ROLES, quantity_unit
@@ -68,6 +68,10 @@ class RawTable:
         begins = [(begin, name) for begin, name in self.pieces if begin < line]
         return f"{line - begins[-1][0]} of {begins[-1][1]}" if begins else str(line)
 
+    def where(self, line: int, column: int) -> str:
+        """The file, and where a cell stands in it."""
+        return f"{self.sheet.path}, {self.place(line, column)}"
+
     def complain(self, line: int, column: int, found: str, expected: str) -> InputError:
         """The error for one cell.
 
@@ -83,7 +87,7 @@ class RawTable:
         InputError
             With the file and the cell, as the sheet counts; the caller raises it.
         """
-        return InputError(f"{self.sheet.path}, {self.place(line, column)}: found {found}, expected {expected}")
+        return InputError(f"{self.where(line, column)}: found {found}, expected {expected}")
 
     def column(self, column: int) -> list[str]:
         """The cells of a column."""
@@ -120,13 +124,15 @@ def find_table(sheet: Sheet) -> RawTable:
         raise InputError(f"{sheet.path}, line {line}: found no rows of numbers, expected a header and readings")
     shown = rows[first : first + _SHOWN]
     above, units = _above_readings(rows[:first])
-    if not above or not _is_header(above[-1]) or _is_title(above[-1], shown):
+    if not above:
         return _without_header(sheet, first)
-    head = above[-1]
+    *others, head = above
+    if not _is_header(head) or _is_title(head, shown):
+        return _without_header(sheet, first)
     _check_names_are_short(sheet, head)
     width = max(len(row.cells) for row in (head, *shown))
     header = _padded(head.cells, width)
-    names = _padded(above[-2].cells, width) if len(above) > 1 else ()
+    names = _padded(others[-1].cells, width) if others else ()
     body = tuple(row for row in rows[first:] if not row.comment)
     _check_width(sheet, head, body, width)
     _check_gaps(sheet, head, body)
@@ -149,10 +155,13 @@ def _above_readings(rows: Sequence[SheetRow]) -> tuple[list[SheetRow], tuple[str
         above.pop()
     above = _without_channels(above)
     units: tuple[str, ...] = ()
-    if len(above) > 1 and _are_units(above[-1]) and len(above[-2].filled) >= max(2, len(above[-1].filled)):
-        units = tuple(cell.strip("[]() ") for cell in above.pop().cells)
-    above = _without_channels(above)
-    return above, units
+    if len(above) > 1:
+        head, below = above[-2:]
+        enough = max(2, len(below.filled))
+        if _are_units(below) and len(head.filled) >= enough:
+            units = tuple(cell.strip("[]() ") for cell in below.cells)
+            above.pop()
+    return _without_channels(above), units
 
 
 def _without_header(sheet: Sheet, first: int) -> RawTable:
@@ -160,7 +169,7 @@ def _without_header(sheet: Sheet, first: int) -> RawTable:
     body = tuple(row for row in sheet.rows[first:] if not row.comment)
     width = max(len(row.cells) for row in body[:_SHOWN])
     names = tuple(str(column + 1) for column in range(width))
-    unnamed = replace(sheet, described=f"{sheet.described}, no header")
+    unnamed = sheet.also("no header")
     return RawTable(unnamed, names, ("",) * width, body, body[0].line, nameless=True)
 
 

@@ -111,8 +111,8 @@ class Recorded:
             answers = {f"--zero-mm {x[0]:g}": "counted from the first reading", "--zero-mm 0": "as they stand"}
             if np.abs(x - length_mm).min() < FAR * length_mm:
                 answers |= {f"--zero-mm {length_mm:g}": "lengths of the wire"}
-            place = self.table.place(self.table.rows[0].line, self.columns["displacement"].index)
-            raise Undecided(f"{self.table.sheet.path}, {place}: {found}", "where the wire begins to pull", answers)
+            where = self.table.where(self.table.rows[0].line, self.columns["displacement"].index)
+            raise Undecided(f"{where}: {found}", "where the wire begins to pull", answers)
 
     def readings(self, control: Control) -> Readings:
         """The same, by what was set."""
@@ -142,12 +142,13 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     choices : Choices
         What the user decided.
     """
-    columns = _of_sample(table, understand(table, choices.mapping), about)
+    columns = understand(table, choices.mapping)
+    columns = _of_sample(table, columns, about)
     not_read = _first_not_read(table, columns["displacement"])
-    table, notes = complete_rows(table, columns, choices.drop_breaks)
+    table, about_rows = complete_rows(table, columns, choices.drop_breaks)
     if not_read not in {row.line for row in table.rows}:  # below the readings
         not_read = None
-    numbers = {role: column for role, column in columns.items() if not _is_of_clocks(table, column)}
+    numbers = _plain_columns(table, columns)
     indices = [column.index for column in numbers.values()]
     decimal = decimal_sign(table, indices, choices.decimal)
     check_signs(table, indices, decimal)
@@ -155,7 +156,13 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
     if not table.rows:
         found = "no row with a time, a displacement and a tension, all of them numbers"
         raise InputError(f"{table.sheet.path}: found {found}, expected readings")
-    notes = [*_whose(table, columns), _read_as(table, columns, decimal), *_by_units_alone(columns), *notes, *left_out]
+
+    notes = _whose(table, columns)
+    notes.append(_read_as(table, columns, decimal))
+    notes += _by_units_alone(columns)
+    notes += about_rows
+    notes += left_out
+
     texts: dict[Role, list[str]] = {}
     values: dict[Role, Floats] = {}
     for role, column in numbers.items():
@@ -163,14 +170,13 @@ def recorded_in(table: RawTable, about: About, choices: Choices) -> tuple[Record
             texts[role] = _numbers(table, column, decimal)
     for role, text in texts.items():
         values[role] = _converted(columns[role], text)
-    of_holds = choices.time_since == "hold"
-    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes, durations=of_holds)
+    durations = choices.time_since == "hold"
+    values["time"], of_day = _times(table, columns["time"], values.get("time"), notes, durations=durations)
     _check_sizes(table, columns, values)
     values["displacement"] = _from_zero(values["displacement"], choices.zero_mm)
     notes += unread(table, columns)
     hold, numbering = _hold_numbers(table, columns.get("hold"), decimal)
-    recorded = Recorded(table, columns, texts, values, hold, of_day, numbering, not_read)
-    return _from_zero_on(recorded, notes)
+    return _from_zero_on(Recorded(table, columns, texts, values, hold, of_day, numbering, not_read), notes)
 
 
 def _first_not_read(table: RawTable, displacement: Column) -> int | None:
@@ -198,19 +204,26 @@ def _of_sample(table: RawTable, columns: dict[Role, Column], about: About) -> di
     size = {"displacement": about.length_mm, "tension": about.area_mm2}
     out = dict(columns)
     for role, column in columns.items():
-        if column.unit is None or not column.unit.of_sample:
+        unit = column.unit
+        if unit is None or not unit.of_sample:
             continue
         times = size[role]
         if times is None:
-            found = f"a stress in {column.unit.text}"
+            found = f"a stress in {unit.text}"
             expected = "--area-mm2 A, the sample's cross-section, or a column of forces"
             raise table.complain(table.header_line, column.index, found, expected)
-        out[role] = replace(column, unit=replace(column.unit, factor=column.unit.factor * times))
+        absolute = replace(unit, factor=unit.factor * times)
+        out[role] = replace(column, unit=absolute)
     return out
 
 
-def _is_of_clocks(table: RawTable, column: Column) -> bool:
-    return column.role == "time" and clock.is_clock(table, column.index, column.unit)
+def _plain_columns(table: RawTable, columns: dict[Role, Column]) -> dict[Role, Column]:
+    """All columns but one of clocks, whose cells are no numbers."""
+    plain = dict(columns)
+    time = columns["time"]
+    if clock.is_clock(table, time.index, time.unit):
+        del plain["time"]
+    return plain
 
 
 def _whose(table: RawTable, columns: dict[Role, Column]) -> list[str]:
@@ -327,18 +340,20 @@ def _hold_numbers(
 ) -> tuple[NDArray[np.int64] | None, list[str]]:
     if column is None:
         return None, []
-    cells = table.column(column.index)
+    index = column.index
+    cells = table.column(index)
     plain = [_plain_hold(cell, decimal) for cell in cells]
     if None not in plain:
         return np.array(plain, dtype=np.int64), []
     for row in table.rows:
-        cell = row.cell(column.index)
+        cell = row.cell(index)
         if is_number(cell):
-            raise table.complain(row.line, column.index, shown(cell), "a whole number for each hold")
+            raise table.complain(row.line, index, shown(cell), "a whole number for each hold")
     names = list(dict.fromkeys(cells))
     number_of = {name: i for i, name in enumerate(names, start=1)}
     numbers = np.array([number_of[cell] for cell in cells], dtype=np.int64)
-    return numbers, [f"holds numbered in order, {names[0]} to {names[-1]}"]
+    note = f"holds numbered in order, {names[0]} to {names[-1]}"
+    return numbers, [note]
 
 
 def _plain_hold(cell: str, decimal: Decimal) -> int | None:

@@ -64,18 +64,24 @@ def row_for_each_reading(table: RawTable) -> RawTable:
         return _one_below_the_other(table)
     by_row = across.role == "time"
     roles: tuple[Role, ...] = ("displacement", "tension") if by_row else ("time",)
-    others = [i for i, name in enumerate(table.header) if name and i not in across.values]
-    beside = [(i, role) for i in others for role in roles if is_of(table, i, role)]
+    beside = []
+    for i, name in enumerate(table.header):
+        if name and i not in across.values:
+            beside += [(i, role) for role in roles if is_of(table, i, role)]
     if len(beside) != 1:
         return table
-    column, role = beside[0]
+    ((column, role),) = beside
     read: Role = "displacement" if "tension" in (across.role, role) else "tension"
-    rows = _by_row(table, across, column) if by_row else _by_column(table, across, column)
+    if by_row:
+        where = "row"
+        rows = _by_row(table, across, column)
+    else:
+        where = "column"
+        rows = _by_column(table, across, column)
     name, unit = _name_of_cells(table, across, read)
     header = ("hold", table.header[column], f"{across.role} [{across.unit}]", name)
     units = ("", table.units[column], across.unit, unit)
-    where = "row" if by_row else "column"
-    sheet = replace(table.sheet, described=f"{table.sheet.described}, a hold in each {where}")
+    sheet = table.sheet.also(f"a hold in each {where}")
     return RawTable(sheet, header, units, tuple(rows), table.header_line, turned=True)
 
 
@@ -88,16 +94,17 @@ def _one_below_the_other(table: RawTable) -> RawTable:
     if len(names) > 1:
         return table
     header, units = zip(*names.pop(), strict=True)
-    missing = lacking(replace(table, header=header, units=units), ())
+    of_one = replace(table, header=header, units=units)
+    missing = lacking(of_one, ())
     if len(missing) != 1:
         return table
-    set_role = missing[0]
+    (set_role,) = missing
     settings = _settings_of(list(columns), set_role)
     if settings is None:
         return table
     unit, numbers = settings
     rows = _rows_under(table, [*columns.values()], numbers)
-    sheet = replace(table.sheet, described=f"{table.sheet.described}, holds side by side")
+    sheet = table.sheet.also("holds side by side")
     all_names = ("hold", set_role, *header)
     all_units = ("", unit, *units)
     return RawTable(sheet, all_names, all_units, rows, table.header_line, turned=True)
@@ -140,13 +147,16 @@ def _across(table: RawTable) -> _Across | None:
     found: dict[tuple[Role, str], dict[int, tuple[str, str]]] = {}
     for i, name in enumerate(table.header):
         measure = _MEASURE.fullmatch(name)
-        role = None if measure is None else _along_header(measure["unit"])
-        if measure is None or role is None:
+        if measure is None:
+            continue
+        number, unit = measure["number"], measure["unit"]
+        role = _along_header(unit)
+        if role is None:
             continue
         left = _EMPTY.sub("", f"{measure['before']} {measure['after']}")
-        cells = " ".join(_AT.sub("", left).split()).strip("@=,;: ")
-        of_kind = found.setdefault((role, cells), {})
-        of_kind[i] = measure["number"], measure["unit"]
+        words = _AT.sub("", left).split()
+        cells = " ".join(words).strip("@=,;: ")
+        found.setdefault((role, cells), {})[i] = number, unit
     if not found:
         return None
     role, cells = max(found, key=lambda kind: len(found[kind]))

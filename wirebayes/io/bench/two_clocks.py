@@ -44,17 +44,21 @@ def clock_of(table: RawTable, column: int, unit: Unit | None) -> Clock | None:
     unit : Unit or None
         None for clocks and dates.
     """
-    cells = [cell.replace(",", ".") for cell in table.column(column)]
     try:
         if is_clock(table, column, unit):
             time_s, _, _ = seconds(table, column, unit)
             return Clock(time_s, _tick_s(time_s))
+        cells = [cell.replace(",", ".") for cell in table.column(column)]
         values = np.array([float(cell) for cell in cells])
     except (InputError, ValueError):
         return None
-    places = max(len(cell.partition(".")[2]) for cell in cells)
+    places = 0
+    for cell in cells:
+        _, _, fraction = cell.partition(".")
+        places = max(places, len(fraction))
     factor = 1.0 if unit is None else unit.factor
-    return Clock(values * factor, abs(factor) * 10.0**-places)
+    tick_s = abs(factor) * 10.0**-places
+    return Clock(values * factor, tick_s)
 
 
 def _tick_s(time_s: Floats) -> float:

@@ -46,7 +46,8 @@ def finest_of_same(table: RawTable, likely: Sequence[int], role: Role) -> list[i
         return [*likely]
     for values, own, _ in columns:
         rounding = ROUNDED * (own + step) + SAME_UNIT * np.abs(first)
-        if not (np.abs(values - first) <= rounding).all():
+        agree = np.abs(values - first) <= rounding
+        if not agree.all():
             return [*likely]
     finest = int(np.argmin(steps))
     return [likely[finest]]

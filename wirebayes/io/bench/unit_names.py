@@ -32,16 +32,19 @@ def with_quantities(table: RawTable) -> RawTable:
         The same where columns have names of their own.
     """
     cells = tuple(cell.strip("[]() ") for cell in table.header)
-    if _are_named_by_units(cells) and len({label for label in table.above if label}) > 1:
-        return replace(table, header=_quantities(cells, cells), units=cells, header_line=table.header_line - 1)
+    labels = {label for label in table.above if label}
+    if len(labels) > 1 and _are_named_by_units(cells):
+        header = _quantities(cells, cells)
+        return replace(table, header=header, units=cells, header_line=table.header_line - 1)
     repeated = {name for name in table.header if name and table.header.count(name) > 1}
-    under_repeated = tuple(
-        unit if name in repeated else "" for name, unit in zip(table.header, table.units, strict=True)
-    )
-    of_specimens = len(repeated) > 1 and not any(map(speaks_of_a_quantity, repeated))
-    if of_specimens and _are_named_by_units(under_repeated):
-        return replace(table, header=_quantities(table.header, under_repeated), above=table.header)
-    return table
+    if len(repeated) < 2 or any(map(speaks_of_a_quantity, repeated)):
+        return table
+    columns = zip(table.header, table.units, strict=True)
+    under_repeated = tuple(unit if name in repeated else "" for name, unit in columns)
+    if not _are_named_by_units(under_repeated):
+        return table
+    header = _quantities(table.header, under_repeated)
+    return replace(table, header=header, above=table.header)
 
 
 def with_units_beside(table: RawTable) -> RawTable:

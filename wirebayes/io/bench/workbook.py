@@ -36,10 +36,15 @@ def sheet_of_workbook(path: Path, raw: bytes, chosen: str | None = None) -> Shee
     rows = _rows_of_sheets(path, raw)
     if chosen is not None:
         if chosen not in rows:
-            names = ", ".join(rows)
-            raise InputError(f"{path}: found no sheet {chosen!r}{hint(chosen, list(rows))}, expected one of {names}")
+            names = list(rows)
+            found = f"no sheet {chosen!r}{hint(chosen, names)}"
+            raise InputError(f"{path}: found {found}, expected one of {', '.join(names)}")
         return Sheet(path, rows[chosen], lettered=True, described=f"sheet {chosen}")
-    full = [name for name, found in rows.items() if sum(map(_measured, found)) > 1]
+    full = []
+    for name, found_rows in rows.items():
+        measured = sum(map(_measured, found_rows))
+        if measured > 1:
+            full.append(name)
     if not full:
         raise InputError(f"{path}: found no sheet with columns of numbers, expected a header and readings")
     if len(full) > 1:
