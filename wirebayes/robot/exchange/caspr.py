@@ -46,7 +46,9 @@ def robot_of_caspr(bodies: Element, cables: Element, cable_set: str | None = Non
     link = _platform(bodies)
     joint, physical = link.one("joint"), link.one("physical")
     moves, turns = _ways(joint)
-    freedom: Freedom = "orientation" if not moves else "pose" if turns else "position"
+    freedom: Freedom = "orientation"
+    if moves:
+        freedom = "pose" if turns else "position"
     normal = np.eye(3)[turns[0]] if len(turns) == 1 else None
     centre = physical.one("com_location").vector()
     base = link.one("parent").one("location").vector()
@@ -57,10 +59,11 @@ def robot_of_caspr(bodies: Element, cables: Element, cable_set: str | None = Non
     if len(legs) < 2:
         raise chosen.fail(f"{len(legs)} cables", "at least two")
     bounds, own_bounds = _bounds(wires)
-    names = " and ".join(Path(root.file).name for root in (bodies, cables))
+    files = f"{Path(bodies.file).name} and {Path(cables.file).name}"
+    of_file = Path(bodies.file).stem.removesuffix("_bodies")
     return ImportedRobot(
-        link.attributes.get("name") or Path(bodies.file).stem.removesuffix("_bodies"),
-        f"Imported from CASPR's {names}, cable set {chosen.attribute('id')!r}.",
+        link.attributes.get("name") or of_file,
+        f"Imported from CASPR's {files}, cable set {chosen.attribute('id')!r}.",
         freedom,
         physical.one("mass").number(),
         centre,
@@ -131,12 +134,15 @@ def _home(joint: Element, moves: tuple[int, ...], turns: tuple[int, ...], base: 
         return (None if moves else base), np.zeros(3)
     words = Element(joint.file, joint.tag, joint.line, {}, text=joint.attributes["q_initial"])
     q = words.vector(len(moves) + len(turns))
+    moved, angles = q[: len(moves)], q[len(moves) :]
     position = np.array(base)
-    position[list(moves)] += q[: len(moves)]
+    position[list(moves)] += moved
+    axes = np.eye(3)
+    fixed = joint.attribute("type") == _FIXED_AXES if turns else False
     turned = np.eye(3)
-    for axis, angle in zip(turns, q[len(moves) :], strict=True):
-        own = matrix(angle * np.eye(3)[axis])
-        turned = own @ turned if joint.attribute("type") == _FIXED_AXES else turned @ own
+    for axis, angle in zip(turns, angles, strict=True):
+        own = matrix(angle * axes[axis])
+        turned = own @ turned if fixed else turned @ own
     return position, vector(turned)
 
 
@@ -169,14 +175,18 @@ def _leg(cable: Element, centre: Floats) -> _Leg:
     if len(ends) != 2:
         raise cable.fail(f"{len(ends)} attachments", "two: a wire runs straight from the base to the platform")
     first, last = ends
-    pulley = first.tag == "base_rotating_pulley"
-    if not pulley and _link(first) == 1 and _link(last) == 0:
-        first, last = last, first
-    exit_m, radius, axis = _over_pulley(first) if pulley else _from_base(first)
-    if _link(last) != 1:
-        raise last.fail(f"link {_link(last)}", "link 1, the platform")
+    if first.tag == "base_rotating_pulley":
+        exit_m, radius, axis = _over_pulley(first)
+    else:
+        if _link(first) == 1 and _link(last) == 0:
+            first, last = last, first
+        exit_m, radius, axis = _from_base(first)
+    on_link = _link(last)
+    if on_link != 1:
+        raise last.fail(f"link {on_link}", "link 1, the platform")
     point = last.one("location").vector()
-    return _Leg(exit_m, point + (centre if reference == "com" else 0.0), radius, axis)
+    origin = centre if reference == "com" else 0.0
+    return _Leg(exit_m, point + origin, radius, axis)
 
 
 def _over_pulley(end: Element) -> tuple[Floats, float, Floats]:

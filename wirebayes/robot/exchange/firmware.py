@@ -80,11 +80,12 @@ def _reprapfirmware(text: str, where: str) -> tuple[list[list[float]], _Settings
     names = [f"M669 {letter}" for letter in _ANCHORS[:count]]
     anchors = _anchors(found, names, where, "M669 with A, B, C, D")
     renamed = {"U": "lines", "O": "on spool", "W": "mass", "Y": "beyond", "I": "least", "X": "most"}
+    values, line = found.values, found.line
     for letter, name in renamed.items():
         code = f"M666 {letter}"
-        if code in found.values:
-            found.values[name] = found.values[code]
-            found.line[name] = found.line[code]
+        if code in values:
+            values[name] = values[code]
+            line[name] = line[code]
     return anchors, found
 
 

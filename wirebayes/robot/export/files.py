@@ -50,20 +50,22 @@ def _anchors(robot: Robot) -> Floats:
 def reprapfirmware(robot: Robot, line: WireDraws) -> str:
     """Lines for ``config.g`` of RepRapFirmware (M669 and M666), each value with its 90 % interval in a comment."""
     count = "" if robot.joints == ANCHORS_UNLESS_SAID else f"N{robot.joints} "
-    anchors = []
+    anchors = ""
     for letter, anchor in zip(ANCHORS, _anchors(robot), strict=False):
-        anchors.append(letter + _joined(1e3 * anchor, ".2f"))
+        anchors += f" {letter}{_joined(1e3 * anchor, '.2f')}"
     parts = mean_of_each_winch(robot, robot.lines)
     beyond = mean_of_each_winch(robot, robot.beyond_m)
+    lowest = np.full(robot.joints, robot.rule.lowest_N)
+    highest = np.full(robot.joints, robot.rule.highest_N)
     spring = working_spring(robot, line)
     rows = [
-        (f"M669 K6 {count}{' '.join(anchors)}", "anchors, mm"),
+        (f"M669 K6 {count}{anchors.lstrip()}", "anchors, mm"),
         (f"M666 U{_joined(parts, '.0f')}", "mechanical advantages"),
         (f"M666 W{robot.mass_kg:g}", "mover, kg"),
         (f"M666 S{spring.mean_N:.0f}", f"spring constant per unit length, N: {spring.described}"),
         (f"M666 Y{_joined(1e3 * beyond, '.0f')}", "wire beyond each anchor, mm"),
-        (f"M666 I{_joined(np.full(robot.joints, robot.rule.lowest_N), 'g')}", "smallest planned force, N"),
-        (f"M666 X{_joined(np.full(robot.joints, robot.rule.highest_N), 'g')}", "largest planned force, N"),
+        (f"M666 I{_joined(lowest, 'g')}", "smallest planned force, N"),
+        (f"M666 X{_joined(highest, 'g')}", "largest planned force, N"),
     ]
     on_spool = turned_by(robot).sum(0)
     if robot.winch is not None:
@@ -95,8 +97,10 @@ def klipper(robot: Robot, line: WireDraws) -> str:
     spring = working_spring(robot, line)
     parts = mean_of_each_winch(robot, robot.lines)
     beyond = mean_of_each_winch(robot, robot.beyond_m)
-    lowest, highest = np.full(robot.joints, robot.rule.lowest_N), np.full(robot.joints, robot.rule.highest_N)
-    text = _head(robot, line, spring, "#") + (
+    lowest = np.full(robot.joints, robot.rule.lowest_N)
+    highest = np.full(robot.joints, robot.rule.highest_N)
+    text = _head(robot, line, spring, "#")
+    text += (
         "[printer]\nkinematics: winch\n"
         "# The next options are those of the Hangprinter branch of Klipper; upstream does not know them.\n"
         f"winch_mover_weight: {robot.mass_kg:g}  # kg\n"
@@ -113,7 +117,8 @@ def klipper(robot: Robot, line: WireDraws) -> str:
         growth_mm = 1e3 * growth
         text += f"winch_buildup_factor: {growth_mm.mean():.5f}  # mm: {_joined(growth_mm, '.5f', ', ')}\n"
         of_spools = _klipper_spools(robot, drums, 2 * np.pi * (1e3 * radius) / parts)
-    for letter, anchor, spool in zip(STEPPERS, 1e3 * _anchors(robot), of_spools, strict=False):
+    anchors_mm = 1e3 * _anchors(robot)
+    for letter, anchor, spool in zip(STEPPERS, anchors_mm, of_spools, strict=False):
         x, y, z = anchor
         text += f"\n[stepper_{letter}]\nanchor_x: {x:.2f}\nanchor_y: {y:.2f}\nanchor_z: {z:.2f}\n{spool}"
     return text
@@ -254,19 +259,26 @@ def working_spring(robot: Robot, line: WireDraws, wire: str | None = None) -> Wo
     wire = wire or _first(robot)
     wires = for_robot(robot, line)
     home = _mean_tension_at_home(robot, wire)
-    at_N = line.each.get(wire, line).tension_ref_N if home is None else home
+    if home is None:
+        at_N = line.each.get(wire, line).tension_ref_N
+        point = "a middle tension of the test"
+    else:
+        at_N = home
+        point = "the mean tension of the lines at the home pose"
     stiffness = _sample(robot, wires, wire).stiffness_N(at_N)
     good = np.isfinite(stiffness)
-    fitted, of = wire not in robot.given, wire if len({*robot.wire}) > 1 else ""
+    fitted = wire not in robot.given
+    several = len(set(robot.wire)) > 1
+    of = wire if several else ""
     if not good.any():
         which = "the fitted line" if fitted and not of else f"the wire {wire}"
         raise InputError(f"{robot.name}: {which} cannot carry {at_N:.3g} N, so no spring constant is known")
     if wires.law == "hooke" and not wires.at("strain"):
         return WorkingSpring(stiffness, "", fitted, of)
-    point = "a middle tension of the test" if home is None else "the mean tension of the lines at the home pose"
     remark = f"The spring constant depends on the tension: it is the tangent at {at_N:.4g} N, {point}."
     if not good.all():
-        remark += f" {100 * np.mean(~good):.2g} % of the draws cannot carry that tension and are left out."
+        lost = 100 * np.mean(~good)
+        remark += f" {lost:.2g} % of the draws cannot carry that tension and are left out."
     return WorkingSpring(stiffness[good], remark, fitted, of)
 
 
@@ -313,14 +325,17 @@ def mujoco(robot: Robot, line: WireDraws) -> str | None:
     if not commands.feasible.all():
         return None
     if robot.winch is not None:
-        robot = replace(robot, home_rotation_rad=vector(commands.rotation)[0])
-    which = cut_from(robot)
-    zero, offset = commands.zero_m[0], commands.offset_m[0]
+        turn = vector(commands.rotation)[0]
+        robot = replace(robot, home_rotation_rad=turn)
+    remark = cut_from(robot)
+    offset = commands.offset_m[0]
     if wires.law == "hooke" and not wires.at("strain"):
         k1 = np.broadcast_to(wires.theta["k1"], (robot.legs, 1))[:, 0]
-        return mjcf(robot, k1, zero, offset, remark=which)
-    remark = _of_tangents(commands.tension_N[0]) + (f"; {which}" if which else "")
-    return mjcf(robot, *_tangent_springs(wires, commands), offset, remark=remark)
+        return mjcf(robot, k1, commands.zero_m[0], offset, remark=remark)
+    tangents = _of_tangents(commands.tension_N[0])
+    remark = f"{tangents}; {remark}" if remark else tangents
+    stiffness, zero = _tangent_springs(wires, commands)
+    return mjcf(robot, stiffness, zero, offset, remark=remark)
 
 
 def _of_tangents(tension_N: Floats) -> str:
@@ -352,12 +367,20 @@ def _head(robot: Robot, line: WireDraws, spring: WorkingSpring, mark: str) -> st
     of_leg = lines_of(robot, line)
     about = {}
     for name in dict.fromkeys(robot.wire):
-        about[name] = _origin(name in robot.given, of_leg[robot.wire.index(name)])
+        own = of_leg[robot.wire.index(name)]
+        about[name] = _origin(name in robot.given, own)
     several = len(about) > 1
-    lines = [f"{robot.name}: {cut_from(robot)}." if several else f"{robot.name}: line {about[robot.wire[0]]}."]
+    if several:
+        of_wires = cut_from(robot)
+        numbers = _wires_in_words(robot, line, about, spring)
+    else:
+        of_wires = f"line {about[robot.wire[0]]}"
+        numbers = [spring.remark]
+    lines = [f"{robot.name}: {of_wires}."]
     lines.append("The firmware knows no creep; creep-table.csv says how much a line grows under load.")
-    lines += [f"Beware: {doubt.text}." for doubt in doubts(robot, line)]
-    lines += _wires_in_words(robot, line, about, spring) if several else [spring.remark]
+    for doubt in doubts(robot, line):
+        lines.append(f"Beware: {doubt.text}.")
+    lines += numbers
     lines.append(_pulleys_left_out(robot))
     return "".join(f"{mark} {text}\n" for text in lines if text)
 

@@ -53,18 +53,24 @@ def mjcf(
     if towards_m is None:
         towards_m = robot.home_m + robot.platform_m @ turn.T
     radius, axis = wheels(robot)
-    exits, points = _sites("exit", robot.exit_m - radius * axis), _sites("point", robot.platform_m)
+    exits = _sites("exit", robot.exit_m - radius * axis)
+    points = _sites("point", robot.platform_m)
     pulleys = ""
     for i in np.flatnonzero(radius[:, 0]).tolist():
         pulleys += _rim(i, robot.exit_m[i], float(radius[i, 0]), axis[i], towards_m[i])
     tendons = _tendons(robot, k1_N, zero_m, offset_m, radius[:, 0])
-    comment = _comment(remark) + _comment(_STILL if pulleys else "")
+    comment = _comment(remark)
+    if pulleys:
+        comment += _comment(_STILL)
+    position = spaced(robot.home_m)
+    quaternion = spaced(_quaternion(robot.home_rotation_rad))
+    centre = spaced(robot.centre_of_mass_m)
     inertia = spaced(np.full(3, mass * robot.size_m**2))
     return (
         f'<mujoco model={quoteattr(robot.name)}>{comment}<option gravity="0 0 {-GRAVITY!r}" timestep="{timestep_s!r}" '
         f'integrator="implicitfast"><flag contact="disable"/></option><worldbody>{exits}'
-        f'<body pos="{spaced(robot.home_m)}" quat="{spaced(_quaternion(robot.home_rotation_rad))}">{joints}'
-        f'<inertial pos="{spaced(robot.centre_of_mass_m)}" mass="{mass!r}" diaginertia="{inertia}"/>{points}'
+        f'<body pos="{position}" quat="{quaternion}">{joints}'
+        f'<inertial pos="{centre}" mass="{mass!r}" diaginertia="{inertia}"/>{points}'
         f"</body>{pulleys}</worldbody><tendon>{tendons}</tendon></mujoco>\n"
     )
 
@@ -81,12 +87,15 @@ def _tendons(robot: Robot, k1_N: Floats, zero_m: Floats, offset_m: Floats, radiu
     """Wires as springs that only pull; around a pulley MuJoCo counts the way to its centre, a radius more."""
     stiffness = k1_N * robot.lines**2 / zero_m
     free = (zero_m - offset_m) / robot.lines
-    rest = np.where(radius_m > 0, free + radius_m, free).clip(0.0)
+    to_centre = np.where(radius_m > 0, free + radius_m, free)
+    rest = to_centre.clip(0.0)
     out = ""
     for i in range(robot.legs):
+        k = float(stiffness[i])
+        length = float(rest[i])
         wrapped = _wrapped(i) if radius_m[i] else ""
         out += (
-            f'<spatial stiffness="{float(stiffness[i])!r}" springlength="0 {float(rest[i])!r}">'
+            f'<spatial stiffness="{k!r}" springlength="0 {length!r}">'
             f'<site site="exit{i}"/>{wrapped}<site site="point{i}"/></spatial>'
         )
     return out

@@ -109,12 +109,14 @@ def _inertia(robot: Robot) -> tuple[float, ...]:
 def _left_out(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> list[str]:
     """Comments, without the double hyphens that XML forbids in them."""
     lines = ["The wires are left out: this format knows none. They pull from exit_i to point_i, and only when longer."]
-    lines += [text for text in (cut_from(robot),) if text]
-    for i, (lines_i, beyond, k, zero) in enumerate(
-        zip(robot.lines, robot.beyond_m, stiffness_N, zero_m, strict=True), 1
-    ):
+    cut = cut_from(robot)
+    if cut:
+        lines.append(cut)
+    for i in range(robot.legs):
+        parts, beyond = robot.lines[i], robot.beyond_m[i]
+        k, zero = stiffness_N[i], zero_m[i]
         lines.append(
-            f"wire {i}: {lines_i:g} line(s), {beyond:g} m beyond the exit; stiffness {k:.6g} N, zero-tension "
+            f"wire {i + 1}: {parts:g} line(s), {beyond:g} m beyond the exit; stiffness {k:.6g} N, zero-tension "
             f"length {zero:.6g} m at the home pose"
         )
     if robot.pulleys is not None:

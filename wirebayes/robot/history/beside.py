@@ -25,12 +25,16 @@ def beside_fresh(carried: CreepState, legs: int) -> CreepState:
 
     def one_more(values: Floats | float, last: Floats | float = 0.0) -> Floats:
         whole = np.broadcast_to(values, carried.creep_mm.shape)
-        return np.concatenate([whole, np.broadcast_to(last, (legs, 1))], 1)
+        column = np.broadcast_to(last, (legs, 1))
+        return np.concatenate([whole, column], 1)
 
+    past = []
+    for start, amount, k2 in carried.past:
+        past.append((start, one_more(amount), one_more(k2, k2[:, :1])))
     return replace(
         carried,
         creep_mm=one_more(carried.creep_mm),
         beside_mm={key: one_more(value) for key, value in carried.beside_mm.items()},
-        past=tuple((start, one_more(amount), one_more(k2, k2[:, :1])) for start, amount, k2 in carried.past),
+        past=tuple(past),
         elongation_mm=one_more(carried.elongation_mm),
     )

@@ -133,13 +133,19 @@ def find_mode(known: LogUnknowns, read: LogReadings, way: Way, without: Bools) -
     without : (w,) bool array
         Wires that are left out.
     """
-    d, m = known.count, len(read.of.offset)
-    z, last, cost, best = np.zeros(d + m), np.zeros(d + m), np.inf, None
+    d = known.count
+    size = d + len(read.of.offset)
+    z, last = np.zeros(size), np.zeros(size)
+    cost, best = np.inf, None
     for number in range(_MOST):
-        track = way(known.differences(z[:d]), f"mode, pass {number + 1}", without)
+        columns = known.differences(z[:d])
+        track = way(columns, f"mode, pass {number + 1}", without)
         predicted = predicted_readings(track)
-        residual = (read.values - predicted[0] - read.of.offset * z[d:])[None]
-        new = float(read.cost(residual, z[None])[0]) if track.held[0].all() else np.inf
+        missed = read.values - predicted[0] - read.of.offset * z[d:]
+        residual = missed[None]
+        new = np.inf
+        if track.held[0].all():
+            new = float(read.cost(residual, z[None])[0])
         if not new <= cost:  # no better, or not in balance: go half as far
             z = 0.5 * (z + last)
             continue
@@ -170,18 +176,20 @@ def draw_posterior(known: Callable[[], LogUnknowns], read: LogReadings, mode: Mo
     white, tracks, logs = [], [], []
     for _ in range(_BATCHES):
         prior = known().draws
+        n = len(prior)
         batch = _moved(prior, read, mode, way, rng)
         white.append(batch.white)
         tracks.append(batch.track)
         logs.append(batch.log_weight)
         share, effective = _shares(np.concatenate(logs))
-        n = len(prior)
         if effective >= _ENOUGH * n:
             break
     if not effective:
         return Draws(white[0], tracks[0], 0.0)
     pick = systematic_rows(share, n, rng)
-    return Draws(np.concatenate(white)[pick], _joined(tracks).part(pick), min(effective, float(n)))
+    picked = np.concatenate(white)[pick]
+    track = _joined(tracks).part(pick)
+    return Draws(picked, track, min(effective, float(n)))
 
 
 def _shares(logs: Floats) -> tuple[Floats, float]:
@@ -207,23 +215,28 @@ def _moved(prior: Floats, read: LogReadings, mode: Mode, way: Way, rng: Generato
     n, d = prior.shape
     every = np.zeros(1, bool)
     noise = rng.standard_normal((n, len(mode.white)))
-    prior = np.concatenate([prior, rng.standard_normal((n, len(read.of.offset)))], 1)
+    offsets = rng.standard_normal((n, len(read.of.offset)))
+    prior = np.concatenate([prior, offsets], 1)
     draws = _linear_draws(prior, mode, noise)
     track = way(draws[:, :d], "poses", every)
-    todo, before = np.ones(n, bool), np.full(n, np.inf)
+    todo = np.ones(n, bool)
+    before = np.full(n, np.inf)
     for number in range(_PASSES):
         residual = read.residual(track, draws)
         found = read.gathered(mode.slope, residual)
         move = found.moves(prior - draws, noise)
-        size = np.where(read.missed(residual), np.inf, _length(move, found))
+        length = _length(move, found)
+        size = np.where(read.missed(residual), np.inf, length)
         todo &= (size > _NEAR) & (size < before)  # one that goes astray is left where it is
         before = size
         if number == _PASSES - 1 or not todo.any():
             break
         draws[todo] += move[todo]
-        track = track.with_columns(todo, way(draws[todo, :d], "poses", every))
+        moved = way(draws[todo, :d], "poses", every)
+        track = track.with_columns(todo, moved)
     weight = _log_weight(read, draws, residual, found)
-    return _Batch(draws, track, np.where(size <= _NEAR, weight, -np.inf))
+    near = size <= _NEAR
+    return _Batch(draws, track, np.where(near, weight, -np.inf))
 
 
 def _linear_draws(prior: Floats, mode: Mode, noise: Floats) -> Floats:

@@ -108,9 +108,12 @@ def follow_log(
     since = float(times[0])
     hold = np.searchsorted(starts_s, times, "right") - 1
     track = _empty(wires.count, robot.legs, np.maximum(hold, 0))
-    brought = fresh(robot.legs, wires.count) if carried is None else _without_clocks(carried, wires)
+    brought = fresh(robot.legs, wires.count)
+    if carried is not None:
+        brought = _without_clocks(carried, wires)
     schedule = _schedule(times, joint_m)
-    walk = _begin(history.robot_at(robot, 0), wires, schedule, since, start, brought, error_m)
+    first_robot = history.robot_at(robot, 0)
+    walk = _begin(first_robot, wires, schedule, since, start, brought, error_m)
     ahead = [float(time) for time in starts_s if time > since]
     for k, time in enumerate(times):
         while ahead and ahead[0] < time:
@@ -170,18 +173,22 @@ def clock_starts(history: History, tension_N: Floats, share: float = RESTART) ->
     times = history.times_s
     if history.hold is not None and np.isfinite(share):
         new = np.diff(history.hold) != 0
-        return np.asarray(times[np.concatenate([[True], new])])
-    starts, reference = [float(times[0])], tension_N[0]
+        begins = np.concatenate([[True], new])
+        return np.asarray(times[begins])
+    starts = [float(times[0])]
+    reference = tension_N[0]
     for k in range(1, len(times)):
-        after = tension_N[k]
+        before, after = tension_N[k - 1], tension_N[k]
         if _loaded(history, k):
             if _changed(reference, after, share):
                 starts.append(float(times[k]))
                 reference = after
             continue
+        lasts = times[k] - times[k - 1]
         while _changed(reference, after, share):
-            reached, reference = _first_changed(reference, tension_N[k - 1], after, share)
-            starts.append(float(times[k - 1] + reached * (times[k] - times[k - 1])))
+            reached, reference = _first_changed(reference, before, after, share)
+            start = times[k - 1] + reached * lasts
+            starts.append(float(start))
     return np.array(starts)
 
 

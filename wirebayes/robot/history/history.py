@@ -77,9 +77,15 @@ def divided(history: History, pieces: Indices) -> tuple[History, Indices]:
     before = np.floor(at).astype(int)  # what stays until the next row
 
     def between(values: Floats | None) -> Floats | None:
-        return None if values is None else np.stack([np.interp(at, index, column) for column in values.T], 1)
+        if values is None:
+            return None
+        columns = [np.interp(at, index, column) for column in values.T]
+        return np.stack(columns, 1)
 
-    turned = None if history.rotation is None else Slerp(index, Rotation.from_matrix(history.rotation))(at).as_matrix()
+    turned = None
+    if history.rotation is not None:
+        rotations = Rotation.from_matrix(history.rotation)
+        turned = Slerp(index, rotations)(at).as_matrix()
     fine = History(
         np.interp(at, index, history.times_s),
         between(history.joint_m),

@@ -107,15 +107,19 @@ class Information:
         counts : float
             From `reading_weight`.
         """
-        there = np.isfinite(residual).any(0) & np.isfinite(slope).all(0)
+        known = np.isfinite(residual)
+        there = known.any(0) & np.isfinite(slope).all(0)
         if not there.any():
             return
-        H, noise, left = np.concatenate([slope, np.diag(of.offset)]), of.noise, residual
+        H = np.concatenate([slope, np.diag(of.offset)])
+        noise, left = of.noise, residual
         if not there.all():
-            H, noise, left = H[:, there], noise[there], left[:, there]
+            H = H[:, there]
+            noise = noise[there]
+            left, known = left[:, there], known[:, there]
         scaled = H * (counts / noise**2)
-        if not np.isfinite(left).all():
-            left = np.where(np.isfinite(left), left, np.nanmean(left, 0))  # a fallen draw has no say
+        if not known.all():
+            left = np.where(known, left, np.nanmean(left, 0))  # a fallen draw has no say
         self.matrix += scaled @ H.T
         self.vector += left @ scaled.T
 

@@ -82,15 +82,19 @@ def parse_log(table: CsvTable, robot: Robot, columns_of: Callable[[Robot, Sequen
     InputError
         Naming line and column, what was found and what was expected.
     """
-    header = columns_of(robot, table.header)
+    names = table.header
+    header = columns_of(robot, names)
     table.check_header(header)
     cells = table.numbers(_allowed)
     if len(cells) < 2:
         found = counted(len(cells), "row")
         raise InputError(f"{table.path}: found {found} of values, expected two or more")
-    _refuse_late(table, cells[:, table.header.index("time_s")])
-    joints = header.required[1:] if header.required[1] not in POSITION else ()
-    history = _history(robot, joints, table.header, cells)
+    times_s = cells[:, names.index("time_s")]
+    _refuse_late(table, times_s)
+    joints = header.required[1:]
+    if joints[0] in POSITION:
+        joints = ()
+    history = _history(robot, joints, names, cells)
     _refuse_unlikely(robot, history, table, joints)
     return history
 

@@ -32,14 +32,16 @@ def pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> t
     rows : list of lists
     """
     track = found.track
+    position, tension = track.position_m, track.tension_N
     columns: dict[str, Any] = {"time_s": history.times_s, "hold": track.hold + 1}
-    columns |= _with_bands_along("", "m", track.position_m)
+    columns |= _with_bands_along("", "m", position)
     if robot.degrees == 6:
-        columns |= _with_bands_along("r", "rad", rotation_vectors(track.rotation))
-    distance = np.linalg.norm(track.position_m - to.position_m, axis=-1)
+        turn = rotation_vectors(track.rotation)
+        columns |= _with_bands_along("r", "rad", turn)
+    distance = np.linalg.norm(position - to.position_m, axis=-1)
     columns |= _with_bands("distance", "mm", 1e3 * distance)
     for i in range(robot.legs):
-        columns[f"tension_{i + 1}_N"] = mean_of_finite(track.tension_N[..., i])
+        columns[f"tension_{i + 1}_N"] = mean_of_finite(tension[..., i])
     columns["held"] = track.held.mean(0)
     return _as_table(columns)
 
@@ -81,15 +83,19 @@ def correction_table(
     rows : list of lists
     """
     columns: dict[str, Any] = {"time_s": history.times_s}
-    joint_m = mean_of_finite(joint_m) if joint_m.ndim == 3 else joint_m
+    if joint_m.ndim == 3:
+        joint_m = mean_of_finite(joint_m)
     described = _described(change_m)
-    mean, sd = (winches.of_each_winch(robot, described[name]) for name in ("mean", "sd"))
+    mean = winches.of_each_winch(robot, described["mean"])
+    sd = winches.of_each_winch(robot, described["sd"])
     joint = winches.of_each_winch(robot, joint_m) + mean
-    columns |= {f"joint_{i + 1}_m": joint[:, i] for i in range(robot.joints)}
+    for i in range(robot.joints):
+        columns[f"joint_{i + 1}_m"] = joint[:, i]
     if robot.drums is not None:
         columns |= _motor_columns(robot, robot.drums, joint_m + described["mean"])
     for i in range(robot.joints):
-        columns |= {f"change_{i + 1}_mm": 1e3 * mean[:, i], f"change_{i + 1}_sd_mm": 1e3 * sd[:, i]}
+        columns[f"change_{i + 1}_mm"] = 1e3 * mean[:, i]
+        columns[f"change_{i + 1}_sd_mm"] = 1e3 * sd[:, i]
     return _as_table(columns)
 
 

@@ -138,12 +138,14 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
     hung = 1e3 * nominal_length(robot)[:, None] / length
     longer = np.where(_is_given(robot), 1.0, hung)
     if _grows_with_length(lines):
-        exponent = _of_legs([one.parameters.get(LENGTH_EXPONENT, np.ones(1)) for one in lines], line.count)
+        exponents = [one.parameters.get(LENGTH_EXPONENT, np.ones(1)) for one in lines]
+        exponent = _of_legs(exponents, line.count)
         theta["B"] = theta["B"] * longer ** (exponent - 1.0)
     reference = _reference_tension(line, lines)
     hold = steady_hold(theta, length * longer, reference, length_ref_mm=length)
     effects = _united(line)
-    theta = dict(Placed(_at_sample(effects), theta).change("sample", theta, hold))
+    at_sample = Placed(_at_sample(effects), theta)
+    theta = dict(at_sample.change("sample", theta, hold))
     others = tuple(effect for effect in effects if effect.place != "sample")
     return Wires(line.law, line.history, theta, length, others, reference)
 

@@ -36,14 +36,17 @@ class _Winding:
 def _winding(drums: Drums, leg: int) -> _Winding:
     per_turn = _wire_per_turn(drums, leg)
     per_rad = per_turn / (2 * np.pi)
-    turns, wound_m = drums.layer_turns[leg], drums.wire_m[leg]
-    wire, angle = np.zeros(len(per_turn)), np.zeros(len(per_turn))
-    if len(per_turn) > 1:
+    turns = drums.layer_turns[leg]
+    wound_m = drums.wire_m[leg]
+    layers = len(per_turn)
+    wire, angle = np.zeros(layers), np.zeros(layers)
+    if layers > 1:
         filled = np.cumsum(turns * per_turn)
         wire[1:] = filled[:-1]
-        angle[1:] = 2 * np.pi * turns * np.arange(1, len(per_turn))
+        angle[1:] = 2 * np.pi * turns * np.arange(1, layers)
     last = _layer_of(wire, wound_m)
-    full = angle[last] + (wound_m - wire[last]) / per_rad[last]
+    beyond = (wound_m - wire[last]) / per_rad[last]
+    full = angle[last] + beyond
     return _Winding(angle, wire, per_rad, float(full))
 
 

@@ -101,17 +101,20 @@ def sag_warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: 
     i = int(heavy[np.argmax(extra[heavy])])
     others = ""
     if heavy.size > 1:
-        others = (
-            f"; {counted(heavy.size - 1, 'more wire')} weigh{'s' * (heavy.size == 2)} more than {100 * _REPORTED:g} %"
-        )
+        verb = "weighs" if heavy.size == 2 else "weigh"
+        others = f"; {counted(heavy.size - 1, 'more wire')} {verb} more than {100 * _REPORTED:g} %"
     weighs = f"wire {i + 1} weighs"
     if not _stated(robot)[i]:
+        lightest = short(1e3 * _mass_kg_m(robot)[i], 2)
         weighs = (
             f"no mass_kg_m above 0 is stated of wire {i + 1}, and even the lightest rope for tension.highest_N, of "
-            f"{short(1e3 * _mass_kg_m(robot)[i], 2)} g/m, weighs"
+            f"{lightest} g/m, weighs"
         )
+    percent = short(100 * share[i], 2)
+    depth_mm = short(1e3 * depth[i], 2)
+    extra_mm = short(1e3 * extra[i], 2)
     text = (
-        f"{weighs} {short(100 * share[i], 2)} % of its tension: it sags by {short(1e3 * depth[i], 2)} mm "
-        f"and is {short(1e3 * extra[i], 2)} mm longer than the straight line it is taken for{others}"
+        f"{weighs} {percent} % of its tension: it sags by {depth_mm} mm "
+        f"and is {extra_mm} mm longer than the straight line it is taken for{others}"
     )
     return [Notice("sag", text)]

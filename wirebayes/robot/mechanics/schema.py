@@ -307,16 +307,20 @@ def _winches(tables: list[Keys], legs: list[dict[str, Any]]) -> Indices | None:
     Legs of one winch turn together: what their joint value means must be the same.
     """
     number: dict[object, int] = {}
-    winch = np.array([number.setdefault(leg["winch"] or i, len(number)) for i, leg in enumerate(legs)])
+    numbers = []
+    for i, leg in enumerate(legs):
+        own = number.setdefault(leg["winch"] or i, len(number))
+        numbers.append(own)
     if len(number) == len(legs):
         return None
+    shared = {"actuator": "actuator", "ratio": "pulley_ratio", **_DRUM}
     for i, leg in enumerate(legs):
-        first = legs[int(np.argmax(winch == winch[i]))]
-        for key, name in {"actuator": "actuator", "ratio": "pulley_ratio", **_DRUM}.items():
+        first = legs[numbers.index(numbers[i])]
+        for key, name in shared.items():
             if leg[key] != first[key]:
                 expected = f"that of the first leg of winch {leg['winch']}, {first[key]}"
                 raise tables[i].complain(name, str(leg[key]), expected)
-    return winch
+    return np.array(numbers)
 
 
 _TURNING = 3  # wires that turn a platform every way

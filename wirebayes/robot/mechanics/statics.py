@@ -167,8 +167,8 @@ def unbalance_and_stiffness(
     beta = pull / shape.straight_m
     alpha = slope_N_m * (lines * lines) - beta
     degrees = robot.degrees
-    gradient = (J * pull).sum(1)
     force = robot.mass_kg * GRAVITY
+    gradient = (J * pull).sum(1)
     gradient[2] += force
     H = np.empty((degrees, degrees, pull.shape[-1]))
     for i in range(degrees):
@@ -182,13 +182,16 @@ def unbalance_and_stiffness(
     for i in range(3):
         H[i, i] += total
     if degrees == 6:
-        moment = force * turned(robot.centre_of_mass_m[None], rotation)[:, 0]
+        arm = turned(robot.centre_of_mass_m[None], rotation)[:, 0]
+        moment = force * arm
         gradient[3] += moment[1]
         gradient[4] -= moment[0]
         _add_rotation(shape, moment, pull, beta, H)
     for i in range(degrees):
         H[i + 1 :, i] = H[i, i + 1 :]
-    return (gradient, H) if robot.motions is None else _carried(robot, gradient, H)
+    if robot.motions is None:
+        return gradient, H
+    return _carried(robot, gradient, H)
 
 
 def _upper_row(J: Floats, weight: Floats, i: int) -> Floats:
@@ -218,13 +221,18 @@ def _add_rotation(shape: Geometry, moment: Floats, pull: Floats, beta: Floats, H
     swung = beta * r
     _couple(swung.sum(1), H)
     q = pull * u - swung  # Σ τ u rᵀ - β r rᵀ in one outer product
-    outer = np.stack([(component * r).sum(1) for component in q])
+    rows = []
+    for component in q:
+        rows.append((component * r).sum(1))
+    outer = np.stack(rows)
     outer[2] += moment  # the weight, an arm of its own
     trace = outer[0, 0] + outer[1, 1] + outer[2, 2]
-    turned_twice = 0.5 * (outer + outer.swapaxes(0, 1))
+    twice = outer + outer.swapaxes(0, 1)
+    turned_twice = 0.5 * twice
     for i in range(3):  # nothing is in the lower triangle yet, not even a number
-        H[3 + i, 3 + i :] += turned_twice[i, i:]
-        H[3 + i, 3 + i] -= trace
+        row = H[3 + i]
+        row[3 + i :] += turned_twice[i, i:]
+        row[3 + i] -= trace
 
 
 def _couple(swung: Floats, H: Floats) -> None:

@@ -41,15 +41,22 @@ def _nearest(reference: Floats, structure: Floats, load: Floats, lowest: float, 
     """`nearest` with forces in units of the load."""
     left, sizes, right = np.linalg.svd(structure)
     rank = int((sizes > 1e-10 * sizes[0]).sum())
-    particular = right[:rank].T @ ((left.T @ load)[:rank] / sizes[:rank])
-    if np.abs(structure @ particular - load).max() > 1e-9 * np.abs(load).max():
+    along = (left.T @ load)[:rank] / sizes[:rank]
+    particular = right[:rank].T @ along
+    unbalanced = np.abs(structure @ particular - load).max()
+    if unbalanced > 1e-9 * np.abs(load).max():
         return None
     null = right[rank:].T
-    tau = np.asarray(particular + null @ (null.T @ (reference - particular)))
-    outside = float(max(lowest - tau.min(), tau.max() - highest))
+    wished = null.T @ (reference - particular)
+    tau = np.asarray(particular + null @ wished)
+    too_low = lowest - tau.min()
+    too_high = tau.max() - highest
+    outside = float(max(too_low, too_high))
     if null.shape[1] == 0:  # there is no choice
         return tau if outside <= 1e-9 * _size(tau) else None
-    return tau if outside <= 0.0 else _brought_inside(tau, null, outside, lowest, highest)
+    if outside <= 0.0:
+        return tau
+    return _brought_inside(tau, null, outside, lowest, highest)
 
 
 def _size(tau: Floats) -> float:

@@ -1,6 +1,8 @@
 """The paper's section 4 over a workspace: how far a vertical platform moves and tilts within a minute."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -174,16 +176,22 @@ def scaled_robot(robot: Robot, factor: float, mass_kg: float) -> Robot:
     Robot
     """
     lengths = ("exit_m", "platform_m", "centre_of_mass_m", "beyond_m", "wire_m", "home_m", "lower_m", "upper_m")
-    rule = replace(
-        robot.rule,
-        lowest_N=robot.rule.lowest_N * mass_kg / robot.mass_kg,
-        highest_N=robot.rule.highest_N * mass_kg / robot.mass_kg,
-    )
-    pulleys = robot.pulleys and replace(robot.pulleys, radius_m=factor * robot.pulleys.radius_m)
     sizes = ("radius_m", "pitch_m", "layer_m", "wire_m")
-    drums = robot.drums and replace(robot.drums, **{name: getattr(robot.drums, name) * factor for name in sizes})
-    grown = {name: getattr(robot, name) * factor for name in lengths}
+    rule, pulleys, drums = robot.rule, robot.pulleys, robot.drums
+    lowest_N = rule.lowest_N * mass_kg / robot.mass_kg
+    highest_N = rule.highest_N * mass_kg / robot.mass_kg
+    rule = replace(rule, lowest_N=lowest_N, highest_N=highest_N)
+    if pulleys is not None:
+        pulleys = replace(pulleys, **_multiplied(pulleys, ("radius_m",), factor))
+    if drums is not None:
+        drums = replace(drums, **_multiplied(drums, sizes, factor))
+    grown = _multiplied(robot, lengths, factor)
     return replace(robot, mass_kg=mass_kg, rule=rule, pulleys=pulleys, drums=drums, **grown)
+
+
+def _multiplied(of: object, names: Sequence[str], factor: float) -> dict[str, Any]:
+    """Some attributes, each times a factor."""
+    return {name: getattr(of, name) * factor for name in names}
 
 
 def claim_summary(out: WorkspaceDrift) -> ClaimNumbers:

@@ -172,16 +172,23 @@ def after_calibration(
     still, foreseen : PoseError
         `foreseen`: the controller compensates for the mean creep of the draws, given the same history.
     """
-    tau = inverse.tensions(robot, position_m[None], rotation[None])
+    at = position_m[None], rotation[None]
+    tau = inverse.tensions(robot, *at)
     load = np.repeat(tau.T, wires.count, 1)
     before = carried.strain(wires)
-    joint = inverse.commands(robot, wires, position_m[None], rotation[None], tau, before).joint_m
+
+    def joint_of(strain: Floats) -> Floats:
+        return inverse.commands(robot, wires, *at, tau, strain).joint_m
+
+    joint = joint_of(before)
     ahead = HoldCreep(wires, carried, load, "start")
 
     def expected(time_s: float) -> Floats:
         # every robot starts exact; what is foreseen is the mean growth since then
-        growth = (ahead.advance(time_s, load).strain(wires) - before).mean(1, keepdims=True)
-        return inverse.commands(robot, wires, position_m[None], rotation[None], tau, before + growth).joint_m
+        strain = ahead.advance(time_s, load).strain(wires)
+        growth = (strain - before).mean(1, keepdims=True)
+        return joint_of(before + growth)
 
     still = error(robot, wires, lambda time_s: joint, position_m, rotation, times_s, carried)
-    return still, error(robot, wires, expected, position_m, rotation, times_s, carried)
+    compensated = error(robot, wires, expected, position_m, rotation, times_s, carried)
+    return still, compensated

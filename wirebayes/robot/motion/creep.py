@@ -165,10 +165,11 @@ class HoldCreep:
         """What the wires carry now."""
         hold, law, carried = self.hold, self.law, self.carried
         self._look(self.time_s)
-        own = (carried.clock_s, carried.creep_mm + self.amount, self.k2)
-        past = (*carried.past, own)
+        amount = carried.creep_mm + self.amount
+        grown = carried.creep_mm + self.grown
+        past = (*carried.past, (carried.clock_s, amount, self.k2))
         hold.past = list(past)
-        creep = law.creep(carried.creep_mm + self.grown, hold)
+        creep = law.creep(grown, hold)
         hold.grown = creep
         beside = law.beside(carried.beside_mm, hold)
         elongation = law.elongation(creep, beside, hold)

@@ -148,22 +148,31 @@ class CreepingHold:
         least : bool
             It is taken in any case.
         """
-        long = not least and 1.0 - (self.creep.time_s / time) ** self.power > _FALL_STEP
-        done = np.maximum(self.creep.progress(time), 1e-300)
-        guess = self.creep.onward(time, self.slope)
-        there = self._follow(guess, time, _GLANCE if long else path.SMALLEST)
+        creep = self.creep
+        long = not least and self._is_long(time)
+        done = np.maximum(creep.progress(time), 1e-300)
+        guess = creep.onward(time, self.slope)
+        smallest = _GLANCE if long else path.SMALLEST
+        there = self._follow(guess, time, smallest)
         found = there.here.found
         last, off = self._corrected(guess, there.here, time, done)
         worst = self._worst(off, last, self.live & found)
         if worst > self.tolerance and not least:
             return worst
         here = self._settle(last, time, there.here)
-        fell = self.live & ~(found & here.found)
+        held = found & here.found
+        fell = self.live & ~held
         if long and fell.any():
             return np.inf
-        self._note(fell, there, here, (self.creep.time_s, time))
+        span_s = creep.time_s, time
+        self._note(fell, there, here, span_s)
         self._take(last, here, done)
         return worst
+
+    def _is_long(self, time: float) -> bool:
+        """Whether a step to a time is long enough for a platform to fall within it."""
+        passed = self.creep.time_s / time
+        return bool(1.0 - passed**self.power > _FALL_STEP)
 
     def _take(self, last: HoldCreep, here: forward.Equilibria, done: Floats) -> None:
         """Go on from the end of a step in which creep's clock has gone so far."""
@@ -213,14 +222,18 @@ class CreepingHold:
     def _follow(self, creep: HoldCreep, time_s: float, smallest: float) -> path.Followed:
         rows = np.flatnonzero(self.live)
         zero, offset = self._lengths(time_s, creep.state())
-        old = self.lengths[0][rows], self.lengths[1][rows]
+        new = zero[rows], offset[rows]
+        old_zero, old_offset = self.lengths
+        old = old_zero[rows], old_offset[rows]
         start = self.here.position_m[rows], self.here.rotation[rows]
         wires = self.wires.part(rows)
-        found = path.follow(self.robot, wires, start, old, (zero[rows], offset[rows]), smallest)
+        found = path.follow(self.robot, wires, start, old, new, smallest)
         if len(rows) == self.n:
             return found
-        whole = path.Followed(forward.put_back(found.here, rows, self.n), np.ones(self.n), np.zeros(self.n))
-        whole.share[rows], whole.drop_m[rows] = found.share, found.drop_m
+        here = forward.put_back(found.here, rows, self.n)
+        whole = path.Followed(here, np.ones(self.n), np.zeros(self.n))
+        whole.share[rows] = found.share
+        whole.drop_m[rows] = found.drop_m
         return whole
 
     def _settle(self, creep: HoldCreep, time_s: float, near: forward.Equilibria) -> forward.Equilibria:
@@ -236,10 +249,12 @@ class CreepingHold:
         tau = chosen_rows(fell, last.tension_N, here.tension_N)
         self._note_slack(fell[:, None], tau, span_s[1])
         moving = self.live[:, None] & np.isfinite(tau)
-        self.lowest_N = np.where(moving, np.minimum(self.lowest_N, tau), self.lowest_N)
+        lower = np.minimum(self.lowest_N, tau)
+        self.lowest_N = np.where(moving, lower, self.lowest_N)
         if fell.any():
             pose = last.position_m, last.rotation
-            self.left = np.where(fell, self._stiffness(pose), self.left)
+            stiffness = self._stiffness(pose)
+            self.left = np.where(fell, stiffness, self.left)
         self.live = self.live & ~fell
         self._note_status(fell, last, here)
 

@@ -217,12 +217,16 @@ def _iterate(robot: Robot, cases: _Cases) -> tuple[_Cases, Ints]:
     step = _newton_step(robot, cases)
     x, R = _stepped(robot, cases, step)
     new = _evaluate(robot, cases.wires, cases.zero, cases.offset, x, R)
-    noise = 1e-14 * (np.abs(cases.at.energy) + robot.mass_kg * GRAVITY * cases.span)
+    lifted = robot.mass_kg * GRAVITY * cases.span
+    noise = 1e-14 * (np.abs(cases.at.energy) + lifted)
     accept = _leads_down(robot, cases, step, new, noise)
     moved = cases.moved(accept, x, R, new)
     bare = moved.at.size <= cases.floor  # balanced: the next step uses the bare stiffness
-    damping = np.where(accept, _calmer(cases, step, new, noise), np.maximum(1e-3, cases.damping * 10))
-    moved = replace(moved, damping=np.where(bare, 0.0, damping))
+    less = _calmer(cases, step, new, noise)
+    more = np.maximum(1e-3, cases.damping * 10)
+    damping = np.where(accept, less, more)
+    damping = np.where(bare, 0.0, damping)
+    moved = replace(moved, damping=damping)
     still = step.length < 1e-9 * robot.size_m
     return moved, _ended(cases, moved, step, accept & still)
 
@@ -374,7 +378,10 @@ def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Float
     gradient, H = in_metres(*derivatives, robot.edge_scale[:, None])
     height = x[2]
     if robot.degrees == 6:
-        c = robot.centre_of_mass_m
-        height = height + (R[2, 0] * c[0] + R[2, 1] * c[1] + R[2, 2] * c[2])
-    total = energy(wires, stretched, zero).sum(0) + robot.mass_kg * GRAVITY * height
-    return _Point(total, gradient, H, tau, np.abs(gradient).max(0))
+        a, b, c = robot.centre_of_mass_m
+        above = R[2, 0] * a + R[2, 1] * b + R[2, 2] * c
+        height = height + above
+    elastic = energy(wires, stretched, zero).sum(0)
+    potential = robot.mass_kg * GRAVITY * height
+    size = np.abs(gradient).max(0)
+    return _Point(elastic + potential, gradient, H, tau, size)

@@ -143,17 +143,22 @@ def _of_each_line(
     error_m: Floats | float,
 ) -> Commands:
     """`commands` as if every line had a winch of its own."""
-    tau, offset = tension_N.T, robot.beyond_m[:, None]
+    tau = tension_N.T
+    offset = robot.beyond_m[:, None]
     shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
     free = statics.stretched(robot, shape, offset)
     zero = zero_tension_length(wires, free, tau)
-    joint = zero / (1.0 + creep) - (robot.beyond_joint_m[:, None] + error_m)
+    grown = 1.0 + creep
+    beyond = robot.beyond_joint_m[:, None] + error_m
+    joint = zero / grown - beyond
     if robot.is_linear.any():
         linear = robot.is_linear[:, None]
-        fixed = (robot.wire_m[:, None] + error_m) * (1.0 + creep)
+        fixed = (robot.wire_m[:, None] + error_m) * grown
         zero = np.where(linear, fixed, zero)
-        drawn = stretched_length(wires, np.where(linear, fixed, 1.0), tau) - free
-        joint = np.where(linear, drawn / _ratio(robot), joint)
+        held = np.where(linear, fixed, 1.0)
+        drawn = stretched_length(wires, held, tau) - free
+        moved = drawn / _ratio(robot)
+        joint = np.where(linear, moved, joint)
         offset = offset + np.where(linear, drawn, 0.0)
     return _of_draws(zero, joint, offset, tau, rotation)
 

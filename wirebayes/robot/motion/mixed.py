@@ -132,19 +132,23 @@ def _lowest(energy: _Quadratic, taut: Bools) -> tuple[Floats, Floats]:
     taut : (w, n) bool array
         The first guess.
     """
-    step, tau = np.full(energy.load.shape, np.nan), np.full(taut.shape, np.nan)
-    rows, here = np.arange(taut.shape[1]), np.zeros(energy.load.shape)
+    step = np.full(energy.load.shape, np.nan)
+    tau = np.full(taut.shape, np.nan)
+    here = np.zeros(energy.load.shape)
+    rows = np.arange(taut.shape[1])
     for _ in range(_SETS):
         there, positive = energy.least_with(taut)
         pull = energy.tensions(there)
-        settled = positive & ((pull > 0) == taut).all(0)
+        as_assumed = ((pull > 0) == taut).all(0)
+        settled = positive & as_assumed
         done = rows[settled]
         step[:, done] = there[:, settled]
         tau[:, done] = np.maximum(pull[:, settled], 0.0)
         left = np.flatnonzero(positive & ~settled)
         if not left.size:
             break
-        rows, energy = rows[left], energy.part(left)
+        rows = rows[left]
+        energy = energy.part(left)
         here = _lowest_between(energy, here[:, left], there[:, left])
         taut = energy.tensions(here) > 0
     return step.T, tau.T
@@ -191,14 +195,17 @@ def approach(
     """
     ahead, tau = newton_step_with_tensions(robot, wires, pose, tension_N, lengths)
     x, R = after_step(robot, pose, ahead)
-    rows, step = np.arange(len(x)), ahead
+    rows = np.arange(len(x))
+    step = ahead
     for _ in range(_STEPS):
         further = _goes_on(robot, step)
-        rows, tau = rows[further], tau[further]
+        rows = rows[further]
         if not rows.size:
             break
         here = x[rows], R[rows]
-        step, tau = newton_step_with_tensions(robot, wires.part(rows), here, tau, _rows_of(lengths, rows))
+        own_wires = wires.part(rows)
+        own_lengths = _rows_of(lengths, rows)
+        step, tau = newton_step_with_tensions(robot, own_wires, here, tau[further], own_lengths)
         x[rows], R[rows] = after_step(robot, here, step)
     return (x, R), ahead
 

@@ -245,14 +245,17 @@ class _Aim:
         A, value = self._linearised(at, bound)
         imbalance = np.abs(value).max(1)
         wish, weight = self._wish(at, goal)
-        wish[imbalance > _FAR_FROM_BALANCE] = 0.0
+        far = imbalance > _FAR_FROM_BALANCE
+        wish[far] = 0.0
         sound = _all_finite(A, value)  # a wire without length has no direction
         B = chosen_rows(sound, A / weight, 0.0)
         wished = chosen_rows(sound, wish * weight, np.nan)
-        missed = value + (B @ wished[..., None])[..., 0]
-        back, multiplier = _least_change(B, missed)
-        hindrance = -bound * multiplier[:, -bound.shape[1] :]  # the bounds' equations are the last
-        return _Step(_cut((wished - back) / weight), imbalance, hindrance)
+        changed = (B @ wished[..., None])[..., 0]
+        back, multiplier = _least_change(B, value + changed)
+        of_bounds = multiplier[:, -bound.shape[1] :]  # the bounds' equations are the last
+        hindrance = -bound * of_bounds
+        change = _cut((wished - back) / weight)
+        return _Step(change, imbalance, hindrance)
 
     def _linearised(self, at: tuple[Floats, Floats, Floats], bound: Ints) -> tuple[Floats, Floats]:
         """Slopes (n, e, 6 + w) and values (n, e) of all equations."""

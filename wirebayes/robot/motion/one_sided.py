@@ -59,13 +59,16 @@ def held(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> Bools:
 def _bounds(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> tuple[Bools, Floats, Floats]:
     """Where any wire is just not slack, and least and largest stiffness, ``(n,)`` each; NaN where there is no pose."""
     balance = _Balance.at(robot, wires, pose, lengths)
-    both, one_way = balance.two_way(), balance.one_way()
+    both = balance.two_way()
+    one_way = balance.one_way()
     values = np.asarray(np.linalg.eigvalsh(both), np.float64)
-    least, largest = values[:, 0].copy(), values[:, -1]
+    least = values[:, 0].copy()
+    largest = values[:, -1]
     touched = np.asarray(balance.touching.any(axis=0))
     known = np.isfinite(pose[0]).all(axis=1)
     decided = known & np.isfinite(one_way).all(axis=(0, 1))
-    for k in np.flatnonzero(decided & touched & (least <= _APART * largest)):
+    small = least <= _APART * largest
+    for k in np.flatnonzero(decided & touched & small):
         touching = balance.touching[:, k]
         least[k] = _least_of(both[k], one_way[:, touching, k])
     return touched, np.where(known, least, np.nan), largest
@@ -137,14 +140,16 @@ def _least_of(both: Floats, one_way: Floats) -> Floats:
     d = len(both)
     size = np.abs(both).max() + (one_way**2).sum()
     noise = np.random.default_rng(0).standard_normal((d, d))
-    apart = both + _APART * size * (noise + noise.T)
+    symmetric = noise + noise.T
+    apart = both + _APART * size * symmetric
     _, vectors = np.linalg.eigh(apart + _of_every_set(one_way))
     both_ways = np.concatenate([vectors, -vectors], axis=-1)
     tried = both_ways.mT.reshape(-1, d)
     stretch = np.maximum(tried @ one_way, 0.0)
+    squares = (stretch**2).sum(axis=1)
     form = np.einsum("vi,ij,vj->v", tried, both, tried)
-    value = form + (stretch**2).sum(axis=1)
-    return np.asarray(value.min())
+    least = (form + squares).min()
+    return np.asarray(least)
 
 
 def _of_every_set(one_way: Floats) -> Floats:

@@ -91,10 +91,13 @@ def follow(
     """
     followed, good = _undivided(robot, wires, start, old, new)
     here = followed.here
-    divided = _Divided(np.full(len(good), 0.5), np.zeros(len(good), bool))
-    live = np.flatnonzero(~good & np.isfinite(here.position_m).all(1))
+    n = len(good)
+    divided = _Divided(np.full(n, 0.5), np.zeros(n, bool))
+    balanced = np.isfinite(here.position_m).all(1)
+    live = np.flatnonzero(~good & balanced)
     while live.size:
-        share = np.minimum(followed.share[live] + divided.step[live], 1.0)
+        ahead = followed.share[live] + divided.step[live]
+        share = np.minimum(ahead, 1.0)
         between = _between(old, new, live, share)
         part = wires.part(live)
         pose = here.position_m[live], here.rotation[live]
@@ -160,17 +163,20 @@ def _step(
 
     Where the step leads further than is believed, nothing is solved: no solution would be taken.
     """
+    zero, offset = lengths
     near, ahead = mixed.approach(robot, wires, start, tension_N, lengths)
     predicted = mixed.after_step(robot, start, ahead)
     # Where the stiffness predicts nothing, as of wires that part just now, what does not jump has not fallen.
     ahead = np.where(np.isfinite(ahead), ahead, 0.0)
     believed = _believed(robot, ahead)
-    zero = chosen_rows(believed, lengths[0], np.nan)
-    there = forward.solve_equilibrium(robot, wires, zero, lengths[1], *near)
+    solvable = chosen_rows(believed, zero, np.nan)
+    there = forward.solve_equilibrium(robot, wires, solvable, offset, *near)
     _let_go(robot, wires, there, lengths)
-    trusted = _TRUST * np.linalg.norm(ahead, axis=1) + _JUMP * robot.span_m
+    way = np.linalg.norm(ahead, axis=1)
+    trusted = _TRUST * way + _JUMP * robot.span_m
     near_prediction = _apart_m(robot, there, predicted) <= trusted
-    return there, np.asarray(there.found & believed & near_prediction)
+    held = there.found & believed & near_prediction
+    return there, np.asarray(held)
 
 
 def _believed(robot: Robot, ahead: Floats) -> Bools:
@@ -240,13 +246,15 @@ def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: flo
     """
     step = newton_step(robot, wires, near, lengths)
     pose = mixed.after_step(robot, near, step)
-    out = _as_found(*pose, tensions_at(robot, wires, *pose, *lengths))
+    tau = tensions_at(robot, wires, *pose, *lengths)
+    out = _as_found(*pose, tau)
     # the error left is of the order of the step's square over a wire's length
     exact = np.linalg.norm(step, axis=1) < small * robot.size_m
     far = np.flatnonzero(~exact)
     if far.size:
-        own, start = (lengths[0][far], lengths[1][far]), (near[0][far], near[1][far])
-        rest = forward.solve_equilibrium(robot, wires.part(far), *own, *start)
+        zero, offset = lengths
+        position, turn = near
+        rest = forward.solve_equilibrium(robot, wires.part(far), zero[far], offset[far], position[far], turn[far])
         _put_in(out, far, rest)
     return out
 

@@ -115,11 +115,15 @@ def tied(
     creep, error_m : (w, n) array
         As for `inverse.commands`.
     """
-    creep, error = (np.broadcast_to(v, tension_N.T.shape).T for v in (creep, error_m))
+    shape = tension_N.T.shape
+    creep = np.broadcast_to(creep, shape).T
+    error = np.broadcast_to(error_m, shape).T
     out = Tied.nothing(rotation, tension_N)
-    live = np.flatnonzero(np.isfinite(joint_m).all(1) & np.isfinite(tension_N).all(1))
+    known = np.isfinite(joint_m).all(1) & np.isfinite(tension_N).all(1)
+    live = np.flatnonzero(known)
     goal = _Goal(position_m, rotation, tension_N)
-    cases = _Cases.beginning(rows_of(goal, live), mean_of_each_winch(robot, joint_m)[live])
+    joint = mean_of_each_winch(robot, joint_m)[live]
+    cases = _Cases.beginning(rows_of(goal, live), joint)
     for _ in range(_STEPS):
         if not live.size:
             break
@@ -159,15 +163,18 @@ def _here(robot: Robot, wires: Wires, cases: _Cases, creep: Floats, error: Float
     """Balance and tensions at the cases' poses and joint values, with their slopes."""
     scale = robot.edge_scale
     bare, offset = lengths(robot, cases.joint @ turned_by(robot).T)
-    zero = (bare + error) * (1.0 + creep)
+    grown = 1.0 + creep
+    zero = (bare + error) * grown
     turn = batch_last(cases.R)
     shape = statics.geometry(robot, cases.x.T, turn)
     stretched = statics.stretched(robot, shape, offset.T)
     tau, slope = tension(wires, stretched, zero.T)
     gradient, hessian = statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)
-    by_joint = _by_joint(robot, slope.T, stretched.T / zero, 1.0 + creep)
+    ratio = stretched.T / zero
+    by_joint = _by_joint(robot, slope.T, ratio, grown)
     by_force, by_tension = _slopes(robot, shape, hessian, slope, by_joint)
-    return _Here(gradient.T * scale, by_force, tau.T, by_tension)
+    force = gradient.T * scale
+    return _Here(force, by_force, tau.T, by_tension)
 
 
 def _by_joint(robot: Robot, slope: Floats, ratio: Floats, grown: Floats) -> Floats:
@@ -194,15 +201,17 @@ def _slopes(
 
 def _step(robot: Robot, here: _Here, cases: _Cases, goal: _Goal) -> Floats:
     """(n, d + j) The step that meets every aim as far as those before it leave it free."""
-    columns = here.by_force.shape[2]
-    step = np.zeros((len(here.force), columns))
-    free = np.broadcast_to(np.eye(columns), (len(step), columns, columns))
+    n, _, columns = here.by_force.shape
+    step = np.zeros((n, columns))
+    free = np.broadcast_to(np.eye(columns), (n, columns, columns))
     for by_step, wanted, least in _aims(robot, here, cases, goal):
         inside = by_step @ free
         size = np.linalg.norm(by_step, axis=(1, 2))
         back = _inverse(inside, least * size)
-        missing = wanted[..., None] - by_step @ step[..., None]
-        step = step + (back @ missing)[..., 0]
+        reached = by_step @ step[..., None]
+        missing = wanted[..., None] - reached
+        more = back @ missing
+        step = step + more[..., 0]
         free = free - back @ inside
     return step
 

@@ -77,14 +77,16 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
     turned = request.orientation or Orientation(x, R)
     content = _requested(robot, line, x, R, turned)
     if not np.isfinite(tau).all():
-        return _unheld(robot, content, *_why_not(robot, x, turned))
+        why_not = _why_not(robot, x, turned)
+        return _unheld(robot, content, *why_not)
     lifted = on_plane.lifted(robot, x, R, tau[0])
     if lifted:
         return _unheld(robot, content, lifted)
     shared = draws.for_robot(robot, line)
     commands = inverse.commands(robot, shared, x[None], R[None], tau)
-    content["feasible_draws"] = float(commands.feasible.mean())
-    if not commands.feasible.any():
+    feasible = commands.feasible
+    content["feasible_draws"] = float(feasible.mean())
+    if not feasible.any():
         return _unheld(robot, content, "These wires cannot pull as hard as the pose requires, however far stretched.")
     held = _Held(robot, line, shared, request, commands, tau)
     if robot.winch is not None:
@@ -119,24 +121,29 @@ class _Held:
 def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, content: PoseJson) -> PoseAnswer:
     """What is said of a pose that can be held, besides what `content` has already."""
     robot, line, request = held.robot, held.line, held.request
+    wires, commands, tension_N = held.wires, held.commands, held.tension_N[0]
     x, R = request.position_m, request.rotation
     rng = np.random.default_rng(request.seed)
-    content["inverse"] = _inverse(robot, held.commands, held.tension_N[0])
+    content["inverse"] = _inverse(robot, commands, tension_N)
     if robot.plane is not None:
-        content["plane"] = on_plane.on_plane(robot, held.wires, held.commands, x, R, held.tension_N[0])
-    content["forward"] = round_trip(robot, held.wires, held.commands, x, R)
-    content["equilibria"] = stable_poses(robot, held.wires, x, R, rng)
-    proved = proofs.only_equilibrium(robot, held.wires, x, R)
+        content["plane"] = on_plane.on_plane(robot, wires, commands, x, R, tension_N)
+    content["forward"] = round_trip(robot, wires, commands, x, R)
+    poses = stable_poses(robot, wires, x, R, rng)
+    content["equilibria"] = poses
+    proved = proofs.only_equilibrium(robot, wires, x, R)
     courses = _courses(held, rng)
-    band = proofs.enclosed(robot, held.wires, courses[0.0], x, R)
+    band = proofs.enclosed(robot, wires, courses[0.0], x, R)
     content["certificate"] = {**proved, **band}
-    content["drift"] = [{"specimen_spread": s, **_drift(c, x, R)} for s, c in courses.items()]
-    content["stability"] = [{"specimen_spread": s, **stability.summary(c)} for s, c in courses.items()]
+    content["drift"] = []
+    content["stability"] = []
+    for spread, course in courses.items():
+        content["drift"].append({"specimen_spread": spread, **_drift(course, x, R)})
+        content["stability"].append({"specimen_spread": spread, **stability.summary(course)})
     content["claim"] = _claim(courses, x, R, request)
     content["pose_error"] = controllers.errors(robot, line, request, rng, other)
     content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
     content["variance_shares"] = _shares(robot, line, courses, x, R)
-    warnings = _warnings(held, courses, content["equilibria"]["commanded_stable"], turned)
+    warnings = _warnings(held, courses, poses["commanded_stable"], turned)
     content["warnings"] = to_json(warnings)
     spaces = map_slices(robot, line, request.slices)
     content["workspace"] = _workspace(spaces)
@@ -285,13 +292,16 @@ def _by_leg(values: Floats) -> Band:
 def _drift(course: Course, x: Floats, R: Floats) -> DriftBands:
     shift, angle = drift.distance_moved(course, x, R)
     shift = np.where(course.found[:, None, None], shift, np.nan)
+    distance = np.linalg.norm(shift, axis=-1)
+    tilt = turning.tilt(course.rotation, R)
+    from_vertical = turning.tilt(course.rotation)
     return {
         "times_s": course.times_s,
         "solved": float(course.found.mean()),
         "displacement_mm": band_over_draws(1e3 * shift),
-        "distance_mm": band_over_draws(1e3 * np.linalg.norm(shift, axis=-1)),
-        "tilt_deg": band_over_draws(np.degrees(turning.tilt(course.rotation, R))),
-        "from_vertical_deg": band_over_draws(np.degrees(turning.tilt(course.rotation))),
+        "distance_mm": band_over_draws(1e3 * distance),
+        "tilt_deg": band_over_draws(np.degrees(tilt)),
+        "from_vertical_deg": band_over_draws(np.degrees(from_vertical)),
         "rotation_deg": band_over_draws(np.degrees(angle)),
         "tension_N": band_over_draws(course.tension_N),
     }
@@ -320,7 +330,8 @@ def _claim(courses: dict[float, Course], x: Floats, R: Floats, request: PoseRequ
 def _shares(robot: Robot, line: WireDraws, courses: dict[float, Course], x: Floats, R: Floats) -> VarianceShares:
     """Shares of the variance of the drift's size at the last time, shared draw; and what specimens add to it."""
     size = {spread: _last_distance(course, x, R) for spread, course in courses.items()}
-    held = np.isfinite(size[0.0])
+    shared = size[0.0]
+    held = np.isfinite(shared)
     result: VarianceShares = {"time_s": courses[0.0].times_s[-1], "output": "distance"}
     if robot.is_on_given_wires:
         result["sentence"] = "The robot's file gives the parameters of all wires: no share comes from the fit."
@@ -329,8 +340,10 @@ def _shares(robot: Robot, line: WireDraws, courses: dict[float, Course], x: Floa
         result["sentence"] = "Fewer than 30 draws that hold the platform: no shares are computed."
         return result
     parameters = {name: values[held] for name, values in _parameters(line).items()}
-    result["shared_draw"] = variance_shares.shares(parameters, size[0.0][held])
-    result["sd_mm"] = [{"specimen_spread": s, "sd_mm": _sd_mm(distance_m)} for s, distance_m in size.items()]
+    result["shared_draw"] = variance_shares.shares(parameters, shared[held])
+    result["sd_mm"] = []
+    for spread, distance_m in size.items():
+        result["sd_mm"].append({"specimen_spread": spread, "sd_mm": _sd_mm(distance_m)})
     return result
 
 

@@ -126,14 +126,16 @@ def rows(found: tuple[Map, ...]) -> list[tuple[float, ...]]:
     """A row of `TABLE` for every point; NaN where no tensions hold it."""
     out: list[tuple[float, ...]] = []
     for one in found:
-        held = {tuple(x): i for i, x in enumerate(one.drift.position_m)}
-        inside = one.drift.holds()
+        drift = one.drift
+        held = {tuple(x): i for i, x in enumerate(drift.position_m)}
+        inside = drift.holds()
         for x in one.requested_m:
             i = held.get(tuple(x))
             values = [0.0] + [np.nan] * 9
             if i is not None:
-                values = _at_point(one.drift, i, inside[i])
-            out.append((*map(float, one.rotation_rad), *map(float, x), *map(float, values)))
+                values = _at_point(drift, i, inside[i])
+            row = [*one.rotation_rad, *x, *values]
+            out.append(tuple(map(float, row)))
     return out
 
 

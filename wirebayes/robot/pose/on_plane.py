@@ -51,8 +51,10 @@ def on_plane(
     assert known is not None
     force = plane.normal_force(robot, position_m, rotation, tension_N)
     good = np.flatnonzero(commands.feasible)
-    x, R = np.repeat(position_m[:, None], good.size, 1), np.repeat(rotation[..., None], good.size, 2)
-    K = statics.stiffness(robot, wires.part(good), x, R, commands.zero_m[good].T, commands.offset_m[good].T)
+    x = np.repeat(position_m[:, None], good.size, 1)
+    R = np.repeat(rotation[..., None], good.size, 2)
+    zero, offset = commands.zero_m[good], commands.offset_m[good]
+    K = statics.stiffness(robot, wires.part(good), x, R, zero.T, offset.T)
     width, turn = plane.friction_half_width(robot, K, force)
     return {
         "normal": known.normal,

@@ -69,17 +69,22 @@ def balanced_orientation(robot: Robot, position_m: Floats, asked_rad: Floats | N
     Orientation
     """
     asked = np.full(3, np.nan) if asked_rad is None else asked_rad
-    near = turning.matrix(np.where(np.isfinite(asked), asked, robot.home_rotation_rad))
+    near_rad = np.where(np.isfinite(asked), asked, robot.home_rotation_rad)
+    near = turning.matrix(near_rad)
+    as_it_is = Orientation(position_m, near)
     clear = _clear(robot, position_m, near)
     if robot.freedom == "position":
-        unheld = clear and robot.plane is None and not _held(robot, position_m, near)
-        return _nowhere(robot, position_m, near) if unheld else Orientation(position_m, near)
+        must_hang = clear and robot.plane is None
+        if must_hang and not _held(robot, position_m, near):
+            return _nowhere(robot, position_m, near)
+        return as_it_is
     if not clear or _commanded(robot, position_m, near, asked_rad):
-        return Orientation(position_m, near)
+        return as_it_is
     there = _hung(robot, position_m, near, asked)
     if there.found is None or asked_rad is not None or _decided_by_balance(robot, there):
         return there
-    return replace(there, turned_away=tuple(turned_away(robot, there.rotation)))
+    away = turned_away(robot, there.rotation)
+    return replace(there, turned_away=tuple(away))
 
 
 def _decided_by_balance(robot: Robot, there: Orientation) -> bool:
@@ -182,6 +187,7 @@ def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, h
     refused = np.isfinite(asked) & movable & ~had
     choice = int(found.choice[0])
     left = choice - int(had.sum())
+    others = found.others[0]
     content: OrientationFound = {
         "commanded_degrees": degrees,
         "of_degrees": robot.freedoms,
@@ -190,10 +196,12 @@ def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, h
         "commanded_components": _names(had),
         "free_components": free,
         "refused_components": _names(refused),
-        "other_rotation_vectors_rad": found.others[0],
-        "sentence": _summary(robot, degrees, len(places), left, free, len(found.others[0])),
+        "other_rotation_vectors_rad": others,
+        "sentence": _summary(robot, degrees, len(places), left, free, len(others)),
     }
-    return Orientation(x, R, content, "", _missed(asked, turning.vector(R[None])[0], refused))
+    turned_rad = turning.vector(R[None])[0]
+    missed = _missed(asked, turned_rad, refused)
+    return Orientation(x, R, content, "", missed)
 
 
 def _missed(asked: Floats, vector: Floats, refused: Bools) -> str:

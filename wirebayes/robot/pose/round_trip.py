@@ -29,19 +29,22 @@ def round_trip(robot: Robot, wires: Wires, commands: inverse.Commands, x: Floats
         The pose.
     """
     lengths = commands.zero_m, commands.offset_m
-    near, turned = plane.onto(robot, (x + 0.01 * robot.size_m)[None], R[None])
+    beside = x + 0.01 * robot.size_m
+    near, turned = plane.onto(robot, beside[None], R[None])
     back = forward.solve_equilibrium(robot, wires, *lengths, near[0], turned[0])
     off_m = np.abs(back.position_m - x)[back.found]
-    pose = np.repeat(x[None], len(commands.zero_m), axis=0), commands.rotation
-    stiffness = one_sided.lowest_stiffness(robot, wires, pose, lengths)
+    slack = commands.tension_N[0] <= 0
+    everywhere = np.repeat(x[None], len(commands.zero_m), axis=0)
+    stiffness = one_sided.lowest_stiffness(robot, wires, (everywhere, commands.rotation), lengths)
     statuses = {}
     for code, text in outcome.STATUS.items():
-        statuses[text] = int((back.status == code).sum())
+        ended_so = back.status == code
+        statuses[text] = int(ended_so.sum())
     return {
         "solved": float(back.found.mean()),
         "statuses": statuses,
         "largest_round_trip_error_m": float(off_m.max(initial=0.0)),
-        "slack_wires": int((commands.tension_N[0] <= 0).sum()),
+        "slack_wires": int(slack.sum()),
         "lowest_stiffness_N_m": band_over_draws(stiffness[commands.feasible]),
     }
 
@@ -67,18 +70,20 @@ def stable_poses(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: Generato
         return {"stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []}
     zero_m, offset_m = commands.zero_m, commands.offset_m
     here = forward.solve_equilibrium(robot, mean, zero_m, offset_m, x, R)
-    returned = np.abs(here.position_m[0] - x).max() < _SAME * robot.span_m
+    away_m = np.abs(here.position_m[0] - x).max()
+    returned = here.found[0] and away_m < _SAME * robot.span_m
     found = equilibria.equilibria(robot, mean, zero_m[0], offset_m[0], rng, known=(x, R))
     own = _is_at(robot, found, x, R)
     poses = []
-    for i in range(len(own)):
-        poses.append(_equilibrium(found.position_m[i], found.rotation[i], found.tension_N[i], own[i], stable=True))
+    for i, is_own in enumerate(own):
+        one = _equilibrium(found.position_m[i], found.rotation[i], found.tension_N[i], is_own, stable=True)
+        poses.append(one)
     if not own.any():
         poses.append(_equilibrium(x, R, tau[0], True, stable=False))
     return {
         "stable_found": len(found.position_m),
         "starts": 65,
-        "commanded_stable": bool(here.found[0] and returned),
+        "commanded_stable": bool(returned),
         "poses": poses,
     }
 

@@ -19,11 +19,17 @@ def summary(course: Course) -> FallsReport:
     Probabilities are shares of the draws that began; wires are numbered from 1 in the order of the robot's legs.
     """
     falls = course.falls
-    began = np.isfinite(falls.stiffness_share) if falls is not None else np.zeros(0, bool)
-    if falls is None or not began.any():
+    if falls is None:
+        return {"began": 0.0}
+    began = np.isfinite(falls.stiffness_share)
+    if not began.any():
         return {"began": 0.0}
     fell, fell_at_s = falls.fell[began], falls.time_s[began]
+    fallen_by = fell_at_s[:, None] <= course.times_s
+    by_wire = _by_wire(falls.wire[began][fell], course.tension_N.shape[-1], len(fell))
     slack_s = falls.slack_s[began]
+    is_slack = np.isfinite(slack_s)
+    slack_time = [_spread(times[known]) for times, known in zip(slack_s.T, is_slack.T, strict=True)]
     drop_m = falls.drop_m[began][fell]
     caught = np.isfinite(drop_m)
     holds = began & ~falls.fell  # margins mean something where there is a hold to lose
@@ -31,13 +37,13 @@ def summary(course: Course) -> FallsReport:
     return {
         "began": float(began.mean()),
         "fall_probability": float(fell.mean()),
-        "fall_probability_at": (fell_at_s[:, None] <= course.times_s).mean(0),
+        "fall_probability_at": fallen_by.mean(0),
         "fall_time_s": _spread(fell_at_s[fell]),
-        "fall_wires": _by_wire(falls.wire[began][fell], course.tension_N.shape[-1], len(fell)),
+        "fall_wires": by_wire,
         "fall_distance_mm": _spread(1e3 * drop_m[caught]),
         "caught_probability": float(caught.mean()) if fell.any() else None,
-        "slack_probability": np.isfinite(slack_s).mean(0),
-        "slack_time_s": [_spread(times[np.isfinite(times)]) for times in slack_s.T],
+        "slack_probability": is_slack.mean(0),
+        "slack_time_s": slack_time,
         "least_tension_wire": int(_nearest(falls, began)) + 1,
         "least_tension_share": band_over_draws(lowest),
         "stiffness_share": band_over_draws(falls.stiffness_share[holds]),
@@ -74,20 +80,29 @@ def stability_warnings(courses: dict[float, Course], stable: bool = True) -> lis
     stable : bool
         Whether the commanded pose is a stable equilibrium at all.
     """
-    last = max(course.times_s[-1] for course in courses.values())
-    found = {_who(spread): summary(course) for spread, course in courses.items()}
-    began = {who: one for who, one in found.items() if one["began"]}
+    last_s = max(course.times_s[-1] for course in courses.values())
+    within = f"within {last_s:g} s"
+    found, began = {}, {}
+    for spread, course in courses.items():
+        who = _who(spread)
+        found[who] = one = summary(course)
+        if one["began"]:
+            began[who] = one
+    notices: list[Notice] = []
+
+    def warn(kind: str, head: str, by_who: dict[str, str]) -> None:
+        if by_who:
+            notices.append(Notice(kind, f"{head}: {_beside(by_who)}"))
+
     reason = "no stable equilibrium is found there" if stable else "the pose is balanced but not stable"
-    told: list[tuple[str, str, dict[str, str]]] = []
-    told.append(("fall", f"draws cannot begin at the pose, {reason}", _told(found, _not_begun)))
-    told.append(("fall", f"the platform falls within {last:g} s", _told(began, _fallen)))
+    warn("fall", f"draws cannot begin at the pose, {reason}", _told(found, _not_begun))
+    warn("fall", f"the platform falls {within}", _told(began, _fallen))
     slack = _told(began, _slack)
-    told.append(("slack", f"wires go slack within {last:g} s", slack))
+    warn("slack", f"wires go slack {within}", slack)
     if not slack:
-        told.append(("slack", f"a wire may keep little of its tension within {last:g} s", _told(began, _weak)))
-    softest = f"the stiffness against the softest motion may fall within {last:g} s"
-    told.append(("fall", softest, _told(began, _loose)))
-    return [Notice(kind, f"{head}: {_beside(by_who)}") for kind, head, by_who in told if by_who]
+        warn("slack", f"a wire may keep little of its tension {within}", _told(began, _weak))
+    warn("fall", f"the stiffness against the softest motion may fall {within}", _told(began, _loose))
+    return notices
 
 
 def _who(spread: float) -> str:

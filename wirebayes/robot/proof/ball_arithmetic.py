@@ -68,16 +68,21 @@ class Balance:
         from flint import arb_mat
 
         d = self.robot.degrees
-        turn, by_turn = self._turn(y[3:]) if d == 6 else (self.R, None)
+        turn, by_turn = self.R, None
+        if d == 6:
+            turn, by_turn = self._turn(y[3:])
         centre_of_mass = _times(turn, self.robot.centre_of_mass_m)
-        force, moment = self.weight, _cross(centre_of_mass, self.weight)
+        force = self.weight
+        moment = _cross(centre_of_mass, self.weight)
         slope = arb_mat(d, d)
         if d == 6:
             by_arm = _skew(self.weight) * _skew(centre_of_mass) * by_turn
             slope += _block(arb_mat(3, 3), None, by_arm, self.size)
         for i in range(self.robot.legs):
             r, line = self._line(i, y, turn)
-            pull, by_place = self._pulled(i, self._span(i, line), pulls[i] if pulls else None)
+            span = self._span(i, line)
+            known = pulls[i] if pulls else None
+            pull, by_place = self._pulled(i, span, known)
             force = _sum(force, pull)
             if d == 3:
                 slope += by_place
@@ -104,12 +109,18 @@ class Balance:
         m = self.arb(float(self.robot.lines[i]))
         u, bends = span.direction, span.curvature
         stretched = m * span.length + self.offset[i]
-        tau, stiff = known or self.pull(i, self.strain(i, stretched), stretched)
+        if known is None:
+            strain = self.strain(i, stretched)
+            known = self.pull(i, strain, stretched)
+        tau, stiff = known
         by_place = arb_mat(3, 3)
         for j in range(3):
             for k in range(3):
-                by_place[j, k] = -m * (stiff * m * u[j] * u[k] + tau * bends[j][k])
-        return [-m * tau * a for a in u], by_place
+                stretching = stiff * m * u[j] * u[k]
+                turning = tau * bends[j][k]
+                by_place[j, k] = -m * (stretching + turning)
+        force = [-m * tau * a for a in u]
+        return force, by_place
 
     def at_centre(self) -> tuple[Any, list[tuple[Any, Any]]]:
         """Balance at the centre in parts: the weight's, and each wire's wrench of 1 N with its tension."""
@@ -127,7 +138,9 @@ class Balance:
     def strand(self, i: int, y: list[Any]) -> "Strand":
         """One wire's geometry over a box of poses."""
         m = self.arb(float(self.robot.lines[i]))
-        turn, by_turn = self._turn(y[3:]) if self.robot.degrees == 6 else (self.R, None)
+        turn, by_turn = self.R, None
+        if self.robot.degrees == 6:
+            turn, by_turn = self._turn(y[3:])
         r, line = self._line(i, y, turn)
         span = self._span(i, line)
         length = m * span.length + self.offset[i]

@@ -83,7 +83,9 @@ def certify(
         return _unproved(robot, position_m, rotation)
     for _ in range(3):  # inside, further images only shrink the enclosure
         radius = np.minimum(radius, image(radius))
-    unique = _alone_within(image, radius, robot.span_m) if how_alone else float(radius.min())
+    unique = float(radius.min())
+    if how_alone:
+        unique = _alone_within(image, radius, robot.span_m)
     return Certificate(True, position_m, rotation, radius, unique)
 
 

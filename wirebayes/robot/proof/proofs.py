@@ -43,9 +43,9 @@ def only_equilibrium(robot: Robot, wires: Wires, position_m: Floats, rotation: F
     mean = control.known(wires)
     k1 = np.broadcast_to(mean.theta["k1"][:, 0], robot.legs)
     here = inverse.commands_at(robot, mean, position_m, rotation)
-    zero = here.zero_m[0]
+    zero, offset, turn = here.zero_m[0], here.offset_m[0], here.rotation[0]
     try:
-        proof = certify(robot, wires.law, (k1, k1), (zero, zero), here.offset_m[0], position_m, here.rotation[0])
+        proof = certify(robot, wires.law, (k1, k1), (zero, zero), offset, position_m, turn)
     except ImportError:
         return {"proved": None, "sentence": "python-flint is not installed (extra: certificate)."}
     return {"proved": proof.proved, "enclosure_m": proof.radius_m, "alone_within_m": proof.unique_m}

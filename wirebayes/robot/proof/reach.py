@@ -112,9 +112,12 @@ def reach(
         python-flint is not installed.
     """
     d = robot.degrees
+    by_k1, by_zero = generators
     unknown = np.full(d, np.nan)
-    nothing = Reach(False, position_m, rotation, unknown, unknown, np.full((d, generators[0].shape[1]), np.nan))
-    k1_bounds, zero_bounds = _bounds(k1_N, generators[0]), _bounds(zero_m, generators[1])
+    unknown_line = np.full((d, by_k1.shape[1]), np.nan)
+    nothing = Reach(False, position_m, rotation, unknown, unknown, unknown_line)
+    k1_bounds = _bounds(k1_N, by_k1)
+    zero_bounds = _bounds(zero_m, by_zero)
     if min(k1_bounds[0].min(), zero_bounds[0].min()) <= 0:
         return nothing
     middle = Balance(robot, law, (k1_N, k1_N), (zero_m, zero_m), offset_m, position_m, rotation)
@@ -128,7 +131,8 @@ def reach(
     beside = box_around_image(image, d, robot.span_m)
     if beside is None:
         return nothing
-    return Reach(True, position_m, rotation, (along + beside) * _UP, beside, line)
+    radius = (along + beside) * _UP
+    return Reach(True, position_m, rotation, radius, beside, line)
 
 
 def _bounds(middle: Floats, generators: Floats) -> tuple[Floats, Floats]:
@@ -140,13 +144,15 @@ def _linear_answer(middle: Balance, C: Floats, generators: tuple[Floats, Floats]
     """Approximate change of the pose by each parameter, (d, q)."""
     d = len(C)
     still = [middle.arb(0)] * d
-    out = np.zeros((d, generators[0].shape[1]))
-    for i, (by_k1, by_zero) in enumerate(zip(*generators, strict=True)):
+    of_k1, of_zero = generators
+    out = np.zeros((d, of_k1.shape[1]))
+    for i, (by_k1, by_zero) in enumerate(zip(of_k1, of_zero, strict=True)):
         strand = middle.strand(i, still)
         strain = middle.strain(i, strand.length)
-        slope_k1, slope_zero = middle.by_wire(i, strand.length, strain)
+        slopes = middle.by_wire(i, strand.length, strain)
+        slope_k1, slope_zero = (float(slope.mid()) for slope in slopes)
         push = np.array([float(force.mid()) for force in strand.wrench])
-        pull = float(slope_k1.mid()) * by_k1 + float(slope_zero.mid()) * by_zero
+        pull = slope_k1 * by_k1 + slope_zero * by_zero
         out -= np.outer(C @ push, pull)
     return out
 

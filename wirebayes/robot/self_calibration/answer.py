@@ -131,24 +131,25 @@ def _named(robot: Robot, prior: LengthPrior, session: Session, known: LengthPost
     """Estimates in the words of a whole robot's calibration; its geometry is exact here."""
     zero = np.zeros((robot.legs, 3))
     reference = _moment(known, slice(robot.legs))
-    learnt = reference.sd < 0.5 * prior.reference_sd_m
-    turn = rotation.vector(np.where(np.isfinite(known.ended_rotation[0]), known.ended_rotation[0], np.eye(3)))
+    before = prior.reference_sd_m
+    learnt = reference.sd < 0.5 * before
+    ended = known.ended_rotation[0]
+    turn = rotation.vector(np.where(np.isfinite(ended), ended, np.eye(3)))
     pose = np.hstack([known.ended_m[0], turn])
-    before_mm, now_mm = 1e3 * prior.reference_sd_m, 1e3 * reference.sd
-    open_ = [
-        f"the reference length of wire {i + 1}: known to {before_mm:.2g} mm before, to {now_mm[i]:.2g} mm now"
-        for i in np.flatnonzero(~learnt)
-    ]
+    poses = interval_about(pose, known.ended_sd[0], _HALF)
+    holds = np.asarray(session.numbers, float).tolist()
+    open_ = []
+    for i in np.flatnonzero(~learnt):
+        widths = f"known to {1e3 * before:.2g} mm before, to {1e3 * reference.sd[i]:.2g} mm now"
+        open_.append(f"the reference length of wire {i + 1}: {widths}")
+    determined = int(learnt.sum())
     return {
         "exit_points_m": interval_about(robot.exit_m, zero, _HALF),
         "platform_points_m": interval_about(robot.platform_m, zero, _HALF),
         "zero_tension_lengths_m": interval_about(known.length_m[0], known.length_sd_m[0], _HALF),
         "references_m": interval_about(*reference),
-        "poses": {
-            "hold": np.asarray(session.numbers, float).tolist(),
-            **interval_about(pose, known.ended_sd[0], _HALF),
-        },
-        "identified": {"determined": int(learnt.sum()), "of": robot.legs, "combinations": [], "not_determined": open_},
+        "poses": {"hold": holds, **poses},
+        "identified": {"determined": determined, "of": robot.legs, "combinations": [], "not_determined": open_},
     }
 
 
@@ -212,14 +213,22 @@ def _at_fault(
     robot: Robot, prior: LengthPrior, session: Session, readings: Floats, known: LengthPosterior
 ) -> sensors.Suspects | None:
     """Which sensor would explain what contradicts; None where sensors have a bias already, or explain little of it."""
+    if prior.bias_sd_N > 0:
+        return None
     holds = int(session.read.sum())
-    widest = session.tension_sd_N * float(readings[: holds * robot.legs].max(initial=0.0))  # no more than it ever read
-    if holds < sensors.LEAST_HOLDS or prior.bias_sd_N > 0 or not widest > 0:
+    if holds < sensors.LEAST_HOLDS:
+        return None
+    tensions = readings[: holds * robot.legs]
+    widest = session.tension_sd_N * float(tensions.max(initial=0.0))  # no more than it ever read
+    if not widest > 0:
         return None
     # errors of sensors add to the readings: the first steps foresee already what they explain
-    other = length_posterior(robot, replace(prior, bias_sd_N=widest), session, readings[None], patience=1)
+    biased = replace(prior, bias_sd_N=widest)
+    other = length_posterior(robot, biased, session, readings[None], patience=1)
+    if not other.converged[0]:
+        return None
     left = float(other.misfit[0] / known.misfit[0])  # of what contradicts, with errors of all sensors
-    if not other.converged[0] or (other.p_joint[0] < SIGNIFICANT and left > 1 - sensors.MOST):
+    if other.p_joint[0] < SIGNIFICANT and left > 1 - sensors.MOST:
         return None
     bias = slice(-robot.legs, None)
     return sensors.weighed(other.unknowns[0, bias], other.covariance[0, bias, bias], widest)

@@ -50,10 +50,12 @@ def eliminated(e: Equations, white: Floats, damping: float) -> NormalEquations:
     mixed = by_hold.mT @ by_robot
     follows = -inverse @ mixed
     alone = -inverse @ (by_hold.mT @ residual)
-    matrix = (by_robot.mT @ by_robot + mixed.mT @ follows).sum(0)
-    slope = (by_robot.mT @ residual + mixed.mT @ alone).sum(0)[:, 0]
+    of_each_hold = by_robot.mT @ by_robot + mixed.mT @ follows
+    slope_of_each = by_robot.mT @ residual + mixed.mT @ alone
+    slope = slope_of_each.sum(0)[:, 0]
     squares = np.einsum("pki,pki->i", by_robot, by_robot)
-    matrix = matrix + (1.0 + damping) * np.eye(len(white)) + damping * np.diag(squares)
+    prior = (1.0 + damping) * np.eye(len(white))
+    matrix = of_each_hold.sum(0) + prior + damping * np.diag(squares)
     return NormalEquations(follows, alone[..., 0], inverse, matrix, slope + white)
 
 
@@ -141,14 +143,17 @@ class _Target:
 
     def ahead(self, here: _Place, damping: float) -> _Place:
         """Where a step leads; led back where it gains less than foreseen. Infinitely high where there is no step."""
-        change, hold = _step(self.unknowns.robot, here, damping)
-        if not (np.isfinite(change).all() and np.isfinite(hold).all()):  # singular with so little damping
+        robot = self.unknowns.robot
+        change, hold = _step(robot, here, damping)
+        known = np.isfinite(change).all() and np.isfinite(hold).all()
+        if not known:  # singular with so little damping
             return replace(here, cost=np.inf)
-        there = self.at(_stepped(self.unknowns.robot, here.state, change, hold))
+        there = self.at(_stepped(robot, here.state, change, hold))
         white = there.state.white
         foreseen = _foreseen(here.equations, change, hold) + float(white @ white)
+        least_gain = _AS_FORESEEN * (here.cost - foreseen)
         for _ in range(_CORRECTIONS):
-            if here.cost - there.cost > _AS_FORESEEN * (here.cost - foreseen):
+            if here.cost - there.cost > least_gain:
                 break
             there = self.corrected(there)
         return there

@@ -191,7 +191,8 @@ def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mo
     m, d = white.shape
     here = target.predicted(white)
     cost = target.cost(here, white)
-    moved, damping = np.ones(m, bool), np.full(m, 1e-3)
+    moved = np.ones(m, bool)
+    damping = np.full(m, 1e-3)
     converged, ended = np.zeros((2, m), bool)
     J = np.zeros((m, target.readings.shape[1], d))
     for taken in range(iterations):
@@ -208,13 +209,15 @@ def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mo
         ended = converged | absurd
         if ended.all():
             break
-        tried = white + chosen_rows(~ended, _damped_step(normal, slope, damping), 0.0)
+        step = _damped_step(normal, slope, damping)
+        tried = white + chosen_rows(~ended, step, 0.0)
         there = target.predicted(tried, near=(here.begun_m, here.begun_rotation))
         new = target.cost(there, tried)
         moved = _better(new, cost)
         white = chosen_rows(moved, tried, white)
         damping = np.where(moved, damping / 10, damping * 10)
-        here, cost = _pick(moved, there, here), np.where(moved, new, cost)
+        here = _pick(moved, there, here)
+        cost = np.where(moved, new, cost)
     return _Mode(white, here, cost, converged)
 
 

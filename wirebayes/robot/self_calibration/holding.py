@@ -134,7 +134,8 @@ class _Walk:
         longest : float
             Step, in the logarithm of time.
         """
-        step, opening, taken = pace.next, None, 0
+        step, taken = pace.next, 0
+        opening = None
         while self.creep.time_s < duration_s:
             free = taken >= _MOST
             taken += 1
@@ -142,12 +143,13 @@ class _Walk:
             if now == 0.0:
                 self._begin(duration_s, pace, free)
                 continue
-            error = self._try(_next(now, duration_s, step), np.inf if free else _ERROR)
+            allowed_error = np.inf if free else _ERROR
+            error = self._try(_next(now, duration_s, step), allowed_error)
             factor = _factor(error, 3)
             if self.creep.time_s > now and opening is None:
                 opening = step * min(max(factor, 1.0), _LONGER)
-            allowed = step * min(max(factor, _SHORTER), _LONGER)
-            step = longest if free else min(longest, allowed)
+            longer = step * min(max(factor, _SHORTER), _LONGER)
+            step = longest if free else min(longest, longer)
         pace.next = min(longest, opening or step)
         zero = self._zero(self.creep.state())
         pose = self.here.position_m, self.here.rotation
@@ -193,10 +195,13 @@ class _Walk:
         guess = creep.onward(time_s, self.slope)
         zero = self._zero(guess.state())
         here = self._solved(zero, guess.grown - creep.grown)
-        if ((here.tension_N > 0) != (self.here.tension_N > 0)).any():
+        were_taut = self.here.tension_N > 0
+        are_taut = here.tension_N > 0
+        if (are_taut != were_taut).any():
             self._look(here, zero)
         done = np.maximum(creep.progress(time_s), 1e-300)
-        last = creep.toward(time_s, creep.amount_at(here.tension_N.T))
+        amount = creep.amount_at(here.tension_N.T)
+        last = creep.toward(time_s, amount)
         off = last.grown - guess.grown
         share = self._share_of_error(done)
         worst = self._worst(here, share * off)
@@ -206,8 +211,10 @@ class _Walk:
             off = (1.0 - share) * off
             last.grown = guess.grown + off
         last.amount = self._amount(here, off)
-        self.slope, self.before = (last.amount - creep.amount) / done, done
-        self.creep, self.here = last, here
+        self.slope = (last.amount - creep.amount) / done
+        self.before = done
+        self.creep = last
+        self.here = here
         return worst
 
     def _share_of_error(self, done: Floats) -> Floats:

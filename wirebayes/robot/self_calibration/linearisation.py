@@ -143,17 +143,19 @@ def _more_creep(about: _About, creep: Grown, since: State) -> Floats:
 
 def _loops(out: Equations, about: _About, creep: Grown, since: State) -> None:
     """Every wire is as long as its way: stretched from what the joint value, its reference and creep make of it."""
-    loop, leg, d = out.rows["loop"], np.arange(about.here.legs), about.here.degrees
+    robot, unknowns = about.here, about.unknowns
+    loop, d = out.rows["loop"], robot.degrees
+    leg = np.arange(robot.legs)
     lengths = _Lengths.at(about, creep, since)
-    way = statics.stretched(about.here, about.shape, lengths.offset.T).T
+    way = statics.stretched(robot, about.shape, lengths.offset.T).T
     out.residual[:, loop] = way - lengths.bare * lengths.longer
     out.by_hold[:, loop, :d] = about.J
     out.by_hold[:, leg, d + leg] = -lengths.bare * lengths.by_pull(creep)
     _loops_by_wires(out, about, lengths, creep)
-    if about.unknowns.errors.drum > 0:
-        _loops_by_drum(out, about.unknowns, lengths)
+    if unknowns.errors.drum > 0:
+        _loops_by_drum(out, unknowns, lengths)
     _loops_by_points(out, about)
-    _weigh_loops(out, about.here, about.noise)
+    _weigh_loops(out, robot, about.noise)
 
 
 def _loops_by_wires(out: Equations, about: _About, lengths: _Lengths, creep: Grown) -> None:
@@ -200,16 +202,18 @@ def _errors_apart(robot: Robot) -> Floats | None:
 
 def _balance(out: Equations, about: _About) -> None:
     """The wires carry the platform."""
-    scale, d = about.here.edge_scale, about.here.degrees
-    pull, taut = pulled(about.state.pull_N, about.noise.soft_N)
-    none = np.zeros_like(pull.T)
-    gradient, hessian = statics.unbalance_and_stiffness(about.here, about.shape, about.turn, pull.T, none)
-    stiffness = batch_first(hessian) * scale * scale[:, None]
-    force = about.noise.balance * about.here.mass_kg * GRAVITY
+    robot, noise = about.here, about.noise
+    scale, d = robot.edge_scale, robot.degrees
     balance = out.rows["balance"]
+    pull, taut = pulled(about.state.pull_N, noise.soft_N)
+    none = np.zeros_like(pull.T)
+    gradient, hessian = statics.unbalance_and_stiffness(robot, about.shape, about.turn, pull.T, none)
+    stiffness = batch_first(hessian) * scale * scale[:, None]
+    by_pull = about.J.mT * taut[:, None]
+    force = noise.balance * robot.mass_kg * GRAVITY
     out.residual[:, balance] = gradient.T * scale / force
     out.by_hold[:, balance, :d] = stiffness / force
-    out.by_hold[:, balance, d:] = about.J.mT * taut[:, None] / force
+    out.by_hold[:, balance, d:] = by_pull / force
     _balance_by_points(out, about, pull, force)
 
 
@@ -245,10 +249,13 @@ def _swing(robot: Robot, shape: statics.Geometry, rotation: Floats, pull: Floats
     by_line = np.moveaxis(turn, 1, 2)  # (p, 3, w, 3)
     by_arm = np.zeros_like(by_line)
     if robot.degrees == 6:
+        direction = batch_first(shape.direction).mT
         arm = turns.cross_matrix(batch_first(shape.arm_m).mT)  # (p, w, 3, 3)
-        pulls = turns.cross_matrix(batch_first(shape.direction).mT * tau.T[..., None])
-        by_line = np.concatenate([by_line, np.moveaxis(arm @ turn, 1, 2)], 1)
-        by_arm = np.concatenate([by_arm, np.moveaxis(-pulls, 1, 2)], 1)
+        pulls = turns.cross_matrix(direction * tau.T[..., None])
+        moment_by_line = np.moveaxis(arm @ turn, 1, 2)
+        moment_by_arm = np.moveaxis(-pulls, 1, 2)
+        by_line = np.concatenate([by_line, moment_by_line], 1)
+        by_arm = np.concatenate([by_arm, moment_by_arm], 1)
     by_platform = np.einsum("pdwi,pij->pdwj", by_line + by_arm, rotation)
     return -by_line, by_platform
 
@@ -292,16 +299,20 @@ def _off_usual(about: _About) -> Floats:
 def _tensions_by_robot(out: Equations, about: _About, read: Bools) -> None:
     """Slopes by levels and by the sensors' biases, where these are unknown."""
     unknowns, session = about.unknowns, about.holds.session
-    leg = np.arange(unknowns.robot.legs)
+    legs = unknowns.robot.legs
+    leg = np.arange(legs)
     row = out.rows["tension"].start + leg
-    level_N, bias_N = unknowns.errors.level_N, unknowns.prior.bias_sd_N
+    level_N = unknowns.errors.level_N
     if level_N > 0:
-        by_level = np.where(read, 0.0, -level_N / about.noise.pull_N)
-        out.by_robot[:, row, unknowns.slices["level"].start + leg] = by_level
+        slope = np.where(read, 0.0, -level_N / about.noise.pull_N)
+        column = unknowns.slices["level"].start + leg
+        out.by_robot[:, row, column] = slope
+    bias_N = unknowns.prior.bias_sd_N
     if bias_N > 0:
         by_bias = session.signs * bias_N / session.tension_sd_N
-        first = unknowns.slices["wires"].stop - len(leg)
-        out.by_robot[:, row, first + leg] = np.where(read, by_bias, 0.0)
+        slope = np.where(read, by_bias, 0.0)
+        column = unknowns.slices["wires"].stop - legs + leg
+        out.by_robot[:, row, column] = slope
 
 
 def _poses(out: Equations, about: _About) -> None:

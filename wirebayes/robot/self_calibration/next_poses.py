@@ -56,11 +56,15 @@ def next_poses(found: Whole, holds: Holds, count: int, rng: np.random.Generator)
     poses = _candidates(robot, rng)
     if count == 0 or not len(poses.x):
         return NextPoses(np.empty((0, 3)), np.empty(0))
-    told = _commanded(found, robot, _as_read(holds, poses), poses)
-    motion = _follows(_at(found, _blind(told), poses), robot.degrees)
-    root = np.moveaxis(motion[:, :3], 0, 1).reshape(-1, motion.shape[2])  # what counts: the position
+    as_read = _as_read(holds, poses)
+    told = _commanded(found, robot, as_read, poses)
+    unread = _at(found, _blind(told), poses)
+    motion = _follows(unread, robot.degrees)
+    position = motion[:, :3]  # what counts
+    root = np.moveaxis(position, 0, 1).reshape(-1, motion.shape[2])
     information = _information(_at(found, told, poses))
-    picked, sd = _one_after_another(found.covariance, information, root, min(count, len(poses.x)))
+    most = min(count, len(poses.x))
+    picked, sd = _one_after_another(found.covariance, information, root, most)
     return NextPoses(poses.x[picked], sd)
 
 

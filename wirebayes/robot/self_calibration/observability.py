@@ -41,9 +41,11 @@ def response(
     tau, slope = tension(wires, stretched, zero)
     _, hessian = statics.unbalance_and_stiffness(robot, shape, turn, tau, slope)
     J = batch_first(statics.wire_jacobian(robot, shape))
-    motion = np.asarray(-solve(batch_first(hessian), J), np.float64)
+    moves = -solve(batch_first(hessian), J)
+    motion = np.asarray(moves, np.float64)
     lengthening = J.mT @ motion
-    change = slope.T[:, :, None] * lengthening + np.eye(robot.legs)
+    by_lengthening = slope.T[:, :, None] * lengthening
+    change = by_lengthening + np.eye(robot.legs)
     # The tension depends on stretched / zero alone under either law, so its slope by zero follows from the other.
     by_zero = -slope * stretched / zero
     return motion, np.asarray(change), by_zero.T

@@ -60,18 +60,22 @@ def odd_hold(found: Whole, session: Session) -> list[Notice]:
         Of a search that converged.
     session : Session
     """
-    if found.unknowns.errors.joint_m is not None:
+    unknowns, equations = found.unknowns, found.equations
+    if unknowns.errors.joint_m is not None:
         return []  # then the joint test knows
+    robot, joint_m = unknowns.robot, found.noise.joint_m
     share = _shares(found).sum(1)
     p = _chances(found, share)
     worst = int(p.argmin())
-    residual = found.equations.residual[worst, found.equations.rows["loop"]]
-    open_m = residual * found.noise.joint_m / found.unknowns.robot.lines
-    visible = root_mean_square(open_m) > USUAL * found.unknowns.robot.span_m
-    if not (len(p) * p[worst] < _CHANCE and visible):
+    residual = equations.residual[worst, equations.rows["loop"]]
+    open_m = residual * joint_m / robot.lines
+    visible = root_mean_square(open_m) > USUAL * robot.span_m
+    unlikely = len(p) * p[worst] < _CHANCE
+    if not (unlikely and visible):
         return []
     leg = int(np.abs(open_m).argmax())
-    return [Notice("data", _odd_in_words(session.numbers[worst], share[worst], leg, found.noise.joint_m))]
+    text = _odd_in_words(session.numbers[worst], share[worst], leg, joint_m)
+    return [Notice("data", text)]
 
 
 def _odd_in_words(hold: float, share: float, leg: int, joint_m: float) -> str:

@@ -79,10 +79,12 @@ def predict_session(
         begun.append(hold.begun)
         ended.append(hold.here)
         if session.read[k]:
+            tension = hold.here.tension_N + bias * session.signs[k]
             read.append(hold.here)
-            tensions.append(hold.here.tension_N + bias * session.signs[k])
+            tensions.append(tension)
             lengths.append(length)
     position, turn = _poses(read)
+    solved = [here.found for here in ended]
     return PredictedSession(
         _standardised(session, np.concatenate(tensions, 1), turn),
         length,
@@ -92,7 +94,7 @@ def predict_session(
         *_poses(begun),
         *_poses(ended),
         np.stack(lengths, 1),
-        np.all([here.found for here in ended], axis=0),
+        np.all(solved, axis=0),
     )
 
 

@@ -41,15 +41,19 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: Generator) -> Sta
         Draws the places that the search begins from.
     """
     robot, session = unknowns.robot, holds.session
+    lowest_N = robot.rule.lowest_N
     unread = ~np.isfinite(holds.tension_N)
-    pull = np.where(unread, robot.rule.lowest_N, holds.tension_N)
-    pull = np.maximum(pull, 1e-3 * robot.rule.lowest_N)
+    pull = np.where(unread, lowest_N, holds.tension_N)
+    pull = np.maximum(pull, 1e-3 * lowest_N)
+    home_turn = turns.matrix(robot.home_rotation_rad)
     position = chosen_rows(holds.placed, session.position_m, robot.home_m)
-    turn = chosen_rows(holds.oriented, session.rotation, turns.matrix(robot.home_rotation_rad))
+    turn = chosen_rows(holds.oriented, session.rotation, home_turn)
+    pose = position, turn
     if _lost(unknowns, holds).any():
         ratio = stretch(unknowns, white, pull).ratio
-        _locate(unknowns, holds, white, ratio, (position, turn), rng)
-    _fill_unread(moved(robot, unknowns.parts(white)), pull, unread, (position, turn))
+        _locate(unknowns, holds, white, ratio, pose, rng)
+    as_found = moved(robot, unknowns.parts(white))
+    _fill_unread(as_found, pull, unread, pose)
     return State(np.array(white), position, turn, pull)
 
 
@@ -87,7 +91,9 @@ def _locate(unknowns: Unknowns, holds: Holds, white: Floats, ratio: Floats, pose
     bare, offset = inverse.lengths(robot, holds.session.joint_m[lost])
     goal = (bare + parts.reference_m) * ratio[lost]
     search = _PoseSearch(robot, _trials(goal), _trials(offset))
-    x, R = search.descended(_trials(position[lost]), _trials(turn[lost]), _trials(holds.placed[lost]), rng)
+    start = _trials(position[lost]), _trials(turn[lost])
+    placed = _trials(holds.placed[lost])
+    x, R = search.descended(*start, placed, rng)
     best = search.best_trials(x, R)
     position[lost] = x.T[best]
     turn[lost] = batch_first(R)[best]

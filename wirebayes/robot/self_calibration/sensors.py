@@ -70,16 +70,22 @@ def weighed(bias_N: Floats, covariance: Floats, prior_sd_N: float) -> Suspects:
         The prior's standard deviation, which is taken out.
     """
     w = len(bias_N)
+    unit = np.eye(w)
     precision = inv(covariance)
-    information = precision - np.eye(w) / prior_sd_N**2
+    information = precision - unit / prior_sd_N**2
     score = precision @ bias_N  # of the readings alone: the prior's own is zero at zero
     own = np.maximum(np.diag(information), 1e-300)
     least = 1e-9 * np.trace(information) / w  # of a combination that the readings do not show
-    total = float(score @ solve(information + least * np.eye(w), score[:, None])[:, 0])
-    left = np.maximum(total - score**2 / own, 0.0)
-    alone = chdtrc(w - 1, left) if w > 1 else np.ones(w)
-    share = np.clip(score**2 / own / max(total, 1e-300), 0.0, 1.0)
-    return Suspects(score / own, own**-0.5, float(chdtrc(w, max(total, 0.0))), alone, share)
+    together = solve(information + least * unit, score[:, None])[:, 0]
+    total = float(score @ together)
+    explained = score**2 / own
+    left = np.maximum(total - explained, 0.0)
+    alone = np.ones(w)
+    if w > 1:
+        alone = chdtrc(w - 1, left)
+    share = np.clip(explained / max(total, 1e-300), 0.0, 1.0)
+    by_chance = float(chdtrc(w, max(total, 0.0)))
+    return Suspects(score / own, own**-0.5, by_chance, alone, share)
 
 
 def suspects(found: Whole, holds: Holds, progress: ShareDone = lambda share: None) -> Suspects | None:
@@ -92,14 +98,17 @@ def suspects(found: Whole, holds: Holds, progress: ShareDone = lambda share: Non
     progress : function of a share between 0 and 1
     """
     unknowns = found.unknowns
+    if unknowns.prior.bias_sd_N > 0:
+        return None
     read = np.isfinite(holds.tension_N)
-    if unknowns.prior.bias_sd_N > 0 or read.all(1).sum() < LEAST_HOLDS:
+    if read.all(1).sum() < LEAST_HOLDS:
         return None
     widest = float(holds.tension_N[read].max())  # no sensor is off by more than it ever read
     if not widest > 0:
         return None
     free = _with_biases(found, widest)
-    legs, end = unknowns.robot.legs, free.slices["wires"].stop
+    legs = unknowns.robot.legs
+    end = free.slices["wires"].stop
     sensors = slice(end - legs, end)
     white = np.insert(found.state.white, end - legs, np.zeros(legs))
     state = replace(found.state, white=white)
@@ -109,7 +118,8 @@ def suspects(found: Whole, holds: Holds, progress: ShareDone = lambda share: Non
         state, before = other.state, bias
         bias = widest * state.white[sensors]
         covariance = widest**2 * other.covariance[sensors, sensors]
-        still = np.abs(bias - before) < _STILL * np.sqrt(np.diag(covariance))
+        sd = np.sqrt(np.diag(covariance))
+        still = np.abs(bias - before) < _STILL * sd
         if other.converged or still.all():
             return weighed(bias, covariance, widest)
     return None

@@ -141,7 +141,8 @@ class LengthPrior:
         values = self.fitted
         own = len(self.own) * legs
         biased = legs if self.bias_sd_N > 0 else 0
-        mean = np.concatenate([np.zeros(legs), values.mean(1), np.zeros(own + biased)])
+        expected = values.mean(1)
+        mean = np.concatenate([np.zeros(legs), expected, np.zeros(own + biased)])
         # A parameter that is given exactly still gets a relative uncertainty, far below anything that matters.
         fitted = 1e-12 * np.eye(len(values))
         if self.line.count > 1:
@@ -149,21 +150,25 @@ class LengthPrior:
         references = self.reference_sd_m**2 * np.eye(legs)
         specimens = self.own_sd**2 * np.eye(own)
         sensors = self.bias_sd_N**2 * np.eye(biased)
-        return mean, block_diag(references, fitted, specimens, sensors)
+        covariance = block_diag(references, fitted, specimens, sensors)
+        return mean, covariance
 
     def wires(self, robot: Robot, unknowns: Floats) -> tuple[Wires, Floats]:
         """Wires, and reference errors ``(n, w)``, of unknowns ``(n, d)``."""
-        first_own = robot.legs + len(self.names)
-        wires = self._without_specimens(robot, unknowns[:, robot.legs : first_own])
+        legs = robot.legs
+        first_own = legs + len(self.names)
+        wires = self._without_specimens(robot, unknowns[:, legs:first_own])
         theta = dict(wires.theta)
         for k, name in enumerate(self.own):
-            start = first_own + k * robot.legs
-            deviation = unknowns[:, start : start + robot.legs].T
-            theta[name] = theta[name] * np.exp(self._specimen_scale(robot, name) * deviation)
+            start = first_own + k * legs
+            deviation = unknowns[:, start : start + legs].T
+            scale = self._specimen_scale(robot, name)
+            theta[name] = theta[name] * np.exp(scale * deviation)
         whole = replace(wires, theta=theta)
         if not self.creeps:
             whole = without_creep(whole)
-        return whole, unknowns[:, : robot.legs]
+        references = unknowns[:, :legs]
+        return whole, references
 
     def _without_specimens(self, robot: Robot, fitted: Floats) -> Wires:
         """Wires of the lines' parameters ``(n, p)``, specimens of one line alike."""

@@ -76,14 +76,16 @@ def starting_references(
     mean, _ = prior.moments(robot.legs)
     expected = predict_session(robot, prior, session, mean[None])
     loops = _loops(robot, prior, session, readings, expected)
-    x, R = _expected_poses(expected, len(readings))
-    error = np.zeros((len(readings), robot.legs))
+    m = len(readings)
+    x, R = _expected_poses(expected, m)
+    error = np.zeros((m, robot.legs))
     for _ in range(iterations):
         equations = _linearised(robot, loops, x, R, error)
         change, move = _step(equations, error, prior.reference_sd_m)
         error = error + change
         x, R = _moved(robot, x, R, move)
-        if not np.abs(change).max() >= 1e-7:
+        largest = np.abs(change).max()
+        if not largest >= 1e-7:
             break
     # Absurd readings lead nowhere: such a robot starts from its references.
     known = np.asarray(np.isfinite(error).all(1))
@@ -136,13 +138,13 @@ def _linearised(robot: Robot, loops: _Loops, x: Floats, R: Floats, error: Floats
     of_readings = np.repeat(error, r // len(error), 0)
     loop, loop_by_pose = _closing(robot, loops, x, R, of_readings)
     balance, balance_by_pose = _balancing(robot, loops, x, R)
-    loop_by_length = -(loops.stretch * loops.weight)[:, None] * np.eye(robot.legs)
+    weighted = loops.stretch * loops.weight
+    loop_by_length = -weighted[:, None] * np.eye(robot.legs)
     balance_by_length = np.zeros((r, robot.degrees, robot.legs))
-    return _Equations(
-        np.concatenate([loop, balance], 1),
-        np.concatenate([loop_by_pose, balance_by_pose], 1),
-        np.concatenate([loop_by_length, balance_by_length], 1),
-    )
+    value = np.concatenate([loop, balance], 1)
+    by_pose = np.concatenate([loop_by_pose, balance_by_pose], 1)
+    by_length = np.concatenate([loop_by_length, balance_by_length], 1)
+    return _Equations(value, by_pose, by_length)
 
 
 def _closing(robot: Robot, loops: _Loops, x: Floats, R: Floats, error: Floats) -> tuple[Floats, Floats]:

@@ -69,15 +69,18 @@ def _directions(unknowns: Unknowns) -> Floats:
 
 def by_unknown(unknowns: Unknowns, values: Floats) -> Floats:
     """Slopes ``(p, w, d)`` of values ``(p, w, 1 + 2 c)`` at the columns of `differing_wires`."""
-    legs, p = unknowns.robot.legs, len(unknowns.prior.names)
+    legs = unknowns.robot.legs
+    p = len(unknowns.prior.names)
     c = (values.shape[2] - 1) // 2
-    up, down = values[..., 1 : 1 + c], values[..., 1 + c :]
+    up = values[..., 1 : 1 + c]
+    down = values[..., 1 + c :]
     slope = (up - down) / (2 * _STEP)
     out = np.zeros((*values.shape[:2], len(unknowns.moments[0])))
-    out[..., legs : legs + p] = slope[..., :p]
+    first_own = legs + p
+    out[..., legs:first_own] = slope[..., :p]
     leg = np.arange(legs)
     for k in range(c - p):
-        own = legs + p + k * legs + leg
+        own = first_own + k * legs + leg
         out[:, leg, own] = slope[..., p + k]
     return out
 
@@ -106,14 +109,16 @@ def grown(
     columns = _count(wires)
     if not unknowns.prior.creeps:
         strain = np.zeros((*pull_N.shape, columns))
-        return Grown(strain[..., 0], by_unknown(unknowns, strain), strain[..., 0])
+        none = strain[..., 0]
+        return Grown(none, by_unknown(unknowns, strain), none)
     # two more columns: all tensions a little larger, and smaller
-    more = wires.part(np.concatenate([np.arange(columns), [0, 0]]))
+    rows = np.concatenate([np.arange(columns), [0, 0]])
     factor = np.concatenate([np.ones(columns), [1 + _LOAD, 1 - _LOAD]])
     tensions = np.maximum(pull_N[..., None] * factor, 0.0)
-    strain, course = crept(more, loaded(tensions), known)
+    strain, course = crept(wires.part(rows), loaded(tensions), known)
     by_wires = by_unknown(unknowns, strain[..., :-2])
-    return Grown(strain[..., 0], by_wires, _by_pull(strain, pull_N), course)
+    by_pull = _by_pull(strain, pull_N)
+    return Grown(strain[..., 0], by_wires, by_pull, course)
 
 
 def _by_pull(strain: Floats, pull_N: Floats) -> Floats:

@@ -132,18 +132,23 @@ class Unknowns:
 
     def parts(self, white: Floats) -> Parts:
         """Physical values of a vector ``(m,)``."""
+        legs, errors = self.robot.legs, self.errors
         mean, root = self.moments
         wires = mean + root @ white[self.slices["wires"]]
-        drum, level = white[self.slices["drum"]], white[self.slices["level"]]
-        none = np.zeros(self.robot.legs)
+        bias = self.prior.bias_N(legs, wires[None])[0]
+        drum = level = np.zeros(legs)
+        if errors.drum > 0:
+            drum = of_each_leg(self.robot, errors.drum * white[self.slices["drum"]])
+        if errors.level_N > 0:
+            level = errors.level_N * white[self.slices["level"]]
         return Parts(
-            exit_m=self._moved("exit", white, self.robot.exit_m, self.errors.exit_m),
-            platform_m=self._moved("platform", white, self.robot.platform_m, self.errors.platform_m),
-            reference_m=wires[: self.robot.legs],
-            bias_N=self.prior.bias_N(self.robot.legs, wires[None])[0],
-            drum=of_each_leg(self.robot, self.errors.drum * drum) if len(drum) else none,
+            exit_m=self._moved("exit", white, self.robot.exit_m, errors.exit_m),
+            platform_m=self._moved("platform", white, self.robot.platform_m, errors.platform_m),
+            reference_m=wires[:legs],
+            bias_N=bias,
+            drum=drum,
             wires=wires,
-            level_N=self.errors.level_N * level if len(level) else none,
+            level_N=level,
         )
 
     def _moved(self, name: str, white: Floats, points_m: Floats, sd_m: float) -> Floats:

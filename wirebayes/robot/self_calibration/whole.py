@@ -137,12 +137,14 @@ class _Search:
             progress(taken / _ROUNDS)
             found = self._round()
             sd = np.sqrt(np.diag(found.covariance))
-            moved = np.abs(self.state.white - self.passed[-1].white) / sd
+            change = self.state.white - self.passed[-1].white
+            moved = np.abs(change) / sd
             moved_on = float(moved.max(initial=0.0))
             if self._settled(found) and moved_on < _STILL:
                 return found
             self.opened_m.append(length_rms_m(found))
-            if _given_up(self.opened_m, most_open_m(found, _HOPELESS), lost_m(found)):
+            hopeless_m = most_open_m(found, _HOPELESS)
+            if _given_up(self.opened_m, hopeless_m, lost_m(found)):
                 break
             self._go_on(found, sd, moved_on)
         return replace(found, converged=False)

@@ -232,10 +232,12 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
         return {"pose_now": None, "joint_values_for_home_m": None}
     unknowns = found.unknowns
     parts = unknowns.parts(found.state.white)
-    wires = unknowns.prior.wires(robot, parts.wires[None])[0]
-    there, home, turn = moved(robot, parts), robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
-    tau = inverse.tensions(there, home, turn)
-    joint = inverse.commands(there, wires, home, turn, tau, s.strain[:, None], parts.reference_m[:, None]).joint_m[0]
+    wires, _ = unknowns.prior.wires(robot, parts.wires[None])
+    there = moved(robot, parts)
+    home = robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
+    tau = inverse.tensions(there, *home)
+    strain, reference = s.strain[:, None], parts.reference_m[:, None]
+    joint = inverse.commands(there, wires, *home, tau, strain, reference).joint_m[0]
     if not usable:
         joint = np.full(robot.legs, np.nan)
     return pose_and_home(robot, s.position_m.mean[-1], s.turn_rad.mean[-1], joint)

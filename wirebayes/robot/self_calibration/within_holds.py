@@ -189,15 +189,20 @@ def _held(wires: Wires, carried: CreepState, loaded: Loaded, course: TensionCour
         states = _creeping(wires, carried, times, path)
         strains = np.array([state.strain(wires) for state in states])
         change = _tensions(loaded, course, hold, strains) - path
-        same = bool(np.abs(change).max() < _SAME * loaded.sd_N)
-        further = 0.0 if same or before is None else _extrapolated(before, change)
+        largest_N = np.abs(change).max()
+        same = bool(largest_N < _SAME * loaded.sd_N)
+        further = 0.0
+        if before is not None and not same:
+            further = _extrapolated(before, change)
         path = np.maximum(path + (1.0 + further) * change, 0.0)
         if same:
             break
         before = change if before is None else None
     coarse = _creeping(wires, carried, times[::2], path[::2])[-1]
-    off = strains[-1] - coarse.strain(wires)
-    return _Held(strains[-1], off, _ahead(strains)[..., 0], path, same, states[-1])
+    strain = strains[-1]
+    off = strain - coarse.strain(wires)
+    ahead = _ahead(strains)[..., 0]
+    return _Held(strain, off, ahead, path, same, states[-1])
 
 
 def _ahead(strains: Floats) -> Floats:
