@@ -28,7 +28,7 @@ def counted(count: int, what: str) -> str:
 def lasting(seconds: float) -> str:
     """A time as people say it: 45 s, 12 min, 24 h."""
     unit, size = next((unit, size) for unit, size in _TIMES if seconds >= size or size == 1.0)
-    return f"{seconds / size:.3g} {unit}"
+    return f"{short(seconds / size, 3)} {unit}"
 
 
 def to_be_held(seconds: float) -> str:
@@ -143,8 +143,8 @@ def unit_text(unit: str) -> str:
 
 
 def short(value: float, digits: int = 4) -> str:
-    """A number with at most so many digits and no zeros behind them: 6, 4.5, 1800."""
-    return f"{float(f'{value:.{digits}g}'):g}"
+    """A number with at most so many digits, no zeros behind them and no exponent below 10^9: 6, 4.5, 1800, 2100000."""
+    return f"{float(f'{value:.{digits}g}'):.9g}"
 
 
 def coordinates(values: Iterable[float], digits: int = 4) -> str:

@@ -64,7 +64,7 @@ def _exit_points(points: MeanAndSd) -> list[str]:
     lines = ["  exit points in mm, ± standard error:"]
     for wire, (means, errors) in enumerate(zip(points["mean"], points["sd"], strict=True), start=1):
         axes = zip(means, errors, strict=True)
-        place = ", ".join(f"{1e3 * mean:z.1f} ± {1e3 * error:.2g}" for mean, error in axes)
+        place = ", ".join(f"{1e3 * mean:z.1f} ± {short(1e3 * error, 2)}" for mean, error in axes)
         lines.append(f"    wire {wire}: ({place})")
     return lines
 

@@ -107,7 +107,8 @@ def _gain(report: ExperimentFindings) -> str:
     if before is None or after is None:
         return ""
     worse = ": no better" if error_grows(held) else ""
-    return f"error on holds kept out of the fit: {before:.3g} -> {after:.3g} {unit_read(held['plain'])} rms{worse}"
+    change = f"{short(before, 3)} -> {short(after, 3)} {unit_read(held['plain'])}"
+    return f"error on holds kept out of the fit: {change} rms{worse}"
 
 
 def _unit_and_meaning(effect: str, unit: str) -> str:
@@ -191,21 +192,21 @@ def of_plan(row: JudgedProtocol) -> list[str]:
     """Of a planned test: its rank and length, and what would be known afterwards."""
     budget = "" if row["within_budget"] else ", longer than the available time"
     name = f"{row['rank']}. {row['name']}"
-    lines = [f"{name}: {row['duration_min']:.3g} min{budget}, {row['information_bits']:.3g} bits"]
+    lines = [f"{name}: {short(row['duration_min'], 3)} min{budget}, {short(row['information_bits'], 3)} bits"]
     known = []
     parameters = row["parameters"]
     for parameter in _SHOWN:
         if parameter in parameters:
             width = parameters[parameter]
             unit = unit_text(width["unit"])
-            known.append(f"{parameter} {width['sd']:.2g} {unit}".rstrip())
+            known.append(f"{parameter} {short(width['sd'], 2)} {unit}".rstrip())
     creep = row["creep"]
     creep_sd = creep["creep_1h_mm"]["sd"]
-    known.append(f"creep after 1 h at {creep['tension_N']:.3g} N {creep_sd:.2g} mm")
+    known.append(f"creep after 1 h at {short(creep['tension_N'], 3)} N {short(creep_sd, 2)} mm")
     lines.append(f"  expected sd: {', '.join(known)}")
     drift_sd = row["robot"] and row["robot"]["drift_sd_mm"]
     if drift_sd is not None:
-        lines.append(f"  drift of the robot after 1 h: sd {drift_sd:.2g} mm")
+        lines.append(f"  drift of the robot after 1 h: sd {short(drift_sd, 2)} mm")
     return lines
 
 
@@ -218,7 +219,7 @@ def of_check(name: str, test: CheckedExperiment) -> list[str]:
     lines = [f"{name}: {_recorded(test, unit)}; {test['length_mm']:g} mm of {test['material']}"]
     if test["temperature_C"]:
         coldest, warmest = test["temperature_C"]
-        lines.append(f"  temperature from {coldest:.3g} to {warmest:.3g} °C")
+        lines.append(f"  temperature from {short(coldest, 3)} to {short(warmest, 3)} °C")
     lines += _holds_table(test, unit)
     lines += _determined(test)
     lines += _shown(test)
@@ -245,7 +246,7 @@ def _recorded(test: CheckedExperiment, unit: str) -> str:
     many = f"{counted(test['recorded_holds'], 'hold')}, {counted(test['readings'], 'reading')}"
     step = read_value(test, "resolution")
     steps = f", written in steps of {step:g} {unit}" if step else ""
-    return f"{many} in {test['duration_s'] / 60.0:.3g} min{steps}"
+    return f"{many} in {short(test['duration_s'] / 60.0, 3)} min{steps}"
 
 
 def _determined(test: CheckedExperiment) -> list[str]:
@@ -268,8 +269,8 @@ def _holds_table(test: CheckedExperiment, unit: str) -> list[str]:
     for hold in test["holds"]:
         number = "-" if hold["number"] is None else hold["number"]
         place = f"{hold['tension_N']:g} N" if weights else f"{hold['displacement_mm']:g} mm"
-        begins = f"{hold['start_s']:.6g} s"
-        lasts = f"{hold['duration_s']:.6g} s"
+        begins = f"{short(hold['start_s'], 6)} s"
+        lasts = f"{short(hold['duration_s'], 6)} s"
         lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {_course(hold, unit)}")
     return lines
 
@@ -279,7 +280,7 @@ def _course(hold: HoldUnderstood, unit: str) -> str:
     if hold["number"] is None:
         return "none: held, not recorded"
     first, last = read_value(hold, "first"), read_value(hold, "last")
-    return f"{hold['readings']} from {hold['first_s']:g} s on, {first:.4g} to {last:.4g} {unit}"
+    return f"{hold['readings']} from {hold['first_s']:g} s on, {short(first, 4)} to {short(last, 4)} {unit}"
 
 
 _SHOWS = {

@@ -15,6 +15,7 @@ from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.sentences import short
 
 OFF_PLANE = 1e-6  # of the robot's span: so far from its plane a pose is rounded
 
@@ -98,7 +99,7 @@ def _refuse_off_plane(robot: Robot, position_m: Floats, rotation: Floats) -> Non
     far = float(plane.off(robot, position_m[None], rotation[None])[0])
     if robot.freedom == "orientation" and far > 0:
         home = ", ".join(f"{v:g}" for v in robot.home_m)
-        raise InputError(f"--position: found a position {far:.3g} m off the ball joint, expected {home}")
+        raise InputError(f"--position: found a position {short(far, 3)} m off the ball joint, expected {home}")
     if robot.plane is not None and far > OFF_PLANE * robot.span_m:
         home, normal = (", ".join(f"{v:g}" for v in values) for values in (robot.home_m, robot.plane.normal))
         raise InputError(

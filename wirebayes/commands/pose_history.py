@@ -23,6 +23,7 @@ from wirebayes.robot.mechanics import plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.self_calibration.calibrated import to_dict
+from wirebayes.sentences import short
 from wirebayes.strict.columns import columns_table
 from wirebayes.strict.files import PathLike
 from wirebayes.views.calibration import Calibration
@@ -181,5 +182,6 @@ def _refuse_off_plane(robot: Robot, option: str, history: History) -> None:
     if far.max() > OFF_PLANE * robot.span_m:
         when = history.times_s[int(far.argmax())]
         raise InputError(
-            f"{option}: found a pose {far.max():.3g} m off the robot's plane or ball joint at {when:g} s, expected none"
+            f"{option}: found a pose {short(far.max(), 3)} m off the robot's plane or ball joint at {when:g} s, "
+            "expected none"
         )

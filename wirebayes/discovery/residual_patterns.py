@@ -10,6 +10,7 @@ from wirebayes.json_files.discovery import Disagreement
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import NOISES, Sample
 from wirebayes.numeric.typing import Array
+from wirebayes.sentences import short
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Control
 
@@ -211,7 +212,7 @@ def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
     if pattern.hold is not None:
         side = "above" if amplitude > 0 else "below"
         size = abs(amplitude) * pattern.counts_as
-        off = f"{size:.3g} {pattern.unit}"
+        off = f"{short(size, 3)} {pattern.unit}"
         return f"{names}: hold {pattern.hold} lies {off} {side} what the others predict ({chance})."
     if pattern.moves is not None:
         parameter = _PARAMETERS[pattern.moves]
@@ -227,6 +228,6 @@ def _change(amplitude: float, covariate: str) -> str:
     grows = amplitude > 0
     factor = np.exp(np.clip(2 * abs(amplitude), 0, 20))
     share = factor - 1 if grows else 1 - 1 / factor
-    size = f"{100 * share:.2g} %" if factor < 2 else f"a factor of {factor:.3g}"
+    size = f"{short(100 * share, 2)} %" if factor < 2 else f"a factor of {short(factor, 3)}"
     way = "grows" if grows else "decreases"
     return f"{way} with {covariate}, by {size}"

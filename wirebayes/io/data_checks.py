@@ -15,7 +15,7 @@ from wirebayes.io.readings import READ, times_run_on
 from wirebayes.io.zero_shifts import slack_below, zero_shift
 from wirebayes.numeric.typing import Floats
 from wirebayes.result_warnings import Notice
-from wirebayes.sentences import some_of
+from wirebayes.sentences import short, some_of
 from wirebayes.wire.protocol import Control, Protocol
 
 RUN_ON = 0.01  # two holds of four readings: rarer orders of honest times are not worth a silence
@@ -111,8 +111,8 @@ def negative_tension(readings: CheckedTest) -> str:
     if -lowest[worst] <= max(NEGATIVE * largest, spread):
         return ""
     return (
-        f"tension falls to {lowest[worst]:.4g} N in hold {readings.number[worst]}, while a wire only pulls and a slack "
-        "one reads 0 N: check the sign of tension_N and where it was zeroed"
+        f"tension falls to {short(lowest[worst], 4)} N in hold {readings.number[worst]}, while a wire only pulls and "
+        "a slack one reads 0 N: check the sign of tension_N and where it was zeroed"
     )
 
 
@@ -127,7 +127,7 @@ def slack_holds(readings: CheckedTest) -> str:
         return ""
     return (
         f"the wire pulls with next to nothing in hold{'s' * (len(numbers) > 1)} {some_of(numbers)} "
-        f"({least:.2g} N or less): a slack wire shows neither stiffness nor creep, so test it where it stays taut"
+        f"({short(least, 2)} N or less): a slack wire shows neither stiffness nor creep, so test it where it stays taut"
     )
 
 
@@ -146,12 +146,12 @@ def unresponsive_tension(readings: CheckedTest) -> str:
     largest = max(row.max() for row in readings.each)
     if largest <= FLAT * noise:
         return (
-            f"no reading stands out from the scatter within the holds ({noise:.2g} N): the wire was slack "
+            f"no reading stands out from the scatter within the holds ({short(noise, 2)} N): the wire was slack "
             "throughout, or rows of other tests are mixed in"
         )
     if len(means) > 1 and np.ptp(means) <= FLAT * noise:
         return (
-            f"tension stays at {means.mean():.4g} N while the displacement changes by {span:g} mm: "
+            f"tension stays at {short(means.mean(), 4)} N while the displacement changes by {span:g} mm: "
             "check that tension_N is this wire's, and the wire's clamps"
         )
     begins = np.array([row[0] for row in readings.each])
@@ -172,7 +172,7 @@ def elongation(readings: CheckedTest) -> str:
         return "the displacement falls as the weight rises: check the sign of displacement_mm"
     if len(means) > 1 and np.ptp(means) <= FLAT * readings.noise:
         return (
-            f"the displacement stays at {means.mean():.4g} mm while the weight changes by {np.ptp(weights):g} N: "
+            f"the displacement stays at {short(means.mean(), 4)} mm while the weight changes by {np.ptp(weights):g} N: "
             "check that displacement_mm is this wire's, and the gauge"
         )
     return ""
@@ -186,8 +186,8 @@ def strain_scale(readings: CheckedTest) -> str:
         return ""
     much = "only " if strain < LEAST_STRAIN else ""
     return (
-        f"the displacements differ by {much}{strain:.2g} of the wire's length of {readings.protocol.length_mm:g} mm: "
-        "check that displacement_mm and length_mm are both in mm"
+        f"the displacements differ by {much}{short(strain, 2)} of the wire's length of "
+        f"{readings.protocol.length_mm:g} mm: check that displacement_mm and length_mm are both in mm"
     )
 
 
@@ -212,9 +212,9 @@ def outlier(readings: CheckedTest) -> str:
     if distance[worst] <= max(ISOLATED * usual, GROSS * span):
         return ""
     return (
-        f"the reading of {each[hold][at]:.5g} {unit} in hold {readings.number[hold]} at "
-        f"{readings.times_s[hold][at]:g} s is {distance[worst]:.3g} {unit} from its neighbours: check it, correct a "
-        "misprint or leave its row out"
+        f"the reading of {short(each[hold][at], 5)} {unit} in hold {readings.number[hold]} at "
+        f"{readings.times_s[hold][at]:g} s is {short(distance[worst], 3)} {unit} from its neighbours: check it, "
+        "correct a misprint or leave its row out"
     )
 
 
@@ -252,7 +252,7 @@ def rising(readings: CheckedTest) -> str:
     if rises.mean() < RISING_SHARE or np.median(rise) <= RISE * noise:
         return ""
     return (
-        f"tension rises within {int(rises.sum())} of {len(rise)} holds on loading, by {np.median(rise):.3g} N in "
+        f"tension rises within {int(rises.sum())} of {len(rise)} holds on loading, by {short(np.median(rise), 3)} N in "
         "the middle, while a held wire relaxes: check that time_s runs forward, and the sensor and the room for drift"
     )
 
@@ -274,8 +274,8 @@ def creeping_back(readings: CheckedTest) -> str:
         return ""
     return (
         f"the displacement falls within {int(falls.sum())} of {len(fall)} holds under ever larger weights, by "
-        f"{np.median(fall):.3g} mm in the middle, while a loaded wire creeps on: check that displacement and tension "
-        "are not interchanged, that time_s runs forward, and the gauge and the room for drift"
+        f"{short(np.median(fall), 3)} mm in the middle, while a loaded wire creeps on: check that displacement and "
+        "tension are not interchanged, that time_s runs forward, and the gauge and the room for drift"
     )
 
 
@@ -293,9 +293,9 @@ def jump_within_a_hold(readings: CheckedTest) -> str:
             else "if the gauge or the hook was touched, correct the readings from there on"
         )
         return (
-            f"{READ[control].split('_')[0]} jumps from {row[at]:.5g} to {row[at + 1]:.5g} {readings.unit} between "
-            f"{time[at]:g} and {time[at + 1]:g} s of hold {readings.number[j]}, out of the hold's course, and stays "
-            f"there: {moved}"
+            f"{READ[control].split('_')[0]} jumps from {short(row[at], 5)} to {short(row[at + 1], 5)} "
+            f"{readings.unit} between {time[at]:g} and {time[at + 1]:g} s of hold {readings.number[j]}, out of the "
+            f"hold's course, and stays there: {moved}"
         )
     return ""
 

@@ -14,7 +14,7 @@ from wirebayes.io.checked_test import reading_noise
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold
 from wirebayes.numeric.typing import Floats, Ints
-from wirebayes.sentences import counted, listed
+from wirebayes.sentences import counted, listed, short
 from wirebayes.wire.protocol import Protocol
 
 NOTHING = 0.03  # of the reading before: no wire relaxes so far from one reading to the next
@@ -271,8 +271,8 @@ def _jumps(test: _Test) -> list[Event]:
         before = np.ptp(test.read[:i])
         if abs(jump) > max(JUMP * before, MOVED * test.noise) and _stays_away(test.read, i, jump):
             text = (
-                f"displacement jumps by {jump:.3g} mm in {test.place(i)} and stays there: did the wire break or slip? "
-                "leave these readings out"
+                f"displacement jumps by {short(jump, 3)} mm in {test.place(i)} and stays there: did the wire break "
+                "or slip? leave these readings out"
             )
             return [Event("break", text, np.arange(i, len(test.read)))]
     return []

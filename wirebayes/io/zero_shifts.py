@@ -11,6 +11,7 @@ import numpy as np
 
 from wirebayes.io.checked_test import CheckedTest
 from wirebayes.numeric.typing import Bools, Floats, Ints
+from wirebayes.sentences import short
 
 FEWEST = 6  # with fewer moves one way nothing shows what a move usually adds
 STANDS_OUT = 4.0  # a step is off by so many times what nine in ten of the other moves are off by
@@ -67,9 +68,9 @@ def zero_shift(readings: CheckedTest) -> str:
     what = "tension" if readings.protocol.control == "displacement" else "displacement"
     before, after = readings.number[hold - 1], readings.number[hold]
     return (
-        f"from hold {before} to hold {after} the {what} changes by {step:.3g} {readings.unit}, where the other moves "
-        f"suggest {expected:.3g} {readings.unit}, and the difference stays: was the sensor zeroed there, did the wire "
-        "slip, or is time or a move not recorded? correct the readings from there on, or leave them out"
+        f"from hold {before} to hold {after} the {what} changes by {short(step, 3)} {readings.unit}, where the other "
+        f"moves suggest {short(expected, 3)} {readings.unit}, and the difference stays: was the sensor zeroed there, "
+        "did the wire slip, or is time or a move not recorded? correct the readings from there on, or leave them out"
     )
 
 

@@ -12,7 +12,7 @@ from wirebayes.io.readings import READ, SET, Hold, protocol_holds
 from wirebayes.numeric.typing import Array, Bools, Floats, Ints
 from wirebayes.prediction.predictive import PredictionRequest
 from wirebayes.results.read_back import Stored
-from wirebayes.sentences import counted
+from wirebayes.sentences import counted, short
 from wirebayes.strict.table import CsvTable
 from wirebayes.wire.effect import EventEffect
 from wirebayes.wire.protocol import Protocol
@@ -220,7 +220,7 @@ class _File:
         limit = float(np.min(stored.draws["k1"] - _WEIGHT_SDS * stored.draws["setting_sd"]))
         for i, hold in enumerate(self.holds):
             if hold.setting >= limit:
-                expected = f"a tension below {limit:.4g} N: eq (3) allows none as large as k1"
+                expected = f"a tension below {short(limit, 4)} N: eq (3) allows none as large as k1"
                 raise self.complain(i, 0, SET[hold.control], f"{hold.setting:g}", expected)
 
     def check_repeats(self, trained: Protocol, row_of: dict[int, int]) -> None:

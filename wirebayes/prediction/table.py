@@ -19,6 +19,7 @@ from wirebayes.prediction.predictive import draw_predictive
 from wirebayes.prediction.request import ProtocolRequest
 from wirebayes.result_warnings import Notice
 from wirebayes.results.read_back import Stored
+from wirebayes.sentences import short
 from wirebayes.strict.files import PathLike
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control
@@ -109,8 +110,8 @@ def _far_off(hold: Hold, read: float, drawn: Floats) -> str | None:
         return None
     unit = READ_UNIT[hold.control]
     return (
-        f"hold {hold.number}: its first reading, {read:.4g} {unit}, is {distance / sd:.0f} standard "
-        f"deviations from the {mean:.4g} {unit} expected there: check {READ[hold.control]} (in {unit}?) and "
+        f"hold {hold.number}: its first reading, {short(read, 4)} {unit}, is {distance / sd:.0f} standard "
+        f"deviations from the {short(mean, 4)} {unit} expected there: check {READ[hold.control]} (in {unit}?) and "
         f"{SET[hold.control]}; what follows from it is not to be relied on"
     )
 
@@ -140,9 +141,13 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
     time = max(row[columns.index("time_s")] for row in rows)
     out = []
     if tension > FAR_UP * highest:
-        out.append(f"tensions of up to {tension:.4g} N are predicted; none above {highest:.4g} N was tested")
+        out.append(
+            f"tensions of up to {short(tension, 4)} N are predicted; none above {short(highest, 4)} N was tested"
+        )
     if time > FAR_ON * longest:
-        out.append(f"holds of up to {time:.4g} s are predicted; none longer than {longest:.4g} s was tested")
+        out.append(
+            f"holds of up to {short(time, 4)} s are predicted; none longer than {short(longest, 4)} s was tested"
+        )
     return [Notice("extrapolation", text) for text in out]
 
 

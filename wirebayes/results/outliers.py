@@ -13,6 +13,7 @@ from scipy.special import stdtrit
 from wirebayes.json_files.batch import OutlierRow, Row
 from wirebayes.json_files.values import INTERVAL
 from wirebayes.numeric.typing import Array
+from wirebayes.sentences import short
 
 FALSE_ALARMS = 0.05  # of materials whose specimens are all alike, the usual one in twenty has an outlier
 LEAST_SPECIMENS = 6  # with fewer, one would have to lie more than twelve spreads away to be called far
@@ -82,8 +83,8 @@ def _row(
     called = f"{parameter} per m of length" if parameter == "B" else parameter
     side = "above" if z > 0 else "below"
     sentence = (
-        f"{experiment}: {called} is {value:.4g}, {abs(z):.1f} robust standard deviations {side} "
-        f"the median of {specimens} specimens of {material}, {median:.4g}"
+        f"{experiment}: {called} is {short(value, 4)}, {abs(z):.1f} robust standard deviations {side} "
+        f"the median of {specimens} specimens of {material}, {short(median, 4)}"
     )
     return {
         "experiment": experiment,

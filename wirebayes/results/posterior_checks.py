@@ -112,8 +112,9 @@ def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:
     unit = SET_UNIT[sample.protocol.control]
     settings, read = ("weights", "displacements") if unit == "N" else ("displacements", "tensions")
     return (
-        f"setting_sd is at least {low:.2g} {unit} while the test steps by {step:.3g} {unit}: the {settings} do not "
-        f"explain the {read}; look for holds in the wrong order, readings of two wires mixed, or another unit"
+        f"setting_sd is at least {short(low, 2)} {unit} while the test steps by {short(step, 3)} {unit}: the "
+        f"{settings} do not explain the {read}; look for holds in the wrong order, readings of two wires mixed, or "
+        "another unit"
     )
 
 
@@ -148,14 +149,14 @@ def noise(own: Mapping[str, Floats], sample: Sample) -> str:
     unit = READ_UNIT[sample.protocol.control]
     if signal > 0 and low > NOISY * signal:
         return (
-            f"sensor_sd is at least {low:.2g} {unit} while the readings differ by {signal:.3g} {unit} in all: no wire "
-            "of this model gives them; look for a misprint among them, mixed-up rows, or another unit"
+            f"sensor_sd is at least {short(low, 2)} {unit} while the readings differ by {short(signal, 3)} {unit} in "
+            "all: no wire of this model gives them; look for a misprint among them, mixed-up rows, or another unit"
         )
     largest = signal if unit == "mm" else np.abs(readings).max()  # where displacements begin means nothing
     if max(high, sample.resolution) < QUIET * largest:
         return (
-            f"the readings carry no noise (sensor_sd below {high:.1g} {unit}): they were computed or smoothed, and the "
-            f"intervals are far narrower than a bench's; state resolution_{unit}, and fit what the sensor wrote"
+            f"the readings carry no noise (sensor_sd below {short(high, 1)} {unit}): they were computed or smoothed, "
+            f"and the intervals are far narrower than a bench's; state resolution_{unit}, and fit what the sensor wrote"
         )
     return ""
 
@@ -170,9 +171,9 @@ def unlikely_stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -
         return ""
     low, high = np.quantile(prior["k1"], [0.05, 0.95])
     return (
-        f"k1 = {middle:.3g} N is far outside its prior ({low:.3g} to {high:.3g} N, from the tensions and strains of "
-        "the test): check displacement_mm and length_mm, and whether the wire was taut; if they are right, give this "
-        "wire a prior of its own ([prior.k1])"
+        f"k1 = {short(middle, 3)} N is far outside its prior ({short(low, 3)} to {short(high, 3)} N, from the "
+        "tensions and strains of the test): check displacement_mm and length_mm, and whether the wire was taut; if "
+        "they are right, give this wire a prior of its own ([prior.k1])"
     )
 
 

@@ -13,7 +13,7 @@ from wirebayes.io.bench.plateaus import FEWEST, Plateau, noise_of, plateaus
 from wirebayes.io.bench.recorded import BEGUN_BEFORE, CONTINUOUS, PAUSE, Cut, Cycles, Readings, level_of
 from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.result_warnings import Notice
-from wirebayes.sentences import counted
+from wirebayes.sentences import counted, short
 
 ARRIVING = 2  # readings by which the end of a move is known: none of them counts
 LONG = 10  # times as many readings: shorter holds have none to spare
@@ -168,11 +168,11 @@ def _notes(readings: Readings, found_holds: Sequence[Plateau], move_s: float) ->
     if move_s > 0.0:
         begins = (
             "each hold begins in the middle of the move to it, for the wire creeps while it moves; moves took "
-            f"{move_s:.3g} s (median), and readings as soon after one are left out, up to a tenth of the hold"
+            f"{short(move_s, 3)} s (median), and readings as soon after one are left out, up to a tenth of the hold"
         )
     return [
         f"a continuous recording of {count} readings: {counted(len(found_holds), 'hold')} where the {readings.role} "
-        f"stays within {noise:.2g} {readings.unit} or so, {count - kept} readings of moves dropped",
+        f"stays within {short(noise, 2)} {readings.unit} or so, {count - kept} readings of moves dropped",
         begins,
     ]
 
@@ -182,10 +182,10 @@ def _slow(moves_s: Floats, held_s: Floats) -> tuple[Notice, ...]:
     if np.median(moves_s / held_s) <= AFTER_MOVE:
         return ()
     text = (
-        f"moves took {np.median(moves_s):.3g} s, {100.0 * np.median(moves_s / held_s):.0f} % of their holds (medians): "
-        "what the wire does while it moves is taken as one step in the middle of the move, which is right for moves of "
-        f"up to {100.0 * AFTER_MOVE:.0f} % of a hold; beyond, creep rates may be off by more than their intervals say, "
-        "and discover may name effects that the moves made: move faster or hold longer"
+        f"moves took {short(np.median(moves_s), 3)} s, {100.0 * np.median(moves_s / held_s):.0f} % of their holds "
+        "(medians): what the wire does while it moves is taken as one step in the middle of the move, which is right "
+        f"for moves of up to {100.0 * AFTER_MOVE:.0f} % of a hold; beyond, creep rates may be off by more than their "
+        "intervals say, and discover may name effects that the moves made: move faster or hold longer"
     )
     return (Notice("left-out", text),)
 

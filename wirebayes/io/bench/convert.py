@@ -42,7 +42,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import OPTIONAL, REQUIRED
 from wirebayes.numeric.typing import Floats
 from wirebayes.result_warnings import Notice
-from wirebayes.sentences import listed
+from wirebayes.sentences import listed, short
 from wirebayes.wire.protocol import Control
 
 
@@ -217,7 +217,7 @@ def _convert(recorded: Recorded, notes: list[str], about: About, choices: Choice
     notes += thinned
     notes += _missing_holds(holds)
     if resolution:
-        step = f"{resolution:.3g} {UNITS[read]}"
+        step = f"{short(resolution, 3)} {UNITS[read]}"
         notes.append(f"{read}s are written in steps of {step}: that is their resolution")
 
     header = (*REQUIRED, *OPTIONAL) if "temperature" in values else REQUIRED

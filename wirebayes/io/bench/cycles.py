@@ -9,7 +9,7 @@ import numpy as np
 from wirebayes.io.bench.no_weight import NEXT_TO_NOTHING
 from wirebayes.io.bench.recorded import Cycles, Readings
 from wirebayes.numeric.typing import Floats
-from wirebayes.sentences import lasting
+from wirebayes.sentences import lasting, short
 
 DEPARTS = 0.05  # of the range of the cycles: nearer to where the wire was before them it still rests there
 TAUT = 0.05  # of the largest reading: at less, an unloaded wire pulls with next to nothing however far it is let go
@@ -39,9 +39,9 @@ def cycles_before(readings: Readings, before_hold: int, left: int, turn: int, en
         setting = max(setting, NEXT_TO_NOTHING * high)
     lasts = lasting(end_s - begin_s)
     sentence = (
-        f"before hold {before_hold} the {role} went to and fro between {low:.4g} and {high:.4g} {unit} for "
-        f"{lasts}: what the wire crept meanwhile is that of a hold without readings at {setting:.4g} {unit}, where it "
-        "pulls as in the mean of the cycles"
+        f"before hold {before_hold} the {role} went to and fro between {short(low, 4)} and {short(high, 4)} {unit} for "
+        f"{lasts}: what the wire crept meanwhile is that of a hold without readings at {short(setting, 4)} {unit}, "
+        "where it pulls as in the mean of the cycles"
     )
     rounded = float(f"{setting:.6g}")
     return Cycles(before_hold, rounded, begin_s, end_s, sentence)

@@ -33,7 +33,7 @@ from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
 from wirebayes.io.unread_ends import unread_s
 from wirebayes.numeric.typing import Floats
-from wirebayes.sentences import counted, lasting, listed
+from wirebayes.sentences import counted, lasting, listed, short
 
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
@@ -227,7 +227,7 @@ def _scatter(readings: Readings, groups: Sequence[Rows]) -> str:
     drifts = bool(long) and trend_by_chance(long, x) < TREND_BY_CHANCE
     how = "drift" if drifts else "scatter"
     role = readings.role
-    return f"{role}s {how} by up to {largest:.2g} {readings.unit} in a hold: its median is its {role}"
+    return f"{role}s {how} by up to {short(largest, 2)} {readings.unit} in a hold: its median is its {role}"
 
 
 def _check_resets(readings: Readings, groups: Sequence[Rows]) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 
 from wirebayes.io.bench.table import RawTable
 from wirebayes.numeric.typing import Bools, Floats, Ints
+from wirebayes.sentences import short
 
 TICKS_S = (0.001, 0.01, 0.1, 1.0, 60.0)  # what clocks count; rarer stamps are a person's, or a test's own steps
 FEWEST = 10  # stamps between the first and the last that show a habit
@@ -76,8 +77,8 @@ def spread(time_s: Floats) -> tuple[Floats, list[str]]:
     places = np.where(followed, counts, complete)
     within = np.arange(n) - np.repeat(begins, counts)
     since_stamp = tick * within / np.repeat(places, counts)
-    note = f"each time stamp, of {tick:g} s, is that of {usual:.2g} readings: they are spread evenly up to the next one"
-    return time_s + since_stamp, [note]
+    stamped = f"each time stamp, of {tick:g} s, is that of {short(usual, 2)} readings"
+    return time_s + since_stamp, [f"{stamped}: they are spread evenly up to the next one"]
 
 
 def _tick(steps_s: Floats) -> float | None:

@@ -33,7 +33,7 @@ from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pages.wires_known import wires_known
 from wirebayes.report.pictures.robot import CONTROLLERS
 from wirebayes.robot.mechanics.wires_used import specimens_in_words
-from wirebayes.sentences import lasting, quantity, specimens_are
+from wirebayes.sentences import lasting, quantity, short, specimens_are
 
 _FIRST = 2  # pictures that prove the answer: how far it moves, and how far it turns
 _CAPTIONS = {
@@ -202,7 +202,7 @@ def _slice(entry: SliceOfWorkspace) -> list[str]:
     if any(turn):
         components = ", ".join(f"{value:.3g}" for value in turn)
         orientation = f"({components}) rad"
-    where = [orientation, f"{entry['axis']} = {entry['at_m']:.3g} m", percent(entry["feasible"])]
+    where = [orientation, f"{entry['axis']} = {short(entry['at_m'], 3)} m", percent(entry["feasible"])]
     if not entry["feasible"]:
         return [*where, *[NONE] * 5]
     return [

@@ -15,6 +15,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.exchange.imported import ImportedRobot
+from wirebayes.sentences import short
 from wirebayes.strict.files import read_text
 
 SUFFIXES = (".g", ".cfg")
@@ -159,7 +160,7 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
 
     extent = float(np.ptp(anchors, axis=0).max())
     if extent < _SMALLEST_MM:
-        raise InputError(f"{path}: found anchors within {extent:.3g} of one another, expected millimetres")
+        raise InputError(f"{path}: found anchors within {short(extent, 3)} of one another, expected millimetres")
     if "mass" not in found.values:
         raise InputError(f"{path}: found no weight of the mover, expected M666 W or winch_mover_weight in kg")
     bounds = None

@@ -24,6 +24,7 @@ from wirebayes.robot.mechanics.rotation import matrix, vector
 from wirebayes.robot.mechanics.winches import mean_of_each_winch, of_each_leg, of_each_winch, turned_by
 from wirebayes.robot.mechanics.wires import Wires, stretched_length, tension
 from wirebayes.robot.motion import inverse
+from wirebayes.sentences import short
 from wirebayes.wire.fresh import FreshSample
 
 ANCHORS = "ABCDI"  # as M669 of RepRapFirmware names them, at most five: its E is an extruder
@@ -272,13 +273,13 @@ def working_spring(robot: Robot, line: WireDraws, wire: str | None = None) -> Wo
     of = wire if several else ""
     if not good.any():
         which = "the fitted line" if fitted and not of else f"the wire {wire}"
-        raise InputError(f"{robot.name}: {which} cannot carry {at_N:.3g} N, so no spring constant is known")
+        raise InputError(f"{robot.name}: {which} cannot carry {short(at_N, 3)} N, so no spring constant is known")
     if wires.law == "hooke" and not wires.at("strain"):
         return WorkingSpring(stiffness, "", fitted, of)
-    remark = f"The spring constant depends on the tension: it is the tangent at {at_N:.4g} N, {point}."
+    remark = f"The spring constant depends on the tension: it is the tangent at {short(at_N, 4)} N, {point}."
     if not good.all():
-        lost = 100 * np.mean(~good)
-        remark += f" {lost:.2g} % of the draws cannot carry that tension and are left out."
+        lost = 100 * float(np.mean(~good))
+        remark += f" {short(lost, 2)} % of the draws cannot carry that tension and are left out."
     return WorkingSpring(stiffness[good], remark, fitted, of)
 
 
@@ -339,7 +340,7 @@ def mujoco(robot: Robot, line: WireDraws) -> str | None:
 
 
 def _of_tangents(tension_N: Floats) -> str:
-    pulls = ", ".join(f"{value:.4g}" for value in tension_N)
+    pulls = ", ".join(f"{short(value, 4)}" for value in tension_N)
     return f"linear springs with the tension and tangent stiffness of the home pose, where the wires carry {pulls} N"
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.sentences import short
 
 
 def urdf(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> str:
@@ -116,8 +117,8 @@ def _left_out(robot: Robot, stiffness_N: Floats, zero_m: Floats) -> list[str]:
         parts, beyond = robot.lines[i], robot.beyond_m[i]
         k, zero = stiffness_N[i], zero_m[i]
         lines.append(
-            f"wire {i + 1}: {parts:g} line(s), {beyond:g} m beyond the exit; stiffness {k:.6g} N, zero-tension "
-            f"length {zero:.6g} m at the home pose"
+            f"wire {i + 1}: {parts:g} line(s), {beyond:g} m beyond the exit; stiffness {short(k, 6)} N, zero-tension "
+            f"length {short(zero, 6)} m at the home pose"
         )
     if robot.pulleys is not None:
         radii = ", ".join(f"{1e3 * radius:g}" for radius in robot.pulleys.radius_m)

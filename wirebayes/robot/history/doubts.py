@@ -13,6 +13,7 @@ from wirebayes.robot.mechanics import draws, sag
 from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.draws import WireDraws
 from wirebayes.robot.motion import inverse, plausible
+from wirebayes.sentences import short
 
 _FEWEST = 50  # effective draws; of so many, what lies beyond a 5 % quantile is 2 to 8 %
 _NAMED = 6  # times in a warning: as many as a line holds
@@ -72,7 +73,11 @@ def history_warnings(
     content : dict
         Of ``pose.json``, with ``clock`` and ``drift``.
     """
-    out = [*_lost(history.times_s, found.track), *_contradicted(history, found, line.count), *_unsure_clock(content)]
+    out = [
+        *_lost(history.times_s, found.track),
+        *_contradicted(history, found, line.count),
+        *_unsure_clock(history, content),
+    ]
     out += _dynamics(history.times_s, found.plain.position_m[0])
     holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
     longest = float(np.diff(history.times_s[holds]).max())
@@ -89,7 +94,7 @@ def _lost(times_s: Floats, track: Track) -> list[Notice]:
     lost = 1.0 - track.held[:, -1].mean()
     if lost > 0:
         first = times_s[np.argmin(track.held.all(0))]
-        text = f"the platform falls or loses its hold in {100 * lost:.3g} % of the draws, first at {first:g} s"
+        text = f"the platform falls or loses its hold in {short(100 * lost, 3)} % of the draws, first at {first:g} s"
         out.append(Notice("fall", text))
     slack = ((track.tension_N <= 0) & track.held[..., None]).any(1).mean(0)
     for i in np.flatnonzero(slack > 0.05):
@@ -105,8 +110,8 @@ def _contradicted(history: History, found: Estimate, draws_used: int) -> list[No
         out.append(Notice("not-converged", text))
     elif found.misfit is not None and found.misfit > _MISFIT:
         text = (
-            f"the readings contradict joint values and wires: mean squared residual {found.misfit:.3g}, expected about "
-            "1; check signs, units, payload and the standard errors"
+            f"the readings contradict joint values and wires: mean squared residual {short(found.misfit, 3)}, "
+            "expected about 1; check signs, units, payload and the standard errors"
         )
         out.append(Notice("misfit", text))
     if found.effective is not None and found.effective < _FEWEST:
@@ -119,17 +124,18 @@ def _contradicted(history: History, found: Estimate, draws_used: int) -> list[No
     return out
 
 
-def _unsure_clock(content: PoseHistoryJson) -> list[Notice]:
+def _unsure_clock(history: History, content: PoseHistoryJson) -> list[Notice]:
     """That poses depend on when the wires' clocks restart."""
     largest_mm = content["clock"]["largest_mm"]
     distance = content["drift"][0]["distance_mm"]
     widths = np.asarray(distance["q95"], float) - np.asarray(distance["q05"], float)
     if not largest_mm > 0.5 * np.max(widths, initial=0.0, where=np.isfinite(widths)):
         return []
-    text = (
-        f"when the wires' clocks restart matters here: by up to {largest_mm:.3g} mm, more than half of "
-        "the band; give a column hold to say it"
-    )
+    much = f"by up to {short(largest_mm, 3)} mm, more than half of the band"
+    if history.hold is None:
+        text = f"when the wires' clocks restart matters here: {much}; give a column hold to say it"
+    else:
+        text = f"clocks of the wires that ran on from hold to hold would move the poses {much}: the test cannot show it"
     return [Notice("clock", text)]
 
 
@@ -150,8 +156,8 @@ def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
     if share[k] <= _INERTIA:
         return []
     text = (
-        f"the platform's inertia is left out: at {times_s[k + 1]:.10g} s it takes {100 * share[k]:.2g} % of its weight "
-        "to accelerate it, so tensions and poses are those of a slower motion along the same way"
+        f"the platform's inertia is left out: at {times_s[k + 1]:.10g} s it takes {short(100 * share[k], 2)} % of "
+        "its weight to accelerate it, so tensions and poses are those of a slower motion along the same way"
     )
     return [Notice("left-out", text)]
 

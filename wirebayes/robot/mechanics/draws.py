@@ -3,8 +3,9 @@
 Bench quantities, instrument effects and one-off events are dropped here and go no further.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.robot.mechanics.wires import Wires
+from wirebayes.sentences import short
 from wirebayes.wire import laws
 from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed, steady_hold
 
@@ -321,10 +323,10 @@ def wire_warnings(robot: Robot, line: WireDraws, tension_N: Floats, time_s: floa
     return out
 
 
-def _span(values: Floats, form: str) -> str:
+def _span(values: Floats, written: Callable[[float], str]) -> str:
     """The least and the largest of positive values, once where they look alike; 0 for one that vanishes beside it."""
     least, largest = float(values.min()), float(values.max())
-    ends = [format(end if end >= _VANISHES * largest else 0.0, form) for end in (least, largest)]
+    ends = [written(end if end >= _VANISHES * largest else 0.0) for end in (least, largest)]
     return " to ".join(dict.fromkeys(ends))
 
 
@@ -355,9 +357,10 @@ def _beyond(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -
     if line.tension_range_N is not None and loads.size:
         low, high = line.tension_range_N
         if loads.min() < low or loads.max() > high:
-            out.append(f"tensions {_span(loads, '.3g')} N leave the tested range {low:.3g} to {high:.3g} N")
+            span = _span(loads, partial(short, digits=3))
+            out.append(f"tensions {span} N leave the tested range {short(low, 3)} to {short(high, 3)} N")
     if line.time_range_s is not None and time_s > line.time_range_s[1]:
-        out.append(f"{time_s:.4g} s is longer than the longest tested hold, {line.time_range_s[1]:.4g} s")
+        out.append(f"{short(time_s, 4)} s is longer than the longest tested hold, {short(line.time_range_s[1], 4)} s")
     lengths = 1e3 * zero_m[np.isfinite(zero_m)]
     return out + _other_lengths(line, lengths) if lengths.size else out
 
@@ -369,4 +372,4 @@ def _other_lengths(line: WireDraws, length_mm: Floats) -> list[str]:
     rule = "is taken to be a strain of the whole wire"
     if LENGTH_EXPONENT in line.parameters:
         rule = "grows with length by the exponent fitted to the tested lengths"
-    return [f"wires of {_span(length_mm, '.0f')} mm, tested at {line.length_mm:.0f} mm: creep {rule}"]
+    return [f"wires of {_span(length_mm, '{:.0f}'.format)} mm, tested at {line.length_mm:.0f} mm: creep {rule}"]

@@ -9,6 +9,7 @@ from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.drums import paid_out
 from wirebayes.robot.mechanics.firmware import wire_of
 from wirebayes.robot.mechanics.winches import of_each_leg, of_each_winch
+from wirebayes.sentences import short
 
 _MOTOR, _STRAIGHT = "motor_", "straight_"
 
@@ -82,8 +83,8 @@ def meant(name: str, joint_m: float) -> str:
         What it stands for.
     """
     if name.startswith(_MOTOR):
-        return f", which pays out {joint_m:.4g} m"
-    return f", which is {joint_m:.4g} m of wire" if name.startswith(_STRAIGHT) else ""
+        return f", which pays out {short(joint_m, 4)} m"
+    return f", which is {short(joint_m, 4)} m of wire" if name.startswith(_STRAIGHT) else ""
 
 
 def _has(header: Sequence[str], prefix: str) -> bool:

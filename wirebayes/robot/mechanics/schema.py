@@ -14,6 +14,7 @@ from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.robot.mechanics.description import Drums, Freedom, GivenWire, Plane, Pulleys, Robot, TensionRule
 from wirebayes.robot.mechanics.shipped import shipped as shipped
 from wirebayes.robot.mechanics.tensions import CHOICES
+from wirebayes.sentences import short
 from wirebayes.strict.files import read_text
 from wirebayes.strict.toml_keys import LARGEST_NUMBER, Keys
 
@@ -352,5 +353,5 @@ def _layers(leg: Keys, radius_m: float) -> dict[str, float]:
     layers = wire / (2 * math.pi * radius_m * turns)
     if layers > _MOST_LAYERS:
         expected = f"wire for no more than {_MOST_LAYERS} layers on the drum"
-        raise leg.complain("wire_length_m", f"{wire:g}, {layers:.3g} layers", expected)
+        raise leg.complain("wire_length_m", f"{wire:g}, {short(layers, 3)} layers", expected)
     return {"drum_turns": turns, "drum_layer": height, "drum_wire": wire}

@@ -5,6 +5,7 @@ import numpy as np
 from wirebayes.json_files.pose import Specimens, WiresUsed
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import CORE, WireDraws
+from wirebayes.sentences import short
 
 
 def wires_summary(robot: Robot, line: WireDraws) -> WiresUsed:
@@ -48,6 +49,6 @@ def specimens_in_words(wires: WiresUsed) -> list[str]:
         shares = []
         for parameter in CORE:
             low, middle, high = (100 * one["spread"][parameter][key] for key in ("q05", "q50", "q95"))
-            shares.append(f"{parameter} by {middle:.2g} % ({low:.2g} to {high:.2g} %)")
+            shares.append(f"{parameter} by {short(middle, 2)} % ({short(low, 2)} to {short(high, 2)} %)")
         sentences.append(f"Specimens of {name} differ as estimated from {one['tests']} tests: {', '.join(shares)}.")
     return sentences

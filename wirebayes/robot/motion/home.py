@@ -7,7 +7,7 @@ from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.motion import hanging, inverse
-from wirebayes.sentences import coordinates
+from wirebayes.sentences import coordinates, short
 
 TURNED_AWAY = 1.0  # degrees from the home orientation: nobody levels a platform by eye to much better
 
@@ -69,4 +69,6 @@ def nearest_balance(position_m: Floats, near_m: Floats) -> str:
     position_m, near_m : (3,) array
     """
     far = float(np.linalg.norm(near_m - position_m))
-    return f"the nearest position that was found to have a balance is {far:.3g} m away, ({coordinates(near_m, 5)}) m"
+    return (
+        f"the nearest position that was found to have a balance is {short(far, 3)} m away, ({coordinates(near_m, 5)}) m"
+    )

@@ -21,7 +21,7 @@ from wirebayes.robot.mechanics.joint_columns import column_of_leg, meant
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse
-from wirebayes.sentences import listed, number
+from wirebayes.sentences import listed, number, short
 from wirebayes.strict.table import CsvTable
 
 _FAR = 10.0  # times the robot's size: no wire is so long, and of millimetres those above a hundredth of it are noticed
@@ -58,11 +58,11 @@ def wrong(robot: Robot, joint_m: Floats) -> tuple[tuple[int, int], str] | None:
         return _first(none), "a length above 0"
     far = np.abs(joint_m) > most
     if far.any():
-        return _first(far), f"metres, at most {most:.3g}, {_FAR:g} times the robot's size"
-    short = overstretched(robot, joint_m)
-    if short.any():
+        return _first(far), f"metres, at most {short(most, 3)}, {_FAR:g} times the robot's size"
+    stretching = overstretched(robot, joint_m)
+    if stretching.any():
         whole = "the length of the whole wire, lines x straight + beyond_exit_m"
-        return _first(short), f"{whole}: between these lengths no pose stretches every wire by less than 100 %"
+        return _first(stretching), f"{whole}: between these lengths no pose stretches every wire by less than 100 %"
     return None
 
 
@@ -271,11 +271,13 @@ def _strained(wire: WireDraws, leg: int, pull_N: float) -> str:
     mean = {name: values[0] for name, values in wire.centre().parameters.items()}
     stretch = pull_N / mean["k1"]
     if stretch > _TWICE - 1:
-        return f"k1_N = {mean['k1']:.4g}: {pull_N:.3g} N stretch wire {leg + 1} by {number(100 * stretch)} %"
+        return (
+            f"k1_N = {short(mean['k1'], 4)}: {short(pull_N, 3)} N stretch wire {leg + 1} by {number(100 * stretch)} %"
+        )
     creep = mean["B"] * pull_N ** mean["U"] / wire.length_mm
     if creep > _TWICE - 1:
-        keys = f"B_mm = {mean['B']:.4g}, length_mm = {wire.length_mm:.4g}"
-        return f"{keys}: wire {leg + 1} creeps by {number(100 * creep)} % at {pull_N:.3g} N"
+        keys = f"B_mm = {short(mean['B'], 4)}, length_mm = {short(wire.length_mm, 4)}"
+        return f"{keys}: wire {leg + 1} creeps by {number(100 * creep)} % at {short(pull_N, 3)} N"
     return ""
 
 

@@ -34,6 +34,7 @@ from wirebayes.robot.pose.orientation import Orientation, by_lines
 from wirebayes.robot.pose.request import PoseRequest, band_over_draws
 from wirebayes.robot.pose.round_trip import round_trip, stable_poses
 from wirebayes.robot.proof import proofs
+from wirebayes.sentences import short
 
 _LEVEL = 1e-6  # sine of a wire's angle to the horizontal: so little is rounding in the robot's file
 
@@ -253,7 +254,7 @@ def _inverse(robot: Robot, commands: inverse.Commands, tension_N: Floats) -> Inv
 
 def _weak(commands: inverse.Commands) -> list[Notice]:
     weak = 100 * (1 - float(commands.feasible.mean()))
-    text = f"{weak:.2g} % of the draws cannot pull as hard as the pose requires, however far stretched"
+    text = f"{short(weak, 2)} % of the draws cannot pull as hard as the pose requires, however far stretched"
     return [Notice("unheld", text)] if weak > 0 else []
 
 

@@ -9,6 +9,7 @@ from wirebayes.robot.mechanics.description import GRAVITY, Plane, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import inverse
 from wirebayes.robot.pose.request import band_over_draws
+from wirebayes.sentences import short
 
 _ROUNDING = 1e-9  # of the weight: a force so small is none
 
@@ -28,7 +29,7 @@ def lifted(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats
     force = plane.normal_force(robot, position_m, rotation, tension_N)
     if force >= -_ROUNDING * robot.mass_kg * GRAVITY:
         return ""
-    return f"The wires lift the platform off its plane: the plane would have to pull with {-force:.3g} N."
+    return f"The wires lift the platform off its plane: the plane would have to pull with {short(-force, 3)} N."
 
 
 def on_plane(
@@ -70,12 +71,13 @@ def on_plane(
 
 def _sentence(robot: Robot, known: Plane, force: float, width: Floats, turn: Floats) -> str:
     """With how much the plane carries the platform, and how far friction can hold it."""
-    said = f"The plane carries the platform with {force:.4g} N"
+    said = f"The plane carries the platform with {short(force, 4)} N"
     if abs(force) < _ROUNDING * robot.mass_kg * GRAVITY:
         said = "The plane carries nothing of the platform"
     if not known.friction:
         return f"{said}."
     middle = 1e3 * np.median(width, axis=0)
-    along = ", ".join(f"±{v:.2g} mm along {axis}" for v, axis in zip(middle, "xyz", strict=True) if v > 1e-9)
+    along = ", ".join(f"±{short(v, 2)} mm along {axis}" for v, axis in zip(middle, "xyz", strict=True) if v > 1e-9)
     about = f" and turned by ±{np.degrees(np.median(turn)):.2g}°" if turn.any() else ""
-    return f"{said}; its friction, {known.friction * abs(force):.3g} N at most, can hold the platform {along}{about}."
+    most = short(known.friction * abs(force), 3)
+    return f"{said}; its friction, {most} N at most, can hold the platform {along}{about}."

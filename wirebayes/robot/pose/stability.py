@@ -9,6 +9,7 @@ from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.motion.course import Course, Falls
 from wirebayes.robot.pose.request import band_over_draws
+from wirebayes.sentences import short
 
 NEAR_SLACK, NEAR_LOOSE = 0.2, 0.3  # shares of first tension and stiffness: a builder wants to know below these
 
@@ -132,10 +133,10 @@ def _fallen(found: FallsReport) -> str | None:
     if times is None:
         return None
     wire = int(np.argmax(found["fall_wires"])) + 1
-    end = f"dropping {drop['median']:.3g} mm" if drop else "nothing catching it nearby"
+    end = f"dropping {short(drop['median'], 3)} mm" if drop else "nothing catching it nearby"
     return (
-        f"in {_percent(found['fall_probability'])} of the draws, first after {times['first']:.3g} s, in the median "
-        f"after {times['median']:.3g} s, wire {wire} giving way, {end}"
+        f"in {_percent(found['fall_probability'])} of the draws, first after {short(times['first'], 3)} s, in the "
+        f"median after {short(times['median'], 3)} s, wire {wire} giving way, {end}"
     )
 
 
@@ -143,7 +144,7 @@ def _slack(found: FallsReport) -> str | None:
     each = []
     for i, (share, times) in enumerate(zip(found["slack_probability"], found["slack_time_s"], strict=True)):
         if times is not None:
-            each.append(f"wire {i + 1} in {_percent(share)} of the draws, first after {times['first']:.3g} s")
+            each.append(f"wire {i + 1} in {_percent(share)} of the draws, first after {short(times['first'], 3)} s")
     return ", ".join(each) or None
 
 
@@ -162,4 +163,4 @@ def _loose(found: FallsReport) -> str | None:
 
 
 def _percent(share: float) -> str:
-    return "nearly all" if 0.995 <= share < 1 else f"{100 * share:.3g} %"
+    return "nearly all" if 0.995 <= share < 1 else f"{short(100 * share, 3)} %"

@@ -31,7 +31,7 @@ from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Moment
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about
 from wirebayes.robot.self_calibration.whole import progress_of
-from wirebayes.sentences import number
+from wirebayes.sentences import number, short
 
 CANDIDATES = 200  # in the workspace: the best of them come within a few percent of the best there are
 # Times the error of a reference length and the creep of the wire that crept most, by which a pose may be off. In
@@ -140,7 +140,7 @@ def _named(robot: Robot, prior: LengthPrior, session: Session, known: LengthPost
     holds = np.asarray(session.numbers, float).tolist()
     open_ = []
     for i in np.flatnonzero(~learnt):
-        widths = f"known to {1e3 * before:.2g} mm before, to {1e3 * reference.sd[i]:.2g} mm now"
+        widths = f"known to {short(1e3 * before, 2)} mm before, to {short(1e3 * reference.sd[i], 2)} mm now"
         open_.append(f"the reference length of wire {i + 1}: {widths}")
     determined = int(learnt.sum())
     return {
@@ -180,9 +180,9 @@ def _unsure(known: LengthPosterior, plain: LengthPosterior) -> list[Notice]:
     if not known.p_joint[0] >= SIGNIFICANT:  # where it is not known, too
         text = (
             "robot and wires do not explain the readings together with the reference lengths (joint test, "
-            f"{chance(known.p_joint[0])}, mean squared residual {known.misfit[0]:.3g}): do not use these lengths; "
-            "check exit and platform points, which are taken as exact, --wires, the readings' units and signs, "
-            "--tension-sd and --reference-sd"
+            f"{chance(known.p_joint[0])}, mean squared residual {short(known.misfit[0], 3)}): do not use these "
+            "lengths; check exit and platform points, which are taken as exact, --wires, the readings' units and "
+            "signs, --tension-sd and --reference-sd"
         )
         notices.append(Notice("misfit", text))
     return notices
@@ -202,8 +202,8 @@ def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: Len
     for i in np.flatnonzero(apart > plausible):
         text = (
             f"hold {session.numbers[i]:g}: the requested pose is {shift[i]:.3g} m and {angle[i]:.2g} rad from the one "
-            f"that its joint values lead to, more than errors of the lengths and creep explain ({plausible:.2g} m); "
-            "check both"
+            f"that its joint values lead to, more than errors of the lengths and creep explain "
+            f"({short(plausible, 2)} m); check both"
         )
         out.append(Notice("misfit", text))
     return out

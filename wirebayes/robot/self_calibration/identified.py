@@ -11,6 +11,7 @@ from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.self_calibration.posterior import Whole
+from wirebayes.sentences import short
 
 _DETERMINED = 0.5  # of the standard deviation before
 _FLAT = 1e-6  # of the span
@@ -73,7 +74,7 @@ def identified(found: Whole) -> Identified:
     sentences = []
     for one in combinations:
         if not one.determined:
-            known = f"known to {one.before_mm:.2g} mm before, to {one.after_mm:.2g} mm now"
+            known = f"known to {short(one.before_mm, 2)} mm before, to {short(one.after_mm, 2)} mm now"
             sentences.append(f"{_SAYS[one.name]}: {known}")
     sentences += _of_references(found)
     size = _sizes(found)
@@ -87,7 +88,7 @@ def _of_references(found: Whole) -> list[str]:
     before = 1e3 * found.unknowns.prior.reference_sd_m
     out = []
     for i in np.flatnonzero(sd >= _DETERMINED):
-        known = f"known to {before:.2g} mm before, to {before * sd[i]:.2g} mm now"
+        known = f"known to {short(before, 2)} mm before, to {short(before * sd[i], 2)} mm now"
         out.append(f"the reference length of wire {i + 1}: {known}")
     return out
 

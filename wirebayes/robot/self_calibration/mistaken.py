@@ -18,7 +18,7 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.winches import lengths
 from wirebayes.robot.self_calibration.session import Session
-from wirebayes.sentences import number
+from wirebayes.sentences import number, short
 from wirebayes.strict.table import CsvTable
 
 _ANOTHER_UNIT = 3.0  # times: units of force differ by 3.6 (ounces) and more, masses that were measured badly by less
@@ -155,8 +155,8 @@ def _mixed_up(balance: "_Balance", names: Sequence[str]) -> tuple[str, str, str]
     for i, j in combinations(range(len(names)), 2):
         other = balance.left(balance.pull(_swapped(len(names), i, j)))
         if _BETTER * other < left:
-            found = f"tensions that leave {100 * left:.2g} % of the weight unbalanced"
-            return f"columns {names[i]} and {names[j]}", found, _in_place(f"{100 * other:.2g} %")
+            found = f"tensions that leave {short(100 * left, 2)} % of the weight unbalanced"
+            return f"columns {names[i]} and {names[j]}", found, _in_place(f"{short(100 * other, 2)} %")
     return None
 
 

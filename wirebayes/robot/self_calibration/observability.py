@@ -10,6 +10,7 @@ from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires, tension
+from wirebayes.sentences import short
 
 
 def response(
@@ -163,7 +164,7 @@ def _sentence(rank: int, weakest: Floats, known_m: float) -> str:
         if abs(weakest[i]) > 0.2:
             parts.append(f"{weakest[i]:+.2f} of wire {i + 1}")
     seen = f"The readings show {rank} of {len(weakest)} combinations of lengths to a tenth of their prior uncertainty"
-    return f"{seen}; least of all {', '.join(parts)}, known to {1e3 * known_m:.2g} mm."
+    return f"{seen}; least of all {', '.join(parts)}, known to {short(1e3 * known_m, 2)} mm."
 
 
 def choose_poses(change_N: Floats, count: int, tension_sd_N: float, prior_sd_m: float) -> list[int]:

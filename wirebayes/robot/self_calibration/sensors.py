@@ -20,6 +20,7 @@ from wirebayes.robot.self_calibration.posterior import Whole
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance
 from wirebayes.robot.self_calibration.unknowns import Unknowns
 from wirebayes.robot.self_calibration.whole import estimate
+from wirebayes.sentences import short
 
 LEAST_HOLDS = 2  # read: at a single one an error of a sensor and one of a length look the same
 _TRIES, _STILL = 3, 0.5  # searches, and standard deviations: along a narrow valley the last steps change little
@@ -178,4 +179,4 @@ def _how_much(found: Suspects) -> str:
 
 def _in_words(wire: int, bias_N: float, sd_N: float) -> str:
     much = "much" if bias_N > 0 else "little"
-    return f"wire {wire + 1} (reads {abs(bias_N):.3g} +- {sd_N:.2g} N too {much})"
+    return f"wire {wire + 1} (reads {short(abs(bias_N), 3)} +- {short(sd_N, 2)} N too {much})"

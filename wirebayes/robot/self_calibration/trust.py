@@ -7,6 +7,7 @@ from wirebayes.json_files.calibrate import Interval
 from wirebayes.numeric.linear_algebra import solve
 from wirebayes.numeric.typing import Floats
 from wirebayes.result_warnings import Notice
+from wirebayes.sentences import short
 
 # Of a session with nothing wrong one in a hundred is called unusable: a warning that is heeded costs another session,
 # lengths that are wrong cost a crash.
@@ -68,7 +69,7 @@ def unlearnt(prior_mm: float) -> Notice:
     return Notice(
         "prior",
         f"the readings determine no combination of points and reference lengths beyond what was known before "
-        f"(references: {prior_mm:.3g} mm): there is nothing to set; read tensions, measured poses or more poses",
+        f"(references: {short(prior_mm, 3)} mm): there is nothing to set; read tensions, measured poses or more poses",
     )
 
 

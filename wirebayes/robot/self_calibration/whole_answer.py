@@ -37,6 +37,7 @@ from wirebayes.robot.self_calibration.summary import Summary, summarised
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, interval_about, unlearnt, unlikely
 from wirebayes.robot.self_calibration.unknowns import StatedErrors, Unknowns
 from wirebayes.robot.self_calibration.whole import estimate, progress_of
+from wirebayes.sentences import short
 
 _UNEVEN = 0.05  # of the weight: balance that fails by more shows that something else held the platform
 
@@ -261,8 +262,8 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
         out.append(Notice("data", text))
     if found.converged and search.inexact:
         text = (
-            f"geometry, taken as exact, and joint values agree to {1e3 * found.noise.joint_m:.2g} mm only: do not use "
-            "these values; give --anchor-sd, or --joint-sd if the joint values are that uncertain"
+            f"geometry, taken as exact, and joint values agree to {short(1e3 * found.noise.joint_m, 2)} mm only: do "
+            "not use these values; give --anchor-sd, or --joint-sd if the joint values are that uncertain"
         )
         out.append(Notice("misfit", text))
     elif found.converged and search.p < SIGNIFICANT:
@@ -271,8 +272,8 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
         out.append(unlearnt(1e3 * found.unknowns.prior.reference_sd_m))
     if verdict.uneven and not lost(found):  # else nothing is known of the tensions
         text = (
-            f"the tensions leave {100 * found.noise.balance:.2g} % of the weight unbalanced: the platform was held by "
-            "something else, or the tensions are not those of the wires; do not use these values"
+            f"the tensions leave {short(100 * found.noise.balance, 2)} % of the weight unbalanced: the platform was "
+            "held by something else, or the tensions are not those of the wires; do not use these values"
         )
         out.append(Notice("misfit", text))
     return out
@@ -289,7 +290,7 @@ def _not_converged(found: Whole, session: Session) -> str:
     if not lost(found):
         return "read more poses, or check the readings and the stated errors"
     off_m = length_rms_m(found)
-    off = f"{off_m:.2g} m (root mean square) from" if off_m < found.unknowns.robot.span_m else "not at all near"
+    off = f"{short(off_m, 2)} m (root mean square) from" if off_m < found.unknowns.robot.span_m else "not at all near"
     return (
         f"the joint values are {off} what robot and stated errors allow{most_open(found, session)}; "
         "check their units and signs, the order of the columns, and the robot's file"
