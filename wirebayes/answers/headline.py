@@ -46,7 +46,20 @@ def check_in_a_sentence(name: str, test: CheckedExperiment) -> str:
         Of the experiment.
     test : dict
     """
-    parameters, effects = test["parameters"], test["effects"]
+    effects = test["effects"]
+    said = _determined(test)
+    shown = sum(effect["shows"] == "yes" for effect in effects.values())
+    every = counted(len(effects), "effect")
+    said.append(f"it would show {shown} of {every}")
+    holds = counted(test["recorded_holds"], "hold")
+    readings = counted(test["readings"], "reading")
+    answer = ", ".join(said)
+    return f"{name}, {holds} with {readings}: {answer}; 90 % intervals in brackets."
+
+
+def _determined(test: CheckedExperiment) -> list[str]:
+    """The stiffness where it is known, and the parameters that are not."""
+    parameters = test["parameters"]
     alone = [parameter for parameter, known in parameters.items() if known["determined_by"] == "prior"]
     said = []
     k1 = parameters.get("k1")
@@ -57,11 +70,7 @@ def check_in_a_sentence(name: str, test: CheckedExperiment) -> str:
         said.append(f"it does not determine {listed(alone)}")
     else:
         said.append("every parameter is determined by the readings")
-    shown = sum(effect["shows"] == "yes" for effect in effects.values())
-    said.append(f"it would show {shown} of {counted(len(effects), 'effect')}")
-    holds = counted(test["recorded_holds"], "hold")
-    readings = counted(test["readings"], "reading")
-    return f"{name}, {holds} with {readings}: {', '.join(said)}; 90 % intervals in brackets."
+    return said
 
 
 def fit_in_a_sentence(summary: SummaryJson) -> str:
@@ -72,7 +81,8 @@ def fit_in_a_sentence(summary: SummaryJson) -> str:
     summary : dict
     """
     name = summary["experiment"]
-    trusted = summary["converged"] and summary.get("model_check", {}).get("passed") is not False
+    check = summary.get("model_check", {})
+    trusted = summary["converged"] and check.get("passed") is not False
     doubt = "" if trusted else "If the model were right: "
     k1 = summary["parameters"].get("k1")
     time, creep = creep_as_long_as_held(summary)
@@ -80,9 +90,9 @@ def fit_in_a_sentence(summary: SummaryJson) -> str:
         return f"{doubt}{name}: the readings do not say how much this wire creeps."
     stretched = quantity(creep["q50"], creep["q05"], creep["q95"], "mm")
     stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
-    tension = f"{short(summary['derived']['tension_N'])} N"
+    tension = short(summary["derived"]["tension_N"])
     return (
-        f"{doubt}{name} creeps by {stretched} within {time} under {tension}, and its "
+        f"{doubt}{name} creeps by {stretched} within {time} under {tension} N, and its "
         f"stiffness is {stiff} per unit of strain; 90 % intervals in brackets."
     )
 
@@ -97,6 +107,7 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
     report : dict
         Its part of ``discovery.json``.
     """
+    verdict = report["verdict"]
     effects = [spoken(effect) for effect in report["effects"]]
     several = len(effects) > 1
     sizes = {}
@@ -104,18 +115,21 @@ def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:
         sizes[spoken(effect)] = quantity(size["mean"], size["q05"], size["q95"], size["unit"])
     what = _missing(report, effects)
     with_it = "with them" if several else "with it"
-    if report["verdict"] == "ambiguous":  # then the model has the most likely of several
-        with_it = f"with {listed([f'{effect} of {size}' for effect, size in sizes.items()])}"
+    if verdict == "ambiguous":  # then the model has the most likely of several
+        of_sizes = [f"{effect} of {size}" for effect, size in sizes.items()]
+        with_it = f"with {listed(of_sizes)}"
     elif sizes:
-        what += f", of size {listed(list(sizes.values()))}"
-    if report["verdict"] == "partial":
+        every_size = listed(list(sizes.values()))
+        what += f", of size {every_size}"
+    if verdict == "partial":
         what += "; and so is something that no effect in the catalogue explains"
         with_it = "with all of them" if several else "with both"
-    gain = _gain_in_words(report, with_it)
-    sure = ""
-    if report["p_global"] is not None:
-        sure = f" ({p_in_words(report['p_global'], report['p_simulations'])})"
-    return f"{name}: {what}{gain}{sure}."
+    what += _gain_in_words(report, with_it)
+    p = report["p_global"]
+    if p is not None:
+        sure = p_in_words(p, report["p_simulations"])
+        what += f" ({sure})"
+    return f"{name}: {what}."
 
 
 def _missing(report: ExperimentFindings, effects: Sequence[str]) -> str:
@@ -162,15 +176,18 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
     if not scored:
         return f"{name}: no model could be judged."
     best, *others = scored
-    text = f"{name}: {spoken(best['name'])} predicts left-out holds best"
-    gain, base = best["difference"], table["base"]
-    if gain is not None and best["name"] != base:
-        text += f", {_ahead(gain)} against {base}"
+    model, base = best["name"], table["base"]
+    text = f"{name}: {spoken(model)} predicts left-out holds best"
+    gain = best["difference"]
+    if gain is not None and model != base:
+        ahead = _ahead(gain)
+        text += f", {ahead} against {base}"
         text += _by_chance(gain)
     if others:
         come = "come" if len(others) > 1 else "comes"
         names = [spoken(row["name"]) for row in others]
-        text += f"; then {come} {some_of(names, 3)}"
+        behind = some_of(names, 3)
+        text += f"; then {come} {behind}"
     return f"{text}."
 
 
@@ -186,6 +203,18 @@ def _by_chance(gain: Difference) -> str:
     return "" if meaningful(gain["elpd"], gain["se"]) else ", which may be chance"
 
 
+def _how_many(rows: Sequence[Row]) -> str:
+    """Tests, materials and fits that converged, and how stiff the wires are."""
+    materials = {row["material"] for row in rows if row["material"]}
+    kinds = "one material"
+    if len(materials) > 1:
+        kinds = f"{len(materials)} materials"
+    many = "One test" if len(rows) == 1 else f"{len(rows)} tests"
+    converged = sum(bool(row["converged"]) for row in rows)
+    stiffnesses = _stiffnesses(rows)
+    return f"{many} of {kinds}, {converged} converged{stiffnesses}."
+
+
 def batch_in_sentences(found: BatchJson) -> list[str]:
     """A sentence a finding: how many were fitted, what is missing in which, which stand apart.
 
@@ -194,11 +223,7 @@ def batch_in_sentences(found: BatchJson) -> list[str]:
     found : dict
     """
     rows = found["experiments"]
-    materials = {row["material"] for row in rows if row["material"]}
-    kinds = f"{len(materials)} materials" if len(materials) > 1 else "one material"
-    many = "One test" if len(rows) == 1 else f"{len(rows)} tests"
-    converged = sum(bool(row["converged"]) for row in rows)
-    out = [f"{many} of {kinds}, {converged} converged{_stiffnesses(rows)}."]
+    out = [_how_many(rows)]
     failed = [row["name"] for row in rows if row["error"]]
     if failed:
         out.append(f"Not fitted: {some_of(failed)}.")
@@ -297,13 +322,15 @@ def calibration_in_a_sentence(found: CalibrateJson) -> str:
         return "Not converged: there are no lengths to use."
     sd_mm = [1e3 * sd_m for sd_m in known["length_m"]["sd"]]
     wires = f"{found['robot']}'s {len(sd_mm)} wires"
-    holds = f"{found['read']} of {counted(found['holds'], 'hold')}"
-    lengths = f"{from_to(min(sd_mm), max(sd_mm))} mm (standard errors), from {holds}."
+    holds = counted(found["holds"], "hold")
+    errors = from_to(min(sd_mm), max(sd_mm))
+    lengths = f"{errors} mm (standard errors), from {found['read']} of {holds}."
     points = 1e3 * np.array(found["exit_points_m"]["sd"], float)
     if not np.any(points > 0):
         return f"The zero-tension lengths of {wires} are known to {lengths}"
     before = number(found["prior"].get("anchor_sd_mm", 0.0))
+    after = from_to(points.min(), points.max())
     return (
-        f"The exit points of {wires} are known to {from_to(points.min(), points.max())} mm "
-        f"(before: {before} mm), their zero-tension lengths to {lengths}"
+        f"The exit points of {wires} are known to {after} mm (before: {before} mm), "
+        f"their zero-tension lengths to {lengths}"
     )

@@ -24,12 +24,16 @@ def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
     moved = "is away from where it is meant to be" if measured else "has drifted"
     drifts = []
     for drift in found["drift"]:
-        if known_at_the_end(drift):
-            distance = _band_at_the_end(drift["distance_mm"])
-            time = lasting(drift["times_s"][-1])
-            alike = specimens_are(drift["specimen_spread"])
-            drifts.append(f"{robot}: after {time} the platform {moved} by {distance} if {alike}")
-    return lines + (drifts or [f"{robot}: no draw of the wires could be solved"])
+        if not known_at_the_end(drift):
+            continue
+        distance = _band_at_the_end(drift["distance_mm"])
+        last = drift["times_s"][-1]
+        time = lasting(last)
+        alike = specimens_are(drift["specimen_spread"])
+        drifts.append(f"{robot}: after {time} the platform {moved} by {distance} if {alike}")
+    if not drifts:
+        drifts.append(f"{robot}: no draw of the wires could be solved")
+    return lines + drifts
 
 
 def _band_at_the_end(band: Band) -> str:

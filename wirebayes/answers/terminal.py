@@ -31,19 +31,22 @@ from wirebayes.sentences import (
 
 def of_fit(summary: SummaryJson) -> list[str]:
     """Of a fit: its state, the parameters and the creep, with units and 90 % intervals."""
+    name = summary["experiment"]
     state = "converged" if summary["converged"] else "NOT CONVERGED"
-    passed = summary["model_check"]["passed"] if "model_check" in summary else None
-    checked = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}[passed]
+    checked = "model not checked"
+    if "model_check" in summary:
+        words = {True: "model check passed", False: "MODEL CHECK FAILED", None: "model not checked"}
+        checked = words[summary["model_check"]["passed"]]
     time, elongation = creep_as_long_as_held(summary)
+    creep = _band(elongation)
     tension = short(summary["derived"]["tension_N"])
     effects = [key.split("@")[0] for key in summary["effects"]]
-    return [
-        f"{summary['experiment']}: {state}, {checked} (medians, 90 % intervals)",
-        *_parameters(summary, "stiffness", ("k1",)),
-        f"  creep after {time} at {tension} N: {_band(elongation)} mm",
-        *_parameters(summary, "creep law", ("B", "U", "k2", "N")),
-        *_parameters(summary, "effects", effects),
-    ]
+    lines = [f"{name}: {state}, {checked} (medians, 90 % intervals)"]
+    lines += _parameters(summary, "stiffness", ("k1",))
+    lines.append(f"  creep after {time} at {tension} N: {creep} mm")
+    lines += _parameters(summary, "creep law", ("B", "U", "k2", "N"))
+    lines += _parameters(summary, "effects", effects)
+    return lines
 
 
 _SHOWN = ("k1", "B", "U", "k2", "N")
@@ -61,8 +64,9 @@ def _parameters(summary: SummaryJson, title: str, wanted: Sequence[str]) -> list
 def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     """Of one experiment that something may be missing in: what, how large, and what it is worth."""
     verdict, effects = report["verdict"], report["effects"]
+    missing = _verdict(report)
     sure = p_in_words(report["p_global"], report["p_simulations"])
-    lines = [f"{name}: {_verdict(report)} ({sure})"]
+    lines = [f"{name}: {missing} ({sure})"]
     candidates = likely(report)
     if verdict == "unknown" and candidates:
         lines.append(f"  its largest part may be {candidates}; nothing is established")
@@ -155,11 +159,14 @@ def missing_in(rows: Sequence[Row]) -> list[str]:
         where = _tests(names)
         out.append(f"{what} is missing in {where}.")
     for effects, names in _undecided_in(rows).items():
-        what = listed([spoken(effect) for effect in effects], "or").capitalize()
-        out.append(f"{what} is missing in {_tests(names)}; these readings do not tell which.")
+        one_of_these = listed([spoken(effect) for effect in effects], "or")
+        what = one_of_these.capitalize()
+        where = _tests(names)
+        out.append(f"{what} is missing in {where}; these readings do not tell which.")
     nameless = [row["name"] for row in rows if row["verdict"] in ("unknown", "partial")]
     if nameless:
-        out.append(f"Something that no effect in the catalogue explains is missing in {_tests(nameless)}.")
+        where = _tests(nameless)
+        out.append(f"Something that no effect in the catalogue explains is missing in {where}.")
     return out
 
 
@@ -188,11 +195,8 @@ def _tests(names: list[str]) -> str:
     return f"{many} ({some_of(names)})"
 
 
-def of_plan(row: JudgedProtocol) -> list[str]:
-    """Of a planned test: its rank and length, and what would be known afterwards."""
-    budget = "" if row["within_budget"] else ", longer than the available time"
-    name = f"{row['rank']}. {row['name']}"
-    lines = [f"{name}: {short(row['duration_min'], 3)} min{budget}, {short(row['information_bits'], 3)} bits"]
+def _expected(row: JudgedProtocol) -> list[str]:
+    """Standard deviations of parameters and creep after a planned test."""
     known = []
     parameters = row["parameters"]
     for parameter in _SHOWN:
@@ -203,7 +207,17 @@ def of_plan(row: JudgedProtocol) -> list[str]:
     creep = row["creep"]
     creep_sd = creep["creep_1h_mm"]["sd"]
     known.append(f"creep after 1 h at {short(creep['tension_N'], 3)} N {short(creep_sd, 2)} mm")
-    lines.append(f"  expected sd: {', '.join(known)}")
+    return known
+
+
+def of_plan(row: JudgedProtocol) -> list[str]:
+    """Of a planned test: its rank and length, and what would be known afterwards."""
+    budget = "" if row["within_budget"] else ", longer than the available time"
+    name = f"{row['rank']}. {row['name']}"
+    minutes, bits = short(row["duration_min"], 3), short(row["information_bits"], 3)
+    lines = [f"{name}: {minutes} min{budget}, {bits} bits"]
+    expected = ", ".join(_expected(row))
+    lines.append(f"  expected sd: {expected}")
     drift_sd = row["robot"] and row["robot"]["drift_sd_mm"]
     if drift_sd is not None:
         lines.append(f"  drift of the robot after 1 h: sd {short(drift_sd, 2)} mm")
@@ -216,7 +230,9 @@ MOST_OUTLIERS = 10  # of outliers, on a terminal
 def of_check(name: str, test: CheckedExperiment) -> list[str]:
     """Of a test that is not fitted yet: its holds, and what it can determine."""
     unit = unit_read(test, "resolution")
-    lines = [f"{name}: {_recorded(test, unit)}; {test['length_mm']:g} mm of {test['material']}"]
+    recorded = _recorded(test, unit)
+    wire = f"{test['length_mm']:g} mm of {test['material']}"
+    lines = [f"{name}: {recorded}; {wire}"]
     if test["temperature_C"]:
         coldest, warmest = test["temperature_C"]
         lines.append(f"  temperature from {short(coldest, 3)} to {short(warmest, 3)} °C")
@@ -335,11 +351,16 @@ def options_of_best(table: ComparedModels) -> str | None:
         return None
     best = next(iter(rows.values()))
     effects = best.get("effects", [])
-    if any(not what_it_is(effect) for effect in effects):
+    if not all(what_it_is(effect) for effect in effects):
         return None
     options = [f"--effect {effect}" for effect in effects]
-    options += [f"--{key.replace('_', '-')} {best[key]}" for key in _CHOICES if best[key] != base[key]]
-    return " ".join(options) if options or best is base else None
+    for key in _CHOICES:
+        if best[key] != base[key]:
+            option = key.replace("_", "-")
+            options.append(f"--{option} {best[key]}")
+    if not options and best is not base:
+        return None
+    return " ".join(options)
 
 
 _CHOICES: tuple[Literal["elastic_law", "history", "likelihood"], ...] = ("elastic_law", "history", "likelihood")

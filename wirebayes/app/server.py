@@ -46,15 +46,16 @@ def serve(folder: Path, port: int | None = None, *, seed: int = 0, browse: bool 
     InputError
         The port is taken, or the folder cannot be written.
     """
-    shelf, jobs = Shelf(folder), Jobs()
+    jobs = Jobs()
     listening = _bound(port)
-    address = f"http://{ADDRESS}:{listening.getsockname()[1]}/"
+    bound = listening.getsockname()[1]
+    address = f"http://{ADDRESS}:{bound}/"
     load_early()  # from this thread, whose end would be that of the processes' parent
-    add_pages(shelf, jobs, seed)
+    add_pages(Shelf(folder), jobs, seed)
     application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     logging.getLogger("nicegui").setLevel(logging.ERROR)  # an address that does not exist is nobody's business
     nicegui.ui.run_with(application, title="wirebayes", dark=False, show_welcome_message=False)
-    own = _Own(application, listening.getsockname()[1])
+    own = _Own(application, bound)
     config = uvicorn.Config(own, log_level="warning", timeout_graceful_shutdown=_PATIENCE_S, lifespan="on")
     server = uvicorn.Server(config)
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -60,11 +60,13 @@ def _read(test: Test, step: str, options: dict[str, Any], progress: Progress) ->
     if test.is_experiment_file:
         return _read_experiment_file(test, target)
     given: dict[str, Any] = {key: options[key] or None for key in ("length_mm", "material", "area_mm2")}
-    imported = wirebayes.import_bench(test.raw, output=target, **given, **_choices(options))
+    choices = _choices(options)
+    imported = wirebayes.import_bench(test.raw, output=target, **given, **choices)
     names = list(imported.summary()["experiments"])
     file = names[0] if len(names) == 1 else "experiments"
+    lines = imported.lines()
     warnings = [notice.text for notice in imported.warnings]
-    return _understood(f"{file}.toml", names, imported.lines(), warnings)
+    return _understood(f"{file}.toml", names, lines, warnings)
 
 
 def _ask(test: Test, step: str, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
@@ -98,30 +100,36 @@ def _own_robot(place: Path) -> tuple[Path, dict[str, Path]]:
     if len(robots) != 1 or len(tables) > 1:
         found = ", ".join(path.name for path in files)
         raise InputError(f"found {found}; expected one robot's file (TOML), and one table of poses (CSV) or none")
+    robot = robots[0]
     if not tables:
-        return robots[0], {}
-    header = tables[0].read_text(encoding="utf-8", errors="replace").partition("\n")[0]
-    kind = "joints" if "joint_1" in header or "motor_1" in header else "trajectory"
-    return robots[0], {kind: tables[0]}
+        return robot, {}
+    table = tables[0]
+    text = table.read_text(encoding="utf-8", errors="replace")
+    header, _, _ = text.partition("\n")
+    are_joints = "joint_1" in header or "motor_1" in header
+    kind = "joints" if are_joints else "trajectory"
+    return robot, {kind: table}
 
 
 def _read_experiment_file(test: Test, target: Path) -> dict[str, Any]:
     from wirebayes.io import data_checks
     from wirebayes.report.pictures.bench import understood
 
-    files = [path for path in test.raw if path.suffix.lower() == ".toml"]
-    if len(files) > 1:
-        raise InputError(f"found {files[0].name} and {files[1].name}, expected one experiment file at a time")
-    experiments = wirebayes.read_experiments(files[0])
-    shutil.copytree(files[0].parent, target)
+    file, *others = [path for path in test.raw if path.suffix.lower() == ".toml"]
+    if others:
+        raise InputError(f"found {file.name} and {others[0].name}, expected one experiment file at a time")
+    experiments = wirebayes.read_experiments(file)
+    shutil.copytree(file.parent, target)
     warnings = []
+    names = []
     for experiment in experiments:
-        understood(experiment, target / f"{experiment.name}.svg")
+        name = experiment.name
+        understood(experiment, target / f"{name}.svg")
         notices = data_checks.of_experiment(experiment)
-        warnings += [notice.of(experiment.name).text for notice in notices]
-    names = [experiment.name for experiment in experiments]
+        warnings += [notice.of(name).text for notice in notices]
+        names.append(name)
     lines = [repr(experiment) for experiment in experiments]
-    return _understood(files[0].name, names, lines, warnings)
+    return _understood(file.name, names, lines, warnings)
 
 
 def _understood(file: str, names: list[str], lines: list[str], warnings: list[str]) -> dict[str, Any]:

@@ -43,10 +43,13 @@ def import_robot_command(
             "no tensions within the bounds hold the platform at its home pose; give another --position or --tension",
             err=True,
         )
-    if not quiet:
-        rolling = 0 if robot.pulleys is None else int((robot.pulleys.radius_m > 0).sum())
-        over = f", {rolling} of them over pulleys" if rolling else ""
-        print(f"Written: {file}: {robot.legs} wires{over}, {robot.mass_kg:g} kg")
-        for sentence in robot.source.strip().splitlines():
-            print(f"  {sentence}")
-        print(f"Next: wirebayes pose {file} --wires DIR")
+    if quiet:
+        return
+    rolling = 0
+    if robot.pulleys is not None:
+        rolling = int((robot.pulleys.radius_m > 0).sum())
+    over = f", {rolling} of them over pulleys" if rolling else ""
+    print(f"Written: {file}: {robot.legs} wires{over}, {robot.mass_kg:g} kg")
+    for sentence in robot.source.strip().splitlines():
+        print(f"  {sentence}")
+    print(f"Next: wirebayes pose {file} --wires DIR")

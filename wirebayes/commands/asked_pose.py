@@ -77,13 +77,15 @@ def asked_rotation(rotation: Numbers | None) -> Floats | None:
     if rotation is None:
         return None
     text = text_of(rotation)
-    words = ["free" if word.strip() in ("free", "None") else word for word in text.split(",")]
-    if "free" not in words:
+    words = text.split(",")
+    is_free = [word.strip() in ("free", "None") for word in words]
+    if not any(is_free):
         return np.asarray(numbers("--rotation", text, 3))
     try:
-        found = np.array([np.nan if word == "free" else float(word) for word in words])
+        values = [np.nan if free else float(word) for word, free in zip(words, is_free, strict=True)]
     except ValueError:
-        found = np.array([np.inf])
+        values = [np.inf]
+    found = np.array(values)
     if len(found) != 3 or np.isinf(found).any():
         raise InputError(f"--rotation: found {text!r}, expected three finite numbers or free, separated by commas")
     return found if np.isfinite(found).any() else None

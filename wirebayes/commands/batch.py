@@ -51,6 +51,7 @@ _FIRST = ("name", "material", "file", "length_mm", "holds", "readings", "converg
 _LAST = ("verdict", "effects", "best_effect", "p_global", "check", "outlier", "warnings", "error")
 
 Sources = PathLike | Experiment | Iterable[PathLike | Experiment]
+_WithFile = tuple[Experiment, str]  # and the name of the file that it came from
 
 
 def batch(
@@ -130,8 +131,10 @@ def batch(
     own, left_out = path_of(own_effects), names_given(without)
     catalogue_without(left_out, catalogue(own))
     read, unreadable = _read(sources, train_holds, keep_going)
+    experiments = [experiment for experiment, _ in read]
     effort = policy or DEFAULT
-    task = BatchTask(discover, check, spec, seed, effort, left_out, own, simulations or SIMULATIONS, posteriors)
+    checked = simulations or SIMULATIONS
+    task = BatchTask(discover, check, spec, seed, effort, left_out, own, checked, posteriors)
     configuration = {
         "command": "batch",
         "version": __version__,
@@ -144,34 +147,36 @@ def batch(
         "without": sorted(left_out),
         "own_effects": source_of(own),
         "train_holds": train_holds,
-        **data_of(experiment for experiment, _ in read),
+        **data_of(experiments),
         "unreadable": unreadable,
         **other_effort(policy, simulations),
     }
     place = ResultFolder.at(output)
-    if check_run(place.path, configuration) == "done":
+    path = place.path
+    if check_run(path, configuration) == "done":
         return Batch(place, own, computed=False)
     with computing():
-        _compute(read, task, place.path, configuration, scheduler, progress or silent)
-    with open_run(place.path, configuration) as run:
-        rows: list[Row] = [read_json(place.path / experiment.name / _ROW) for experiment, _ in read]
+        _compute(read, task, path, configuration, scheduler, progress or silent)
+    with open_run(path, configuration) as run:
+        rows: list[Row] = [read_json(path / experiment.name / _ROW) for experiment in experiments]
         rows += [_empty(file, error) for file, error in unreadable.items()]
-        _tabulate(rows, outliers(rows), place.path)
+        _tabulate(rows, outliers(rows), path)
         run.finish()
     return Batch(place, own)
 
 
-def _read(
-    sources: Sources, train_holds: int | None, keep_going: bool
-) -> tuple[list[tuple[Experiment, str]], dict[str, str]]:
+def _read(sources: Sources, train_holds: int | None, keep_going: bool) -> tuple[list[_WithFile], dict[str, str]]:
     """Every experiment with the file it came from, and what is wrong with the files that cannot be read."""
     given = [sources] if isinstance(sources, str | os.PathLike | Experiment) else list(sources)
-    read: list[tuple[Experiment, str]] = []
+    read: list[_WithFile] = []
     wrong: dict[str, str] = {}
     for source in given:
-        if not isinstance(source, str | os.PathLike | Experiment):
+        if isinstance(source, Experiment):
+            file = source.source.name
+        elif isinstance(source, str | os.PathLike):
+            file = str(source)
+        else:
             raise InputError(f"sources: found {type(source).__name__}, expected paths of files or Experiments")
-        file = source.source.name if isinstance(source, Experiment) else str(source)
         try:
             found = _experiments(source, train_holds)
         except InputError as error:
@@ -179,9 +184,11 @@ def _read(
             continue
         read += [(experiment, file) for experiment in found]
     if wrong and not (keep_going and read):
-        listed = "; ".join(list(wrong.values())[:_LISTED])
-        more = f"; and {len(wrong) - _LISTED} more files" if len(wrong) > _LISTED else ""
-        raise InputError(listed + more)
+        errors = list(wrong.values())
+        listed = "; ".join(errors[:_LISTED])
+        if len(errors) > _LISTED:
+            listed += f"; and {len(errors) - _LISTED} more files"
+        raise InputError(listed)
     if not read:
         raise InputError("sources: found no experiments, expected one or more")
     return _distinct(read), wrong
@@ -197,21 +204,23 @@ def _experiments(source: PathLike | Experiment, train_holds: int | None) -> list
     return found
 
 
-def _distinct(read: list[tuple[Experiment, str]]) -> list[tuple[Experiment, str]]:
+def _distinct(read: list[_WithFile]) -> list[_WithFile]:
     """The experiments, those of one name with the name of their file before it."""
     times = Counter(experiment.name for experiment, _ in read)
-    distinct = list[tuple[Experiment, str]]()
-    by_name = dict[str, str]()
+    distinct = []
+    by_name: dict[str, str] = {}
     for experiment, file in read:
         name = experiment.name
         if times[name] > 1:
-            name = f"{Path(file).stem}.{name}"
+            stem = Path(file).stem
+            name = f"{stem}.{name}"
             experiment = replace(experiment, name=name)
+        taken = ""
         if name in by_name:
             taken = f"a second time (first in {by_name[name]})"
-            raise InputError(f"{file}: found the experiment {name} {taken}, expected another name")
-        if name in (TABLE, PARQUET):
+        elif name in (TABLE, PARQUET):
             taken = "which is a file of the results"
+        if taken:
             raise InputError(f"{file}: found the experiment {name} {taken}, expected another name")
         by_name[name] = file
         distinct.append((experiment, file))
@@ -219,7 +228,7 @@ def _distinct(read: list[tuple[Experiment, str]]) -> list[tuple[Experiment, str]
 
 
 def _compute(
-    read: Sequence[tuple[Experiment, str]],
+    read: Sequence[_WithFile],
     task: BatchTask,
     folder: Path,
     configuration: Mapping[str, Any],
@@ -269,7 +278,7 @@ def _scratch(folder: Path, scheduler: str | None) -> Iterator[Path | None]:
         shutil.rmtree(path, ignore_errors=True)
 
 
-def _results(pool: Executor, todo: Sequence[tuple[Experiment, str]], task: BatchTask) -> Iterator[tuple[str, Done]]:
+def _results(pool: Executor, todo: Sequence[_WithFile], task: BatchTask) -> Iterator[tuple[str, Done]]:
     """Name and result of each experiment as they end."""
     work = (((experiment, file), packed(experiment, file, task)) for experiment, file in todo)
     for (experiment, file), future in as_finished(pool, do, work):
@@ -336,14 +345,15 @@ def _warnings(rows: Sequence[Row]) -> list[NoticeJson]:
 
 def _line(row: Row, far: Sequence[OutlierRow], names: Sequence[str]) -> list[Any]:
     """The cells of an experiment."""
-    lists = {
-        "effects": row["effects"],
-        "outlier": [outlier["parameter"] for outlier in far if outlier["experiment"] == row["name"]],
-        "warnings": [notice["text"] for notice in row["warnings"]],
-    }
+    outliers_in = [outlier["parameter"] for outlier in far if outlier["experiment"] == row["name"]]
+    warned = [notice["text"] for notice in row["warnings"]]
     cells: dict[str, Any] = dict(row)
-    for key, items in lists.items():
+    for key, items in (("effects", row["effects"]), ("outlier", outliers_in), ("warnings", warned)):
         cells[key] = "; ".join(items) or None
     parameters: dict[str, Any] = dict(row["parameters"])
-    values = [parameters.get(name, {}).get(quantile) for name in names for quantile in QUANTITIES]
-    return [*(cells[key] for key in _FIRST), *values, *(cells[key] for key in _LAST)]
+    line = [cells[key] for key in _FIRST]
+    for name in names:
+        of_parameter = parameters.get(name, {})
+        line += [of_parameter.get(quantile) for quantile in QUANTITIES]
+    line += [cells[key] for key in _LAST]
+    return line

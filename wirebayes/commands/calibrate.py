@@ -152,10 +152,11 @@ def calibrate(
         **given.of_readings(),
         "--specimen-spread": specimen_spread,
         "readings": read,
-        **({"--tension-bias": bias} if bias else {}),
-        **given.of_geometry(),
-        "--next-poses": next_poses,
     }
+    if bias:
+        options["--tension-bias"] = bias
+    options |= given.of_geometry()
+    options["--next-poses"] = next_poses
     place = ResultFolder.at(output)
     decides = configuration("calibrate", robot, posterior_of(wires, experiment), draws, seed, own, options)
     with open_run(place.path, decides) as run:
@@ -216,16 +217,19 @@ class _GivenErrors:
         """Errors of geometry and poses in metres; None where the lengths alone are to be estimated."""
         exact = not (self.anchor_mm or self.platform_mm or self.drum_percent)
         stated = self.pose_mm or self.joint_mm is not None
-        poses_known = bool(np.isfinite(session.position_m).all() and np.isfinite(session.rotation).all())
+        poses_known = np.isfinite(session.position_m).all() and np.isfinite(session.rotation).all()
         if exact and not stated and poses_known and session.read.any():
             return None
-        joint_mm = 0.0 if exact and self.joint_mm is None else self.joint_mm
+        joint_m = 0.0 if exact else None
+        if self.joint_mm is not None:
+            joint_m = 1e-3 * self.joint_mm
         platform_mm = self.platform_mm if robot.degrees == 6 else 0.0  # of a point, they are errors of the exit points
+        pose_mm = self.pose_mm or 0.0
         return StatedErrors(
             1e-3 * self.anchor_mm,
             1e-3 * platform_mm,
-            1e-3 * (self.pose_mm or 0.0),
-            None if joint_mm is None else 1e-3 * joint_mm,
+            1e-3 * pose_mm,
+            joint_m,
             1e-2 * self.drum_percent,
         )
 
@@ -337,10 +341,12 @@ def calibrated_of(
     stored: UnknownsJson = read_json(path, absent)
     with stored_results(path):
         own = _belongs_to(robot, wires, experiment)
-        if stored["robot"] != own["robot"]:
+        same_robot = stored["robot"] == own["robot"]
+        if not same_robot:
             of_another = f"found one of another {robot.name} in {folder}"
             raise InputError(f"--calibration: {of_another}, expected one of the robot given")
-        if stored["wires"] != own["wires"]:
+        same_wires = stored["wires"] == own["wires"]
+        if not same_wires:
             raise InputError(f"--calibration: found one with other wires in {folder}, expected those of --wires")
         return from_dict(stored, robot, line)
 

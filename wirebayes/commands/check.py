@@ -77,7 +77,8 @@ def check(
     >>> found["effects"]["guide_friction"]["shows"]  # needs unloading
     'no'
     """
-    seed, own, report = check_seed(seed), path_of(own_effects), progress or silent
+    seed, own = check_seed(seed), path_of(own_effects)
+    report = progress or silent
     experiments = experiments_of(source, experiment, drop_breaks=drop_breaks)
     kinds = catalogue(own)
     for one in experiments:
@@ -97,8 +98,9 @@ def check(
             found: dict[str, CheckedExperiment] = {}
             for done, one in enumerate(experiments):
                 report("check", done, len(experiments))
-                found[one.name] = _checked(one, kinds, seed_of(seed, one.name))
-                understood(one, place.path / f"{one.name}.svg")
+                name = one.name
+                found[name] = _checked(one, kinds, seed_of(seed, name))
+                understood(one, place.path / f"{name}.svg")
             report("check", len(experiments), len(experiments))
             content: CheckJson = {"experiments": found, "warnings": notices_by_part(found)}
             write_json(place.path / CHECKED, content)

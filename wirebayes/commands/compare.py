@@ -238,11 +238,14 @@ def carry_out(plan: ComparisonPlan, output: PathLike | None, progress: Progress 
     with open_run(path, plan.configuration) as opened:
         if opened.state == "done":
             return Comparison(place, plan.own_effects, computed=False)
+        report = progress or silent
+        tasks = plan.tasks
         with computing():
-            judge_all(plan.tasks, path, plan.seed, plan.policy, report=progress or silent)
+            judge_all(tasks, path, plan.seed, plan.policy, report=report)
         tables: dict[str, ComparedModels] = {}
         for one in plan.experiments:
-            files = [path / task.file for task in plan.tasks if task.experiment is one]
+            own_tasks = [task for task in tasks if task.experiment is one]
+            files = [path / task.file for task in own_tasks]
             tables[one.name] = _compared(one, path / one.name, files)
         warnings = notices_by_part(tables)
         content: ComparisonJson = {"version": 1, "seed": plan.seed, "experiments": tables, "warnings": warnings}

@@ -152,18 +152,22 @@ def _searched_and_sampled(
     spec = settings.spec
     sampled = partial(run, directory=output, seed=seed, policy=policy)
     plain = partial(sampled, plain_jobs(experiments, spec, own))
+    prepare = partial(catalogue, own)
     waits: list[Callable[[Progress], None]] = []
     with computing(), prepared_copy(partial(_in_gaps, plain)) as in_copy:
-        with workers(prepare=partial(catalogue, own)) as parallel_map, loaded_meanwhile(_PICTURES):
+        with workers(prepare=prepare) as parallel_map, loaded_meanwhile(_PICTURES):
 
             def concluded(models: Concluded) -> None:
-                waits.append(begin(jobs_of(models, spec, own), output, seed, policy, parallel_map))
+                jobs = jobs_of(models, spec, own)
+                wait = begin(jobs, output, seed, policy, parallel_map)
+                waits.append(wait)
 
             found = investigate(experiments, settings, seed, report, parallel_map, concluded)
             for wait in waits:
                 wait(report)
         in_copy(plain)
-        sampled(plain_jobs(_void(found, experiments, output), spec, own), report=report)
+        void = _void(found, experiments, output)
+        sampled(plain_jobs(void, spec, own), report=report)
     return found
 
 

@@ -80,10 +80,11 @@ def export(
     line = draws_for(machine, wires, draws, experiment, own)
     contents = _contents(machine, line)
     header, table = files.creep_tables(machine, line, loads, moments)
+    warnings = _warnings(machine, line, contents)
     summary: ExportSummary = {
         "files": sorted([*contents, TABLE]),
         "creep_table": [dict(zip(header, row, strict=True)) for row in table],
-        "warnings": to_json(_warnings(machine, line, contents)),
+        "warnings": to_json(warnings),
     }
     place = ResultFolder.at(output)
     options = {"--experiment": experiment, "--tensions": text_of(tensions), "--times": text_of(times)}
@@ -91,10 +92,11 @@ def export(
     decides = configuration("export", robot, posterior, draws, seed, own, options)
     with open_run(place.path, decides) as run:
         if run.state != "done":
-            write_csv(run.directory / TABLE, header, table)
+            folder = run.directory
+            write_csv(folder / TABLE, header, table)
             for name, text in contents.items():
-                write_text(run.directory / name, text)
-            write_json(run.directory / Export._content, summary)
+                write_text(folder / name, text)
+            write_json(folder / Export._content, summary)
             run.finish()
     return Export(place, own, computed=run.state != "done")
 

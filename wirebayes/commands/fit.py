@@ -177,13 +177,16 @@ def _compute(jobs: Sequence[Job], folder: Path, seed: int, check: bool, policy: 
             with checked_meanwhile(jobs[0], folder, seed):
                 run(jobs, folder, seed, policy=policy, report=report)
         else:
-            with workers(len(jobs), partial(catalogue, jobs[0].own_effects)) as parallel_map:
+            prepare = partial(catalogue, jobs[0].own_effects)
+            with workers(len(jobs), prepare) as parallel_map:
                 run(jobs, folder, seed, policy=policy, report=report, parallel_map=parallel_map)
                 if check:
                     write_checks(jobs, folder, seed, report, parallel_map)
     for job in jobs:
+        experiment = job.experiments[0]
+        own_folder = folder / job.folder
         hold_by_hold = job.spec.likelihood == "hold"
-        write_next_hold(job.experiments[0], folder / job.folder, hold_by_hold=hold_by_hold)
+        write_next_hold(experiment, own_folder, hold_by_hold=hold_by_hold)
 
 
 def fits_in(

@@ -28,6 +28,8 @@ from wirebayes.wire.protocol import Control
 
 Read = TypeVar("Read")
 TOGETHER = "experiments"  # the file of all, where there are several
+_WithFiles = tuple[str, Converted]  # and the names of the files that it came from
+_Ask = Callable[[Undecided], str]  # which of the possible answers holds
 
 
 def import_bench(
@@ -123,11 +125,13 @@ def import_bench(
         raw = [raw]
     paths = raw_files([Path(path) for path in raw])
     names = _names(paths, name, each_file)
+    length = float(length_mm)
     zero = None if zero_mm is None else float(zero_mm)
     area = None if area_mm2 is None else float(area_mm2)
     said = names_given(mapping)
     choices = Choices(said, decimal, time_since, sheet, zero, control, specimens, each_file, drop_breaks)
-    samples = [About(own, material, float(length_mm), area, name_is_stated=name is not None) for own in names]
+    is_stated = name is not None
+    samples = [About(own, material, length, area, name_is_stated=is_stated) for own in names]
     tests, choices = _read_all(paths, samples, choices, ask)
     if drop_breaks:
         tests = [(path, _without_breaks(test)) for path, test in tests]
@@ -136,7 +140,7 @@ def import_bench(
         "version": __version__,
         "raw": {path.name: hashlib.sha256(read_bytes(path)).hexdigest() for path in paths},
         "names": names,
-        "length_mm": float(length_mm),
+        "length_mm": length,
         "material": material,
         "area_mm2": area,
         **vars(choices),
@@ -210,8 +214,8 @@ def _check_names(named: Sequence[tuple[Path, str]]) -> None:
 
 
 def _read_all(
-    paths: Sequence[Path], samples: Sequence[About], choices: Choices, ask: Callable[[Undecided], str] | None
-) -> tuple[list[tuple[str, Converted]], Choices]:
+    paths: Sequence[Path], samples: Sequence[About], choices: Choices, ask: _Ask | None
+) -> tuple[list[_WithFiles], Choices]:
     """The tests of all files, each with the names of its files, and the choices made for them."""
     tests: list[tuple[Path, Converted]] = []
     for path, about in zip(paths, samples, strict=True):
@@ -226,11 +230,13 @@ def _read_all(
         join = partial(_joined, paths, samples[0])
         joined, choices = _decided(join, choices, ask)
         return [joined], choices
-    _check_names([(path, test.experiment.name) for path, test in tests])
-    return [(path.name, test) for path, test in tests], choices
+    names = [(path, test.experiment.name) for path, test in tests]
+    _check_names(names)
+    by_file = [(path.name, test) for path, test in tests]
+    return by_file, choices
 
 
-def _joined(paths: Sequence[Path], about: About, choices: Choices) -> tuple[str, Converted]:
+def _joined(paths: Sequence[Path], about: About, choices: Choices) -> _WithFiles:
     """The test that several files are holds of, with their names."""
     if not about.name_is_stated:
         about = replace(about, name=common_name(paths))
@@ -275,9 +281,7 @@ def _hold_or_test(paths: Sequence[Path], found: str) -> Undecided:
     return Undecided(f"{path_of_all(in_natural_order(paths))}: found {found}", "what each file is", answers)
 
 
-def _decided(
-    read: Callable[[Choices], Read], choices: Choices, ask: Callable[[Undecided], str] | None
-) -> tuple[Read, Choices]:
+def _decided(read: Callable[[Choices], Read], choices: Choices, ask: _Ask | None) -> tuple[Read, Choices]:
     """What was read, and the choices made for it, which hold for what is read after it too."""
     while True:
         try:
@@ -290,25 +294,29 @@ def _decided(
 
 def _without_breaks(test: Converted) -> Converted:
     """A test without the readings of its gross events: their rows say that the hold went on, and no more."""
-    events = gross_events.gross_events_of(test.experiment)
+    experiment = test.experiment
+    events = gross_events.gross_events_of(experiment)
     dropped = {int(reading) for event in events for reading in event.readings}
-    column = test.header.index(READ[test.experiment.control])
+    column = test.header.index(READ[experiment.control])
     rows = [list(row) for row in test.rows]
     with_reading = [row for row in rows if row[column] is not None]
     for reading in dropped:
         with_reading[reading][column] = None
-    if len(with_reading) - 1 in dropped:
+    last = len(with_reading) - 1
+    if last in dropped:
         while rows[-1][column] is None:  # such a row at the end would say that the last hold went on
             rows.pop()
-    notes = [f"left out: {event.text}" for event in events]
-    kept = without_breaks(test.experiment)
+    notes = list(test.notes)
+    notes += [f"left out: {event.text}" for event in events]
+    kept = without_breaks(experiment)
     recording = test.recording
     if recording is not None:  # holds without a reading at the end are gone
-        recording = replace(recording, start_s=recording.start_s[: len(kept.holds)])
-    return replace(test, experiment=kept, rows=rows, notes=[*test.notes, *notes], recording=recording)
+        starts = recording.start_s[: len(kept.holds)]
+        recording = replace(recording, start_s=starts)
+    return replace(test, experiment=kept, rows=rows, notes=notes, recording=recording)
 
 
-def _write(folder: Path, tests: Sequence[tuple[str, Converted]]) -> None:
+def _write(folder: Path, tests: Sequence[_WithFiles]) -> None:
     from wirebayes.report.pictures.bench import understood  # matplotlib only where it is needed
 
     tables: list[str] = []
@@ -320,12 +328,14 @@ def _write(folder: Path, tests: Sequence[tuple[str, Converted]]) -> None:
         notes = [f"from {raw}", *test.notes]
         sentences = [f"{note[:1].upper()}{note[1:]}." for note in notes]
         table = toml_of(experiment, sentences, test.unrecorded)
-        understood(experiment, folder / f"{name}.svg", test.recording)
+        picture = folder / f"{name}.svg"
+        understood(experiment, picture, test.recording)
         content["experiments"][name] = _imported(raw, test)
         write_text(folder / f"{name}.toml", table)
         tables.append(table)
     if len(tests) > 1:
-        write_text(folder / f"{TOGETHER}.toml", "\n".join(tables))
+        every = "\n".join(tables)
+        write_text(folder / f"{TOGETHER}.toml", every)
     content["warnings"] = notices_by_part(content["experiments"])
     write_json(folder / IMPORTED, content)
 

@@ -75,12 +75,12 @@ def import_robot(
         raise InputError("--position: found one for a platform on a ball joint, expected none: the joint is its place")
     if where is None:
         raise InputError(f"{first}: found no pose, expected --position X,Y,Z of the home pose in metres")
-    if not 0 <= bounds[0] < bounds[1]:
-        raise InputError(f"--tension: found {bounds[0]:g},{bounds[1]:g}, expected 0 <= LOWEST < HIGHEST in newtons")
+    lowest, highest = bounds
+    if not 0 <= lowest < highest:
+        raise InputError(f"--tension: found {lowest:g},{highest:g}, expected 0 <= LOWEST < HIGHEST in newtons")
     target = Path(output)
     if target.exists():
         raise InputError(f"{target}: found a file of this name, expected none; nothing is overwritten")
-    lowest, highest = bounds
     text = robot_file(found, (lowest, highest), np.asarray(where))
     schema.parse(text, str(first))
     try:
@@ -111,21 +111,24 @@ def _read(paths: list[Path], cable_set: str | None, pulleys: bool) -> ImportedRo
     parts: dict[str, Element] = {}
     for path in paths:
         root = read_xml(path)
-        if root.tag not in _PARTS:
+        part = _PARTS.get(root.tag)
+        if part is None:
             raise root.fail("this root", "<bodies_system> or <cables> of CASPR, or <models> of WireX")
-        if _PARTS[root.tag] in parts:
+        if part in parts:
             raise root.fail("a second file of this kind", "one robot")
-        parts[_PARTS[root.tag]] = root
-    if "models" in parts:
+        parts[part] = root
+    models = parts.get("models")
+    if models is not None:
         if len(parts) > 1 or cable_set is not None:
-            raise parts["models"].fail("files or a cable set of CASPR beside it", "the file of WireX alone")
-        return wirex.robot_of_wirex(parts["models"], pulleys)
+            raise models.fail("files or a cable set of CASPR beside it", "the file of WireX alone")
+        return wirex.robot_of_wirex(models, pulleys)
     for here, other in (("bodies", "cables"), ("cables", "bodies")):
         if other not in parts:
             beside = _beside(Path(parts[here].file), here, other)
-            parts[other] = read_xml(beside)
-            if _PARTS.get(parts[other].tag) != other:
-                raise parts[other].fail("this root", f"the {other} of CASPR")
+            root = read_xml(beside)
+            if _PARTS.get(root.tag) != other:
+                raise root.fail("this root", f"the {other} of CASPR")
+            parts[other] = root
     found = caspr.robot_of_caspr(parts["bodies"], parts["cables"], cable_set)
     return found if pulleys else _without_pulleys(found)
 

@@ -65,18 +65,22 @@ def load(folder: PathLike, *, own_effects: PathLike | None = None) -> Any:
     >>> wb.load(folder)
     Posterior(kite-1.5m, chain hooke saturating, converged)
     """
-    place, own = ResultFolder(Path(folder)), path_of(own_effects)
+    place = ResultFolder(Path(folder))
+    own = path_of(own_effects)
     path = place.path
     if (path / POSTERIOR).is_file():
         summary: SummaryJson = read_json(path / SUMMARY)
         name = str(summary["experiment"])
         return Posterior(place, own, computed=False, name=name)
     absent = f"{path}: found no {CONFIGURATION}, expected a folder of results"
-    configuration = read_json(path / CONFIGURATION, absent)
-    command = configuration.get("command") if isinstance(configuration, dict) else None
+    file = path / CONFIGURATION
+    configuration = read_json(file, absent)
+    command = None
+    if isinstance(configuration, dict):
+        command = configuration.get("command")
     if command != "fit" and command not in _KINDS:
         known = ", ".join(["fit", *_KINDS])
-        raise InputError(f"{path / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
+        raise InputError(f"{file}, key command: found {command!r}, expected one of {known}")
     if not (path / COMPLETE).is_file():
         raise InputError(f"{path}: found unfinished results, expected finished ones; run the same command again")
     if command == "fit":

@@ -91,7 +91,8 @@ def without_breaks(experiment: Experiment) -> Experiment:
 
 def _experiments_of(source: Source, name: str | None) -> list[Experiment]:
     if isinstance(source, str | os.PathLike):
-        return select(read_experiments(Path(source)), name)
+        read = read_experiments(Path(source))
+        return select(read, name)
     if isinstance(source, Experiment):
         return select([source], name)
     experiments = list(source) if isinstance(source, Iterable) else [source]
@@ -100,7 +101,8 @@ def _experiments_of(source: Source, name: str | None) -> list[Experiment]:
             raise InputError(f"source: found {type(value).__name__}, expected the path of a file or Experiments")
     names = [e.name for e in experiments]
     if not names or len(set(names)) < len(names):
-        raise InputError(f"source: found {', '.join(names) or 'nothing'}, expected experiments of different names")
+        found = ", ".join(names) or "nothing"
+        raise InputError(f"source: found {found}, expected experiments of different names")
     return select(experiments, name)
 
 

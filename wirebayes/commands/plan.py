@@ -120,12 +120,12 @@ def plan(
     kinds = catalogue(own)
     rng = np.random.default_rng(seed_of(seed, "guess"))
     request = _request(source, experiment, tests, list(kinds), spec, own, rng)
-    request = replace(
-        request,
-        aim=request.aim if aim is None else _checked_aim(aim, list(kinds)),
-        budget_min=request.budget_min if budget_min is None else float(budget_min),
-        robot=request.robot if robot is None else robot,
-    )
+    if aim is not None:
+        request = replace(request, aim=_checked_aim(aim, list(kinds)))
+    if budget_min is not None:
+        request = replace(request, budget_min=float(budget_min))
+    if robot is not None:
+        request = replace(request, robot=robot)
     machine = None if request.robot is None else robot_of(request.robot)
     configuration = {
         "command": "plan",
@@ -163,7 +163,10 @@ def _check_tests(tests: object) -> None:
 
 def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, report: Progress) -> list[Judged]:
     """What each test would teach, and what it would show of missing effects."""
-    planned = [(at_centre(test, request.guess.at(test.length_mm), spec), words) for test, words in request.tests]
+    planned = []
+    for test, words in request.tests:
+        guess = request.guess.at(test.length_mm)
+        planned.append((at_centre(test, guess, spec), words))
     first, _ = planned[0]
     stated = {  # all state their creep for the same wire
         "tension_N": middle_tension(first),
@@ -174,7 +177,8 @@ def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, repo
     for done, (test, words) in enumerate(planned):
         report("protocols", done, len(planned))
         guess = request.guess.at(test.length_mm)
-        rng = np.random.default_rng(seed_of(seed, "plan", test.name))
+        own_seed = seed_of(seed, "plan", test.name)
+        rng = np.random.default_rng(own_seed)
         try:
             expected = expected_widths(test, guess, rng, spec, **stated, kept_draws=kept)
         except ValueError as error:
@@ -210,12 +214,14 @@ def _request(
     if path.is_dir():
         return _of_folder(path, name, n, effects, own)
     if is_plan(path):
-        return _of_plan(read_plan(path, effects), name, n, own, rng)
-    experiments = select(read_experiments(path), name)
-    if len(experiments) > 1:
-        names = ", ".join(experiment.name for experiment in experiments)
+        written = read_plan(path, effects)
+        return _of_plan(written, name, n, own, rng)
+    read = read_experiments(path)
+    first, *others = select(read, name)
+    if others:
+        names = ", ".join(experiment.name for experiment in (first, *others))
         raise InputError(f"{source}: found the experiments {names}, expected one of them as --experiment")
-    return _of_experiment(experiments[0], n, spec, rng)
+    return _of_experiment(first, n, spec, rng)
 
 
 def _of_experiment(measured: Experiment, n: int, spec: ModelSpec, rng: Generator) -> PlanRequest:
@@ -235,12 +241,10 @@ def _of_plan(file: PlanFile, name: str | None, n: int, own: Path | None, rng: Ge
         guess = from_tables(file.guess, file.guess_lines, file.source, planned, n, rng)
     else:
         guess, about, _ = _posterior(file.posterior, name, n, own)
-    about |= {
-        "guess": file.guess,
-        "priors": file.priors,
-        "material": file.material,
-        "protocols": [vars(test) for test in file.tests],
-    }
+    about["guess"] = file.guess
+    about["priors"] = file.priors
+    about["material"] = file.material
+    about["protocols"] = [vars(test) for test in file.tests]
     tests = [(test, "") for test in planned]
     return PlanRequest(tests, guess, file.aim, file.budget_min, file.robot, about)
 
@@ -265,17 +269,20 @@ def _rivals(findings: Path, name: str) -> list[str]:
 
 
 def _posterior(folder: Path, name: str | None, n: int, own: Path | None) -> tuple[GuessedWire, dict[str, Any], Sample]:
-    discovered = bool(list(folder.glob("**/plain/posterior.nc")))
-    which, place = find_posterior(folder, name, "plain" if discovered else None)
+    discovered = any(folder.glob("**/plain/posterior.nc"))
+    model = "plain" if discovered else None
+    which, place = find_posterior(folder, name, model)
     stored = read_back.load_posterior(place, which, own)
     if stored.likelihood == "hold":
         message = "found a fit with --likelihood hold, which knows no preload and no setting error, expected a chain"
         raise InputError(f"{folder}: {message}")
     sample = stored.sample
+    length_mm = sample.protocol.length_mm
     source = f"the posterior of {sample.name} in {folder.name}"
-    guess = from_posterior(stored.draws, sample.protocol.length_mm, source, n)
+    guess = from_posterior(stored.draws, length_mm, source, n)
     guess = replace(guess, doubts=stored.doubts)
-    return guess, {"posterior": hash_of(guess.draws)}, sample
+    about = {"posterior": hash_of(guess.draws)}
+    return guess, about, sample
 
 
 def _experiment(test: PlannedTest, file: PlanFile) -> Experiment:
@@ -312,15 +319,19 @@ def _hold(sample: Sample, row: int) -> Hold:
     protocol = sample.protocol
     mask = protocol.mask[row]
     recorded = bool(mask.any())
+    number = int(protocol.number[row]) if recorded else None
+    times = protocol.time_s[row][mask]
+    readings = sample.readings[row, :, 0][mask]
     temperatures = None
     if protocol.warming_K is not None and protocol.reference_C is not None and recorded:
-        temperatures = frozen((protocol.warming_K[row][mask] + protocol.reference_C).tolist())
+        warm = protocol.warming_K[row][mask] + protocol.reference_C
+        temperatures = frozen(warm.tolist())
     return Hold(
-        int(protocol.number[row]) if recorded else None,
+        number,
         float(protocol.setting[row]),
         float(protocol.duration_s[row]),
-        frozen(protocol.time_s[row][mask].tolist()),
-        frozen(sample.readings[row, :, 0][mask].tolist()),
+        frozen(times.tolist()),
+        frozen(readings.tolist()),
         temperatures,
         float(protocol.start_s[row]),
         protocol.control,

@@ -185,17 +185,16 @@ def pose(
     slices = _slices(machine, map_heights, map_rotations)
     other, of_other = given.other(other_fit, machine)
     request = _request(asked, allowed, specimen_spread, slices)
-    begun = given.begun(
-        {
-            **at,
-            "--times": text_of(times),
-            **allowed.options(),
-            "--specimen-spread": specimen_spread,
-            "--other-fit": of_other,
-            **carried,
-            **_options_of(slices),
-        }
-    )
+    options = {
+        **at,
+        "--times": text_of(times),
+        **allowed.options(),
+        "--specimen-spread": specimen_spread,
+        "--other-fit": of_other,
+        **carried,
+        **_options_of(slices),
+    }
+    begun = given.begun(options)
     return pose_at(asked, request, other, begun)
 
 

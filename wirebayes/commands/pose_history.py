@@ -141,16 +141,18 @@ def pose_over_time(asked: AskedPose, option: str, given: Any, errors: Uncertain,
         The table is wrong (line and column).
     """
     robot, columns = asked.robot, _COLUMNS[option]
+    name = option[2:]
     if isinstance(given, str | os.PathLike):
-        history = table.read_log(Path(given), robot, columns)
-        read = content_hash(Path(given))
+        file = Path(given)
+        history = table.read_log(file, robot, columns)
+        read = content_hash(file)
     else:
-        cells = columns_table(given, Path(option[2:]), table.may_be_unread)
+        cells = columns_table(given, Path(name), table.may_be_unread)
         history = table.parse_log(cells, robot, columns)
         read = hash_of({option: [cells.header, *cells.rows]})
     _refuse_off_plane(robot, option, history)
     lasting = {  # in a fixed order, as in `wires.configuration`
-        "of": option[2:],
+        "of": name,
         "content": read,
         "--reference-sd (m)": errors.reference_m,
         "--specimen-spread": errors.spread,
@@ -159,17 +161,19 @@ def pose_over_time(asked: AskedPose, option: str, given: Any, errors: Uncertain,
     }
     if errors.calibrated is not None:
         lasting["--calibration"] = hash_of(to_dict(errors.calibrated))
-    with open_run(begun.place.path, begun.decides | {"history": lasting}) as opened:
+    decides = begun.decides | {"history": lasting}
+    with open_run(begun.place.path, decides) as opened:
         if opened.state == "done":
             return Pose(begun.place, asked.own_effects, computed=False)
         with computing(), np.errstate(all="ignore"):  # a draw whose platform falls has no numbers
             found = history_report(robot, asked.line, history, errors, asked.start, asked.seed, begun.progress)
-        write_json(opened.directory / "pose.json", found.content)
-        for name, (header, rows) in found.tables.items():
-            write_csv(opened.directory / name, header, rows)
+        folder = opened.directory
+        write_json(folder / "pose.json", found.content)
+        for file_name, (header, rows) in found.tables.items():
+            write_csv(folder / file_name, header, rows)
         from wirebayes.report.pictures import robot_history as pictures  # matplotlib only where it is needed
 
-        pictures.save_history_pictures(opened.directory, robot, history, found)
+        pictures.save_history_pictures(folder, robot, history, found)
         opened.finish()
     return Pose(begun.place, asked.own_effects)
 

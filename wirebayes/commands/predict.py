@@ -1,7 +1,7 @@
 """The readings that a posterior expects of a protocol."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,7 +10,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.arrays import protocol_of_columns
 from wirebayes.io.readings import protocol_table
 from wirebayes.io.run_folder import check_file, write_csv
-from wirebayes.prediction.request import request_of
+from wirebayes.prediction.request import ProtocolRequest, request_of
 from wirebayes.prediction.table import (
     Prediction,
     beyond_tested,
@@ -93,7 +93,7 @@ def predict(
     if model is not None:
         check_choice("model", model, ("plain", "final"))
     members = stored_posteriors(posterior, experiment, model, own)
-    first = members[0][1]
+    _, first = members[0]
     control = first.sample.protocol.control
     cells = _cells(protocol, control)
     requests = [(probability, request_of(cells, stored, fresh=fresh)) for probability, stored in members]
@@ -103,18 +103,25 @@ def predict(
     rows = mixture_table(requests, seed)
     if output is not None:
         write_csv(Path(output), header(control), rows)
-    sentence = requests[0][1].sentence
-    if len(requests) > 1:
-        sentence += (
-            f"; averaged over the {len(requests)} models that the readings leave undecided, weighted by probability"
-        )
     doubts = [doubt for _, stored in members for doubt in stored.doubts]
-    notices = to_json([*doubts, *beyond_tested(rows, first), *unlikely_readings(requests, seed)])
-    attributes: dict[str, Any] = {"prediction": sentence, "seed": seed}
+    doubts += beyond_tested(rows, first)
+    doubts += unlikely_readings(requests, seed)
+    notices = to_json(doubts)
+    attributes: dict[str, Any] = {"prediction": _sentence(requests), "seed": seed}
     if notices:  # in two attributes, for netCDF holds text but no mappings
         attributes["warnings"] = [notice["text"] for notice in notices]
         attributes["warning_kinds"] = [notice["kind"] for notice in notices]
     return dataset(rows, attributes, control)
+
+
+def _sentence(requests: Sequence[tuple[float, ProtocolRequest]]) -> str:
+    """What is predicted, and of how many models."""
+    _, asked = requests[0]
+    models = len(requests)
+    if models == 1:
+        return asked.sentence
+    averaged = f"averaged over the {models} models that the readings leave undecided, weighted by probability"
+    return f"{asked.sentence}; {averaged}"
 
 
 def _cells(protocol: Any, control: Control) -> CsvTable:
@@ -196,6 +203,17 @@ def one_of(posteriors: Mapping[str, Posterior], experiment: str | None) -> Poste
     return posteriors[name]
 
 
+def _folders_by_experiment(folder: Path) -> dict[str, list[Path]]:
+    """Where the posteriors of each experiment lie in a folder."""
+    found: dict[str, list[Path]] = {}
+    files = [file for level in _LEVELS for file in folder.glob(level)]
+    for file in sorted(files):
+        for name in read_back.experiments_in(file):
+            folders = found.setdefault(name, [])
+            folders.append(file.parent)
+    return found
+
+
 def find_posterior(folder: Path, experiment: str | None = None, model: str | None = None) -> tuple[str, Path]:
     """Find the posterior of one experiment in a folder.
 
@@ -222,18 +240,15 @@ def find_posterior(folder: Path, experiment: str | None = None, model: str | Non
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: found no such folder, expected one written by fit or discover")
-    found: dict[str, list[Path]] = {}
-    files = [file for level in _LEVELS for file in folder.glob(level)]
-    for file in sorted(files):
-        for name in read_back.experiments_in(file):
-            found.setdefault(name, []).append(file.parent)
+    found = _folders_by_experiment(folder)
     if not found:
         raise InputError(f"{folder}: found no posterior.nc in it, expected a folder written by fit or discover")
+    listed = ", ".join(sorted(found))
     if experiment is None and len(found) > 1:
-        raise InputError(f"{folder}: found {', '.join(sorted(found))}, expected one of them as --experiment")
+        raise InputError(f"{folder}: found {listed}, expected one of them as --experiment")
     name = experiment or next(iter(found))
     if name not in found:
-        raise InputError(f"--experiment {name}: not in {folder}, expected one of {', '.join(sorted(found))}")
+        raise InputError(f"--experiment {name}: not in {folder}, expected one of {listed}")
     places = {place.name: place for place in found[name]}
     if model is None and len(places) == 1:
         (only,) = places.values()

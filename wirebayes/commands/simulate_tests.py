@@ -104,7 +104,7 @@ def simulate_tests(
     control, path = _settings(displacements, weights, unload)
     gaps = frozenset(unrecorded)
     _check_protocol(control, path, sizes, moments, gaps)
-    warmth = _given_numbers("--temperature", temperature)
+    warmth = _temperatures(temperature)
     alike = Bench(times_s=moments, unrecorded=gaps, temperatures_C=warmth).setting(control, path, float(resolution))
     benches = _benches(alike, tests, sizes)
     truth = Truth(chosen, tuple(found.values()), spec.law, spec.history)
@@ -145,9 +145,8 @@ def _effects(
 ) -> tuple[dict[str, Effect], dict[str, float]]:
     """The effects by key, and the amplitudes that were given."""
     if isinstance(effects, Mapping):
-        texts: Sequence[str] = [f"{key}={value}" for key, value in effects.items()]
-    else:
-        texts = names_given(effects)
+        effects = [f"{key}={value}" for key, value in effects.items()]
+    texts = names_given(effects)
     found: dict[str, Effect] = {}
     given: dict[str, float] = {}
     known = catalogue(own)
@@ -187,16 +186,19 @@ def _check_protocol(
 ) -> None:
     """Refuse what no bench could do."""
     shortest, least = min(lengths), min(path)
-    if shortest <= 0 or len(set(lengths)) < len(lengths):
+    is_repeated = len(set(lengths)) < len(lengths)
+    if shortest <= 0 or is_repeated:
         raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")
     if control == "force" and least <= 0:
         raise InputError(f"--weights: found {least:g}, expected more than 0 N")
     if control == "displacement" and least <= -shortest:
         raise InputError(f"--displacements: found {least:g}, expected more than -{shortest:g} mm, a length")
-    if times[0] < 0 or any(after <= before for before, after in pairwise(times)):
+    rising = all(before < after for before, after in pairwise(times))
+    if times[0] < 0 or not rising:
         raise InputError(f"--times: found {text_of(times)!r}, expected rising times from 0 s on")
-    if not unrecorded <= set(range(1, len(path))):
-        raise InputError(f"--unrecorded: found {max(unrecorded)}, expected a hold from 1 to {len(path) - 1}")
+    last = len(path) - 1
+    if not unrecorded <= set(range(1, last + 1)):
+        raise InputError(f"--unrecorded: found {max(unrecorded)}, expected a hold from 1 to {last}")
 
 
 def _name(tests: int, lengths: Sequence[float], test: int, length: float) -> str:
@@ -204,9 +206,9 @@ def _name(tests: int, lengths: Sequence[float], test: int, length: float) -> str
     return name if len(lengths) == 1 else f"{name}-{length:g}mm"
 
 
-def _given_numbers(option: str, values: Numbers) -> list[float]:
-    """Of an option that may be left out; then none."""
-    return _numbers(option, values) if text_of(values) else []
+def _temperatures(values: Numbers) -> list[float]:
+    """None where the option is left out."""
+    return _numbers("--temperature", values) if text_of(values) else []
 
 
 def _numbers(option: str, values: Numbers) -> list[float]:

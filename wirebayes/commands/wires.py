@@ -129,10 +129,6 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
     own_effects : Path, optional
         File of a user's own effects, for a folder.
 
-    Returns
-    -------
-    WireDraws
-
     Raises
     ------
     InputError
@@ -148,8 +144,10 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
     if isinstance(wires, Posteriors):
         wires = one_of(wires, experiment)
     if isinstance(wires, Posterior):
-        return _usable(wires.stored(experiment), wires.name, count)
-    return read_wires(folder_of(wires), count, experiment, own_effects)
+        stored = wires.stored(experiment)
+        return _usable(stored, wires.name, count)
+    folder = folder_of(wires)
+    return read_wires(folder, count, experiment, own_effects)
 
 
 def draws_for(
@@ -168,10 +166,6 @@ def draws_for(
         May be left out where there is one.
     own_effects : Path, optional
         File of a user's own effects, for a folder.
-
-    Returns
-    -------
-    WireDraws
 
     Raises
     ------
@@ -199,9 +193,11 @@ def _together(lines: dict[str, WireDraws]) -> WireDraws:
         _check_alike(name, first, other, line)
         if other == name:
             continue
-        order = rng.permutation(line.count)[:count]
-        others[other] = replace(line.part(order), name=other)
-    return replace(first.part(slice(0, count)), name=name, others=others)
+        order = rng.permutation(line.count)
+        part = line.part(order[:count])
+        others[other] = replace(part, name=other)
+    own = first.part(slice(0, count))
+    return replace(own, name=name, others=others)
 
 
 def _check_alike(name: str, first: WireDraws, other: str, line: WireDraws) -> None:
@@ -239,12 +235,15 @@ def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effec
         values = _log_core(stored.draws)
         values[:, CORE.index("B")] += np.log(first.length_mm / one.length_mm)  # creep is a strain
         logarithms.append(values)
-    log_prior = _log_core(read_back.prior_draws(folders[0], experiment))
+    prior_draws = read_back.prior_draws(folders[0], experiment)
+    log_prior = _log_core(prior_draws)
     prior = log_prior.mean(0), np.cov(log_prior.T)
-    found = between_specimens(logarithms, prior, count, np.random.default_rng(0))
+    rng = np.random.default_rng(0)
+    found = between_specimens(logarithms, prior, count, rng)
+    means = np.exp(found.mean)
     return replace(
         first,
-        parameters=dict(zip(CORE, np.exp(found.mean).T, strict=True)),
+        parameters=dict(zip(CORE, means.T, strict=True)),
         effects=(),
         tension_range_N=_widest([one.tension_range_N for one in ones]),
         time_range_s=_widest([one.time_range_s for one in ones]),
@@ -299,10 +298,6 @@ def read_wires(folder: Path, count: int, experiment: str | None = None, own_effe
         May be left out where the posterior has one.
     own_effects : Path, optional
         File of a user's own effects.
-
-    Returns
-    -------
-    WireDraws
 
     Raises
     ------

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from wirebayes.discovery.fitted_sets import Fits, Key
+from wirebayes.discovery.model_space import ModelPosterior
 from wirebayes.discovery.settings import MIXED
 from wirebayes.discovery.verdict import Decision
 from wirebayes.inference.laplace_fit import LaplaceFit
@@ -52,24 +53,35 @@ def alternatives(
         The final model first, probabilities summing to one; empty where it stands alone.
     """
     names = frozenset(effect.name for effect in final.effects)
+    weights = _weights_of_acting(decision.posterior, fits, i, names, undecided)
+    others = _others(weights, names)
+    keys = [names, *others]
+    total = sum(weights[key] for key in keys)
+    if total <= 0.0 or not others:
+        return []
+    out = []
+    for key in keys:
+        block = final if key == names else fits.of(key)[i]
+        share = weights[key] / total
+        out.append(Alternative(block, remains, share))
+    return out
+
+
+def _weights_of_acting(
+    found: ModelPosterior, fits: Fits, i: int, names: Key, undecided: Sequence[str]
+) -> dict[Key, float]:
+    """Of what acts in block `i`: the names of the final model, and fitted sets that differ in undecided names alone."""
     weights: dict[Key, float] = {}
-    found = decision.posterior
     for s, weight in zip(found.sets, found.weights.values(), strict=True):
         acting = frozenset(name for name in s.names if s.presence[name][i] > 0.5)
         swapped = acting ^ names
         is_fitted = acting and s.key == acting and fits.knows(acting)
-        if not swapped or (is_fitted and swapped <= set(undecided)):
-            weights[acting] = weights.get(acting, 0.0) + weight
+        is_undecided = swapped <= set(undecided)
+        if not swapped or (is_fitted and is_undecided):
+            before = weights.get(acting, 0.0)
+            weights[acting] = before + weight
     weights.setdefault(names, 0.0)
-    others = _others(weights, names)
-    total = sum(weights[key] for key in (names, *others))
-    if total <= 0.0 or not others:
-        return []
-    out = [Alternative(final, remains, weights[names] / total)]
-    for key in others:
-        block = fits.of(key)[i]
-        out.append(Alternative(block, remains, weights[key] / total))
-    return out
+    return weights
 
 
 def _others(weights: Mapping[Key, float], names: Key) -> list[Key]:

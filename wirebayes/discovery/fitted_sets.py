@@ -90,14 +90,15 @@ class Explored:
         best: dict[str, tuple[float, float, FittedSet, dict[int, Refit]]] = {}
         for parent in (self.root, *self.fitted.values()):
             further = parent.further
-            for name in further.winners if further is not None else ():
-                assert further is not None
+            if further is None:
+                continue
+            for name in further.winners:
                 own = further.log_bayes[name]
                 value = parent.effects.log_bayes + own
                 if name not in best or value > best[name][0]:
                     best[name] = value, own, parent, further.amplitudes(name)
         # of names that are best together the one that explains most is better
-        order = sorted(best, key=lambda name: (-best[name][0], -best[name][1]))
+        order = sorted(best, key=lambda name: best[name][:2], reverse=True)
         return {name: best[name][2:] for name in order}
 
 
@@ -164,6 +165,7 @@ def added(
         near = refit.theta[refit.blocks.index(b)]
         blocks[b] = fitted(block.experiments, effects, settings.spec, rng, near, scales=block.scales)
     forms = {b: refit.effect for b, refit in refits.items()}
-    if any(len(refit.blocks) > 1 for refit in refits.values()):
+    is_shared = any(len(refit.blocks) > 1 for refit in refits.values())
+    if is_shared:
         blocks = informed(blocks, forms, rng)
     return blocks, forms

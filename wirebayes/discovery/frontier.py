@@ -54,8 +54,9 @@ class Frontier:
         if key in self.fitted:
             self._weigh_again(key, value)
         elif self._is_better(key, value, parent):
+            names = (*parent.names, name)
             presence = {**parent.presence, name: found.presence[name]}
-            self.known[key] = EffectSet((*parent.names, name), value, presence, None)
+            self.known[key] = EffectSet(names, value, presence, None)
             self.parents[key] = parent.key, name
         known_credit = self.credit.get(key, -np.inf)
         self.credit[key] = max(known_credit, credit)

@@ -23,16 +23,20 @@ def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | No
     `rival` is the log Bayes factor of the best effect; a gross error must beat it and chance by a clear margin.
     """
     samples = block.target.problem.samples
-    cells = [(at, j, r) for at, s in enumerate(samples) for j, r in np.argwhere(s.protocol.mask)]
-    x = expand(block.target, block.z, [], columns=_one_reading_each(cells))
+    cells = []
+    for at, sample in enumerate(samples):
+        cells += [(at, j, r) for j, r in np.argwhere(sample.protocol.mask)]
+    columns = _one_reading_each(cells)
+    x = expand(block.target, block.z, [], columns=columns)
     effects = scan(x).effects[0]
     best = int(np.argmax(effects))
     value = float(effects[best]) + occam(False) - np.log(len(cells))
     if value < max(3.0, rival + 2.0):
         return None
     at, j, r = cells[best]
-    number = int(samples[at].protocol.number[j])
-    return samples[at].name, number, int(r), value
+    sample = samples[at]
+    number = int(sample.protocol.number[j])
+    return sample.name, number, int(r), value
 
 
 def _one_reading_each(cells: Sequence[tuple[int, int, int]]) -> Callable[[Problem, int, Array, Array], Array]:

@@ -96,21 +96,25 @@ def predicted(
     problem, theta = _draws(trained, rng, 500)
     whole = build(experiments, effects, block.spec, scales=block.scales)
     ahead = whole.in_units(problem.units).samples
-    # The training readings' reference tension belongs to the parameters.
-    return [
-        _scored(later, trained_on.model, problem.parameters(theta, trained_on), k, rng).times(problem.read_unit(later))
-        for later, trained_on, k in zip(ahead, problem.samples, train, strict=True)
-    ]
+    out = []
+    for later, trained_on, k in zip(ahead, problem.samples, train, strict=True):
+        # The training readings' reference tension belongs to the parameters.
+        own = problem.parameters(theta, trained_on)
+        scored = _scored(later, trained_on.model, own, k, rng)
+        unit = problem.read_unit(later)
+        out.append(scored.times(unit))
+    return out
 
 
 def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng: Generator) -> HeldOut:
     """The recorded holds of a sample after the first `train`, predicted with draws of its own parameters."""
-    line = linearise(sample.protocol, own, model)
+    protocol = sample.protocol
+    line = linearise(protocol, own, model)
     noise = sample.variance(own), own["setting_sd"]
-    last = np.flatnonzero(sample.protocol.recorded)[train:]
-    trained_on = sample.protocol.mask.copy()
+    last = np.flatnonzero(protocol.recorded)[train:]
+    trained_on = protocol.mask.copy()
     trained_on[last] = False
-    left_out = sample.protocol.mask & ~trained_on
+    left_out = protocol.mask & ~trained_on
     carried = likelihoods.chain(line, sample.readings, trained_on, *noise)
     log_p = likelihoods.held_out_density(line, carried, sample.readings, left_out, *noise)
     draws = log_p.shape[1]
@@ -120,7 +124,7 @@ def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng
     floor = np.concatenate([hold.floor for hold in holds])
     inside = np.concatenate([hold.inside for hold in holds])
     return HeldOut(
-        holds=[int(n) for n in sample.protocol.number[last]],
+        holds=[int(n) for n in protocol.number[last]],
         squares=float((error**2).mean()),
         readings=len(error),
         floor=float(floor.mean()),

@@ -78,18 +78,26 @@ def ladders(
         first = shapes[0][0]
         here = tuple(c for c in candidates if c.probe == first)
         on = sorted({b for c in here for b in c.blocks})
+        own_blocks = [blocks[b] for b in on]
+        own_data = [data[b] for b in on]
         starts: list[_LadderEnds] = []
         for numbers in shapes:
-            strength = {k: _strength(k, [data[b] for b in on]) for k in numbers}
+            strength = {k: _strength(k, own_data) for k in numbers}
             visible = [k for k in numbers if strength[k] > 0]
             if visible:
                 # Of a one-sided form the probe that lies in the middle of the ladder.
-                k = min(visible, key=lambda k: abs(np.log(strength[k] * trials[k].step / _MIDDLE)))
-                starts += _both_signs(trials[k], strength[k], [blocks[b] for b in on])
+                k = min(visible, key=lambda k: _off_middle(strength[k], trials[k]))
+                starts += _both_signs(trials[k], strength[k], own_blocks)
         if starts:
             probes = tuple(s.probe for s in starts)
-            out.append(AmplitudePath(probes, _rungs(starts), here))
+            rungs = _rungs(starts)
+            out.append(AmplitudePath(probes, rungs, here))
     return out
+
+
+def _off_middle(strength: float, probe: Probe) -> float:
+    """Distance of a probe's step from the middle of the ladder, as a logarithm."""
+    return float(abs(np.log(strength * probe.step / _MIDDLE)))
 
 
 def _strength(k: int, data: Sequence[Scan]) -> float:

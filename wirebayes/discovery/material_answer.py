@@ -102,9 +102,10 @@ def answer_material(
     """
     if past is None:
         return MaterialAnswer(Judgement("nothing-missing"), [], [], None, _NO_REMAINDER)
+    decision = past.decision
     p, plain = gate.test.p, gate.blocks[i]
-    before = evidence(past.decision, p, i)
-    accepted = accepted_effects(past.decision, before, i)
+    before = evidence(decision, p, i)
+    accepted = accepted_effects(decision, before, i)
     stages = _stages(plain, accepted, past.explored, i, rng)
     gain = None
     if before.remainder > REMAINS:
@@ -115,9 +116,12 @@ def answer_material(
     if judgement.verdict in ("nothing-missing", "unknown"):
         accepted, stages = [], []
     # beside the effects where some are accepted, else what the plain model leaves over
-    retest = past.decision.retest
-    beside = retest.where[i] if retest is not None else []
-    patterns = {"partial": beside, "unknown": where}.get(judgement.verdict, [])
+    retest = decision.retest
+    patterns = []
+    if judgement.verdict == "unknown":
+        patterns = where
+    elif judgement.verdict == "partial" and retest is not None:
+        patterns = retest.where[i]
     remainder: Remainder = {
         "probability": found.remainder,
         "where": [w["covariate"] for w in patterns if w["p"] <= _VISIBLE],

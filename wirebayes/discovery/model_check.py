@@ -217,14 +217,12 @@ def write_checks(
     """
     todo = [job for job in jobs if not is_checked(job, directory)]
     work = partial(check_model, seed=seed, alpha=level(len(jobs)), simulations=simulations)
-    own_effects = jobs[0].own_effects
-    with (
-        workers(prepare=partial(catalogue, own_effects))
-        if parallel_map is None
-        else nullcontext(parallel_map) as parallel_map
-    ):
+    prepare = partial(catalogue, jobs[0].own_effects)
+    pool = workers(prepare=prepare) if parallel_map is None else nullcontext(parallel_map)
+    with pool as parallel_map:
         # One fit shares its simulations among the cores, several are each done on one.
-        checks = [work(todo[0], parallel_map=parallel_map)] if len(todo) == 1 else parallel_map(work, todo)
+        is_one = len(todo) == 1
+        checks = [work(todo[0], parallel_map=parallel_map)] if is_one else parallel_map(work, todo)
         for done, (job, check) in enumerate(zip(todo, checks, strict=True), 1):
             write_check(job, directory, check)
             report("checks", done, len(todo))

@@ -150,7 +150,9 @@ def log_weights(
     without = []
     beside = []
     for s in sets:
-        smooth = -np.inf if s.remainder is None else over_subsets(s.remainder)[0]
+        smooth = -np.inf
+        if s.remainder is not None:
+            smooth, _, _ = over_subsets(s.remainder)
         if s.names:
             alone = _log_prior_in_families(s, kinds, families) + s.log_bayes
             remainder = np.logaddexp(smooth, other.get(s.key, -np.inf))
@@ -194,16 +196,19 @@ def posterior(
     sums = _Sums.over(names, of_names, blocks)
     for s, bare, more in zip(sets, p_without, p_beside, strict=True):
         sums.add(s, bare, more)
+    inclusion = {name: _at_most_one(value) for name, value in sums.inclusion.items()}
+    together = [_at_most_one(value) for value in sums.together.values()]
+    leading = [_shares(sums.leading(b)) for b in range(blocks)]
     return ModelPosterior(
         tuple(sets),
         p_without,
         p_beside,
         _at_most_one(sums.nothing),
         _at_most_one(sums.remainder),
-        {name: _at_most_one(value) for name, value in sums.inclusion.items()},
+        inclusion,
         tuple(sums.together),
-        [_at_most_one(value) for value in sums.together.values()],
-        [_shares(sums.leading(b)) for b in range(blocks)],
+        together,
+        leading,
     )
 
 
@@ -285,7 +290,8 @@ class _Sums:
             self.inclusion[name] += whole * acts
             idle = idle * (1.0 - acts)
         for family, probability in self.together.items():
-            idle_members = [1.0 - s.presence[name] for name in s.names if name in family]
+            members = [name for name in s.names if name in family]
+            idle_members = [1.0 - s.presence[name] for name in members]
             absent = np.prod(idle_members, axis=0)
             probability += whole * (1.0 - absent)
         return idle

@@ -100,7 +100,10 @@ def weigh_names(
     """
     forms = _forms(trials, candidates, scans)
     by_name = _by_name(forms)
-    promise = {name: max(*own[0].linear, before.get(name, np.inf)) for name, own in by_name.items()}
+    promise = {}
+    for name, own in by_name.items():
+        reached_before = before.get(name, np.inf)
+        promise[name] = max(*own[0].linear, reached_before)
     waiting = sorted(by_name, key=lambda name: -promise[name])  # of names never refitted the scan's first
     room = len(waiting) if most is None else most
     found: dict[_Place, Refit] = {}
@@ -169,21 +172,34 @@ def _tasks(
 
 def _forms(trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan]) -> list[_Form]:
     """The variants of every effect, each place with the probe that the linear scan likes best there."""
-    best: dict[_Place, tuple[float, Candidate]] = {}
+    best = _best_at_each_place(trials, candidates, scans)
     effects: dict[str, Effect] = {}
     for c in candidates:
         effect = trials[c.probe].effect
         effects[effect.key] = effect
-        value = float(log_bayes(c, scans)[0][0])
-        if c.shared:
-            place = effect.key, c.blocks
-            best[place] = max(best.get(place, (-np.inf, c)), (value, c), key=lambda item: item[0])
     out = []
     for key, effect in effects.items():
-        places = [place for place in best if place[0] == key]
-        values, which = zip(*(best[place] for place in places), strict=True)
-        out.append(_Form(effect, tuple(places), values, which))
+        own = {place: found for place, found in best.items() if place[0] == key}
+        values, which = zip(*own.values(), strict=True)
+        out.append(_Form(effect, tuple(own), values, which))
     return out
+
+
+def _best_at_each_place(
+    trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan]
+) -> dict[_Place, tuple[float, Candidate]]:
+    """The candidate that the scan likes best, and how much."""
+    best: dict[_Place, tuple[float, Candidate]] = {}
+    for c in candidates:
+        if not c.shared:
+            continue
+        place = trials[c.probe].effect.key, c.blocks
+        evidence, _, _ = log_bayes(c, scans)
+        value = float(evidence[0])
+        best.setdefault(place, (-np.inf, c))
+        if value > best[place][0]:
+            best[place] = value, c
+    return best
 
 
 def reaches(
@@ -232,8 +248,10 @@ def _summed(forms: Sequence[_Form], found: Mapping[_Place, Refit], blocks: int) 
     variants: dict[str, list[_Summed]] = {}
     for form in forms:
         name = form.effect.name
-        summed = _over_blocks(form, found, most.get(name, np.inf), blocks)
-        variants.setdefault(name, []).append(summed)
+        ceiling = most.get(name, np.inf)
+        summed = _over_blocks(form, found, ceiling, blocks)
+        of_name = variants.setdefault(name, [])
+        of_name.append(summed)
     log_bayes = {}
     presence = {}
     winners = {}

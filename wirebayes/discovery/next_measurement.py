@@ -74,10 +74,11 @@ def other_measurements(p: Protocol, alone: bool, units: Units = NATURAL, setting
         span, last = _ends_in_words(p, units)
     x = p.setting[p.recorded]
     times = _longest_series(p)
-    long = LONGER * (times[-1] or p.duration_s.max() or 1.0)
+    last_time = times[-1]
+    long = LONGER * (last_time or p.duration_s.max() or 1.0)
     spread = np.geomspace(long / 300.0, long, 24)
     log_times = np.concatenate([[0.0], spread])
-    held = f"each held {to_be_held(units.time_s * times[-1])}"
+    held = f"each held {to_be_held(units.time_s * last_time)}"
     dense = f"{to_be_held(units.time_s * long)} with 25 readings spaced evenly in the logarithm of time"
     back = x[-2::-1] if len(x) > 1 else x
     there_and_back = np.concatenate([x, back])
@@ -137,16 +138,18 @@ def _another_length(problem: Problem) -> tuple[str, Problem]:
     """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares."""
     longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
     more = _twice_as_long(longest)
-    fixed = problem.prior.fixed
-    if LENGTH_EXPONENT not in problem.prior.names:
-        fixed = {LENGTH_EXPONENT: 1.0} | fixed
-    prior = replace(problem.prior, fixed=fixed)
+    prior = problem.prior
+    if LENGTH_EXPONENT not in prior.names:
+        fixed = {LENGTH_EXPONENT: 1.0} | prior.fixed
+        prior = replace(prior, fixed=fixed)
     lengths = {s.protocol.length_mm for s in problem.samples}
     which = "a second" if len(lengths) == 1 else "another"
-    length = problem.units.length_mm * more.protocol.length_mm
-    alike = "the same weights" if more.protocol.control == "force" else "steps scaled alike"
+    protocol = more.protocol
+    length = problem.units.length_mm * protocol.length_mm
+    alike = "the same weights" if protocol.control == "force" else "steps scaled alike"
     words = f"repeat the test at {which} length, {length:g} mm, with {alike}"
-    return words, replace(problem, samples=(*problem.samples, more), prior=prior)
+    samples = (*problem.samples, more)
+    return words, replace(problem, samples=samples, prior=prior)
 
 
 def _twice_as_long(sample: Sample) -> Sample:
@@ -178,10 +181,17 @@ def next_measurement(block: LaplaceFit, pair: tuple[Probe, Probe] | None, weakes
     str
         A sentence, also where no plan helps.
     """
-    trials = list(pair) if pair else [weakest] if weakest else []
-    if not trials:
+    if pair:
+        trials = list(pair)
+    elif weakest:
+        trials = [weakest]
+    else:
         return "No candidate remains; repeating the same holds would narrow the parameters."
-    words, ratio = _best_plan(block, lambda target: _separation(target, block, trials))
+
+    def separation(target: LogPosterior) -> float:
+        return _separation(target, block, trials)
+
+    words, ratio = _best_plan(block, separation)
     names = " from ".join(spoken(t.effect.name) for t in trials)
     if ratio < _WORTH:
         aim = f"distinguish {names}; measure one of them" if pair else f"reveal a smaller {names}; measure it"

@@ -104,7 +104,8 @@ class _Free:
 def _weigh_few(x: Tangent, signature: Array, near: Array, far: Array, degrees: int) -> Weighed:
     columns, smooth = _columns(x, signature)
     free = _eliminated(_inner_products(x, columns))
-    amplitude = np.divide(free.along, free.square, out=np.zeros_like(free.square), where=free.square > 0)
+    nowhere = np.zeros_like(free.square)
+    amplitude = np.divide(free.along, free.square, out=nowhere, where=free.square > 0)
     amplitude = np.clip(amplitude, near[:, None], far[:, None])
     left = free.left(amplitude, x.least)
     height = _heights(x, free, left, degrees)
@@ -168,16 +169,19 @@ def _eliminated(gram: Array) -> _Free:
     factor = cholesky(bordered)
     regular = np.isfinite(factor[..., 0, 0])
     factor[~regular] = 1.0
-    diagonal = np.einsum("nkpp->nkp", factor[..., :p, :p])
+    of_parameters = factor[..., :p, :p]
+    diagonal = np.einsum("nkpp->nkp", of_parameters)
     pivot = factor[..., p, p]
     square = pivot**2 - added
+    is_free = square > ABSORBED * own
+    residual = factor[..., -1, :]
     return _Free(
         gram,
         regular,
         log_volume=np.log(diagonal).sum(axis=2),
-        along=factor[..., -1, p] * pivot,
-        square=np.where(square > ABSORBED * own, square, 0.0),
-        taken=factor[..., -1, :p],
+        along=residual[..., p] * pivot,
+        square=np.where(is_free, square, 0.0),
+        taken=residual[..., :p],
     )
 
 

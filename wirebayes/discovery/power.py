@@ -262,10 +262,8 @@ def not_identifiable(block: LaplaceFit, kinds: Sequence[type[Effect]], possible:
             known.append(_DisplacementScale)  # there it is the gain of the sensor
         of_which = f" ({WORD[control]})" if len(controls) > 1 else ""
         for name, share in _absorbed(block, control, known).items():
-            out.append(
-                f"{_of_sensor(name, control)}{of_which}: {100 * share:.1f} % of it is absorbed by the model's own "
-                "parameters"
-            )
+            what = f"{_of_sensor(name, control)}{of_which}"
+            out.append(f"{what}: {100 * share:.1f} % of it is absorbed by the model's own parameters")
     for kind in kinds:
         if kind.name not in possible:
             out.append(f"{kind.name}: this protocol cannot show it ({kind.shows})")

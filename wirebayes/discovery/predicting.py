@@ -82,7 +82,8 @@ class Predicting:
         for other, own in zip(found.sets, found.without.tolist(), strict=True):
             if other.key > s.key and len(other.key) > 1:
                 larger[other.key] = own
-        if sum(larger.values()) < np.exp(-REACH) * weight:
+        least = np.exp(-REACH) * weight
+        if sum(larger.values()) < least:
             return False
         best = self._best_predicting(larger, found)
         if best is None:

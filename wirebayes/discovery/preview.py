@@ -73,9 +73,12 @@ def preview(experiment: Experiment, kinds: Kinds, rng: Generator) -> Preview:
     before = problem.theta_in(NATURAL, prior_draws)
     problem = problem.in_units(NATURAL)
     best = np.array(list(block.best.values()))
-    ends = hold_ends.cost(problem, best, theta.std(axis=0, ddof=1))
+    sd = theta.std(axis=0, ddof=1)
+    ends = hold_ends.cost(problem, best, sd)
     parameters = _parameters(problem, theta, before)
-    return Preview(parameters, _effects(block, kinds, rng), _warnings(problem, theta, before), ends)
+    effects = _effects(block, kinds, rng)
+    warnings = _warnings(problem, theta, before)
+    return Preview(parameters, effects, warnings, ends)
 
 
 def _parameters(problem: Problem, theta: Array, before: Array) -> dict[str, ParameterRange]:
@@ -114,13 +117,16 @@ def _range(draws: Array, before: Array, unit: str) -> ParameterRange:
 def _effects(block: LaplaceFit, kinds: Kinds, rng: Generator) -> dict[str, EffectSize]:
     """Each effect at the size at which it would be seen, in the form and at the hold where it is seen best."""
     control = block.experiments[0].control
-    if expand(block.target, block.z, []).degrees < 1:
-        return {name: _hidden(kind, "fewer readings than parameters", control) for name, kind in kinds.items()}
+    degrees = expand(block.target, block.z, []).degrees
+    if degrees < 1:
+        why = "fewer readings than parameters"
+        return {name: _hidden(kind, why, control) for name, kind in kinds.items()}
     trials, candidates = screening.candidate_probes([block], kinds)
     effects = {name: _hidden(kind, kind.shows, control) for name, kind in kinds.items()}
     if not candidates:
         return effects
-    null = screening.replicated(block, trials, SIMULATIONS, rng).scan
+    simulated = screening.replicated(block, trials, SIMULATIONS, rng)
+    null = simulated.scan
     level = screening.chance_level(candidates, [null])
     found = power.detectable(null, trials, candidates, level)
     for name, (number, amplitude) in found.items():

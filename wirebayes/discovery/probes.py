@@ -36,17 +36,24 @@ class Probe:
 
 def probes(effect: Effect) -> list[Probe]:
     """Amplitudes at which an effect is tried: one where its form is nearly linear, a ladder where it need not be."""
-    column, amplitude = effect.columns()[0], effect.amplitudes[0]
+    column = effect.columns()[0]
+    amplitude = effect.amplitudes[0]
+    neutral = amplitude.neutral
     low, high = amplitude.prior.support()
     scale = float(amplitude.prior.std())
-    one_sided = bool(low >= amplitude.neutral)
-    steps = [0.1 * scale] if effect.nearly_linear or not one_sided else [0.03 * scale, 0.3 * scale, scale, 3.0 * scale]
-    steps = [s for s in steps if amplitude.neutral + s <= high] or [0.5 * (high - amplitude.neutral)]
-    return [
-        Probe(effect, form | {column: amplitude.neutral + s}, s, one_sided)
-        for form in effect.shapes_tried()
-        for s in steps
-    ]
+    one_sided = bool(low >= neutral)
+    steps = [0.1 * scale]
+    if one_sided and not effect.nearly_linear:
+        steps = [0.03 * scale, 0.3 * scale, scale, 3.0 * scale]
+    allowed = [s for s in steps if neutral + s <= high]
+    if not allowed:
+        allowed = [0.5 * (high - neutral)]
+    out = []
+    for form in effect.shapes_tried():
+        for step in allowed:
+            own = form | {column: neutral + step}
+            out.append(Probe(effect, own, step, one_sided))
+    return out
 
 
 def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array]:
@@ -65,24 +72,29 @@ def forms(target: LogPosterior, z: Array, trials: Sequence[Probe]) -> list[Array
     list of (H, R, m) arrays
         One a sample, N; zero where the effect cannot be computed or belongs to another sample.
     """
+    problem = target.problem
     theta = target.coordinates.to_natural(z)
     alike: dict[str, list[int]] = {}
     for k, probe in enumerate(trials):
-        alike.setdefault(probe.effect.key, []).append(k)
+        numbers = alike.setdefault(probe.effect.key, [])
+        numbers.append(k)
     out = []
-    for sample in target.problem.samples:
-        own = target.problem.parameters(theta, sample)
-        shapes = np.zeros((*sample.protocol.time_s.shape, len(trials)))
+    for sample in problem.samples:
+        own = problem.parameters(theta, sample)
+        protocol = sample.protocol
+        shapes = np.zeros((*protocol.time_s.shape, len(trials)))
         plain: Array | None = None
         for numbers in alike.values():
             tried = [trials[k] for k in numbers]
-            if not tried[0].effect.acts_on(sample.name, sample.protocol.control):
+            effect = tried[0].effect
+            if not effect.acts_on(sample.name, protocol.control):
                 continue
             if plain is None:
                 plain = _simulated(sample, own, sample.model)
             added = _with_each(sample, own, tried) - plain
+            added = np.where(np.isfinite(added), added, 0.0)
             steps = [probe.step for probe in tried]
-            shapes[..., numbers] = np.where(np.isfinite(added), added, 0.0) / steps
+            shapes[..., numbers] = added / steps
         out.append(shapes)
     return out
 

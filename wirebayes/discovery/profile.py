@@ -106,7 +106,8 @@ def top_of(profile: Profile, per_delta: float) -> Top | None:
     bend, slope, height = np.polyfit(x, y, 2)
     if bend >= 0:
         return None
-    summit = float(np.clip(-0.5 * slope / bend, x.min(), x.max()))
+    vertex = -0.5 * slope / bend
+    summit = float(np.clip(vertex, x.min(), x.max()))
     rise = height + slope * summit + bend * summit**2
     amplitude = middle + summit * scale * per_delta
     sd = per_delta * scale / np.sqrt(-2.0 * bend)
@@ -141,11 +142,13 @@ def integral_of(profile: Profile, neutral: float, per_delta: float) -> tuple[flo
     whole = float(np.trapezoid(share, grid))
     if not whole > 0.0:
         return -np.inf, per_delta
-    mean = float(np.trapezoid(share * grid, grid)) / whole
+    first_moment = float(np.trapezoid(share * grid, grid))
+    mean = first_moment / whole
     square = share * (grid - mean) ** 2
-    variance = float(np.trapezoid(square, grid)) / whole
-    sd = float(np.sqrt(variance))
-    return top + float(np.log(whole)), sd or per_delta
+    second_moment = float(np.trapezoid(square, grid))
+    sd = float(np.sqrt(second_moment / whole))
+    integral = top + float(np.log(whole))
+    return integral, sd or per_delta
 
 
 def _up_to(neutral: float, profile: Profile) -> tuple[Array, Array]:

@@ -63,7 +63,8 @@ def remainder_evidence(block: LaplaceFit, reference: Reference) -> float:
         units = _log_units(target, z) - _log_units(target, best)
         found.append(_mean(beside_moved) + tops - units)
     values = np.array(found)
-    return float(values[np.isfinite(values)].max(initial=-np.inf)) - without
+    finite = values[np.isfinite(values)]
+    return float(finite.max(initial=-np.inf)) - without
 
 
 def _at_other_modes(block: LaplaceFit, reference: Reference) -> list[tuple[Array, Expansion, Array]]:

@@ -90,11 +90,24 @@ def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, A
     parameters = {name: moving.index(name) for name in _PARAMETERS if name in moving}
     found = {name for name, _, _ in covariates}
     along = [name for name in (_set_in(problem), "elapsed time") if name in found]
-    holds = [(at, int(j)) for at, s in enumerate(problem.samples) for j in np.flatnonzero(s.protocol.recorded)]
-    listed = [Pattern(name) for name, _, degrees in covariates for _ in range(degrees)]
-    listed += [Pattern(name, moves=p) for name in along for p in parameters]
+    listed = []
+    for name, _, degrees in covariates:
+        listed += [Pattern(name)] * degrees
+    for name in along:
+        listed += [Pattern(name, moves=parameter) for parameter in parameters]
+    holds = _recorded_holds(problem)
     listed += [_of_hold(problem, problem.samples[at], j) for at, j in holds]
-    return listed, _Columns(covariates, along, list(parameters.values()), holds)
+    columns = _Columns(covariates, along, list(parameters.values()), holds)
+    return listed, columns
+
+
+def _recorded_holds(problem: Problem) -> list[tuple[int, int]]:
+    """Sample and row of each."""
+    out = []
+    for at, sample in enumerate(problem.samples):
+        rows = np.flatnonzero(sample.protocol.recorded)
+        out += [(at, int(j)) for j in rows]
+    return out
 
 
 @dataclass(frozen=True)
@@ -120,22 +133,24 @@ class _Columns:
 
     def __call__(self, problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
         """(H, R, n, more) of one sample, of its tension and the derivatives."""
+        shape = tension.shape
         out: list[Array] = []
         by_name = {}
         for name, values, degrees in self.covariates:
-            by_name[name] = values[at]
-            for power in range(1, degrees + 1):
-                added = values[at] ** power
-                out.append(np.broadcast_to(added[..., None], tension.shape))
+            value = values[at]
+            by_name[name] = value
+            powers = [value**power for power in range(1, degrees + 1)]
+            out += [np.broadcast_to(power[..., None], shape) for power in powers]
         for name in self.along:
             value = by_name[name][..., None]
             out += [slopes[..., number] * value for number in self.parameters]
         for of_sample, j in self.holds:
-            level = np.zeros(tension.shape)
+            level = np.zeros(shape)
             if of_sample == at:
                 level[j] = 1.0
             out.append(level)
-        return np.stack(out, axis=-1).reshape(*tension.shape, -1)
+        columns = np.stack(out, axis=-1)
+        return columns.reshape(*shape, -1)
 
 
 def _set_in(problem: Problem) -> str:
@@ -156,9 +171,10 @@ def _covariates(problem: Problem) -> list[tuple[str, list[Array], int]]:
     out: list[tuple[str, list[Array], int]] = []
     for name, degrees in _HIGHEST_POWER.items():
         values = [_values(name, sample) for sample in samples]
-        read = np.concatenate([v[s.protocol.mask] for v, s in zip(values, samples, strict=True)])
-        middle = read.mean()
-        spread = read.std()
+        read = [v[s.protocol.mask] for v, s in zip(values, samples, strict=True)]
+        every = np.concatenate(read)
+        middle = every.mean()
+        spread = every.std()
         if spread > 1e-9 * (1.0 + abs(middle)):
             scaled = [(v - middle) / spread for v in values]
             out.append((name, scaled, degrees))
@@ -207,8 +223,9 @@ def _p_value(columns: list[int], data: Scan, null: Scan) -> float:
 
 def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
     chance = f"p = {p:.3f}" if p >= _SMALLEST else f"p < {_SMALLEST:g}"
+    covariate = pattern.covariate
     if p > 0.05:
-        return f"{names}: the residuals show no dependence on {pattern.covariate} ({chance})."
+        return f"{names}: the residuals show no dependence on {covariate} ({chance})."
     if pattern.hold is not None:
         side = "above" if amplitude > 0 else "below"
         size = abs(amplitude) * pattern.counts_as
@@ -216,11 +233,12 @@ def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
         return f"{names}: hold {pattern.hold} lies {off} {side} what the others predict ({chance})."
     if pattern.moves is not None:
         parameter = _PARAMETERS[pattern.moves]
+        changes = _change(amplitude, covariate)
         return (
-            f"{names}: the residuals suggest that {parameter} {_change(amplitude, pattern.covariate)} over two "
-            f"standard deviations of {pattern.covariate} ({chance})."
+            f"{names}: the residuals suggest that {parameter} {changes} over two "
+            f"standard deviations of {covariate} ({chance})."
         )
-    return f"{names}: the residuals of the plain model depend on {pattern.covariate} ({chance})."
+    return f"{names}: the residuals of the plain model depend on {covariate} ({chance})."
 
 
 def _change(amplitude: float, covariate: str) -> str:

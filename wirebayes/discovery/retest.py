@@ -1,6 +1,6 @@
 """The global test once more, with effects inside: whether they leave something over, and a set that does not."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from wirebayes.discovery.fitted_sets import Explored, FittedSet, Key
 from wirebayes.discovery.global_test import is_close, with_more
 from wirebayes.discovery.linear_scan import expand, scan
 from wirebayes.discovery.model_space import ModelPosterior, largest_first
+from wirebayes.discovery.scans import Scan
 from wirebayes.discovery.screening import Replicates
 from wirebayes.discovery.settings import ALPHA_AFTER, GIVE_WAY, MOST_RETESTS, RETESTS
 from wirebayes.json_files.discovery import Disagreement
@@ -75,10 +76,11 @@ def complete(
     """
     weights = found.weights
     least = weights[best.effects.key] * np.exp(-GIVE_WAY)
-    near = [k for k, w in largest_first(weights).items() if k in explored.fitted and w > least]
+    fitted = explored.fitted
+    near = [k for k, w in largest_first(weights).items() if k in fitted and w > least]
     failed: set[Key] = set()
     for key in near[:MOST_RETESTS]:
-        candidate = explored.fitted[key]
+        candidate = fitted[key]
         if candidate is best:
             continue
         if predicts(candidate):
@@ -107,19 +109,30 @@ def retested(best: FittedSet, rng: Generator, parallel_map: ParallelMap) -> Rete
     listed = []
     data = []
     for block in best.blocks:
-        own_patterns, columns = residual_patterns.patterns(block.target.problem)
-        x = expand(block.target, block.z, trials, columns=columns)
+        target = block.target
+        own_patterns, columns = residual_patterns.patterns(target.problem)
+        x = expand(target, block.z, trials, columns=columns)
         listed.append(own_patterns)
         data.append(scan(x))
+    p, nulls = _tested(best, data, rng, parallel_map)
+    where = []
+    for block, own_patterns, here, null in zip(best.blocks, listed, data, nulls, strict=True):
+        names = ", ".join(block.names)
+        where.append(residual_patterns.findings(own_patterns, len(trials), here, null, names))
+    return Retest(p, where)
+
+
+def _tested(
+    best: FittedSet, data: Sequence[Scan], rng: Generator, parallel_map: ParallelMap
+) -> tuple[float, list[Scan]]:
+    """The p of the global test beside a set, and the scans of simulations; half of these are enough for a clear p."""
+    trials, candidates = best.probed
     simulated: list[Replicates] = []
-    for n in ((RETESTS + 1) // 2, RETESTS // 2):
+    half = RETESTS // 2
+    for n in (RETESTS - half, half):
         simulated = with_more(simulated, best.blocks, trials, n, rng, parallel_map)
         nulls = [s.scan for s in simulated]
         test = screening.global_test(candidates, data, nulls)
         if test.p > ALPHA_AFTER and not is_close(test.p, ALPHA_AFTER, len(test.null)):
             break
-    where = []
-    for block, own_patterns, here, null in zip(best.blocks, listed, data, nulls, strict=True):
-        names = ", ".join(block.names)
-        where.append(residual_patterns.findings(own_patterns, len(trials), here, null, names))
-    return Retest(test.p, where)
+    return test.p, nulls

@@ -44,8 +44,6 @@ class Candidate:
     ----------
     probe : int
         Its number among the probes.
-    name : str
-    blocks : tuple of int
     shared : bool
         One amplitude for all its blocks, rather than one each.
     others : tuple of int
@@ -71,20 +69,30 @@ def candidate_probes(blocks: Sequence[LaplaceFit], kinds: Kinds) -> tuple[list[P
             if kind.name in accepted and not issubclass(kind, EventEffect):
                 continue
             for effect in _variants(kind, block, tests):
-                where.setdefault(effect.key, (effect, []))[1].append(at)
+                _, on = where.setdefault(effect.key, (effect, []))
+                on.append(at)
         for effect, on in where.values():
             first = len(trials)
-            trials += probes(effect)
-            numbers = range(first, len(trials))
-            if effect.scope in FILE_WIDE and len(on) > 1:
-                groups = _but_for_each_test(effect, {k: trials[k] for k in numbers})
-                candidates += [Candidate(k, effect.name, tuple(on), True, tuple(others)) for k, *others in groups]
-                continue
-            for number in numbers:
-                candidates += [Candidate(number, effect.name, (b,), True) for b in on]
-                if len(on) > 1:
-                    candidates.append(Candidate(number, effect.name, tuple(on), False))
+            own = probes(effect)
+            candidates += _candidates_of(effect, dict(enumerate(own, first)), tuple(on))
+            trials += own
     return trials, candidates
+
+
+def _candidates_of(effect: Effect, trials: dict[int, Probe], on: tuple[int, ...]) -> list[Candidate]:
+    """Of one effect in its blocks: each of its numbered trials in each block alone, and in all together."""
+    name = effect.name
+    several = len(on) > 1
+    if several and effect.scope in FILE_WIDE:
+        groups = _but_for_each_test(effect, trials)
+        return [Candidate(k, name, on, True, tuple(others)) for k, *others in groups]
+    out = []
+    for number in trials:
+        for block in on:
+            out.append(Candidate(number, name, (block,), True))
+        if several:
+            out.append(Candidate(number, name, on, False))
+    return out
 
 
 def _but_for_each_test(effect: Effect, numbered: Mapping[int, Probe]) -> list[list[int]]:
@@ -143,7 +151,8 @@ def log_bayes(candidate: Candidate, scans: Sequence[Scan]) -> tuple[Array, Array
         amplitude = np.maximum(amplitude, 0.0)
     if not candidate.shared or len(blocks) == 1:
         value = log_ratio.sum(axis=0) + prior * len(blocks)
-        return value, amplitude[0], 1.0 / np.maximum(norm[0], 1e-300)
+        per_delta = 1.0 / np.maximum(norm[0], 1e-300)
+        return value, amplitude[0], per_delta
     value, mean = shared_amplitude(log_ratio, amplitude, norm)
     square = (norm**2).sum(axis=0)
     together = np.sqrt(np.maximum(square, 1e-300))
@@ -186,10 +195,6 @@ def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
         That amplitude.
     norm : (b, ...) array
         δ per amplitude, the curvature where the best amplitude is too small to say.
-
-    Returns
-    -------
-    value, amplitude : (...) arrays
     """
     with np.errstate(all="ignore"):
         weight = np.where(np.abs(a) * norm > 0.5, 2.0 * lr / a**2, norm**2)
@@ -221,34 +226,34 @@ def replicated(
 
     Parameters
     ----------
-    block : LaplaceFit
-    trials : sequence of Probe
-    n : int
-    rng : numpy.random.Generator
     columns : callable, optional
         Further signatures (see `linear_scan.expand`).
-
-    Returns
-    -------
-    Replicates
     """
+    target = block.target
+    problem = target.problem
     z = np.repeat(block.z, n, axis=0)
-    theta = block.target.coordinates.to_natural(z)
-    problem = block.target.problem
+    theta = target.coordinates.to_natural(z)
     y = [replicate(problem, theta, s, rng) for s in problem.samples]
-    density, residuals = block.target.rowwise(y)
+    density, residuals = target.rowwise(y)
     found = climb(density, z, residuals, iterations=25, tolerance=1e-2, curvature_at_end=False)
-    shapes = forms(block.target, block.z, trials)
-    smooth = plain_reference(problem)
+    scanned = _scanned_in_parts(block, trials, found.z, y, columns)
+    return Replicates(scanned, found.z, y)
+
+
+def _scanned_in_parts(block: LaplaceFit, trials: Sequence[Probe], z: Array, y: Sequence[Array], columns: Any) -> Scan:
+    """Simulated readings scanned so many at once that their signatures do not fill the memory."""
+    target = block.target
+    shapes = forms(target, block.z, trials)
+    smooth = plain_reference(target.problem)
     numbers = sum(shape.size for shape in shapes)
     at_once = int(np.clip(_NUMBERS / max(numbers, 1), 1, _ROWS))
     parts = []
-    for begin in range(0, n, at_once):
+    for begin in range(0, len(z), at_once):
         rows = slice(begin, begin + at_once)
         own = [v[..., rows] for v in y]
-        x = expand(block.target, found.z[rows], trials, own, columns, shapes, smooth)
+        x = expand(target, z[rows], trials, own, columns, shapes, smooth)
         parts.append(scan(x))
-    return Replicates(joined(parts), found.z, y)
+    return joined(parts)
 
 
 def joined_replicates(parts: Sequence[Replicates]) -> Replicates:

@@ -87,7 +87,7 @@ def shrinking(
     predicted = parallel_map(_predicted, trained, rng.spawn(len(trained)))
     gain = None
     if smooth:
-        elpd = left_out.of(_fits_compared(plain, stages, smooth))
+        elpd = left_out.of(_fits_compared(plain, stages[-1:], smooth))
         gain = _gain(elpd, len(stages[-1:]), len(train), remains)
     found = list(predicted)  # handed over before, so that no core idles
     by_step = found[: len(models)]
@@ -96,7 +96,8 @@ def shrinking(
     final = beside_smooth[-len(train) :] if remains else by_step[-1]
     out = []
     for i in range(len(train)):
-        report = _compared(by_step[0][i], final[i], flexible[i] if flexible else None, gain)
+        own_flexible = flexible[i] if flexible else None
+        report = _compared(by_step[0][i], final[i], own_flexible, gain)
         out.append(Shrinking(report, _steps(models, by_step, i)))
     return out
 
@@ -140,9 +141,12 @@ class _Smooth:
     trained: list[_Trained]
 
 
-def _fits_compared(plain: LaplaceFit, stages: Sequence[LaplaceFit], smooth: Sequence[_Smooth]) -> list[LaplaceFit]:
+def _fits_compared(plain: LaplaceFit, last: Sequence[LaplaceFit], smooth: Sequence[_Smooth]) -> list[LaplaceFit]:
     """The plain model, the last stage, and what stands beside a smooth discrepancy."""
-    return [plain, *stages[-1:], *(fit for beside in smooth for fit in beside.fits)]
+    fits = [plain, *last]
+    for beside in smooth:
+        fits += beside.fits
+    return fits
 
 
 def _to_be_trained(
@@ -169,11 +173,11 @@ def _beside_discrepancy(
     fitting = []
     for base, added, generators in handed_over:
         effects = list(added)
-        whole = effects[: len(train)]
+        of_whole, of_first = effects[: len(train)], effects[len(train) :]
         singly = [(e,) for e in base.experiments]
         one_scale = partial(fitted, scales=base.scales)
-        fits = parallel_map(one_scale, singly, whole, repeat(base.spec), generators)
-        trained = _each_trained(base, train, effects[len(train) :])
+        fits = parallel_map(one_scale, singly, of_whole, repeat(base.spec), generators)
+        trained = _each_trained(base, train, of_first)
         fitting.append((fits, trained))
     return [_Smooth(list(fits), trained) for fits, trained in fitting]
 
@@ -207,10 +211,13 @@ class _Gain:
 
 def _gain(elpd: Sequence[Array], named: int, n: int, remains: bool) -> _Gain:
     """From (H,) densities of left-out holds: plain, with the effects (`named` is 1 or 0), then n of each smooth lot."""
-    plain, smooth = elpd[0], np.concatenate(elpd[1 + named : 1 + named + n])
-    difference = (np.concatenate(elpd[-n:]) if remains else elpd[1]) - plain
+    plain, others = elpd[0], elpd[1 + named :]
+    smooth = np.concatenate(others[:n])
+    final = np.concatenate(elpd[-n:]) if remains else elpd[1]
+    difference = final - plain
     spread = float(difference.std(ddof=1) * np.sqrt(len(difference)))
-    return _Gain(float(difference.sum()), spread, float((smooth - plain).sum()))
+    by_smooth = float((smooth - plain).sum())
+    return _Gain(float(difference.sum()), spread, by_smooth)
 
 
 def discrepancy_gain(
@@ -248,7 +255,9 @@ def _compared(
 ) -> HeldOutJson:
     """What the report says of the held-out holds of one experiment."""
     d = final.elpd - plain.elpd
-    spread = float(d.std(ddof=1) * np.sqrt(len(d))) if len(d) > 1 else None
+    spread = None
+    if len(d) > 1:
+        spread = float(d.std(ddof=1) * np.sqrt(len(d)))
     return {
         "holds": plain.holds,
         "plain": _score(plain),

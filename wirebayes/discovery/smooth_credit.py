@@ -17,7 +17,8 @@ def beside_smooth(x: Expansion) -> Array:
     remainder and noise ratios are summed over as in `wirebayes.discovery.linear_scan.scan`.
     """
     first = x.of(np.array([0]))
-    nothing = np.full(x.signatures.shape[2], -np.inf)
+    signatures = x.signatures.shape[2]
+    nothing = np.full(signatures, -np.inf)
     if not has_tangent(first)[0]:
         return nothing
     found = project(first)
@@ -25,14 +26,17 @@ def beside_smooth(x: Expansion) -> Array:
     if not seen.any():
         return nothing
     products = _with_remainder(found, seen)
+    shared = products.shared
     least = float(x.least[0])
     half = 0.5 * x.degrees
     left = np.maximum(products.rss, least)
-    left_beside = np.maximum(left[..., None] - _gain(x, products), least)
-    without = products.shared - half * np.log(left)
-    beside = products.shared[..., None] - half * np.log(left_beside)
-    by_signature = beside.reshape(-1, beside.shape[2])
-    return np.asarray(log_sum(by_signature) - log_sum(without.ravel()))
+    left_beside = left[..., None] - _gain(x, products)
+    left_beside = np.maximum(left_beside, least)
+    without = shared - half * np.log(left)
+    beside = shared[..., None] - half * np.log(left_beside)
+    by_signature = beside.reshape(-1, signatures)
+    log_ratio = log_sum(by_signature) - log_sum(without.ravel())
+    return np.asarray(log_ratio)
 
 
 class _Products(NamedTuple):
@@ -70,9 +74,13 @@ def _with_remainder(found: Projected, seen: Bools) -> _Products:
     excess = variance * values[:, None]
     taken = variance / (1.0 + excess)
     volume = np.log1p(excess).sum(axis=2)
+    shared = found.shared[0][seen][:, None]
+    rss = found.rss[0][seen][:, None]
+    along = found.along[0][seen][:, None]
+    square = found.square[0][seen][:, None]
     return _Products(
-        found.shared[0][seen][:, None] - 0.5 * volume,
-        found.rss[0][seen][:, None] - (taken * of_residual**2).sum(axis=2),
-        found.along[0][seen][:, None] - (taken * of_residual) @ of_signatures,
-        found.square[0][seen][:, None] - taken @ of_signatures**2,
+        shared - 0.5 * volume,
+        rss - (taken * of_residual**2).sum(axis=2),
+        along - (taken * of_residual) @ of_signatures,
+        square - taken @ of_signatures**2,
     )

@@ -82,15 +82,18 @@ def _functions(protocol: Protocol, covariance: _Covariance, most: int) -> Array:
     """
     every = _Readings.of(protocol)
     n = len(every.hold)
-    some = every.rows(evenly(n, min(n, _DECOMPOSED)))
+    decomposed = evenly(n, min(n, _DECOMPOSED))
+    some = every.rows(decomposed)
     values, vectors = np.linalg.eigh(covariance(some, some))
     top = np.argsort(values)[::-1][:most]
-    size, vectors = np.sqrt(np.maximum(values[top], 0.0)), vectors[:, top]
-    out = np.zeros((*protocol.mask.shape, len(top)))
+    size = np.sqrt(np.maximum(values[top], 0.0))
+    vectors = vectors[:, top]
+    functions = vectors * size
     if n > _DECOMPOSED:
-        out[np.nonzero(protocol.mask)] = covariance(every, some) @ (vectors / np.maximum(size, _LEAST * size[0]))
-    else:
-        out[np.nonzero(protocol.mask)] = vectors * size
+        scaled = vectors / np.maximum(size, _LEAST * size[0])
+        functions = covariance(every, some) @ scaled
+    out = np.zeros((*protocol.mask.shape, len(top)))
+    out[np.nonzero(protocol.mask)] = functions
     return out
 
 

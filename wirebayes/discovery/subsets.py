@@ -26,14 +26,18 @@ def over_subsets(values: Array) -> tuple[float, Array, list[int]]:
     values = np.asarray(values, float)
     b = len(values)
     weights = _log_weights(b)
-    total = float(np.logaddexp.reduce(weights + _symmetric(values)[1:]))
+    by_size = weights + _symmetric(values)[1:]
+    total = float(np.logaddexp.reduce(by_size))
     without = np.array([_symmetric(np.delete(values, i))[:b] for i in range(b)])  # of 0 to b - 1 others
     each = np.zeros(b)
     if np.isfinite(total):
-        each = np.exp(values + np.logaddexp.reduce(weights + without, axis=1) - total)
+        beside = np.logaddexp.reduce(weights + without, axis=1)
+        each = np.exp(values + beside - total)
+    each = np.minimum(each, 1.0)
     order = np.argsort(-values, kind="stable")
-    most = int(np.argmax(weights + np.cumsum(values[order])))
-    return total, np.minimum(each, 1.0), sorted(int(i) for i in order[: most + 1])
+    highest = weights + np.cumsum(values[order])
+    size = int(np.argmax(highest)) + 1
+    return total, each, sorted(int(i) for i in order[:size])
 
 
 def _log_weights(b: int) -> Array:

@@ -98,10 +98,11 @@ def decide(
         return Decision(found, None, retest)
     if _has_few_holds(plain):
         return Decision(found, best, retest)
+    names = best.effects.names
     by_family = {}
-    for family in dict.fromkeys(found.family(name) for name in best.effects.names):
-        by_family[family] = family_gain(best, family, found, predicting.fits, left_out)
-    first_gain = name_gain(best, best.effects.names[0], predicting.fits, left_out)
+    for family in dict.fromkeys(found.family(name) for name in names):
+        by_family[family] = family_gain(best, family, found, fits, left_out)
+    first_gain = name_gain(best, names[0], fits, left_out)
     return Decision(found, best, retest, by_family, first_gain)
 
 
@@ -122,16 +123,20 @@ def _predicting_sets(
     blocks: int,
 ) -> tuple[list[EffectSet], set[Key], ModelPosterior]:
     """The sets whose last family predicts, those of them whose remainder does not, and what they say together."""
-    sets, gave_way = list(explored.sets), set[Key]()
+    sets = list(explored.sets)
+    gave_way: set[Key] = set()
     while True:
-        found = _posterior(sets, weigh(sets), gave_way, families, blocks)
-        if giving_way := predicting.giving_way(found):
+        weights = weigh(sets)
+        found = _posterior(sets, weights, gave_way, families, blocks)
+        giving_way = predicting.giving_way(found)
+        if giving_way:
             gave_way |= giving_way
             continue
         best = _best_fitted(found, explored)
         if best is None or predicting.last_predicts(best, found):
             return sets, gave_way, found
-        sets = [s for s in sets if not _kinds(best.effects, found) <= _kinds(s, found)]
+        kinds = _kinds(best.effects, found)
+        sets = [s for s in sets if not kinds <= _kinds(s, found)]
         gave_way.clear()  # to sets that may be gone
 
 
@@ -224,10 +229,13 @@ def evidence(decision: Decision, p: float, block: int, remainder_gain: float | N
 def _families(decision: Decision, block: int) -> list[FamilyEvidence]:
     """What is known of each family in a material: those of the best set first, then the others by probability."""
     found = decision.posterior
-    together = {family: float(p[block]) for family, p in zip(found.families, found.together, strict=True)}
+    best = decision.best
+    together = {}
+    for family, probability in zip(found.families, found.together, strict=True):
+        together[family] = float(probability[block])
     accepted = list(decision.gains)
-    if decision.best is not None:
-        accepted = [found.family(name) for name in decision.best.effects.names]
+    if best is not None:
+        accepted = [found.family(name) for name in best.effects.names]
     ranked = sorted(found.families, key=lambda family: -together[family])
     out = []
     for family in dict.fromkeys([*accepted, *ranked]):

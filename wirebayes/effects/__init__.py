@@ -58,7 +58,8 @@ def catalogue(own: Path | None = None) -> dict[str, type[Effect]]:
         return CATALOGUE
     effects = {}
     for effect in _effects_in(own):
-        lacking = [a for a in ("name", "place", "scope", "amplitudes", "sentence") if not hasattr(effect, a)]
+        needed = ("name", "place", "scope", "amplitudes", "sentence")
+        lacking = [attribute for attribute in needed if not hasattr(effect, attribute)]
         if lacking:
             found = f"the effect {effect.__name__} that lacks {', '.join(lacking)}"
             raise InputError(f"{own}: found {found}, expected all of them")
@@ -80,9 +81,8 @@ def _effects_in(own: Path) -> list[type[Effect]]:
     try:
         module = _run(own.resolve(), own.read_bytes())
     except (Exception, SystemExit) as error:  # whatever the user's file raises is reported in one line
-        raise InputError(
-            f"{own}: cannot be run ({type(error).__name__}: {error}), expected a Python file with effects"
-        ) from None
+        raised = f"{type(error).__name__}: {error}"
+        raise InputError(f"{own}: cannot be run ({raised}), expected a Python file with effects") from None
     sys.modules[module.__name__] = module  # so that other processes can be sent its effects
     classes = [value for value in vars(module).values() if isinstance(value, type) and issubclass(value, Effect)]
     return [kind for kind in classes if kind.__module__ == module.__name__]  # not those that the file imports

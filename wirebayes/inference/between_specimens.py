@@ -46,7 +46,11 @@ class LineDraws:
     effective: float
 
 
-def between_specimens(logarithms: list[Floats], prior: tuple[Floats, Floats], count: int, rng: Generator) -> LineDraws:
+_Moments = tuple[Floats, Floats]  # mean (p,) and covariance (p, p)
+_Information = tuple[Floats, Floats]  # precision (p, p), and precision times mean (p,)
+
+
+def between_specimens(logarithms: list[Floats], prior: _Moments, count: int, rng: Generator) -> LineDraws:
     """Line and spread given posteriors of specimens.
 
     Parameters
@@ -67,13 +71,17 @@ def between_specimens(logarithms: list[Floats], prior: tuple[Floats, Floats], co
         log_prior = -0.5 * (((log_s - middle) / sd) ** 2).sum(1)
         return _collapsed(log_s, information, prior)[0] + log_prior
 
-    mode = _mode(log_density, np.full(len(prior[0]), middle), _REACH * sd)
-    root = np.asarray(np.linalg.cholesky(_covariance(log_density, mode, sd)), np.float64)
+    start = np.full(len(prior[0]), middle)
+    mode = _mode(log_density, start, _REACH * sd)
+    covariance = _covariance(log_density, mode, sd)
+    root = np.asarray(np.linalg.cholesky(covariance), np.float64)
     log_s, weight = _weighted(log_density, mode, root, rng)
-    chosen = log_s[rng.permutation(systematic_rows(weight, count, rng))]
+    rows = systematic_rows(weight, count, rng)
+    chosen = log_s[rng.permutation(rows)]
     _, precision, vector = _collapsed(chosen, information, prior)
+    line = _normal_draws(precision, vector, rng)
     effective = float(1.0 / (weight**2).sum())
-    return LineDraws(_normal_draws(precision, vector, rng), np.exp(chosen), effective)
+    return LineDraws(line, np.exp(chosen), effective)
 
 
 def _mode(log_density: Callable[[Floats], Floats], start: Floats, reach: float) -> Floats:
@@ -110,30 +118,33 @@ def _weighted(
     return points, weight / weight.sum()
 
 
-def _information(values: Floats, prior: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+def _information(values: Floats, prior: _Moments) -> _Information:
     """Precision and vector of a specimen's readings alone: its posterior without the prior, never below none."""
-    before = np.linalg.inv(prior[1])
-    precision = np.linalg.inv(np.atleast_2d(np.cov(values.T)))
-    vector = precision @ values.mean(0) - before @ prior[0]
+    mean, covariance = prior
+    before = np.linalg.inv(covariance)
+    spread = np.atleast_2d(np.cov(values.T))
+    precision = np.linalg.inv(spread)
+    vector = precision @ values.mean(0) - before @ mean
     scale = np.sqrt(np.diag(precision))
     products = np.outer(scale, scale)
     sizes, axes = np.linalg.eigh((precision - before) / products)
     kept = sizes > 1e-6  # what the readings say nothing of may come out negative
     axes = axes[:, kept]
     known = (axes * sizes[kept]) @ axes.T
-    part = scale[:, None] * (axes @ (axes.T @ (vector / scale))[:, None])
+    along = axes.T @ (vector / scale)
+    part = scale[:, None] * (axes @ along[:, None])
     return products * known, part[:, 0]
 
 
-def _collapsed(
-    log_s: Floats, information: list[tuple[Floats, Floats]], prior: tuple[Floats, Floats]
-) -> tuple[Floats, Floats, Floats]:
+def _collapsed(log_s: Floats, information: list[_Information], prior: _Moments) -> tuple[Floats, Floats, Floats]:
     """Log likelihood ``(n,)`` of spreads, and the precision and vector of the line's mean given them."""
-    before = np.linalg.inv(prior[1])
+    mean, covariance = prior
+    before = np.linalg.inv(covariance)
     n, p = log_s.shape
-    inverse = np.exp(-2.0 * log_s)[:, :, None] * np.eye(p)
+    inverse_variance = np.exp(-2.0 * log_s)
+    inverse = inverse_variance[:, :, None] * np.eye(p)
     precision = np.tile(before, (n, 1, 1))
-    vector = np.tile(before @ prior[0], (n, 1))
+    vector = np.tile(before @ mean, (n, 1))
     log_likelihood = np.zeros(n)
     for own, own_vector in information:
         both = own + inverse
@@ -156,14 +167,23 @@ def _log_determinant(matrices: Floats) -> Floats:
 
 def _covariance(log_density: Callable[[Floats], Floats], mode: Floats, sd: float) -> Floats:
     """Inverse curvature at the mode, no wider than the prior in any direction."""
+    curvature = _curvature(log_density, mode)
+    sizes, axes = np.linalg.eigh(curvature)
+    least = sd**-2
+    covariance = (axes / np.maximum(sizes, least)) @ axes.T
+    return np.asarray(covariance)
+
+
+def _curvature(log_density: Callable[[Floats], Floats], mode: Floats) -> Floats:
+    """(p, p) negative second derivatives at the mode, by differences."""
     p = len(mode)
     steps = _STEP * np.eye(p)
     corners = []
     for one in steps:
         for other in steps:
             corners += [mode + a * one + b * other for a in (1, -1) for b in (1, -1)]
-    both, one_back, other_back, both_back = log_density(np.array(corners)).reshape(p * p, 4).T
+    at_corners = log_density(np.array(corners))
+    both, one_back, other_back, both_back = at_corners.reshape(p * p, 4).T
     second = both - one_back - other_back + both_back
     hessian = -second.reshape(p, p) / (4 * _STEP**2)
-    sizes, axes = np.linalg.eigh(0.5 * (hessian + hessian.T))
-    return np.asarray((axes / np.maximum(sizes, sd**-2)) @ axes.T)
+    return np.asarray(0.5 * (hessian + hessian.T))

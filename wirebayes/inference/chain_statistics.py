@@ -96,14 +96,17 @@ def cumulative_distance(values: Array, weight: Array) -> float:
     order = np.argsort(values)
     widths = np.diff(values[order])
     n = len(values)
+    share = weight[order] / weight.sum()
     plain = np.linspace(1.0 / n, 1.0 - 1.0 / n, n - 1)
-    weighted = np.cumsum(weight[order] / weight.sum())[:-1]
+    weighted = np.cumsum(share)[:-1]
     middle = 0.5 * (plain + weighted)
     plain_area = float(plain @ widths)
     weighted_area = float(weighted @ widths)
-    diverged = _diverged(plain, middle, widths, weighted_area - plain_area)
-    diverged += _diverged(weighted, middle, widths, plain_area - weighted_area)
-    return float(np.sqrt(diverged / (plain_area + weighted_area)))
+    shift = weighted_area - plain_area
+    diverged = _diverged(plain, middle, widths, shift)
+    diverged += _diverged(weighted, middle, widths, -shift)
+    squared = diverged / (plain_area + weighted_area)
+    return float(np.sqrt(squared))
 
 
 def _diverged(share: Array, middle: Array, widths: Array, excess: float) -> float:
@@ -142,19 +145,25 @@ def _between_over_within(chains: Array) -> float:
 
 def _ess(chains: Array) -> float:
     """Effective number of draws of the mean of (chains, draws), by Geyer's initial monotone sequence."""
+    size = chains.size
     if np.ptp(chains) < _SAME:
-        return float(chains.size)
+        return float(size)
     correlation = _autocorrelation(chains)
-    most = max((chains.shape[1] - 1) // 2, 1)
-    pairs = correlation[: 2 * most].reshape(-1, 2).sum(axis=1)
+    steps = chains.shape[1]
+    most = max((steps - 1) // 2, 1)
+    in_twos = correlation[: 2 * most].reshape(-1, 2)
+    pairs = in_twos.sum(axis=1)
     ends = np.flatnonzero(pairs <= 0.0)
-    last = int(ends[0]) if len(ends) else len(pairs) - 1
+    last = len(pairs) - 1
+    if len(ends):
+        last = int(ends[0])
     rest = float(correlation[2 * last])  # of this pair only the first correlation counts, and once
     if not pairs[last] >= 0.0:
         rest = max(rest, 0.0)
     falling = np.minimum.accumulate(pairs[:last])
     time = -1.0 + 2.0 * float(falling.sum()) + rest
-    return float(chains.size / max(time, 1.0 / np.log10(chains.size)))
+    shortest = 1.0 / np.log10(size)
+    return float(size / max(time, shortest))
 
 
 def _autocorrelation(chains: Array) -> Array:
@@ -190,15 +199,18 @@ def _smoothed(log_ratio: Array, size: int) -> tuple[Array, float]:
     log_weight = log_ratio - log_ratio.max()
     order = np.argsort(log_weight)
     largest = order[-size:]
-    threshold = float(np.exp(log_weight[order[-size - 1]]))
+    below = order[-size - 1]
+    threshold = float(np.exp(log_weight[below]))
     excess = np.exp(log_weight[largest]) - threshold
     shape = scale = np.nan
     if size >= _LEAST_TAIL and np.ptp(excess) > 0.0:
         shape, scale = pareto_fit(excess)
     if np.isfinite(shape):
-        smooth = threshold + scale * _pareto_quantiles(shape, size)
-        log_weight[largest] = np.minimum(np.log(smooth), 0.0)
-    return log_weight - logsumexp(log_weight), shape
+        quantiles = _pareto_quantiles(shape, size)
+        smooth = np.log(threshold + scale * quantiles)
+        log_weight[largest] = np.minimum(smooth, 0.0)
+    normalised = log_weight - logsumexp(log_weight)
+    return normalised, shape
 
 
 def _pareto_quantiles(shape: float, size: int) -> Array:
@@ -226,17 +238,28 @@ def pareto_fit(excess: Array) -> tuple[float, float]:
         NaN where a quarter of the values stand on the threshold: then there is no such tail.
     """
     n = len(excess)
-    quartile = excess[int(n / 4 + 0.5) - 1]
+    quarter = int(n / 4 + 0.5)
+    quartile = excess[quarter - 1]
     if not quartile > 0.0:
         return np.nan, np.nan
     rates = _rates_to_try(excess, quartile)
-    shapes = np.log1p(-rates[:, None] * excess).mean(axis=1)
-    log_likelihood = n * (np.log(-rates / shapes) - shapes - 1.0)
-    weight = np.exp(log_likelihood - logsumexp(log_likelihood))
+    rate = _mean_rate(excess, rates)
+    logarithms = np.log1p(-rate * excess)
+    shape = float(logarithms.mean())
+    scale = -shape / rate
+    towards_a_half = (n * shape + 5.0) / (n + 10.0)
+    return towards_a_half, scale
+
+
+def _mean_rate(excess: Array, rates: Array) -> float:
+    """The rate's posterior mean over those on a grid."""
+    products = -rates[:, None] * excess
+    shapes = np.log1p(products).mean(axis=1)
+    log_likelihood = len(excess) * (np.log(-rates / shapes) - shapes - 1.0)
+    log_weight = log_likelihood - logsumexp(log_likelihood)
+    weight = np.exp(log_weight)
     weight = np.where(weight < _NEGLIGIBLE, 0.0, weight)
-    rate = float(rates @ weight / weight.sum())
-    shape = float(np.log1p(-rate * excess).mean())
-    return (n * shape + 5.0) / (n + 10.0), -shape / rate
+    return float(rates @ weight / weight.sum())
 
 
 def _rates_to_try(excess: Array, quartile: float) -> Array:

@@ -83,17 +83,21 @@ def fit_problem(
     if near is not None and near.keys() >= set(walked):
         known = np.array([[near.get(name, 1.0) for name in problem.names]])
         start = np.round(_sampled(problem, target, known), _START_DIGITS)
-    cloud = None if rough is None else _sampled(problem, target, rough)
+    cloud = None
+    if rough is not None:
+        cloud = _sampled(problem, target, rough)
     chains = ensemble.sample_posterior(
         target, seed, policy, checkpoint=checkpoint, progress=progress, near=start, rough=cloud
     )
     z, log_density, thin = _stored(chains)
-    theta = target.coordinates.to_natural(z.reshape(-1, z.shape[-1]))
+    flat = z.reshape(-1, z.shape[-1])
+    theta = target.coordinates.to_natural(flat)
     rng = np.random.default_rng(seed_of(seed, "completed"))
     _, theta, added = completed(target.problem, theta, rng)
     theta = own.theta_in(problem.units, theta)
-    of_each = theta.reshape(len(z), -1, theta.shape[1])
-    return Fit(problem, of_each, log_density + added.reshape(log_density.shape), chains, thin)
+    by_chain = theta.reshape(len(z), -1, theta.shape[1])
+    log_density = log_density + added.reshape(log_density.shape)
+    return Fit(problem, by_chain, log_density, chains, thin)
 
 
 def _sampled(problem: Problem, target: LogPosterior, theta: Array) -> Array:

@@ -206,12 +206,19 @@ def from_draws(
     """
     height = densities(draws)
     width = draws.std(axis=0)
-    spread = spread_rows(draws / np.where(width > 0, width, 1.0), _STARTS, rng)
-    which = np.append(np.arange(height.shape[1]), np.zeros(len(spread), int))
-    begin = draws[np.append(np.argmax(height, axis=0), spread)]
-    found = climb(
-        lambda z, rows: densities(z)[np.arange(len(rows)), which[rows]], begin, iterations=_STEPS, tolerance=1e-2
-    )
+    scaled = draws / np.where(width > 0, width, 1.0)
+    spread = spread_rows(scaled, _STARTS, rng)
+    highest = np.argmax(height, axis=0)
+    begin = draws[np.append(highest, spread)]
+    of_highest = np.arange(height.shape[1])
+    of_spread = np.zeros(len(spread), int)
+    climbed = np.append(of_highest, of_spread)
+
+    def density(z: Array, rows: Ints) -> Array:
+        every = densities(z)
+        return every[np.arange(len(rows)), climbed[rows]]
+
+    found = climb(density, begin, iterations=_STEPS, tolerance=1e-2)
     found = distinct([found])
     start = mixture.from_modes(found.z, _WIDER * found.covariance, np.zeros(len(found.z)))
     return importance_sample(densities, start, draws, order, rng, ess)

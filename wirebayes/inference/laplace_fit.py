@@ -157,6 +157,7 @@ def fitted(
 
 
 _HOPELESS = 12.0  # nats below the best amplitude, which no curvature makes up for
+_BEST_MODES = 2  # of the fit without an effect, from which climbs with it start
 _TOLERANCE = 1e-2  # nats that a climb may still gain: evidence is compared in tenths of a nat
 
 
@@ -178,27 +179,25 @@ class Pinned:
         self.target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
         self._plain = block
 
-    def starts(self, shapes: Mapping[str, float] = {}, best: int = 2) -> Array:
-        """(k, d) starts: the best modes without the effect, shapes as given.
-
-        Parameters
-        ----------
-        shapes : mapping of column to float
-            Shape constants of the effect; their medians where left out.
-        best : int
-            How many modes.
-        """
-        names = [name for i, name in enumerate(self.target.problem.names) if i != self.column]
-        known = {name: i for i, name in enumerate(self._plain.target.problem.names)}
-        natural = self._plain.target.coordinates.to_natural(self._plain.modes.z[:best])
+    def starts(self, shapes: Mapping[str, float]) -> Array:
+        """(k, d) starts: the best modes without the effect, its shape constants as given, or else at their medians."""
+        problem, plain = self.target.problem, self._plain.target
+        names = list(problem.names)
+        names.pop(self.column)
+        best = self._plain.modes.z[:_BEST_MODES]
+        natural = plain.coordinates.to_natural(best)
         theta = np.empty((len(natural), len(names)))
         for i, name in enumerate(names):
-            if name in known:
-                theta[:, i] = natural[:, known[name]]
+            if name in plain.problem.names:
+                known = plain.problem.names.index(name)
+                theta[:, i] = natural[:, known]
             else:
-                median = self.target.problem.prior.distributions[name].median()
-                theta[:, i] = shapes.get(name.split("[")[0], median)
-        return self._drop(self.target.coordinates.to_sampled(np.insert(theta, self.column, 0.0, axis=1)))
+                median = problem.prior.distributions[name].median()
+                shape = name.split("[")[0]
+                theta[:, i] = shapes.get(shape, median)
+        with_effect = np.insert(theta, self.column, 0.0, axis=1)
+        sampled = self.target.coordinates.to_sampled(with_effect)
+        return self._drop(sampled)
 
     def climb(self, start: Array, amplitude: Array) -> Optimum:
         """Climb every row with its own amplitude; the curvature is the expected information, which is nearly it."""

@@ -85,8 +85,10 @@ class LogPosterior:
             return np.full(len(z), -np.inf)
         if inside.all():
             return value + self.problem.log_likelihood(theta, readings)
+        own_readings = _of_rows(readings, inside)
+        log_likelihood = self.problem.log_likelihood(theta[inside], own_readings)
         value = np.where(inside, value, -np.inf)
-        value[inside] += self.problem.log_likelihood(theta[inside], _of_rows(readings, inside))
+        value[inside] += log_likelihood
         return value
 
 

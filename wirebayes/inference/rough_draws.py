@@ -50,14 +50,16 @@ def _weighted(target: LogPosterior, found: Optimum, rng: Generator, n: int) -> A
 
     A mixture is learned from all draws so far, and all of them are weighted against all mixtures together.
     """
-    proposals = [mixture.from_modes(found.z, _WIDER * found.covariance, found.log_evidence)]
-    components = int(np.clip(len(found.z) + _BESIDE_MODES, *_COMPONENTS))
-    z = np.empty((0, found.z.shape[1]))
+    modes, dimensions = found.z.shape
+    latest = mixture.from_modes(found.z, _WIDER * found.covariance, found.log_evidence)
+    proposals = [latest]
+    components = int(np.clip(modes + _BESIDE_MODES, *_COMPONENTS))
+    z = np.empty((0, dimensions))
     height = np.empty(0)
     by_proposal = np.empty((0, 0))  # log density of each proposal at each draw
     for _ in range(_ROUNDS):
-        new = proposals[-1].rvs(_EACH, rng)
-        by_proposal = np.vstack([by_proposal, proposals[-1].log_density(z)])
+        new = latest.rvs(_EACH, rng)
+        by_proposal = np.vstack([by_proposal, latest.log_density(z)])
         at_new = [proposal.log_density(new) for proposal in proposals]
         by_proposal = np.hstack([by_proposal, at_new])
         z = np.concatenate([z, new])
@@ -66,11 +68,13 @@ def _weighted(target: LogPosterior, found: Optimum, rng: Generator, n: int) -> A
         log_weight = height - drawn_from
         if _are_enough(log_weight, n):
             return z[truncated_rows(log_weight, n, rng)]
-        points = WeightedPoints.weighted(z, _HOT * height - drawn_from).thinned(_LEARNED, rng)
+        points = WeightedPoints.weighted(z, _HOT * height - drawn_from)
+        points = points.thinned(_LEARNED, rng)
         try:
-            proposals.append(mixture.fit_mixture(points, rng, most=components))
+            latest = mixture.fit_mixture(points, rng, most=components)
         except np.linalg.LinAlgError:
             break
+        proposals.append(latest)
     return None
 
 

@@ -67,14 +67,17 @@ def weighted_posterior(problem: Problem, seed: int, ess: float) -> WeightedPoste
     own = problem.in_units(problem.own_units)
     target = LogPosterior(integrated(own))
     pool = witnessed(target, rng, ess)
-    z = pool.drawn(0, min(_DRAWS, len(pool.z)), rng)
-    _, theta, _ = completed(target.problem, target.coordinates.to_natural(z), rng)
+    size = len(pool.z)
+    z = pool.drawn(0, min(_DRAWS, size), rng)
+    theta = target.coordinates.to_natural(z)
+    _, theta, _ = completed(target.problem, theta, rng)
     theta = own.theta_in(problem.units, theta)
     found = effective(pool.log_weight)[0]
     k = tail(pool.log_weight[:, 0])
-    why = f"importance sampling: {found:.0f} effective draws of {len(pool.z)}, Pareto k {k:.2f}"
+    why = f"importance sampling: {found:.0f} effective draws of {size}, Pareto k {k:.2f}"
     log_evidence = float(pool.log_integral[0] - _log_units(own, problem))
-    return WeightedPosterior(problem, theta, log_evidence, bool(pool.settled[0]), why)
+    settled = bool(pool.settled[0])
+    return WeightedPosterior(problem, theta, log_evidence, settled, why)
 
 
 def _log_units(own: Problem, problem: Problem) -> float:
@@ -103,14 +106,14 @@ def witnessed(target: LogPosterior, rng: Generator, ess: float) -> Weighted:
         return target(z)[:, None]
 
     def learned(modes: Optimum, draws: Array) -> Weighted:
-        return importance.importance_sample(
-            density, importance.widened(modes), draws, target.coordinates.order, rng, ess
-        )
+        start = importance.widened(modes)
+        return importance.importance_sample(density, start, draws, target.coordinates.order, rng, ess)
 
     def agreed(pool: Weighted, modes: Optimum) -> bool:
         if not pool.settled[0]:
             return False
-        missing = overlooked_share(target, pool, 0, float(pool.log_integral[0]), importance.widened(modes), rng)
+        log_integral = float(pool.log_integral[0])
+        missing = overlooked_share(target, pool, 0, log_integral, importance.widened(modes), rng)
         return abs(missing) <= _NEXT_TO_NOTHING
 
     known, others = searches(target, rng, 2, starts=_STARTS)
@@ -119,9 +122,12 @@ def witnessed(target: LogPosterior, rng: Generator, ess: float) -> Weighted:
         if agreed(pool, others):
             return pool
         draws = _of_both(target, pool, importance.widened(others), rng)
-        known, others = distinct([known, others]), searches(target, rng, 1, starts=_STARTS)[0]
+        known = distinct([known, others])
+        [others] = searches(target, rng, 1, starts=_STARTS)
         pool = learned(known, draws)
-    return pool if agreed(pool, others) else replace(pool, settled=np.zeros(1, bool))
+    if agreed(pool, others):
+        return pool
+    return replace(pool, settled=np.zeros(1, bool))
 
 
 def _of_both(target: LogPosterior, pool: Weighted, others: Mixture, rng: Generator) -> Array:

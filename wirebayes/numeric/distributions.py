@@ -354,15 +354,19 @@ def log_density_of(distribution: Any) -> Function:
 
 def log_normal(sd_log: Any, median: Any) -> Function:
     """The log density of a log-normal distribution, or of several, a column each."""
-    middle, constant = np.log(median), np.log(sd_log) + _HALF_LOG_2PI
+    middle = np.log(median)
+    constant = np.log(sd_log) + _HALF_LOG_2PI
+
+    def density(log_x: Array) -> Array:
+        score = (log_x - middle) / sd_log
+        return -0.5 * score**2 - log_x - constant
 
     def evaluate(x: Array) -> Array:
         inside = x > 0
         if inside.all():
-            log_x = np.log(x)
-            return -0.5 * ((log_x - middle) / sd_log) ** 2 - log_x - constant
+            return density(np.log(x))
         log_x = np.log(np.where(inside, x, 1.0))
-        return np.where(inside, -0.5 * ((log_x - middle) / sd_log) ** 2 - log_x - constant, -np.inf)
+        return np.where(inside, density(log_x), -np.inf)
 
     return evaluate
 
@@ -376,6 +380,7 @@ def _logit_normal(middle: float, sd: float, most: float) -> Function:
         u = np.where(inside, share, 0.5)
         log_below, log_above = np.log(u), np.log1p(-u)
         score = (log_below - log_above - middle) / sd
-        return np.where(inside, -0.5 * score**2 - log_below - log_above - constant, -np.inf)
+        density = -0.5 * score**2 - log_below - log_above - constant
+        return np.where(inside, density, -np.inf)
 
     return evaluate

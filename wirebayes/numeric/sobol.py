@@ -41,17 +41,20 @@ def strata(dimensions: int, size: int) -> NDArray[np.uint32]:
 
 def _steps(row: tuple[int, ...], digits: int) -> NDArray[np.uint32]:
     """(digits,) directions of one coordinate; of the first one, whose row is empty, each moves by half of the last."""
+    shifts = range(digits - 1, -1, -1)
     if not row:
-        return np.array([1 << (digits - 1 - k) for k in range(digits)], np.uint32)
+        return np.array([1 << shift for shift in shifts], np.uint32)
     polynomial, *odd = row
     degree = len(odd)
     for k in range(degree, digits):
-        new = odd[k - degree] ^ (odd[k - degree] << degree)
+        first = odd[k - degree]
+        new = first ^ (first << degree)
         for back in range(1, degree):
             if polynomial >> (degree - back) & 1:
                 new ^= odd[k - back] << back
         odd.append(new)
-    return np.array([odd[k] << (digits - 1 - k) for k in range(digits)], np.uint32)
+    steps = [number << shift for number, shift in zip(odd[:digits], shifts, strict=True)]
+    return np.array(steps, np.uint32)
 
 
 # For each coordinate but the first: a primitive polynomial over two elements, its coefficients as binary digits, and

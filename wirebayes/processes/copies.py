@@ -56,7 +56,11 @@ def in_copies(pieces: Sequence[Callable[[], T]]) -> list[T]:
         if isinstance(answer, Exception):
             raise answer
         done |= answer
-    return [done[number] if number in done else piece() for number, piece in enumerate(pieces)]
+    results = []
+    for number, piece in enumerate(pieces):
+        result = done[number] if number in done else piece()
+        results.append(result)
+    return results
 
 
 @contextmanager

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 ParallelMap = Callable[..., Iterable[Any]]  # as the built-in `map`
 _PATIENCE_S = 10.0  # for a scheduler and its first worker to answer: a cluster's network takes a second at most
+_AT_ONCE = 1000  # pieces handed over and not finished: more would only fill the memory of whoever keeps the list
 _FORKS = sys.platform == "linux"  # elsewhere system libraries do not survive a fork, or there is none
 _THREADS_OF_THIS = Path("/proc/self/task")  # one folder a thread; on Linux alone
 _LOOKS, _MOMENT_S = 10, 0.001  # ten times as long as a thread takes to be gone
@@ -216,16 +217,14 @@ def _apart(function: Callable[..., object], arguments: tuple[Any, ...]) -> None:
 
 
 @contextmanager
-def executor(
-    scheduler: str | None = None, most: int | None = None, prepare: Callable[[], object] | None = None
-) -> Iterator["Executor"]:
+def executor(scheduler: str | None = None, most: int | None = None) -> Iterator["Executor"]:
     """Where work is done: the workers of a Dask cluster, or processes of this machine.
 
     Parameters
     ----------
     scheduler : str, optional
         Address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``. Work whose worker is lost is done again elsewhere.
-    most, prepare
+    most : int, optional
         As for `workers`, on this machine.
 
     Raises
@@ -234,7 +233,7 @@ def executor(
         No scheduler answers at that address, it has no workers, or Dask is not installed.
     """
     if scheduler is None:
-        with processes(most, prepare) as pool:
+        with processes(most) as pool:
             yield pool
         return
     try:
@@ -268,7 +267,7 @@ def executor(
 
 
 def as_finished(
-    pool: "Executor", function: Callable[[Any], Any], work: Iterable[tuple[Any, Any]], at_once: int = 1000
+    pool: "Executor", function: Callable[[Any], Any], work: Iterable[tuple[Any, Any]]
 ) -> Iterator[tuple[Any, "Future[Any]"]]:
     """Each piece of work's key with its finished future, in the order in which they end.
 
@@ -276,8 +275,6 @@ def as_finished(
     ----------
     function : function of one piece of work
     work : iterable of pairs
-    at_once : int
-        Most pieces handed over and not finished: more would only fill the memory of whoever keeps the list.
     """
     from queue import SimpleQueue
 
@@ -290,7 +287,7 @@ def as_finished(
             running[future] = key
             future.add_done_callback(finished.put)
 
-    hand_over(at_once)
+    hand_over(_AT_ONCE)
     while running:
         future = finished.get()
         yield running.pop(future), future

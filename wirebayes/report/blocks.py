@@ -25,6 +25,7 @@ from wirebayes.sentences import number as number
 from wirebayes.sentences import span as span
 from wirebayes.sentences import unit_text as unit_text
 
+Configuration = dict[str, Any]  # of a folder of results: what its command was given
 _KINDS = {".svg": "image/svg+xml", ".png": "image/png"}
 _A_NUMBER = re.compile(r"[−<±]?\s?\d")
 _SENTENCE = 36  # characters; no number with its interval is longer
@@ -254,11 +255,12 @@ def svg(figure: Figure) -> bytes:
         _lay_out(figure)
         figure.savefig(stream, format="svg", dpi=_DPI, metadata=no_metadata)
     text = stream.getvalue().decode("utf-8")
-    text = text[text.index("<svg") :]
-    text = text.replace("<svg", f'<svg font-family="{_FONTS}"', 1)
+    begins = text.index("<svg")
+    text = text[begins:].replace("<svg", f'<svg font-family="{_FONTS}"', 1)
     for pattern, instead in _SHORTER:
         text = pattern.sub(instead, text)
-    return _COORDINATES.sub(_shorter_path, text).encode("utf-8")
+    text = _COORDINATES.sub(_shorter_path, text)
+    return text.encode("utf-8")
 
 
 def _rasterize_dense(figure: Figure) -> None:
@@ -380,7 +382,7 @@ def files_beside(folder: Path, contents: Sequence[tuple[str, str]], title: str =
     return Section(title, [Links(found)])
 
 
-def seed_of_page(configuration: Mapping[str, Any]) -> str:
+def seed_of_page(configuration: Configuration) -> str:
     """The line at the foot of a page that says which seed its results had."""
     return f"Seed {configuration.get('seed')}."
 

@@ -104,7 +104,9 @@ def measured(protocol: Protocol, readings: Array, title: str) -> Figure:
     readings : (H, R) array
     """
     weights = protocol.control == "force"
-    across, upward = ("weight, N", "displacement, mm") if weights else ("displacement, mm", "tension, N")
+    across, upward = "displacement, mm", "tension, N"
+    if weights:
+        across, upward = "weight, N", "displacement, mm"
     figure, axes = panel(across, upward, title)
     _join_readings(axes, protocol, readings)
     hold, reading = np.nonzero(protocol.mask)
@@ -214,7 +216,9 @@ def residual_figure(
     paper_N : (m,) array, optional
         The paper's prediction.
     """
-    figure, axes = panel("hold (readings in order of time within each)", "measured − predicted, N", title)
+    across = "hold (readings in order of time within each)"
+    upward = "measured − predicted, N"
+    figure, axes = panel(across, upward, title)
     numbers, place = places_in_holds(hold, time_s)
     is_last = np.diff(hold) != 0
     ends = np.flatnonzero(is_last) + 1

@@ -4,7 +4,6 @@ import os
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -12,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from wirebayes._version import __version__
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored_results, writable, write_text
-from wirebayes.report.blocks import Page, View, as_sentence
+from wirebayes.report.blocks import Configuration, Page, View, as_sentence
 from wirebayes.report.pages import PAGES
 
 
@@ -51,7 +50,7 @@ def page_of_folder(folder: Path) -> Page:
         known = ", ".join(PAGES)
         raise InputError(f"{folder / CONFIGURATION}, key command: found {command!r}, expected one of {known}")
     module, _, function = PAGES[command].partition(":")
-    page_of: Callable[[Path, dict[str, Any]], Page] = getattr(import_module(module), function)
+    page_of: Callable[[Path, Configuration], Page] = getattr(import_module(module), function)
     with stored_results(folder):
         return page_of(folder, configuration)
 

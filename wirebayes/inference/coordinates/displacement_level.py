@@ -168,17 +168,22 @@ def _level(problem: Problem, ridge: Ridge, sample: Sample) -> DisplacementLevel 
     if preload not in names:
         return None
     ratio = protocol.length_mm / (sample.model.length_ref_mm or protocol.length_mm)
+    length_exponent: int | float = 0.0
+    if ratio != 1.0:
+        length_exponent = problem.place(LENGTH_EXPONENT, sample)
+    readings = sample.readings[..., 0][protocol.mask]
+    last_recorded = int(np.flatnonzero(protocol.recorded)[-1])
     return DisplacementLevel(
         k1=names.index(k1),
         preload=names.index(preload),
         weight=float(weights[-1]),
         length=protocol.length_mm,
-        last=float(sample.readings[..., 0][protocol.mask][-1]),
-        holds=1 + int(np.flatnonzero(protocol.recorded)[-1]),
+        last=float(readings[-1]),
+        holds=1 + last_recorded,
         modified=sample.model.law == "modified",
         ridge=for_sample(ridge, problem, sample),
         log_ratio=float(np.log(ratio)),
-        length_exponent=0.0 if ratio == 1.0 else problem.place(LENGTH_EXPONENT, sample),
+        length_exponent=length_exponent,
     )
 
 

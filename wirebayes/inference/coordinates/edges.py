@@ -52,14 +52,15 @@ def _half_normal(sd: float, log_prior: Function) -> Edge:
 
     def score(value: Array) -> Array:
         u = value / unit
-        lower = ndtri(np.maximum(erf(u), _NEAREST))
-        upper = -ndtri(erfc(np.maximum(u, 0.5)))
-        return np.where(u < 0.5, lower, upper)
+        below = np.maximum(erf(u), _NEAREST)
+        above = erfc(np.maximum(u, 0.5))
+        return np.where(u < 0.5, ndtri(below), -ndtri(above))
 
     def value(score: Array) -> Array:
-        lower = erfinv(ndtr(np.minimum(score, 0.0)))
-        upper = erfcinv(ndtr(-np.maximum(score, 0.0)))
-        return np.asarray(unit * np.where(score < 0.0, lower, upper))
+        below = ndtr(np.minimum(score, 0.0))
+        above = ndtr(-np.maximum(score, 0.0))
+        u = np.where(score < 0.0, erfinv(below), erfcinv(above))
+        return np.asarray(unit * u)
 
     return Edge(score, value, log_prior, False)
 
@@ -77,8 +78,9 @@ def _cut_off(known: TruncatedNormal) -> Edge:
         u = np.maximum((value - middle) / sd, least)
         right = ndtr(-u) / above
         left = (ndtr(u) - below) / above
+        upper = -ndtri(right)
         lower = ndtri(np.maximum(left, _NEAREST))
-        return np.where(right < 0.5, -ndtri(right), lower)
+        return np.where(right < 0.5, upper, lower)
 
     def value(score: Array) -> Array:
         left = ndtr(np.minimum(score, 0.0))

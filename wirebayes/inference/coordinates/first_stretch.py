@@ -142,16 +142,20 @@ class FirstStretch:
         U = self.ridge.get(theta, "U")
         strain_for_one = self._strain_for_one(theta)
         read = self.read[:, None]
-        tension = np.full(len(theta), self.read[0])
+        first = self.read[0]
+        lowest, highest = first / _MOST, first * _MOST
+        tension = np.full(len(theta), first)
         square = np.ones(len(theta))
         for _ in range(_REPETITIONS):
             crept = strain_for_one * tension**U
             expected = self._after_creep(tension, k1, crept)
-            slope = np.clip(1.0 - U * (1.0 - expected / tension), _LEAST_SLOPE, 1.0)
+            slope = 1.0 - U * (1.0 - expected / tension)
+            slope = np.clip(slope, _LEAST_SLOPE, 1.0)
             square = (slope * slope).sum(axis=0)
-            change = (slope * (read - expected)).sum(axis=0) / square
-            tension = np.clip(tension + change, self.read[0] / _MOST, self.read[0] * _MOST)
-        return tension, 1.0 / np.sqrt(square)
+            along = (slope * (read - expected)).sum(axis=0)
+            tension = np.clip(tension + along / square, lowest, highest)
+        sd = 1.0 / np.sqrt(square)
+        return tension, sd
 
     def _strain_for_one(self, theta: Array) -> Array:
         """(r, n) strain by creep at the readings under a constant tension of 1 N."""
@@ -218,6 +222,10 @@ def _first_stretch(problem: Problem, ridge: Ridge, sample: Sample, preload: int)
     protocol = sample.protocol
     known = problem.prior.distributions[problem.names[preload]]
     ratio = protocol.length_mm / (sample.model.length_ref_mm or protocol.length_mm)
+    length_exponent: int | float = 0.0
+    if ratio != 1.0:
+        length_exponent = problem.place(LENGTH_EXPONENT, sample)
+    first = protocol.mask[0]
     return FirstStretch(
         preload=preload,
         setting_sd=problem.place("setting_sd", sample),
@@ -226,13 +234,13 @@ def _first_stretch(problem: Problem, ridge: Ridge, sample: Sample, preload: int)
         prior_sd=float(known.std()),
         at=float(protocol.setting[0]),
         length=protocol.length_mm,
-        read=sample.readings[0, protocol.mask[0], 0],
-        times_s=protocol.time_s[0, protocol.mask[0]],
+        read=sample.readings[0, first, 0],
+        times_s=protocol.time_s[0, first],
         rounding=float(sample.resolution / np.sqrt(12.0)),
         modified=sample.model.law == "modified",
         ridge=ridge,
         log_ratio=float(np.log(ratio)),
-        length_exponent=0.0 if ratio == 1.0 else problem.place(LENGTH_EXPONENT, sample),
+        length_exponent=length_exponent,
     )
 
 

@@ -168,17 +168,25 @@ class Ridge:
 
         Effects on the amount of creep are included here.
         """
-        carried, every_gained, every_shown = 0.0 * reached[0], [], []
-        effects = Placed(self.effects, {c: self.get(theta, c) for e in self.effects for c in e.columns()})
+        carried = 0.0 * reached[0]
+        every_gained = []
+        every_shown = []
+        amplitudes: dict[str, Array] = {}
+        for effect in self.effects:
+            amplitudes |= {column: self.get(theta, column) for column in effect.columns()}
+        effects = Placed(self.effects, amplitudes)
         for j, (end, pair) in enumerate(zip(self.which_end, self.which_pair, strict=True)):
             amount = drive[j] - self.kept * carried
             if self.effects:
-                amount = effects.change("amount", amount[None], self.holds[j].carrying(carried[None]))[0]
+                hold = self.holds[j].carrying(carried[None])
+                amount = effects.change("amount", amount[None], hold)[0]
             gained = amount * reached[end]
             carried = carried + gained
             every_gained.append(gained)
             every_shown.append(amount * seen[pair])
-        return np.array(np.broadcast_arrays(*every_gained)), np.array(np.broadcast_arrays(*every_shown))
+        gained = np.array(np.broadcast_arrays(*every_gained))
+        shown = np.array(np.broadcast_arrays(*every_shown))
+        return gained, shown
 
 
 _NOTHING = 1e-300  # of a square whose logarithm has to be finite
@@ -200,16 +208,23 @@ def ridges_of(problem: Problem, columns: ColumnMap, for_draws: bool) -> list[Rid
     taken: set[int] = set()
     for sample in problem.samples:
         where, fixed = _parameters(problem, sample, columns)
-        if len(where) + len(fixed) < len(MATERIAL):
+        known = len(where) + len(fixed)
+        if known < len(MATERIAL):
             continue  # a user's prior that allows negative values: leave this material's columns as they are
-        shifted = _shifted(problem, sample, {name for name, column in where.items() if column not in taken})
+        free = {name for name, column in where.items() if column not in taken}
+        shifted = _shifted(problem, sample, free)
         if not for_draws:
-            shifted -= {"U", "k1"} if sample.protocol.control == "force" else {"U"}
-        if shifted:
-            taken |= {where[name] for name in shifted}
-            ridge = _ridge(problem, sample, where, fixed, shifted, for_draws)
+            shifted -= {"U"}
+            if sample.protocol.control == "force":
+                shifted -= {"k1"}
+        if not shifted:
+            continue
+        taken |= {where[name] for name in shifted}
+        ridge = _ridge(problem, sample, where, fixed, shifted, for_draws)
+        if for_draws:
             owned = [column for each in found for column in each.shares]
-            found.append(_with_shares(ridge, problem, sample, columns, owned) if for_draws else ridge)
+            ridge = _with_shares(ridge, problem, sample, columns, owned)
+        found.append(ridge)
     return found
 
 
@@ -273,12 +288,16 @@ def _ridge(
     tension = _driving(sample)
     hold_s, duration = sample.typical_hold_s, sample.protocol.duration_s
     durations = np.where(duration > 0, duration, hold_s)
-    seen = _seen(sample, durations) if for_draws else (np.zeros_like(durations), durations)
+    seen = np.zeros_like(durations), durations
+    if for_draws:
+        seen = _seen(sample, durations)
     times, which = np.unique([*seen, durations], return_inverse=True)
     first, last, end = which.reshape(3, -1)
-    between, which_pair = np.unique(np.column_stack([first, last]), axis=0, return_inverse=True)
-    no_power = np.zeros(1), np.zeros(1)  # U is sampled as it is
-    powers = _powers(problem, sample, np.log(tension), durations / (0.5 * hold_s)) if "U" in shifted else no_power
+    pairs = np.column_stack([first, last])
+    between, which_pair = np.unique(pairs, axis=0, return_inverse=True)
+    powers = np.zeros(1), np.zeros(1)  # U is sampled as it is
+    if "U" in shifted:
+        powers = _powers(problem, sample, np.log(tension), durations / (0.5 * hold_s))
     return Ridge(
         where,
         fixed,
@@ -355,12 +374,18 @@ def _with_shares(ridge: Ridge, problem: Problem, sample: Sample, columns: Column
         if not names or names[0] not in problem.names:
             continue
         amount = problem.names.index(names[0])
-        if amount in owned or amount in ridge.shares or amount not in columns.edges or columns.edges[amount].ends:
+        if amount in owned or amount in ridge.shares:
             continue
-        if effect.in_series and "k1" in ridge.shifted and not ridge.elongations:
+        edge = columns.edges.get(amount)
+        if edge is None or edge.ends:
+            continue
+        shifted = ridge.shifted
+        if effect.in_series and "k1" in shifted and not ridge.elongations:
             ridge = replace(ridge, fixture=amount)
-        elif effect.amplitudes[0].is_elongation and effect.place != "strain" and "B" in ridge.shifted:
-            ridge = replace(ridge, beside=(*ridge.beside, _elongation(ridge, problem, effect, names)))
+        elif effect.amplitudes[0].is_elongation and effect.place != "strain" and "B" in shifted:
+            elongation = _elongation(ridge, problem, effect, names)
+            beside = (*ridge.beside, elongation)
+            ridge = replace(ridge, beside=beside)
     return ridge
 
 

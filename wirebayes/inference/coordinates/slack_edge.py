@@ -93,20 +93,19 @@ def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:
         posterior.
     """
     prior, protocol, readings = problem.prior, sample.protocol, sample.readings[..., 0]
-
-    if protocol.control == "force":
+    if protocol.control == "force" or problem.likelihood != "chain":
         return None
-    if (
-        problem.likelihood != "chain"
-        or not isinstance(preload := problem.place("preload", sample), int)
-        or protocol.mask[0].sum() < 2
-    ):
+    preload = problem.place("preload", sample)
+    if not isinstance(preload, int) or protocol.mask[0].sum() < 2:
         return None
-    first, largest = readings[0, protocol.mask[0]], readings[protocol.mask].max()
-    if first[0] < _CLEARLY * largest or first[0] - first[-1] < _CLEARLY * first[0]:
+    first = readings[0, protocol.mask[0]]
+    largest = readings[protocol.mask].max()
+    fallen = first[0] - first[-1]
+    if first[0] < _CLEARLY * largest or fallen < _CLEARLY * first[0]:
         return None
     setting = problem.column("setting_sd", sample)
-    typical = float(prior.fixed[setting] if setting in prior.fixed else prior.distributions[setting].median())
+    is_fixed = setting in prior.fixed
+    typical = float(prior.fixed[setting] if is_fixed else prior.distributions[setting].median())
     if not typical > 0.0:
         return None
     below = [column for e in sample.model.effects if (column := e.no_creep_below)]

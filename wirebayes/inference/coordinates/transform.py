@@ -133,7 +133,9 @@ class Transformation:
         if for_draws and _is_usual(problem, self.columns, ridges):
             ridge, levels = _of_one_setting(problem, ridges[0], slack, self.scale)
             ridges = [ridge]
-        lasts = _last_readings(problem, ridges) if for_draws and not levels else [[] for _ in ridges]
+        lasts: list[list[LastReadings]] = [[] for _ in ridges]
+        if for_draws and not levels:
+            lasts = _last_readings(problem, ridges)
         means = _mean_elongations(problem, lasts, self.columns)
         of_levels = {column for step in levels if not isinstance(step, Level) for column in step.preloads}
         edges = [Preload(edge, self.scale[edge.preload]) for edge in slack if edge.preload not in of_levels]
@@ -141,12 +143,11 @@ class Transformation:
         self.steps = [*_steps(ridges, lasts, levels, means, edges), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
-        others = [
-            *(step.preload for step in means),
-            *(step.preload for step in toes),
-            *(e.edge.preload for e in edges),
-        ]
-        self._own_scale = [*self.shares, *sorted(of_levels.union(others))]
+        preloads = set(of_levels)
+        preloads.update(step.preload for step in means)
+        preloads.update(step.preload for step in toes)
+        preloads.update(step.edge.preload for step in edges)
+        self._own_scale = [*self.shares, *sorted(preloads)]
 
     @property
     def kinds_of_creep(self) -> list[list[int]]:
@@ -193,16 +194,18 @@ class Transformation:
         theta, z : (n, d) arrays
             Natural parameters and their coordinates.
         """
-        prior, spread = self.problem.prior, self.columns.log_spread
+        prior, columns = self.problem.prior, self.columns
+        spread = columns.log_spread
         # other coordinates than logarithms have a standard deviation of one already
         out = z.copy()
-        out[:, self.log_columns] = self.columns.logarithms(theta)
+        out[:, self.log_columns] = columns.logarithms(theta)
         out /= spread
         for name in prior.powers.keys() & prior.distributions.keys():
             i = self.problem.names.index(name)
-            out[:, i] += prior.log_factor(name, theta) / spread[i]
+            log_factor = prior.log_factor(name, theta)
+            out[:, i] += log_factor / spread[i]
         for i in self._own_scale:
-            out[:, i] = self.columns.coordinate(theta, i)
+            out[:, i] = columns.coordinate(theta, i)
         return np.asarray(out.T)
 
 
@@ -225,22 +228,23 @@ def _steps(
     """
     beside = {step.preload for step in means}
     before = [step for step in preloads if step.edge.threshold != 0.0 or step.edge.preload in beside]
+    after = [step for step in preloads if step not in before]
     level = _read_beside(levels)
     of_stretches = [step for step in levels if isinstance(step, StretchLevel)]
-    of_ridges = zip(ridges, lasts, strict=True)
-    crept = [_after_creep(ridge, own) for ridge, own in of_ridges if "k1" in ridge.shifted]
-    return [
-        *before,
-        *means,
-        *(Stretched(each, step.scale[each.preload]) for step in of_stretches for each in step.levels),
-        *(Loss(ridge, level) for ridge in ridges if "B" in ridge.shifted),
-        *of_stretches,
-        *(step for step in crept if step is not None),
-        *(step for step in levels if not isinstance(step, StretchLevel)),
-        *(Hazard(ridge) for ridge in ridges if "k2" in ridge.shifted),
-        *(Power(ridge) for ridge in ridges if "U" in ridge.shifted),
-        *(step for step in preloads if step not in before),
-    ]
+    of_holds = [step for step in levels if not isinstance(step, StretchLevel)]
+    steps: list[Step] = [*before, *means]
+    for step in of_stretches:
+        steps += [Stretched(each, step.scale[each.preload]) for each in step.levels]
+    steps += [Loss(ridge, level) for ridge in ridges if "B" in ridge.shifted]
+    steps += of_stretches
+    for ridge, own in zip(ridges, lasts, strict=True):
+        crept = _after_creep(ridge, own) if "k1" in ridge.shifted else None
+        if crept is not None:
+            steps.append(crept)
+    steps += of_holds
+    steps += [Hazard(ridge) for ridge in ridges if "k2" in ridge.shifted]
+    steps += [Power(ridge) for ridge in ridges if "U" in ridge.shifted]
+    return steps + list(after)
 
 
 def _of_one_setting(

@@ -78,22 +78,26 @@ def init(
     BurnIn
         Walkers drawn from the modes' normal approximations, widened; nothing is kept yet.
     """
-    spawned = np.random.SeedSequence(seed).spawn(2)
-    rng = np.random.default_rng(spawned[0])
+    of_search, of_walkers = np.random.SeedSequence(seed).spawn(2)
+    rng = np.random.default_rng(of_search)
     before = target.evaluations
-    seen = None if rough is None else (WeightedPoints.equal(rough), WeightedPoints.equal(rough))
+    hot = cold = rough
     witness = None
     if found is None:
         searched = search(target, rng, extra=near)
-        found, seen = searched.modes, seen or (WeightedPoints.equal(searched.warm), WeightedPoints.equal(searched.cold))
+        found = searched.modes
         witness = searched.cold, searched.height
+        if rough is None:
+            hot, cold = searched.warm, searched.cold
     known = _overdispersed(found)
-    random = np.random.RandomState(np.random.MT19937(spawned[1]))
-    places = _finite_draws(target, known, _walking(target, policy), random)
+    random = np.random.RandomState(np.random.MT19937(of_walkers))
+    count = _walking(target, policy)
+    places = _finite_draws(target, known, count, random)
+    walkers = Walkers(*places, random.get_state())
     learned = Learned(known, known, len(found.z), witness)
-    state = BurnIn(Walkers(*places, random.get_state()), learned, rng, target.evaluations - before)
-    if seen is not None:
-        state = _fitted(target, state, policy, *seen, ROUGH_SHARES)
+    state = BurnIn(walkers, learned, rng, target.evaluations - before)
+    if hot is not None and cold is not None:
+        state = _fitted(target, state, policy, WeightedPoints.equal(hot), WeightedPoints.equal(cold), ROUGH_SHARES)
         if state.learned.proposal is not known:
             state = replace(state.knowing(acceptance=1.0), seen=None)  # assumed good until draws show otherwise
     return state
@@ -119,15 +123,13 @@ def burn_in_round(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn
     state, drawn = _drawn(target, state, policy)
     z, value, base = drawn
     weight = value - base
-    typical = weight[truncated_rows(weight, len(weight), state.generator)]
-    against = state.generator.permutation(typical)
-    acceptance = float(np.exp(np.minimum(weight - against, 0.0)).mean())
+    acceptance, middle, high = _quality(weight, state.generator)
     state = state.knowing(acceptance=acceptance)
-    middle, high = np.quantile(typical, [0.5, 0.999])
     settled = acceptance >= GOOD_ACCEPTANCE and high - middle < policy.tail
     last = state.round >= policy.rounds and settled or state.round >= policy.most_rounds
     if acceptance >= USEFUL:
-        state = _fitted(target, state, policy, *_weighted_twice(*drawn), points=POINTS if last else PASSING_POINTS)
+        points = POINTS if last else PASSING_POINTS
+        state = _fitted(target, state, policy, *_weighted_twice(*drawn), points=points)
         left = left_by_search(state.learned, middle) if last else None
         state = _with_excess(state, z, value, weight, left)
     if not last:
@@ -135,6 +137,16 @@ def burn_in_round(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn
     # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
     steps = int(np.clip(np.exp(high - middle), 1, LONGEST_SETTLING))
     return _frozen(target, state, policy, drawn, steps)
+
+
+def _quality(weight: Array, rng: np.random.Generator) -> tuple[float, float, float]:
+    """Of a proposal by its draws' log weights: acceptance rate, and the weights' median and 99.9 % quantile."""
+    rows = truncated_rows(weight, len(weight), rng)
+    typical = weight[rows]
+    against = rng.permutation(typical)
+    accepted = np.exp(np.minimum(weight - against, 0.0))
+    middle, high = np.quantile(typical, [0.5, 0.999])
+    return float(accepted.mean()), middle, high
 
 
 def _frozen(
@@ -170,11 +182,14 @@ def _with_excess(
         drawn = state.drawn.joined(drawn)
         drawn = WeightedPoints(drawn.z[-REMEMBERED:], drawn.weight[-REMEMBERED:])
     state = replace(state, drawn=drawn)
-    if not isinstance(state.learned.proposal, Proposal):
+    known = state.learned.proposal
+    if not isinstance(known, Proposal):
         return state
     every = drawn if left is None else drawn.joined(left)
     places = replace(every, z=every.z[:, :-1])
-    return state.knowing(proposal=proposal.with_excess(state.learned.proposal, places, every.z[:, -1], state.generator))
+    heights = every.z[:, -1]
+    with_excess = proposal.with_excess(known, places, heights, state.generator)
+    return state.knowing(proposal=with_excess)
 
 
 def again(target: LogPosterior, state: Sampling, policy: Policy) -> BurnIn:
@@ -205,18 +220,23 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy, *, draws_stay
         False where walkers are still about where they were placed, by the weights of few draws.
     """
     before = target.evaluations
-    known = _modes_of(target, state.learned.start)
-    found = distinct([known, _climbed(target, state, known)])
-    state = replace(state, evaluations=state.evaluations + target.evaluations - before)
-    if len(found.z) > len(known.z):
-        learned = replace(state.learned, start=_overdispersed(found), modes=len(found.z))
+    learned = state.learned
+    known = _modes_of(target, learned.start)
+    climbed = _climbed(target, state, known)
+    found = distinct([known, climbed])
+    evaluations = state.evaluations + target.evaluations - before
+    state = replace(state, evaluations=evaluations)
+    modes = len(found.z)
+    if modes > len(known.z):
+        learned = replace(learned, start=_overdispersed(found), modes=modes)
         return again(target, replace(state, learned=learned), policy)
     earlier = state.all_kept if draws_stay else Kept()
-    previous = state.learned.proposal if earlier.steps else None
-    learned = replace(state.learned, again=state.learned.again + 1, previous=previous)
+    previous = learned.proposal if earlier.steps else None
+    learned = replace(learned, again=learned.again + 1, previous=previous)
     state = replace(state, learned=learned)
     fitted = _of_kept(target, state, policy, policy.rounds)
-    return replace(state, learned=_as_frozen(fitted.learned), kept=Kept(), earlier=earlier, diagnostics=None)
+    frozen = _as_frozen(fitted.learned)
+    return replace(state, learned=frozen, kept=Kept(), earlier=earlier, diagnostics=None)
 
 
 def _climbed(target: LogPosterior, state: Sampling, known: Optimum) -> Optimum:

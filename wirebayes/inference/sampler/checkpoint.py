@@ -58,14 +58,16 @@ def read_checkpoint(path: Path, fit: Mapping[str, Any]) -> tuple[dict[str, Any],
     with stored_results(path, INSTEAD):
         with zipfile.ZipFile(path) as archive:
             stored = json.loads(archive.read(_VALUES))
-        if stored["format"] != FORMAT:
-            raise InputError(f"{path}: found format {stored['format']}, expected {FORMAT}; {INSTEAD}")
+        found = stored["format"]
+        if found != FORMAT:
+            raise InputError(f"{path}: found format {found}, expected {FORMAT}; {INSTEAD}")
         different = differences(stored["fit"], plain(fit))
         if different:
             raise InputError(f"{path}: belongs to another fit: {different[0]}; {INSTEAD}")
-        with np.load(path, allow_pickle=False) as arrays:
+        with np.load(path, allow_pickle=False) as loaded:
             # an archive whose directory was damaged may seem to hold fewer
-            return stored["values"], _nested({name: arrays[name] for name in stored["arrays"]})
+            arrays = {name: loaded[name] for name in stored["arrays"]}
+        return stored["values"], _nested(arrays)
 
 
 def _flat(arrays: Mapping[str, Any]) -> dict[str, Any]:

@@ -79,13 +79,16 @@ class Components:
         distances = np.einsum("knd,knd->kn", deviates, deviates)
         logs = self.mixture.log_parts(distances)
         logs[: self.straightened] += jacobian
-        which = np.argmax(logs + random.gumbel(size=logs.shape), axis=0)
+        perturbed = logs + random.gumbel(size=logs.shape)
+        which = np.argmax(perturbed, axis=0)
         chosen = which, np.arange(n)
         degrees = self.mixture.degrees[which]
-        stretch = random.chisquare(degrees + d) / (degrees + distances[chosen])
+        square = random.chisquare(degrees + d)
+        stretch = square / (degrees + distances[chosen])
         back = self.mixture.weights[which] * random.uniform(size=n)
+        first = self._until[which] - back
         within = deviates[chosen] * np.sqrt(stretch)[:, None]
-        return np.column_stack([self._until[which] - back, ndtr(within)])
+        return np.column_stack([first, ndtr(within)])
 
     def _deviates(self, x: Array) -> tuple[Array, Any]:
         """(components, n, d) of places (n, d), each in a component's own units, and what straightening adds to logs."""

@@ -102,14 +102,15 @@ def sample_posterior(
         The checkpoint is damaged, of another format, or of another fit.
     """
     of_fit = {"seed": seed, "policy": describe(policy), "parameters": target.problem.names}
-    state: State = resume.load_state(checkpoint, of_fit) or burn_in.init(target, seed, policy, found, near, rough)
+    state: State | None = resume.load_state(checkpoint, of_fit)
+    if state is None:
+        state = burn_in.init(target, seed, policy, found, near, rough)
     resume.save_state(state, checkpoint, of_fit)
     while isinstance(state, BurnIn) or not state.finished:
-        state = (
-            burn_in.burn_in_round(target, state, policy)
-            if isinstance(state, BurnIn)
-            else kept.keep_block(target, state, policy)
-        )
+        if isinstance(state, BurnIn):
+            state = burn_in.burn_in_round(target, state, policy)
+        else:
+            state = kept.keep_block(target, state, policy)
         progress(_share(state, policy))
         resume.save_state(state, checkpoint, of_fit)
     diagnostics, kept_draws = state.diagnostics, state.all_kept

@@ -129,7 +129,8 @@ def fit_mixture(
     middle = share @ points.z
     away = points.z - middle
     scale = (away * share[:, None]).T @ away
-    root = np.linalg.cholesky(scale + 1e-9 * np.diag(np.diag(scale)))
+    variances = np.diag(np.diag(scale))
+    root = np.linalg.cholesky(scale + 1e-9 * variances)
     x = np.linalg.solve(root, away.T).T
     if not np.isfinite(x).all():  # a map fitted to too few points may overflow
         raise np.linalg.LinAlgError("the points do not span their space")
@@ -137,7 +138,8 @@ def fit_mixture(
     def starts() -> Iterator[Mixture]:
         if before is not None and len(before.weights) == most:
             centres = np.linalg.solve(root, (before.centres - middle).T).T
-            yield Mixture(before.weights, centres, np.linalg.solve(root, before.factors), degrees)
+            factors = np.linalg.solve(root, before.factors)
+            yield Mixture(before.weights, centres, factors, degrees)
         for k in range(most, 0, -1):
             centres = x[spread_rows(x, k, rng, share)]
             if len(centres) == k:
@@ -148,7 +150,9 @@ def fit_mixture(
             found = _em(x, points.weight, start)
         except np.linalg.LinAlgError:
             continue
-        return Mixture(found.weights, middle + found.centres @ root.T, root @ found.factors, degrees)
+        centres = middle + found.centres @ root.T
+        factors = root @ found.factors
+        return Mixture(found.weights, centres, factors, degrees)
     raise np.linalg.LinAlgError("the points do not span their space")
 
 
@@ -220,7 +224,8 @@ def _em(
         heavy = share * (degrees + d) / (degrees + distances)
         centres, scale = _moments(heavy, x, squares)
         scale += of_the_whole * np.eye(d)
-        factors = np.linalg.cholesky(scale / (members + of_the_whole)[:, None, None])
+        counted = members + of_the_whole
+        factors = np.linalg.cholesky(scale / counted[:, None, None])
         mixture = Mixture(members / members.sum(), centres, factors, degrees)
         log_likelihood = float(weight @ total)
         if log_likelihood - last < EM_GAIN * members.sum():

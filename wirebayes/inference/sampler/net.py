@@ -34,17 +34,21 @@ def around(given: Array, size: int, random: Any) -> Array:
     (n, size, m) array
         The given points first, the others in the order of Sobol's sequence, which goes to and fro.
     """
-    (n, m), net = given.shape, sobol.strata(given.shape[1], size)
+    n, m = given.shape
+    net = sobol.strata(m, size)
     # Each binary digit is flipped by a coin of its own for all digits before it. Those of the given point, the origin
     # of the net, are not tossed: it is known where that point has to go, and all others follow it.
     flips = np.zeros((n, m, 1), net.dtype)
     for level in range(size.bit_length() - 1):
-        coins = np.frombuffer(random.bytes(n * m << level), np.uint8).reshape(n, m, -1) & 1
+        tossed = np.frombuffer(random.bytes(n * m << level), np.uint8)
+        coins = tossed.reshape(n, m, -1) & 1
         coins[..., 0] = 0
         flips = np.repeat(2 * flips + coins, 2, axis=-1)
-    place = np.minimum((given * size).astype(net.dtype), size - 1)
+    place = (given * size).astype(net.dtype)
+    place = np.minimum(place, size - 1)
     stratum = net ^ flips[:, np.arange(m), net] ^ place[:, None]
-    points: Array = (stratum + random.uniform(size=stratum.shape)) / size
+    within = random.uniform(size=stratum.shape)
+    points: Array = (stratum + within) / size
     points[:, 0] = given
     return points
 

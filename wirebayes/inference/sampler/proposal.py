@@ -199,12 +199,15 @@ def with_excess(of: Proposal, drawn: WeightedPoints, value: Array, rng: Generato
     of = replace(of, excess=None)
     over = value - of.log_density(drawn.z)
     over -= np.quantile(over, 0.5, weights=drawn.weight, method="inverted_cdf")
-    weight = drawn.weight * -np.expm1(np.minimum(TAKEN_AS_IT_IS - over, 0.0))
+    missing = -np.expm1(np.minimum(TAKEN_AS_IT_IS - over, 0.0))
+    weight = drawn.weight * missing
     some = weight > 0.0
+    weight = weight[some]
     u, _ = of.straight.forward(drawn.z[some])
-    if some.sum() < TOO_FEW or not np.isfinite(u).all():
+    if len(weight) < TOO_FEW or not np.isfinite(u).all():
         return of
-    points = WeightedPoints(u, weight[some]).worth(effective_number(weight[some]))
+    points = WeightedPoints(u, weight)
+    points = points.worth(effective_number(weight))
     try:
         excess = mixture.fit_around(points, of.close, rng, most=EXCESS_COMPONENTS, wider=WIDER)
     except np.linalg.LinAlgError:

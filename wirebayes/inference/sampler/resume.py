@@ -55,9 +55,13 @@ def to_values(state: State) -> dict[str, Any]:
         "learned": {name: getattr(state.learned, name) for name in _PLAIN_LEARNED},
     }
     if isinstance(state, BurnIn):
-        return out | {"round": state.round}
-    kept = {which: {name: getattr(getattr(state, which), name) for name in _PLAIN_KEPT} for which in _KEPT}
-    return out | kept | {name: getattr(state, name) for name in _PLAIN_SAMPLING}
+        out["round"] = state.round
+        return out
+    for which in _KEPT:
+        kept = getattr(state, which)
+        out[which] = {name: getattr(kept, name) for name in _PLAIN_KEPT}
+    out |= {name: getattr(state, name) for name in _PLAIN_SAMPLING}
+    return out
 
 
 def to_arrays(state: State) -> dict[str, Any]:
@@ -73,11 +77,23 @@ def to_arrays(state: State) -> dict[str, Any]:
         "witness": _numbered(learned.witness),
     }
     if isinstance(state, BurnIn):
-        seen = {} if state.seen is None else {"hot": asdict(state.seen[0]), "cold": asdict(state.seen[1])}
-        drawn = {} if state.drawn is None else {"drawn": asdict(state.drawn)}
-        return out | {"walk": _numbered(state.walk), "seen": seen} | drawn
-    kept = {which: _blocks(getattr(state, which)) for which in _KEPT}
-    return out | kept | (asdict(state.diagnostics) if state.diagnostics else {})
+        out["walk"] = _numbered(state.walk)
+        out["seen"] = {}
+        if state.seen is not None:
+            hot, cold = state.seen
+            out["seen"] = {"hot": asdict(hot), "cold": asdict(cold)}
+        if state.drawn is not None:
+            out["drawn"] = asdict(state.drawn)
+        return out
+    for which in _KEPT:
+        out[which] = _blocks(getattr(state, which))
+    if state.diagnostics:
+        out |= asdict(state.diagnostics)
+    return out
+
+
+def _points(arrays: Mapping[str, Any]) -> WeightedPoints:
+    return WeightedPoints(**arrays)
 
 
 def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
@@ -95,16 +111,17 @@ def from_stored(values: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
     walkers = Walkers(arrays["positions"], arrays["values"], random)
     run = walkers, learned, generator, values["evaluations"]
     if values["stage"] == "burn-in":
-        seen = (
-            (WeightedPoints(**arrays["seen"]["hot"]), WeightedPoints(**arrays["seen"]["cold"]))
-            if "seen" in arrays
-            else None
-        )
-        drawn = WeightedPoints(**arrays["drawn"]) if "drawn" in arrays else None
+        seen = None
+        if "seen" in arrays:
+            seen = _points(arrays["seen"]["hot"]), _points(arrays["seen"]["cold"])
+        drawn = _points(arrays["drawn"]) if "drawn" in arrays else None
         return BurnIn(*run, values["round"], _tuple(arrays, "walk"), seen, drawn)
     kept, earlier = (_kept(values[which], arrays.get(which, {})) for which in _KEPT)
-    looked = Diagnostics(*(arrays[name] for name in ("autocorrelation", "ess", "r_hat"))) if "ess" in arrays else None
-    return Sampling(*run, kept, looked, earlier=earlier, **{name: values[name] for name in _PLAIN_SAMPLING})
+    looked = None
+    if "ess" in arrays:
+        looked = Diagnostics(arrays["autocorrelation"], arrays["ess"], arrays["r_hat"])
+    said = {name: values[name] for name in _PLAIN_SAMPLING}
+    return Sampling(*run, kept, looked, earlier=earlier, **said)
 
 
 def _drawn_from(arrays: Mapping[str, Any]) -> Proposal | Mixture:

@@ -39,8 +39,10 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     values = _judged_by(target, z)
     before = state.earlier.steps
     if before and _contradicted(state, policy, z, values):
-        state, values = replace(state, earlier=Kept()), values[:, before:]
-    steps, found = values.shape[1], _diagnosed(values)
+        state = replace(state, earlier=Kept())
+        values = values[:, before:]
+    steps = values.shape[1]
+    found = _diagnosed(values)
     beyond = of_search = 0.0
     if state.learned.trusted:
         of_kept, of_search = overlooked_nats(state.learned, *state.all_kept.flat)
@@ -61,13 +63,18 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
             )
             return replace(state, finished=True, why=why)
     elif steps >= policy.most_steps:
-        worst = target.problem.names[int(np.argmin(found.ess))]
-        why = (
-            f"not converged after {steps} steps: {worst} has ESS {found.ess.min():.0f} (wanted {policy.ess:.0f}), "
-            f"largest nested R-hat {found.r_hat.max():.4f} (allowed {policy.r_hat})"
-        )
+        why = f"not converged after {steps} steps: {_lacking(target, found, policy)}"
         return replace(state, finished=True, why=why)
     return state
+
+
+def _lacking(target: LogPosterior, found: Diagnostics, policy: Policy) -> str:
+    worst = target.problem.names[int(np.argmin(found.ess))]
+    least, most = float(found.ess.min()), float(found.r_hat.max())
+    return (
+        f"{worst} has ESS {least:.0f} (wanted {policy.ess:.0f}), "
+        f"largest nested R-hat {most:.4f} (allowed {policy.r_hat})"
+    )
 
 
 def _judged_by(target: LogPosterior, z: Array) -> Array:

@@ -101,7 +101,8 @@ class Straight:
         for j in range(len(v)):
             before = v[:j]
             mean = self._mean(j, before, held[:j])
-            log_scale = self.log_scale[j, 0] + self.log_scale[j, 1 : j + 1] @ before
+            constant, slopes = self.log_scale[j, 0], self.log_scale[j, 1 : j + 1]
+            log_scale = constant + slopes @ before
             log_scale = np.clip(log_scale, self.least[j], self.most[j])
             v[j] = mean + left[j] * np.exp(log_scale)
             held[j] = np.clip(v[j], self.low[j], self.high[j])
@@ -141,8 +142,10 @@ def fit_map(points: WeightedPoints, order: Ints) -> Straight:
     clear = CLEAR * np.sqrt(worth / points.distinct)  # draws that repeat know no more
     every = d**3 / 6.0 < worth / POINTS_A_TERM
     found = [_straighten(v, j, weight, clear, every) for j in range(d)]
-    spread = np.column_stack([one.spread for one in found])
-    left = np.column_stack([one.left for one in found])
+    spreads = [one.spread for one in found]
+    spread = np.column_stack(spreads)
+    lefts = [one.left for one in found]
+    left = np.column_stack(lefts)
     if not np.isfinite(left).all():
         raise np.linalg.LinAlgError("the points do not settle the scales")
     return Straight(
@@ -166,11 +169,13 @@ def _coefficients(found: Sequence["_Straightened"]) -> dict[str, Array]:
     quadratic = np.zeros((d, d, d))
     log_scale = np.zeros((d, d + 1))
     for j, of in enumerate(found):
-        constant[j] = of.of_mean[0]
-        linear[j, :j] = of.of_mean[1 : j + 1]
-        products = of.of_mean[j + 1 :]
-        np.add.at(quadratic[j], (of.one, of.other), products)
-        np.add.at(quadratic[j], (of.other, of.one), products)
+        mean = of.of_mean
+        constant[j] = mean[0]
+        linear[j, :j] = mean[1 : j + 1]
+        products = mean[j + 1 :]
+        curvature = quadratic[j]
+        np.add.at(curvature, (of.one, of.other), products)
+        np.add.at(curvature, (of.other, of.one), products)
         log_scale[j, : j + 1] = of.of_scale
     return {"constant": constant, "linear": linear, "quadratic": quadratic, "log_scale": log_scale}
 
@@ -205,7 +210,8 @@ def _straighten(v: Array, j: int, weight: Array, clear: float, every: bool) -> _
     one, other = np.triu_indices(j if every or many else 0)
     if many and not every:
         one, other = _seen_at_once(v, lines, one, other, y, weight, clear)
-    terms = np.column_stack([lines, v[:, one] * v[:, other]])
+    products = v[:, one] * v[:, other]
+    terms = np.column_stack([lines, products])
     of_mean, of_scale, t = _regress(terms, lines, y, weight)
     # Far out a bend that is only noise throws everything aside: none without evidence.
     kept = np.abs(t[j + 1 :]) > clear
@@ -215,7 +221,8 @@ def _straighten(v: Array, j: int, weight: Array, clear: float, every: bool) -> _
         terms = terms[:, np.append(np.ones(j + 1, bool), kept)]
         of_mean, of_scale, _ = _regress(terms, lines, y, weight, of_scale)
     spread = lines @ of_scale
-    left = (y - terms @ of_mean) * np.exp(-spread)
+    off_mean = y - terms @ of_mean
+    left = off_mean * np.exp(-spread)
     return _Straightened(one, other, of_mean, of_scale, spread, left)
 
 
@@ -229,14 +236,18 @@ def _seen_at_once(
     if not len(one):
         return one, other
     root = np.sqrt(weight)[:, None]
-    both = root * np.column_stack([v[:, one] * v[:, other], y])
+    products = v[:, one] * v[:, other]
+    both = root * np.column_stack([products, y])
     basis = np.linalg.qr(root * lines)[0]
     left = both - basis @ (basis.T @ both)
-    size = np.maximum(np.sqrt((left**2).sum(axis=0)), 1e-300)
+    size = np.sqrt((left**2).sum(axis=0))
+    size = np.maximum(size, 1e-300)
     along = np.abs(left[:, :-1].T @ left[:, -1])
-    t = along / (size[:-1] * size[-1]) * np.sqrt(weight.sum())
-    best = np.argsort(-t, kind="stable")[:MOST_PAIRS]
-    best = np.sort(best[t[best] > clear])
+    correlation = along / (size[:-1] * size[-1])
+    t = correlation * np.sqrt(weight.sum())
+    clearest = np.argsort(-t, kind="stable")[:MOST_PAIRS]
+    best = clearest[t[clearest] > clear]
+    best.sort()
     return one[best], other[best]
 
 
@@ -326,7 +337,8 @@ def _regress(
     inverse = np.linalg.inv((terms.T * weight) @ terms + bend)
     left = y - terms @ of_mean
     variance = weight @ left**2 / worth
-    return of_mean, of_scale, of_mean / np.sqrt(variance * np.diag(inverse))
+    error = np.sqrt(variance * np.diag(inverse))
+    return of_mean, of_scale, of_mean / error
 
 
 def _precision(lines: Array, of_scale: Array) -> Array:

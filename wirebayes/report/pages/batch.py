@@ -2,7 +2,6 @@
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 from wirebayes.answers.headline import batch_in_sentences
 from wirebayes.discovery.settings import ALPHA
@@ -11,6 +10,7 @@ from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
 from wirebayes.report.blocks import (
     Block,
     Columns,
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -37,13 +37,14 @@ _MOST_ROWS = 500  # a page of more takes seconds to open; the CSV holds all
 _SHOWN = ("k1", "B", "U", "k2", "N")
 
 
-def batch_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def batch_page(folder: Path, configuration: Configuration) -> Page:
     """The content of ``batch.json``."""
     found: BatchJson = read_json(folder / "batch.json")
     rows, far = found["experiments"], found["outliers"]
     fitted = [row for row in rows if row["parameters"]]
     lead, *others = batch_in_sentences(found)
-    sections = [Section("Summary", _summary(others, rows, fitted, far))]
+    summary = _summary(others, rows, fitted, far)
+    sections = [Section("Summary", summary)]
     warned: list[Block] = [*before_the_answer(found), *beside_the_answer(found)]
     if warned:
         many = len(found["warnings"]) > _MOST_WARNINGS
@@ -52,13 +53,19 @@ def batch_page(folder: Path, configuration: dict[str, Any]) -> Page:
     is_long = len(rows) > 50
     sections.append(Section("Experiments", _table(rows), folded=is_long))
     sections.append(files_beside(folder, _FILES))
+    terms = ("90 % interval", "p", "robust z")
+    sections.append(meaning(terms, _effects_in(fitted)))
+    footer = seed_of_page(configuration)
+    return Page("Many experiments", lead, sections, footer)
+
+
+def _effects_in(fitted: list[Row]) -> list[str]:
+    """All that the page names."""
     effects = []
     for row in fitted:
         effects += row["effects"]
         effects.append(row["best_effect"] or "")
-    sections.append(meaning(("90 % interval", "p", "robust z"), effects))
-    footer = seed_of_page(configuration)
-    return Page("Many experiments", lead, sections, footer)
+    return effects
 
 
 def _summary(sentences: list[str], rows: list[Row], fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
@@ -104,7 +111,7 @@ def _reliability(rows: list[Row]) -> Points:
 def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
     specimens = Counter(row["material"] for row in fitted if row["material"])
     small = sorted(material for material, count in specimens.items() if count < LEAST_SPECIMENS)
-    if set(small) == set(specimens):
+    if len(small) == len(specimens):
         none = f"None is looked for: that takes {LEAST_SPECIMENS} specimens or more of one material."
         return [Text(none)]
     rule = (
@@ -118,10 +125,12 @@ def _outliers(fitted: list[Row], far: list[OutlierRow]) -> list[Block]:
         return [Text("No specimen is an outlier of its material.", strong=True), Text(rule)]
     lines = []
     for row in far[:_MOST_ROWS]:
+        which = [row["experiment"], row["material"], row["parameter"]]
         figures = [number(row["value"]), number(row["median"]), number(row["z"], 2)]
-        lines.append([row["experiment"], row["material"], row["parameter"], *figures])
+        lines.append([*which, *figures])
     header = ["experiment", "material", "parameter", "its median", "median of the material", "robust z"]
-    return [Table(header, lines, "B is per metre of length."), Text(rule)]
+    table = Table(header, lines, "B is per metre of length.")
+    return [table, Text(rule)]
 
 
 def _table(rows: list[Row]) -> list[Block]:

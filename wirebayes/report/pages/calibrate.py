@@ -11,6 +11,7 @@ from wirebayes.json_files.calibrate import CalibrateJson, EstimatedLengths, Inte
 from wirebayes.report.blocks import (
     Block,
     Columns,
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -33,25 +34,26 @@ from wirebayes.robot.self_calibration.trust import SIGNIFICANT
 from wirebayes.sentences import coordinates, counted, from_to
 
 
-def calibrate_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def calibrate_page(folder: Path, configuration: Configuration) -> Page:
     """The content of ``calibration.json``."""
     found: CalibrateJson = read_json(folder / "calibration.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
     columns = Columns([_done(found), _known(found), _unknown(creep, hooke)])
     first = [*before_the_answer(found), *_errors(found), *beside_the_answer(found), columns]
+    lengths = [_lengths(creep, hooke), *_biases(creep)]
     view = robot_view(folder)
-    sections = [
-        Section("Summary", first),
-        *_geometry(found),
-        Section("Lengths", [_lengths(creep, hooke), *_biases(creep)]),
-        Section("What to do", _next(found)),
-    ]
+    sections = [Section("Summary", first)]
+    sections += _geometry(found)
+    sections.append(Section("Lengths", lengths))
+    sections.append(Section("What to do", _next(found)))
     if view:
         sections.append(Section("Where the platform is", view))
     sections.append(files_beside(folder, _FILES))
-    sections.append(meaning(("90 % interval", "zero-tension length", "specimen spread"), model=False))
+    terms = ("90 % interval", "zero-tension length", "specimen spread")
+    sections.append(meaning(terms, model=False))
+    title = f"Calibration of {found['robot']}"
     lead = calibration_in_a_sentence(found)
-    return Page(f"Calibration of {found['robot']}", lead, sections, seed_of_page(configuration))
+    return Page(title, lead, sections, seed_of_page(configuration))
 
 
 _FILES = (
@@ -94,14 +96,17 @@ def _geometry(found: CalibrateJson) -> list[Section]:
     words = [f"The readings determine {seen['determined']} of {seen['of']} combinations of geometry and references."]
     words += [f"Not determined: {text}." for text in seen["not_determined"]]
     known = Columns([Points("What the readings determine", words)])
+    return [Section("Geometry", [*tables, known]), Section("Poses", [_poses(found)])]
+
+
+def _poses(found: CalibrateJson) -> Table:
     poses = found["poses"]
     rows = []
     for hold, mean, low, high in zip(poses["hold"], poses["mean"], poses["q05"], poses["q95"], strict=True):
-        rows.append([f"{hold:g}", *_intervals(mean[:3], low[:3], high[:3])])
-    return [
-        Section("Geometry", [*tables, known]),
-        Section("Poses", [Table(["hold", *_AXES], rows, "Where the platform was when each hold ended.")]),
-    ]
+        intervals = _intervals(mean[:3], low[:3], high[:3])
+        rows.append([f"{hold:g}", *intervals])
+    header = ["hold", *_AXES]
+    return Table(header, rows, "Where the platform was when each hold ended.")
 
 
 def _points(points: Any, of: str) -> list[Table]:

@@ -1,7 +1,6 @@
 """The pages of ``wirebayes import`` and ``wirebayes check``: what was understood, what a test can determine."""
 
 from pathlib import Path
-from typing import Any
 
 from wirebayes.answers.headline import check_in_a_sentence
 from wirebayes.answers.terminal import of_import
@@ -12,6 +11,7 @@ from wirebayes.json_files.read_units import read_value
 from wirebayes.report.blocks import (
     Block,
     Columns,
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -44,23 +44,28 @@ _MOST_SENTENCES = 3  # of experiments at the top of a page, which a first screen
 _DETERMINED_BY = {"data": "the readings", "data and prior": "readings and prior", "prior": "the prior alone"}
 
 
-def check_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def check_page(folder: Path, configuration: Configuration) -> Page:
     """The content of ``check.json`` or ``import.json``, a section for each experiment."""
     files = files_beside(folder, _FILES)
     if configuration["command"] == "import":
         return _import_page(folder, files)
     content: CheckJson = read_json(folder / "check.json")
     checked = content["experiments"]
-    sections, effects, sentences = [], list[str](), list[str]()
+    sections = []
+    effects = list[str]()
+    sentences = []
     for name, experiment in checked.items():
         picture = _picture(folder, name)
         sections.append(Section(name, _checked(experiment, picture)))
         sentence = check_in_a_sentence(name, experiment)
         sentences.append(sentence)
         effects += experiment["effects"]
-    sections += [files, meaning(("hold", "90 % interval", "prior"), effects, symbols=False)]
+    sections.append(files)
+    terms = ("hold", "90 % interval", "prior")
+    sections.append(meaning(terms, effects, symbols=False))
     lead = " ".join(sentences[:_MOST_SENTENCES])
-    return Page("What this test can determine", lead, sections, seed_of_page(configuration))
+    footer = seed_of_page(configuration)
+    return Page("What this test can determine", lead, sections, footer)
 
 
 def _import_page(folder: Path, files: Section) -> Page:

@@ -12,6 +12,7 @@ from wirebayes.json_files.comparison import ComparedModel, ComparedModels, Compa
 from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.report.blocks import (
     Block,
+    Configuration,
     Page,
     Pictures,
     Section,
@@ -46,26 +47,38 @@ _FILES = (
 )
 
 
-def compare_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def compare_page(folder: Path, configuration: Configuration) -> Page:
     """One section an experiment, from ``comparison.json`` and the pictures beside it."""
     content: ComparisonJson = read_json(folder / "comparison.json")
     found = content["experiments"]
-    sections = [_section(folder, name, table) for name, table in found.items()]
-    sentences = [comparison_in_words(name, table) for name, table in list(found.items())[:_MOST_SENTENCES]]
-    sections.append(files_beside(folder, _FILES))
+    sections = []
+    sentences = []
     effects = []
-    for table in found.values():
+    for name, table in found.items():
+        sections.append(_section(folder, name, table))
+        sentences.append(comparison_in_words(name, table))
         for row in table["models"]:
             effects += row["name"].split(" + ")
-    sections.append(meaning(("hold", "held out", "rms", "elpd", "weight"), effects))
-    return Page("Models side by side", " ".join(sentences), sections, seed_of_page(configuration))
+    lead = " ".join(sentences[:_MOST_SENTENCES])
+    sections.append(files_beside(folder, _FILES))
+    terms = ("hold", "held out", "rms", "elpd", "weight")
+    sections.append(meaning(terms, effects))
+    footer = seed_of_page(configuration)
+    return Page("Models side by side", lead, sections, footer)
 
 
 def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     own = folder / name
     pictures = pictures_in(own, _CAPTIONS) if own.is_dir() else []
     first, others = pictures[:_FIRST], pictures[_FIRST:]
-    scored = [row for row in table["models"] if row.get("failed") is None]
+    scored = []
+    failed = []
+    for row in table["models"]:
+        why = row.get("failed")
+        if why is None:
+            scored.append(row)
+        else:
+            failed.append([spoken(row["name"]), str(why)])
     blocks: list[Block] = before_the_answer(table)
     if first:
         blocks.append(Pictures(first))
@@ -75,7 +88,6 @@ def _section(folder: Path, name: str, table: ComparedModels) -> Section:
     blocks.append(_scores(scored, table["base"]))
     if others:
         blocks.append(Pictures(others))
-    failed = [[spoken(row["name"]), str(row["failed"])] for row in table["models"] if row.get("failed") is not None]
     if failed:
         blocks.append(Table(["model", "why it was not scored"], failed))
     return Section(name, blocks)

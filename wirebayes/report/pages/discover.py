@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from wirebayes.answers.headline import USE, findings_in_a_sentence
 from wirebayes.answers.terminal import in_other_tests
@@ -14,6 +13,7 @@ from wirebayes.json_files.summary import Parameter, SummaryJson
 from wirebayes.report.blocks import (
     Block,
     Columns,
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -37,17 +37,23 @@ from wirebayes.report.pictures.discover import waterfall
 from wirebayes.sentences import listed, p_in_words, quantity, said_beside, spoken
 
 
-def discover_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def discover_page(folder: Path, configuration: Configuration) -> Page:
     """One section an experiment, from ``discovery.json`` and the pictures beside it."""
     content: DiscoveryJson = read_json(folder / "discovery.json")
     found = content["experiments"]
-    sections, sentences, named = [], list[str](), list[str]()
+    sections = []
+    sentences = []
+    named = list[str]()
     for name, v in found.items():
         sections.append(_section(folder, name, v))
         sentences.append(findings_in_a_sentence(name, v))
-        named += [*v["effects"], *v["probabilities"], *v["power"], *v.get("group", [])]
+        named += v["effects"]
+        named += v["probabilities"]
+        named += v["power"]
+        named += v.get("group", [])
     if len(found) > 1:
-        sections.insert(0, Section("Summary", [_overview(found)]))
+        summary = Section("Summary", [_overview(found)])
+        sections.insert(0, summary)
     lead = " ".join(sentences[:_MOST_SENTENCES])
     sections.append(files_beside(folder, _FILES))
     explained = all(_has_parameters(folder / name) for name in found)
@@ -87,16 +93,21 @@ def _section(folder: Path, name: str, v: ExperimentFindings) -> Section:
     for sentence in v.get("not_identifiable", []):
         what, _, why = sentence.partition(": ")
         hidden.append([spoken(what), why])
-    blocks: list[Block] = [*before_the_answer(v), *_alone(v), *beside_the_answer(v)]
+    blocks: list[Block] = before_the_answer(v)
+    blocks += _alone(v)
+    blocks += beside_the_answer(v)
     blocks += _curves(folder, name)
     if v["verdict"] in ("named", "nothing-missing"):
         blocks.append(Text(USE))
-    if v.get("next_measurement"):
-        blocks.append(Text(f"Measure next: {v['next_measurement']}"))
-    blocks += _parameters(folder / name, v)
+    measure_next = v.get("next_measurement")
+    if measure_next:
+        blocks.append(Text(f"Measure next: {measure_next}"))
+    own = folder / name
+    blocks += _parameters(own, v)
     blocks.append(_within_a_minute(v, [what for what, _ in hidden]))
-    blocks += _patterns(folder / name, v)
-    if len(v.get("steps", [])) > 1 and read_value(v["steps"][0], "rmse") is not None:
+    blocks += _patterns(own, v)
+    steps = v.get("steps", [])
+    if len(steps) > 1 and read_value(steps[0], "rmse") is not None:
         blocks += _steps(v)
     if v.get("probabilities"):
         blocks.append(_candidates(v))
@@ -230,8 +241,9 @@ def _parameters(folder: Path, v: ExperimentFindings) -> list[Block]:
     for name, after in final.items():
         if name.startswith(f"{Discrepancy.name}."):
             continue  # heights of a curve, a dozen of them
+        unit = unit_or_dash(after["unit"])
         figures = [*median_and_interval(plain.get(name)), *median_and_interval(after)]
-        rows.append([name, unit_or_dash(after["unit"]), *figures, _means(name)])
+        rows.append([name, unit, *figures, _means(name)])
     header = ["parameter", "unit", "plain", "90 %", "with what was found", "90 %", "what it is"]
     caption = "Each parameter before and after, both on all holds."
     if len(rows) < len(final):
@@ -275,21 +287,23 @@ def _patterns(folder: Path, v: ExperimentFindings) -> list[Block]:
 def _held_out(v: ExperimentFindings) -> list[str]:
     """How much the error on held-out holds changes; nothing where it says nothing."""
     held = v.get("held_out") or {}
-    if not held.get("plain") or not held.get("final") or v["verdict"] == "nothing-missing":
+    plain, final = held.get("plain"), held.get("final")
+    if not plain or not final or v["verdict"] == "nothing-missing":
         return []
     if not held["holds"]:
         return ["No hold was held out: that needs three recorded holds of every test."]
-    plain = number(read_value(held["plain"], "rmse"), 2)
-    final = number(read_value(held["final"], "rmse"), 2)
+    before = number(read_value(plain, "rmse"), 2)
+    after = number(read_value(final, "rmse"), 2)
     goes = "grows" if error_grows(held) else "falls"
     holds = listed([str(hold) for hold in held["holds"]])
-    unit = unit_read(held["plain"])
-    text = f"On the held-out holds {holds} the rms error {goes} from {plain} to {final} {unit}"
+    unit = unit_read(plain)
+    text = f"On the held-out holds {holds} the rms error {goes} from {before} to {after} {unit}"
     if v["verdict"] == "partial":
         text += " with a smooth discrepancy beside the named effects"
     flexible = held.get("flexible")
     if v.get("accepted") and flexible:
-        text += f"; a smooth curve instead of a named effect reaches {number(read_value(flexible, 'rmse'), 2)}"
+        reached = number(read_value(flexible, "rmse"), 2)
+        text += f"; a smooth curve instead of a named effect reaches {reached}"
     return [f"{text}."]
 
 

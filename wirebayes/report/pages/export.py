@@ -2,11 +2,11 @@
 
 import csv
 from pathlib import Path
-from typing import Any
 
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.export import ExportSummary
 from wirebayes.report.blocks import (
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -37,7 +37,7 @@ _FILES = (
 )
 
 
-def export_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def export_page(folder: Path, configuration: Configuration) -> Page:
     """The content of ``creep-table.csv`` and links to what lies beside it."""
     with (folder / "creep-table.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -47,17 +47,22 @@ def export_page(folder: Path, configuration: dict[str, Any]) -> Page:
         "Firmware and simulators know springs but no creep. The files give them the line's spring constant; the table "
         "says how much longer each metre of line will be after a time, which has to be corrected for by other means."
     )
-    pictures = [_growth(wire, [row for row in rows if row.get("wire") == wire]) for wire in wires]
+    pictures = []
+    for wire in wires:
+        own = [row for row in rows if row.get("wire") == wire]
+        pictures.append(_growth(wire, own))
     creep = [*before_the_answer(summary), Pictures(pictures), *beside_the_answer(summary), words]
     header = _HEADER if wires == [None] else ("wire", *_HEADER)
-    caption = "Growth of a new line under a tension held constant, in mm per metre of line."
+    lines = [_line(row) for row in rows]
+    table = Table(header, lines, "Growth of a new line under a tension held constant, in mm per metre of line.")
     sections = [
         Section("Creep of the line", creep),
         files_beside(folder, _FILES, "Files"),
-        Section("Table of the creep", [Table(header, [_line(row) for row in rows], caption)]),
+        Section("Table of the creep", [table]),
         meaning(("90 % interval",), model=False),
     ]
-    return Page("Settings for a robot", _in_a_sentence(rows[-1]), sections, seed_of_page(configuration))
+    lead = _in_a_sentence(rows[-1])
+    return Page("Settings for a robot", lead, sections, seed_of_page(configuration))
 
 
 def _line(row: dict[str, str]) -> list[str]:

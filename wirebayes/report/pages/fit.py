@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,6 +16,7 @@ from wirebayes.report import figures
 from wirebayes.report.blocks import (
     Block,
     Columns,
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -52,9 +52,11 @@ _FILES = (
 )
 
 
-def fit_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def fit_page(folder: Path, configuration: Configuration) -> Page:
     """One section for each experiment of each fit in the folder."""
-    sections, effects, sentences = [], dict[str, Effect](), list[str]()
+    sections = []
+    sentences = []
+    effects: dict[str, Effect] = {}
     from_summaries = bool(configuration.get("own_effects"))  # without the table that explains each parameter
     for file in sorted(folder.glob("*/summary.json")):
         summary: SummaryJson = read_json(file)
@@ -68,8 +70,10 @@ def fit_page(folder: Path, configuration: dict[str, Any]) -> Page:
             sections.append(section(stored, prior, summary))
     lead = " ".join(sentences[:_MOST_SENTENCES])
     sections.append(files_beside(folder, _FILES))
-    sections.append(meaning(("hold", "90 % interval", "prior"), effects, effects, symbols=from_summaries))
-    return Page("What the readings determine", lead, sections, seed_of_page(configuration))
+    terms = ("hold", "90 % interval", "prior")
+    sections.append(meaning(terms, effects, effects, symbols=from_summaries))
+    footer = seed_of_page(configuration)
+    return Page("What the readings determine", lead, sections, footer)
 
 
 def _of_summary(summary: SummaryJson) -> Section:
@@ -99,18 +103,16 @@ def section(stored: Stored, prior: dict[str, Array], summary: SummaryJson) -> Se
     trusted = summary["converged"] and _passed(summary) is not False
     pictures = _pictures(stored, sampled, summary, trusted)
     known = Columns([_measured(stored, summary), *_known(summary, shrunk, trusted)])
-    blocks: list[Block] = [
-        *_cautions(summary),
-        *_shown(pictures, "curve"),
-        Text(_next(summary)),
-        _parameters(draws, shrunk, stored.sample),
-        known,
-        *_shown(pictures, "measured", "residuals"),
-        *_shown(pictures, "pairs"),
-        _derived(summary),
-        *_shown(pictures, "ahead"),
-        Text(_sampled(summary)),
-    ]
+    blocks: list[Block] = list(_cautions(summary))
+    blocks += _shown(pictures, "curve")
+    blocks.append(Text(_next(summary)))
+    blocks.append(_parameters(draws, shrunk, stored.sample))
+    blocks.append(known)
+    blocks += _shown(pictures, "measured", "residuals")
+    blocks += _shown(pictures, "pairs")
+    blocks.append(_derived(summary))
+    blocks += _shown(pictures, "ahead")
+    blocks.append(Text(_sampled(summary)))
     return Section(stored.sample.name, blocks)
 
 
@@ -243,18 +245,22 @@ def _sampled(summary: SummaryJson) -> str:
 
 
 def _measured(stored: Stored, summary: SummaryJson) -> Points:
-    protocol = stored.sample.protocol
-    read = stored.sample.readings[..., 0][protocol.mask]
-    weights = protocol.control == "force"
-    tension = protocol.setting[protocol.recorded] if weights else read
+    sample = stored.sample
+    protocol = sample.protocol
+    read = sample.readings[..., 0][protocol.mask]
+    pulled, tension = "Tensions", read
+    if protocol.control == "force":
+        pulled, tension = "Weights", protocol.setting[protocol.recorded]
     recorded = int(protocol.recorded.sum())
+    unrecorded = len(protocol.recorded) - recorded
     holds = counted(recorded, "hold")
-    if recorded < len(protocol.recorded):
-        holds += f" and {len(protocol.recorded) - recorded} not recorded"
+    if unrecorded:
+        holds += f" and {unrecorded} not recorded"
+    readings = counted(len(read), "reading")
     points = [
-        f"{stored.sample.material}, {protocol.length_mm:g} mm.",
-        f"{holds}, {counted(len(read), 'reading')}.",
-        f"{'Weights' if weights else 'Tensions'} from {number(tension.min())} to {number(tension.max())} N.",
+        f"{sample.material}, {protocol.length_mm:g} mm.",
+        f"{holds}, {readings}.",
+        f"{pulled} from {number(tension.min())} to {number(tension.max())} N.",
         f"The longest hold lasted {protocol.duration_s.max():g} s.",
     ]
     ends = summary.get("hold_ends")
@@ -268,8 +274,8 @@ def _known(summary: SummaryJson, shrunk: dict[str, float], trusted: bool) -> lis
     known: list[str] = []
     undetermined: list[str] = []
     for name, each in summary["identifiability"].items():
-        determined = shrunk.get(name, 0.0) >= MOST
-        (known if determined else undetermined).append(each["sentence"])
+        sentences = known if shrunk.get(name, 0.0) >= MOST else undetermined
+        sentences.append(each["sentence"])
     if not trusted:
         return [Points("What the readings would determine if the model were right", known + undetermined)]
     nothing = ["No parameter."]
@@ -284,15 +290,17 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], sample: Sampl
     lines = []
     for name, values in draws.items():
         low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+        interval = middle_and_span(middle, low, high)
         unit = unit_or_dash(unit_of(name, effects, (control,)))
         share = percent(shrunk.get(name))
-        lines.append([name, unit, *middle_and_span(middle, low, high), share, _means(name, effects)])
+        lines.append([name, unit, *interval, share, _means(name, effects)])
     caption = (
         "The interval contains the parameter with a probability of 90 %, if the model is right. "
         "Contraction is the share of the prior's variance that the readings took away, of the logarithm where a "
         f"quantity is positive; from {100 * MOST:.0f} % on the readings determine a parameter."
     )
-    return Table(["parameter", "unit", "median", "90 % interval", "contraction", "what it is"], lines, caption)
+    header = ["parameter", "unit", "median", "90 % interval", "contraction", "what it is"]
+    return Table(header, lines, caption)
 
 
 def _means(name: str, effects: tuple[Effect, ...]) -> str:
@@ -331,10 +339,13 @@ def _residuals(stored: Stored) -> Figure:
         wanted[:, 0] = False
     replicates = _replicates(stored)
     band = np.quantile(replicates[wanted], [0.05, 0.5, 0.95], axis=1)
-    hold = np.broadcast_to(protocol.number[:, None], wanted.shape)
+    numbers = np.broadcast_to(protocol.number[:, None], wanted.shape)
+    hold = numbers[wanted]
+    time_s = protocol.time_s[wanted]
+    measured = readings[wanted]
     title = f"{sample.name}, {figures.WORDS[kind]}"
     colour = figures.COLOURS[kind]
-    return figures.residual_figure(hold[wanted], protocol.time_s[wanted], readings[wanted], band, title, colour)
+    return figures.residual_figure(hold, time_s, measured, band, title, colour)
 
 
 def _replicates(stored: Stored) -> Array:

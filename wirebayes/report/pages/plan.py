@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from wirebayes.answers.headline import plan_in_a_sentence
 from wirebayes.io.run_folder import read_json
@@ -10,6 +10,7 @@ from wirebayes.json_files.plan import JudgedProtocol, PlanJson
 from wirebayes.report.blocks import (
     Block,
     Columns,
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -38,19 +39,23 @@ _AIMS = {
 _CREEP: tuple[Literal["creep_longest_hold_mm"], Literal["creep_1h_mm"]] = ("creep_longest_hold_mm", "creep_1h_mm")
 
 
-def plan_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def plan_page(folder: Path, configuration: Configuration) -> Page:
     """The content of ``plan.json``."""
     found: PlanJson = read_json(folder / "plan.json")
     rows = found["protocols"]
     sections = [Section("Summary", _summary(folder, found))]
     effects = list[str]()
     for row in rows:
-        sections.append(Section(f"{row['rank']}. {row['name']}", _protocol(row), folded=row["rank"] > 1))
+        rank = row["rank"]
+        title = f"{rank}. {row['name']}"
+        sections.append(Section(title, _protocol(row), folded=rank > 1))
         effects += row["effects"]
     sections.append(files_beside(folder, _FILES))
-    sections.append(meaning(("hold", "90 % interval", "information", "δ"), effects))
+    terms = ("hold", "90 % interval", "information", "δ")
+    sections.append(meaning(terms, effects))
     lead = plan_in_a_sentence(found)
-    return Page("What a test would teach", lead, sections, seed_of_page(configuration))
+    footer = seed_of_page(configuration)
+    return Page("What a test would teach", lead, sections, footer)
 
 
 def _summary(folder: Path, found: PlanJson) -> list[Block]:
@@ -99,16 +104,18 @@ def _reliability(rows: list[JudgedProtocol]) -> Points:
 
 def _ranking(found: PlanJson) -> Table:
     rows = found["protocols"]
-    first = rows[0]["parameters"]
-    names = [name for name in ("k1", "B", "U", "k2", "N") if name in first]
+    first = rows[0]
+    parameters = first["parameters"]
+    names = [name for name in ("k1", "B", "U", "k2", "N") if name in parameters]
     header = ["rank", "test", "minutes", "bits"]
-    header += [with_unit(f"sd of {name}", first[name]["unit"]) for name in names]
+    header += [with_unit(f"sd of {name}", parameters[name]["unit"]) for name in names]
     header.append("sd of creep in 1 h, mm")
-    if rows[0]["robot"] is not None:
+    if first["robot"] is not None:
         header.append("sd of the robot's drift in 1 h, mm")
     header.append("within budget")
+    lines = [_ranked(row, names) for row in rows]
     caption = "Standard deviations of the posterior, median over the simulated tests."
-    return Table(header, [_ranked(row, names) for row in rows], caption)
+    return Table(header, lines, caption)
 
 
 def _ranked(row: JudgedProtocol, names: Sequence[str]) -> list[str]:
@@ -128,10 +135,12 @@ def _ranked(row: JudgedProtocol, names: Sequence[str]) -> list[str]:
 
 
 def _protocol(row: JudgedProtocol) -> list[Block]:
-    size = f"{counted(row['holds'], 'hold')} with {counted(row['readings'], 'reading')}"
+    holds = counted(row["holds"], "hold")
+    readings = counted(row["readings"], "reading")
     words = f": {row['words']}" if row["words"] else ""
     minutes = short(row["duration_min"])
-    blocks: list[Block] = [Text(f"{size}, {minutes} min{words}."), _widths(row)]
+    what = f"{holds} with {readings}, {minutes} min{words}."
+    blocks: list[Block] = [Text(what), _widths(row)]
     if row["effects"]:
         blocks.append(_effects(row))
     if row["not_identifiable"]:
@@ -149,18 +158,16 @@ def _widths(row: JudgedProtocol) -> Table:
     quantities = row["parameters"] | {name: creep[name] for name in _CREEP}
     lines = []
     for name, width in quantities.items():
-        lines.append(
-            [
-                with_unit(_words(name), width["unit"]),
-                number(width["sd"], 2),
-                number(width["width_90"], 2),
-                span(width["width_90_low"], width["width_90_high"], 2),
-                "given" if is_given(width) else number(width["guess_sd"], 2),
-            ]
-        )
+        what = with_unit(_words(name), width["unit"])
+        sd = number(width["sd"], 2)
+        middle = number(width["width_90"], 2)
+        most_tests = span(width["width_90_low"], width["width_90_high"], 2)
+        guess = "given" if is_given(width) else number(width["guess_sd"], 2)
+        lines.append([what, sd, middle, most_tests, guess])
     header = ["quantity", "sd", "90 % width", "in 90 % of tests", "sd of the guess"]
     wire = f"Creep of {number(creep['length_mm'])} mm at {number(creep['tension_N'])} N"
-    return Table(header, lines, f"{wire}; the longest hold lasts {number(creep['longest_hold_s'])} s.")
+    longest = number(creep["longest_hold_s"])
+    return Table(header, lines, f"{wire}; the longest hold lasts {longest} s.")
 
 
 def _effects(row: JudgedProtocol) -> Table:

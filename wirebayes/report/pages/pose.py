@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from typing import Any
 
 from wirebayes.answers.headline import pose_in_a_sentence
 from wirebayes.io.run_folder import read_json
@@ -10,6 +9,7 @@ from wirebayes.json_files.pose import Drift, EquilibriaJson, PoseJson, SliceOfWo
 from wirebayes.report.blocks import (
     Block,
     Columns,
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -49,7 +49,7 @@ _CAPTIONS = {
 _TURNED = "The same with the platform turned by the rotation vector that the title names."
 
 
-def pose_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def pose_page(folder: Path, configuration: Configuration) -> Page:
     """The content of ``pose.json`` and the pictures beside it."""
     content = read_json(folder / "pose.json")
     if "history" in content:
@@ -61,7 +61,9 @@ def pose_page(folder: Path, configuration: dict[str, Any]) -> Page:
     blocks: list[Block] = before_the_answer(pose)
     if first:
         blocks.append(Pictures(first))
-    blocks += [*beside_the_answer(pose), Text(_next(pose)), Columns([_requested(pose), *_answers(pose)])]
+    blocks += beside_the_answer(pose)
+    blocks.append(Text(_next(pose)))
+    blocks.append(Columns([_requested(pose), *_answers(pose)]))
     sections = [
         Section("Summary", blocks),
         Section("The robot", view),
@@ -76,7 +78,9 @@ def pose_page(folder: Path, configuration: dict[str, Any]) -> Page:
         meaning(_TERMS, pose.get("wires", {}).get("effects", [])),
     ]
     filled = [section for section in sections if section.blocks]
-    return Page(f"Robot {pose['robot']}", pose_in_a_sentence(pose), filled, seed_of_page(configuration))
+    title = f"Robot {pose['robot']}"
+    lead = pose_in_a_sentence(pose)
+    return Page(title, lead, filled, seed_of_page(configuration))
 
 
 def _pictures(folder: Path, without_robot: bool) -> list[Picture]:
@@ -112,12 +116,13 @@ def _next(pose: PoseJson) -> str:
 
 
 def _requested(pose: PoseJson) -> Points:
-    position_m = pose["pose"]["position_m"]
-    place = ", ".join(number(float(x)) if x else "0" for x in position_m)
+    asked = pose["pose"]
+    place = ", ".join(number(float(x)) if x else "0" for x in asked["position_m"])
     points = [f"Platform of {pose['mass_kg']:g} kg at ({place}) m."]
     if "orientation" in pose:
-        turned = ", ".join(f"{value:.4g}" for value in pose["pose"]["rotation_vector_rad"])
-        points.append(f"Rotation vector ({turned}) rad. {pose['orientation']['sentence']}")
+        turned = ", ".join(f"{value:.4g}" for value in asked["rotation_vector_rad"])
+        decided = pose["orientation"]["sentence"]
+        points.append(f"Rotation vector ({turned}) rad. {decided}")
     if "plane" in pose:
         points.append(pose["plane"]["sentence"])
     wires = pose.get("wires")
@@ -133,9 +138,10 @@ def _commanded(pose: PoseJson) -> list[str]:
     inverse = pose.get("inverse")
     if not inverse:
         return []
-    low, high = min(inverse["tension_N"]), max(inverse["tension_N"])
+    tensions = inverse["tension_N"]
+    low, high = number(min(tensions)), number(max(tensions))
     rule = pose["tension_distribution"]["choice"].replace("_", " ")
-    points = [f"Tensions by the rule “{rule}”: {number(low)} to {number(high)} N."]
+    points = [f"Tensions by the rule “{rule}”: {low} to {high} N."]
     angles = inverse.get("motor_angle_rad")
     if angles:
         turned = ", ".join("no drum" if angle is None else f"{angle:.5g}" for angle in angles["mean"])
@@ -239,12 +245,13 @@ def _drifted(entry: Drift, turns: bool) -> list[list[str]]:
     spread = _spread(entry["specimen_spread"])
     lines = []
     for i, time in enumerate(entry["times_s"]):
-        if time > 0:
-            cells = []
-            for band in bands:
-                low, middle, high = at_row(band, i)
-                cells += [number(middle), span(low, high)]
-            lines.append([spread, f"{time:g}", *cells])
+        if time <= 0:
+            continue
+        cells = [spread, f"{time:g}"]
+        for band in bands:
+            low, middle, high = at_row(band, i)
+            cells += [number(middle), span(low, high)]
+        lines.append(cells)
     return lines
 
 
@@ -257,19 +264,22 @@ def _errors(pose: PoseJson) -> list[Block]:
     lines = []
     for entry in entries:
         who = [CONTROLLERS[entry["controller"]], _spread(entry["specimen_spread"])]
-        for i, time in enumerate(entry["times_s"]):
-            if entry["distance_mm"]["q50"] and time in (60, 600, entry["times_s"][-1]):
-                low, middle, high = at_row(entry["distance_mm"], i)
+        times, distance = entry["times_s"], entry["distance_mm"]
+        for i, time in enumerate(times):
+            if distance["q50"] and time in (60, 600, times[-1]):
+                low, middle, high = at_row(distance, i)
                 lines.append([*who, f"{time:g}", number(middle), span(low, high), _longest_time(entry)])
     if not lines:
         return []
     header = ["controller", "specimen spread", "after, s", "pose error, mm", "90 %"]
     header.append("last requested time within tolerance, s")
-    evaluated = ", ".join(f"{time:g}" for time in entries[0]["times_s"])
-    grid = (
-        f"The last column is the last of the requested times that is ({evaluated} s); the next section has finer ones."
+    first = entries[0]
+    evaluated = ", ".join(f"{time:g}" for time in first["times_s"])
+    caption = (
+        f"{_limits(first)} The last column is the last of the requested times that is ({evaluated} s); "
+        "the next section has finer ones."
     )
-    return [Table(header, lines, f"{_limits(entries[0])} {grid}")]
+    return [Table(header, lines, caption)]
 
 
 def _between(pose: PoseJson) -> list[Block]:
@@ -278,12 +288,17 @@ def _between(pose: PoseJson) -> list[Block]:
         return []
     lines = []
     for entry in entries:
-        loaded = f"{entry['loaded_before_s'] / 3600:g} h" if entry["loaded_before_s"] else "never"
+        controller = CONTROLLERS[entry["controller"]]
         spread = _spread(entry["specimen_spread"])
-        lines.append([CONTROLLERS[entry["controller"]], spread, loaded, _longest_time(entry)])
+        loaded = "never"
+        if entry["loaded_before_s"]:
+            hours = entry["loaded_before_s"] / 3600
+            loaded = f"{hours:g} h"
+        lines.append([controller, spread, loaded, _longest_time(entry)])
     header = ["controller", "specimen spread", "loaded before", "longest time between calibrations, s"]
+    limits = _limits(entries[0])
     grid = "The last column is the last of eight times a decade, from 1 s on: it is at most a quarter too short."
-    return [Table(header, lines, f"The pose is exact when a calibration ends. {_limits(entries[0])} {grid}")]
+    return [Table(header, lines, f"The pose is exact when a calibration ends. {limits} {grid}")]
 
 
 def _limits(entry: Tolerances) -> str:
@@ -315,8 +330,9 @@ def _equilibria(pose: PoseJson) -> list[Block]:
         return [Text(f"{text} {proof['sentence']}")]
     if not proof["proved"]:
         return [Text(f"{text} Interval arithmetic could not prove that the one shown is the only one.")]
-    alone = f"{number(1e3 * proof['alone_within_m'])} mm"
-    proved = f"{text} Interval arithmetic proves that no other equilibrium lies within {alone} of the pose."
+    alone_mm = 1e3 * proof["alone_within_m"]
+    alone = number(alone_mm)
+    proved = f"{text} Interval arithmetic proves that no other equilibrium lies within {alone} mm of the pose."
     band = proof.get("band")
     if band is None or band["low_mm"] is None or band["high_mm"] is None:
         return [Text(proved)]

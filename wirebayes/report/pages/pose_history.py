@@ -1,7 +1,6 @@
 """The page of ``wirebayes pose --joints`` and ``--trajectory``: a robot over time."""
 
 from pathlib import Path
-from typing import Any
 
 from wirebayes.answers.robot import of_pose
 from wirebayes.json_files.pose_history import HistoryOfRobot, HistoryReadings, PoseHistoryJson
@@ -9,6 +8,7 @@ from wirebayes.json_files.values import Band, Numbers
 from wirebayes.report.blocks import (
     Block,
     Columns,
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -48,7 +48,7 @@ _ROWS = 12  # of the tables on the page
 _SMALLEST_MM = 1e-4  # less is shown as nothing: a tenth of what a dial gauge resolves, and often only rounding
 
 
-def pose_history_page(folder: Path, configuration: dict[str, Any], pose: PoseHistoryJson) -> Page:
+def pose_history_page(folder: Path, configuration: Configuration, pose: PoseHistoryJson) -> Page:
     """The content of ``pose.json`` and the pictures beside it.
 
     Parameters
@@ -66,23 +66,26 @@ def pose_history_page(folder: Path, configuration: dict[str, Any], pose: PoseHis
         return Page(title, lead, [Section("Summary", before_the_answer(pose))])
     pictures = _pictures(folder)
     shown = [pictures.pop(name) for name in _FIRST if name in pictures]
-    wide = [Pictures([pictures.pop(name)]) for name in _WIDE if name in pictures]
-    rest = [Pictures(list(pictures.values()))] if pictures else []
+    more = [Pictures([pictures.pop(name)]) for name in _WIDE if name in pictures]
+    if pictures:
+        more.append(Pictures(list(pictures.values())))
     first = before_the_answer(pose)
     if shown:
         first.append(Pictures(shown))
     first += beside_the_answer(pose)
-    first.append(Columns([Points("What was computed", _requested(pose)), *_answers(pose)]))
+    computed = Points("What was computed", _requested(pose))
+    first.append(Columns([computed, *_answers(pose)]))
     sections = [
         Section("Summary", first),
-        Section("More pictures", [*wide, *rest]),
+        Section("More pictures", more),
         Section("Poses", _poses(pose)),
         Section("Corrections", _corrections(pose)),
         files_beside(folder, _FILES),
         meaning(("90 % interval", "drift", "specimen spread"), pose["wires"]["effects"]),
     ]
     filled = [section for section in sections if section.blocks]
-    return Page(title, lead, filled, seed_of_page(configuration))
+    footer = seed_of_page(configuration)
+    return Page(title, lead, filled, footer)
 
 
 def _pictures(folder: Path) -> dict[str, Picture]:
@@ -99,13 +102,16 @@ def _requested(pose: PoseHistoryJson) -> list[str]:
     history, wires = pose["history"], pose["wires"]
     kind = "measured joint values" if history["kind"] == "measured" else "commanded poses"
     duration = number(float(history["duration_s"]))
-    rows = f"{counted(history['rows'], 'row')} of {kind} over {duration} s"
+    rows = counted(history["rows"], "row")
     platform = f"platform of {pose['mass_kg']:g} kg"
-    if history["highest_payload_kg"]:
-        platform += f", payload up to {history['highest_payload_kg']:g} kg"
+    payload = history["highest_payload_kg"]
+    if payload:
+        platform += f", payload up to {payload:g} kg"
     spread = f"Specimens of one line differ by {100 * history['specimen_spread']:g} %."
     known = wires_known(wires)
-    out = [f"{rows}; {platform}.", f"{known} {spread} {_began(history)}"]
+    began = _began(history)
+    out = [f"{rows} of {kind} over {duration} s; {platform}."]
+    out.append(f"{known} {spread} {began}")
     out += specimens_in_words(wires)
     out.append(_restarted(history))
     readings = pose.get("readings")
@@ -233,10 +239,14 @@ def _corrections(pose: PoseHistoryJson) -> list[Block]:
     change = corrections["change_mm"]
     if not change["mean"]:
         return []
+    times = corrections["times_s"]
     lines = []
-    for i in _shown(corrections["times_s"]):
+    for i in _shown(times):
         joints = zip(change["mean"][i], change["sd"][i], strict=True)
         cells = [f"{_mm(mean)} ± {_mm(sd)}" for mean, sd in joints]
-        lines.append([_seconds(corrections["times_s"][i]), *cells])
-    header = ["time, s", *(f"joint {j + 1}, mm" for j in range(len(change["mean"][0])))]
-    return [Table(header, lines, "Change of each joint value, mean and standard deviation: corrections.csv.")]
+        lines.append([_seconds(times[i]), *cells])
+    header = ["time, s"]
+    for j, _ in enumerate(change["mean"][0], 1):
+        header.append(f"joint {j}, mm")
+    caption = "Change of each joint value, mean and standard deviation: corrections.csv."
+    return [Table(header, lines, caption)]

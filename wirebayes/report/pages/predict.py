@@ -23,7 +23,7 @@ from wirebayes.report.blocks import (
     files_beside,
     span,
 )
-from wirebayes.result_warnings import Warned
+from wirebayes.result_warnings import NoticeJson, Warned
 from wirebayes.sentences import counted, number_within, quantity
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control
@@ -57,21 +57,25 @@ def predict_page(predicted: Prediction, table: Path) -> Page:
         What the rows were written to.
     """
     about = predicted.attrs
+    name = about["experiment"]
     kinds, texts = about.get("warning_kinds", ()), about.get("warnings", ())
-    warned: Warned = {"warnings": [{"kind": kind, "text": text} for kind, text in zip(kinds, texts, strict=True)]}
+    notices: list[NoticeJson] = [{"kind": kind, "text": text} for kind, text in zip(kinds, texts, strict=True)]
+    warned: Warned = {"warnings": notices}
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     predicted.plot(figure.subplots())
-    alt = f"Predicted readings of {about['experiment']} against the time in each hold, medians and 90 % bands."
+    alt = f"Predicted readings of {name} against the time in each hold, medians and 90 % bands."
+    picture = Picture(drawn(figure), alt, _CAPTION)
     blocks: list[Block] = [
         *before_the_answer(warned),
-        Pictures([Picture(drawn(figure), alt, _CAPTION)]),
+        Pictures([picture]),
         *beside_the_answer(warned),
         Text(as_sentence(about["prediction"])),
         _rows(predicted),
     ]
-    beside = files_beside(table.parent, [(table.name, "every row, with mean and standard deviation")])
-    sections = [Section(about["experiment"], blocks), beside]
-    return Page("What later holds will read", in_a_sentence(predicted), sections, f"Seed {about['seed']}.")
+    files = [(table.name, "every row, with mean and standard deviation")]
+    sections = [Section(name, blocks), files_beside(table.parent, files)]
+    lead = in_a_sentence(predicted)
+    return Page("What later holds will read", lead, sections, f"Seed {about['seed']}.")
 
 
 def in_a_sentence(predicted: Prediction) -> str:
@@ -112,18 +116,21 @@ def _figures(predicted: Prediction, row: int) -> tuple[float, float, float]:
     return middle, low, high
 
 
+def _cells(predicted: Prediction, row: int) -> list[str]:
+    """Hold, setting, time and band of one reading."""
+    hold = predicted["hold"].values[row]
+    setting = predicted[SET[_control(predicted)]].values[row]
+    time = predicted["time_s"].values[row]
+    middle, low, high = _figures(predicted, row)
+    return [str(hold), f"{setting:g}", f"{time:g}", number_within(middle, low, high), span(low, high)]
+
+
 def _rows(predicted: Prediction) -> Table:
     """A row for each reading, with its band."""
     control = _control(predicted)
     unit = READ_UNIT[control]
     shown = min(predicted.sizes["reading"], _MOST_ROWS)
-    rows = []
-    for row in range(shown):
-        middle, low, high = _figures(predicted, row)
-        setting = predicted[SET[control]].values[row]
-        time = predicted["time_s"].values[row]
-        hold = str(predicted["hold"].values[row])
-        rows.append([hold, f"{setting:g}", f"{time:g}", number_within(middle, low, high), span(low, high)])
+    rows = [_cells(predicted, row) for row in range(shown)]
     read = READ[control].split("_")[0]
     was_set = SET[control].split("_")[0]
     header = ["hold", f"{was_set}, {SET_UNIT[control]}", "time in the hold, s"]

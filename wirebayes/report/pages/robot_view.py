@@ -18,11 +18,13 @@ def robot_view(folder: Path) -> list[Block]:
     known = [tension for row in scene["tensions_N"] for tension in row if tension is not None]
     about = []
     if known:
-        reach = f"from {number(min(known))} N (blue) to {number(max(known))} N (red)"
+        low, high = number(min(known)), number(max(known))
+        reach = f"from {low} N (blue) to {high} N (red)"
         about.append(f"Wires coloured by their median tension, {reach}; a broken line is a slack wire.")
     if scene["drifted"]:
         alt += " where it was sent and where creep takes it"
         enlarged = f"enlarged {scene['exaggeration']:g} times"
         about.append(f"Blue platform: the commanded pose. Red platform with dotted wires: the mean drift, {enlarged}.")
     about.append("Squares: exit points with the number of their wire. Drag, or press a button, to turn it.")
-    return [View(scene, f"{alt}.", " ".join(about))]
+    caption = " ".join(about)
+    return [View(scene, f"{alt}.", caption)]

@@ -1,7 +1,6 @@
 """The page of ``wirebayes simulate``: the tests that were made up, and the truth behind them."""
 
 from pathlib import Path
-from typing import Any
 
 from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.io.experiment import Experiment
@@ -11,6 +10,7 @@ from wirebayes.json_files.truth import TrueWire, TruthJson
 from wirebayes.report import figures
 from wirebayes.report.blocks import (
     Block,
+    Configuration,
     Page,
     Picture,
     Pictures,
@@ -36,23 +36,23 @@ _FILES = (
 )
 
 
-def simulate_page(folder: Path, configuration: dict[str, Any]) -> Page:
+def simulate_page(folder: Path, configuration: Configuration) -> Page:
     """The content of ``truth.json`` and of the experiments beside it."""
     content: TruthJson = read_json(folder / "truth.json")
     truths = content["experiments"]
     experiments = read_experiments(folder / "experiments.toml")
-    shown = experiments[:_MOST]
-    sections = [_section(experiment, truths[experiment.name]) for experiment in shown]
-    if len(experiments) > _MOST:
-        more = Text(f"The first {_MOST} of {len(experiments)} tests are shown; the files hold all.")
+    count = len(experiments)
+    sections = [_section(experiment, truths[experiment.name]) for experiment in experiments[:_MOST]]
+    if count > _MOST:
+        more = Text(f"The first {_MOST} of {count} tests are shown; the files hold all.")
         sections.append(Section("More tests", [more]))
     sections.append(files_beside(folder, _FILES))
     sections.append(meaning(("hold",), configuration["effects"]))
     stiffness = []
     for truth in list(truths.values())[:_MOST]:
-        k1 = number(truth["parameters"]["k1"])
-        stiffness.append(f"{k1} N")
-    tests = counted(len(experiments), "test")
+        k1 = truth["parameters"]["k1"]
+        stiffness.append(f"{number(k1)} N")
+    tests = counted(count, "test")
     lead = f"Simulated readings of {tests}, whose true parameters are known: k1 is {listed(stiffness)}."
     footer = seed_of_page(configuration)
     return Page("Simulated tests", lead, sections, footer)
@@ -64,14 +64,22 @@ def _section(e: Experiment, truth: TrueWire) -> Section:
     source = drawn(figures.measured(e.protocol(), e.readings(), e.name))
     alt = f"Readings of {e.name} against what was set."
     caption = "Within each hold the readings go from the blue point to the red ones."
+    picture = Picture(source, alt, caption)
+    blocks: list[Block] = [
+        Pictures([picture]),
+        Text(f"{e.material}, {e.length_mm:g} mm. Beyond the plain model: {beyond}."),
+        _true_values(e, truth),
+    ]
+    return Section(e.name, blocks)
+
+
+def _true_values(e: Experiment, truth: TrueWire) -> Table:
+    effects = truth.get("effects", [])
     known = tuple(effect_named(effect) for effect in effects if effect.split("@")[0] in CATALOGUE)
     lines = []
     for name, value in truth["parameters"].items():
         unit = unit_or_dash(unit_of(name, known, (e.control,)))
-        lines.append([name, number(value), unit, SYMBOLS.get(name, "size of an effect")])
-    blocks: list[Block] = [
-        Pictures([Picture(source, alt, caption)]),
-        Text(f"{e.material}, {e.length_mm:g} mm. Beyond the plain model: {beyond}."),
-        Table(["parameter", "true value", "unit", "what it is"], lines, "What an analysis should find."),
-    ]
-    return Section(e.name, blocks)
+        what = SYMBOLS.get(name, "size of an effect")
+        lines.append([name, number(value), unit, what])
+    header = ["parameter", "true value", "unit", "what it is"]
+    return Table(header, lines, "What an analysis should find.")

@@ -12,11 +12,12 @@ def wires_known(wires: WiresUsed) -> str:
     if len(given) == len(legs):
         return "The parameters of every wire are those of the robot's file, not of a posterior."
     model = "the plain model"
-    if wires["effects"]:
-        effects = [spoken(effect) for effect in wires["effects"]]
+    effects = [spoken(effect) for effect in wires["effects"]]
+    if effects:
         model += f" with {listed(effects)}"
     draws = counted(wires["draws"], "posterior draw")
-    known = f"Wires known from {draws} of a sample of {wires['tested_length_mm']:g} mm: {model}."
+    length_mm = wires["tested_length_mm"]
+    known = f"Wires known from {draws} of a sample of {length_mm:g} mm: {model}."
     if not given:
         return known
     which = f"wire {given[0]}" if len(given) == 1 else f"wires {listed(given)}"

@@ -1,6 +1,7 @@
 """Pictures of a batch: each parameter of all specimens, side by side by material."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import matplotlib
 
@@ -42,14 +43,20 @@ def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
             members = [row for row in rows if row["material"] == material and name in row["parameters"]]
             _column(axis, place, name, members, marked)
         axis.set_title(label, fontsize=9, loc="left")
-        axis.set_xticks(range(len(materials)), list(map(verbatim, materials)))
-        axis.tick_params(axis="x", labelsize=7.5, rotation=rotation)
-        without_frame(axis)
-        axis.set_xlim(-0.6, len(materials) - 0.4)
+        _name_materials(axis, materials, rotation)
         axis.tick_params(axis="y", which="both", labelsize=7)
         if name in ("k1", "B", "k2"):
             logarithmic(axis, "y")
     return figure
+
+
+def _name_materials(axis: Axes, materials: Sequence[str], rotation: int) -> None:
+    """Below the columns."""
+    names = [verbatim(material) for material in materials]
+    axis.set_xticks(range(len(names)), names)
+    axis.tick_params(axis="x", labelsize=7.5, rotation=rotation)
+    without_frame(axis)
+    axis.set_xlim(-0.6, len(names) - 0.4)
 
 
 def _most_frequent(rows: list[Row]) -> list[str]:
@@ -59,16 +66,26 @@ def _most_frequent(rows: list[Row]) -> list[str]:
     return materials[:_MOST_MATERIALS]
 
 
+def _interval(row: Row, name: str) -> list[float]:
+    """Ends and median of a parameter; creep per metre of length."""
+    quantiles, length_mm = row["parameters"][name], row["length_mm"]
+    scale = 1.0
+    if name == "B" and length_mm:
+        scale = 1e3 / length_mm
+    return [scale * quantiles[quantile] for quantile in INTERVAL]
+
+
 def _column(axis: Axes, place: int, name: str, members: list[Row], marked: set[tuple[str, str]]) -> None:
     """The specimens of one material."""
-    places = place + np.linspace(-0.35, 0.35, len(members) + 2)[1:-1]
-    for x, row in zip(places, members, strict=True):
-        scale = 1e3 / row["length_mm"] if name == "B" and row["length_mm"] else 1.0
-        low, middle, high = (scale * row["parameters"][name][quantile] for quantile in INTERVAL)
-        apart = (row["name"], name) in marked
-        colour = HOLD if apart else CHAIN
-        if len(members) <= _MOST_BARS or apart:
+    count = len(members)
+    shifts = np.linspace(-0.35, 0.35, count + 2)[1:-1]
+    for x, row in zip(place + shifts, members, strict=True):
+        specimen = row["name"]
+        low, middle, high = _interval(row, name)
+        apart = (specimen, name) in marked
+        colour, size = (HOLD, 5) if apart else (CHAIN, 3)
+        if count <= _MOST_BARS or apart:
             axis.plot([x, x], [low, high], "-", color=colour, lw=0.8, alpha=0.6)
-        axis.plot([x], [middle], "o", color=colour, ms=5 if apart else 3)
+        axis.plot([x], [middle], "o", color=colour, ms=size)
         if apart:
-            axis.annotate(row["name"], (x, middle), (4, 4), textcoords="offset points", fontsize=7, color=colour)
+            axis.annotate(specimen, (x, middle), (4, 4), textcoords="offset points", fontsize=7, color=colour)

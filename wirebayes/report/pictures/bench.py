@@ -33,7 +33,9 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.0))
     _name_axes(upper, lower, experiment.control)
     holds = experiment.holds
-    starts = [hold.start_s for hold in holds] if recording is None else recording.start_s.tolist()
+    starts = [hold.start_s for hold in holds]
+    if recording is not None:
+        starts = recording.start_s.tolist()
     ends = [start + hold.duration_s for start, hold in zip(starts, holds, strict=True)]
     scale, unit = (60.0, "min") if max(ends) > _MINUTES else (1.0, "s")
     time = f"time of the test, {unit}"
@@ -87,7 +89,8 @@ def _draw_holds(upper: Axes, lower: Axes, holds: Sequence[Hold], starts: Sequenc
     every = int(np.ceil(recorded / _MOST_NUMBERS))
     row = 0
     for hold, start in zip(holds, starts, strict=True):
-        ends = np.array([start, start + hold.duration_s]) / scale
+        end = start + hold.duration_s
+        ends = np.array([start, end]) / scale
         setting = [hold.setting] * 2
         if not hold.recorded:
             upper.plot(ends, setting, zorder=3, label=labels.pop("gap", None), color=INK, lw=1.6, ls=":")

@@ -28,12 +28,14 @@ def save_pictures(folder: Path, name: str, table: ComparedModels, models: list[M
     models : list of dict
         What `wirebayes.comparison.compare.judge` returned for each model.
     """
-    save_figure(elpd_differences(name, table), folder / "differences.svg")
+    differences = elpd_differences(name, table)
+    save_figure(differences, folder / "differences.svg")
     best = winner(table)
     held_out = next((model["held_out"] for model in models if model["name"] == best), None)
     if held_out is None:
         return
-    save_figure(held_out_errors(name, table), folder / "held-out-errors.svg")
+    errors = held_out_errors(name, table)
+    save_figure(errors, folder / "held-out-errors.svg")
     for way, words in WORDS.items():
         scores = held_out[way]
         if not scores:
@@ -56,24 +58,26 @@ WORDS: dict[Way, str] = {"free": "held out, predicted freely", "given_first": "h
 def elpd_differences(name: str, table: ComparedModels) -> Figure:
     """Elpd difference from the base with two standard errors, one line a model."""
     base = table["base"]
-    differences = {}
+    rows = []
+    differences = []
     for row in table["models"]:
-        if row["name"] != base and row["difference"] is not None:
-            differences[row["name"]] = row["difference"]
-    rows = [row for row in table["models"] if row["name"] in differences]
-    values = np.array([differences[row["name"]]["elpd"] for row in rows], float)
+        difference = row["difference"]
+        if row["name"] != base and difference is not None:
+            rows.append(row)
+            differences.append(difference)
+    values = np.array([difference["elpd"] for difference in differences], float)
     label = f"elpd − elpd of {base}, all holds left out in turn"
     figure, axes = panel(label, "", name, _size(rows))
     axes.axvline(0, color=QUIET, lw=1)
     axes.axvspan(-4, 4, color=QUIET, alpha=0.25, lw=0)
     edge = -max(_SEEN, 3.0 * float(values.max(initial=0.0)), 40.0)
-    for place, (row, value) in enumerate(zip(rows, values, strict=True)):
+    for place, value in enumerate(values):
         if value < edge:
             axes.annotate(f"← {value:.0f}", (edge, place), fontsize=8, color=HOLD, va="center")
-        else:
-            colour = CHAIN if row["converged"] else QUIET
-            error = 2 * differences[row["name"]]["se"]
-            axes.errorbar(value, place, xerr=error, fmt="o", ms=4, lw=1, color=colour)
+            continue
+        colour = CHAIN if rows[place]["converged"] else QUIET
+        error = 2 * differences[place]["se"]
+        axes.errorbar(value, place, xerr=error, fmt="o", ms=4, lw=1, color=colour)
     _names(axes, rows)
     axes.set_xlim(edge * 1.05, None)
     return figure
@@ -119,21 +123,22 @@ def bands(title: str, scores: PredictionScores) -> Figure:
     """Measured readings minus the predictive median, in the 50, 90 and 99 % bands."""
     readings = {name: np.asarray(values, float) for name, values in scores["readings"].items()}
     unit = unit_read(readings, "observed")
-    figure, axes = panel("hold (readings in order of time within each)", f"measured − predicted, {unit}", title)
+    across = "hold (readings in order of time within each)"
+    figure, axes = panel(across, f"measured − predicted, {unit}", title)
     hold = readings["hold"]
-    time_s = readings["time_s"]
-    numbers, place = places_in_holds(hold, time_s)
+    numbers, place = places_in_holds(hold, readings["time_s"])
     quantiles = read_value(readings, "quantiles")
     median = quantiles[3]
+    deviations = quantiles - median
     for i, number in enumerate(numbers):
         here = hold == number
-        own = (quantiles - median)[:, here]
-        _draw_bands(axes, place[here], own, named=i == 0)
+        _draw_bands(axes, place[here], deviations[:, here], named=i == 0)
     axes.axhline(0, color=CHAIN, lw=1)
     observed = read_value(readings, "observed")
     left = observed - median
     axes.scatter(place, left, s=14, color=INK, zorder=3, label="measured − median")
-    axes.set_xticks(range(len(numbers)), [str(number) for number in numbers])
+    names = [str(number) for number in numbers]
+    axes.set_xticks(range(len(names)), names)
     legend_below(figure, axes, 4)
     return figure
 

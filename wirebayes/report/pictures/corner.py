@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 from wirebayes.report.figures import CHAIN, INK, axis_label
 from wirebayes.wire.protocol import Control
 
@@ -28,12 +27,12 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: C
     """
     count = len(draws)
     figure, axes = _grid(count)
-    scaled = {name: _straight(values) for name, values in draws.items()}
-    unit = [_across(values) for values, _ in scaled.values()]
+    scaled = [_straight(values) for values in draws.values()]
+    unit = [_across(values) for values, _ in scaled]
     _shade_pairs(axes, unit)
     _histograms(axes, unit)
-    for i, (name, (values, is_log)) in enumerate(scaled.items()):
-        places, labels = _few_ticks(values, is_log)
+    for i, name in enumerate(draws):
+        places, labels = _few_ticks(*scaled[i])
         ticks = list(zip(places, labels, strict=True))
         label = axis_label(name, effects, control)
         words = _in_lines(label)
@@ -41,12 +40,17 @@ def corner(draws: Mapping[str, Array], effects: tuple[Any, ...] = (), control: C
         bottom = count - 1 - i
         if i:
             _label_beside(axes, bottom, words, ticks)
+    _outline_cells(axes, count)
+    return figure
+
+
+def _outline_cells(axes: Any, count: int) -> None:
     frames = []
     for i in range(count):
-        frames += [Rectangle((j, count - 1 - i), _SIDE, _SIDE) for j in range(i + 1)]
+        bottom = count - 1 - i
+        frames += [Rectangle((j, bottom), _SIDE, _SIDE) for j in range(i + 1)]
     outlines = PatchCollection(frames, facecolor="none", edgecolor=INK, linewidth=0.8)
     axes.add_collection(outlines)
-    return figure
 
 
 def _in_lines(label: str) -> str:
@@ -63,11 +67,13 @@ def _shade_pairs(axes: Any, unit: Sequence[Array]) -> None:
     half: list[Path] = []
     for i in range(count):
         for j in range(i):
-            regions = _regions(places[j], places[i], (j, count - 1 - i))
-            most += regions[0]
-            half += regions[1]
+            cell = j, count - 1 - i
+            in_most, in_half = _regions(places[j], places[i], cell)
+            most += in_most
+            half += in_half
     for paths, colour in ((most, "#b5c4d1"), (half, CHAIN)):
-        axes.add_collection(PathCollection(paths, facecolor=colour, linewidth=0.0), autolim=False)
+        regions = PathCollection(paths, facecolor=colour, linewidth=0.0)
+        axes.add_collection(regions, autolim=False)
 
 
 def _histograms(axes: Any, unit: Sequence[Array]) -> None:
@@ -144,16 +150,21 @@ def _across(values: Array) -> Array:
 def _few_ticks(values: Array, is_log: bool) -> tuple[Array, list[str]]:
     """Places of a few ticks as shares of the cell, and their labels."""
     low, high = _ends(values)
-    margin = 0.05 * (high - low)  # labels of neighbouring cells do not touch
+    width = high - low
+    margin = 0.05 * width  # labels of neighbouring cells do not touch
+    first, last = low + margin, high - margin
     if is_log:
-        ticks = _logarithmic_ticks(low + margin, high - margin)
+        ticks = _logarithmic_ticks(first, last)
         labels = [f"{10**tick:.6g}" for tick in ticks]
     else:
-        ticks = np.array(MaxNLocator(_MOST_TICKS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
-        ticks = _between(ticks, low + margin, high - margin)
-        ticks = np.where(np.abs(ticks) < 1e-9 * (high - low), 0.0, ticks)
+        locator = MaxNLocator(_MOST_TICKS, steps=[1, 2, 2.5, 5, 10])
+        ticks = np.array(locator.tick_values(low, high))
+        ticks = _between(ticks, first, last)
+        is_zero = np.abs(ticks) < 1e-9 * width
+        ticks = np.where(is_zero, 0.0, ticks)
         labels = [f"{tick:.10g}".replace("-", "\N{MINUS SIGN}") for tick in ticks]
-    return (ticks - low) / (high - low), labels
+    places = (ticks - low) / width
+    return places, labels
 
 
 def _logarithmic_ticks(first: float, last: float) -> Array:
@@ -180,29 +191,33 @@ def _ticks(axes: Any, places: Sequence[tuple[float, float]], step: tuple[float, 
     axes.add_collection(LineCollection(lines, colors=INK, linewidths=0.8, clip_on=False))
 
 
-def _bins(unit: Array) -> NDArray[np.int64]:
+def _bins(unit: Array) -> Ints:
     """(n,) the bin of each draw along an axis of its cell; `_BINS` outside."""
     inside = (unit >= 0.0) & (unit <= 1.0)
     return np.where(inside, np.minimum(unit * _BINS, _BINS - 1), _BINS).astype(np.int64)
 
 
-def _regions(x: NDArray[np.int64], y: NDArray[np.int64], corner: tuple[float, float]) -> tuple[list[Path], list[Path]]:
+def _regions(x: Ints, y: Ints, corner: tuple[float, float]) -> tuple[list[Path], list[Path]]:
     """Outlines in a cell of the densest places, smoothed over neighbours: of 50 to 90 % of the draws, and of 50 %."""
     density = _density(x, y)
     ranked = np.sort(density.ravel())[::-1]
     held = np.cumsum(ranked) / ranked.sum()
-    half = float(ranked[np.searchsorted(held, 0.5)])
-    most = float(ranked[np.searchsorted(held, 0.9)])
+    at_half, at_most = np.searchsorted(held, [0.5, 0.9])
+    half = float(ranked[at_half])
+    most = float(ranked[at_most])
     if not 0 < most < half < ranked[0]:
         return [], []
+    left, bottom = corner
     middles = (np.arange(_BINS) + 0.5) / _BINS
-    across = corner[0] + _SIDE * middles
-    upward = corner[1] + _SIDE * middles
+    across = left + _SIDE * middles
+    upward = bottom + _SIDE * middles
     contours = contour_generator(across, upward, density.T, fill_type=FillType.OuterCode)
-    return _outlines(contours, most, half), _outlines(contours, half, np.inf)
+    outer = _outlines(contours, most, half)
+    inner = _outlines(contours, half, np.inf)
+    return outer, inner
 
 
-def _density(x: NDArray[np.int64], y: NDArray[np.int64]) -> Array:
+def _density(x: Ints, y: Ints) -> Array:
     """Draws in each cell of a grid, given their bins, smoothed over neighbours; those outside are left out."""
     cells = _BINS + 1
     counts = np.bincount(x * cells + y, minlength=cells**2)
@@ -222,18 +237,18 @@ _LONGEST = 17  # letters of a name that fit into a cell
 _BINS = 22  # of a cell along each axis: fine enough to look smooth
 
 
-def _smoothing(cells: int) -> Array:
+def _smoothing() -> Array:
     """(cells, cells) weights of the neighbours of each cell along one axis: normal, and reflected at the ends."""
     reach = np.arange(-_REACH, _REACH + 1)
     weights = np.exp(-0.5 * (reach / _BLUR) ** 2)
-    own = np.arange(cells)[:, None]
+    own = np.arange(_BINS)[:, None]
     neighbour = own + reach
-    from_end = np.minimum(neighbour, 2 * cells - 1 - neighbour)
+    from_end = np.minimum(neighbour, 2 * _BINS - 1 - neighbour)
     inside = np.where(neighbour < 0, -1 - neighbour, from_end)
-    matrix = np.zeros((cells, cells))
+    matrix = np.zeros((_BINS, _BINS))
     np.add.at(matrix, (own, inside), weights / weights.sum())
     return matrix
 
 
 _BLUR, _REACH = 1.0, 4  # cells: standard deviation, and where its tail is cut off
-_SMOOTHING = _smoothing(_BINS)
+_SMOOTHING = _smoothing()

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wirebayes.report.figures import legend_below, logarithmic, panel
@@ -22,14 +23,18 @@ def growth(rows: Sequence[Mapping[str, float]]) -> Figure:
     colours = cycle(len(tensions))
     for tension, colour in zip(tensions, colours, strict=True):
         own = [row for row in rows if row["tension_N"] == tension]
-        label = f"{tension:g} N"
-        times = [row["time_s"] for row in own]
-        low = [row["q05_mm_per_m"] for row in own]
-        middle = [row["q50_mm_per_m"] for row in own]
-        high = [row["q95_mm_per_m"] for row in own]
-        axes.plot(times, middle, "o-", ms=3.5, color=colour, label=label)
-        axes.fill_between(times, low, high, color=colour, alpha=0.2, lw=0)
+        _draw_course(axes, own, colour, f"{tension:g} N")
     logarithmic(axes)
     axes.set_ylim(bottom=0)
     legend_below(figure, axes, 4)
     return figure
+
+
+def _draw_course(axes: Axes, rows: Sequence[Mapping[str, float]], colour: str, label: str) -> None:
+    """Growth under one tension."""
+    times = [row["time_s"] for row in rows]
+    low = [row["q05_mm_per_m"] for row in rows]
+    middle = [row["q50_mm_per_m"] for row in rows]
+    high = [row["q95_mm_per_m"] for row in rows]
+    axes.plot(times, middle, "o-", ms=3.5, color=colour, label=label)
+    axes.fill_between(times, low, high, color=colour, alpha=0.2, lw=0)

@@ -57,12 +57,15 @@ def curve(stored: Stored) -> Curve:
     own = _some(stored)
     dense = _course(own, sample, _dense(protocol))
     quantiles = np.quantile(dense, [0.05, 0.5, 0.95], axis=2)[..., :_POINTS]
-    at_readings = np.median(_course(own, sample, protocol), axis=2)
+    course = _course(own, sample, protocol)
+    at_readings = np.median(course, axis=2)
     inside = _MARGIN + (1.0 - 2.0 * _MARGIN) * _SHARES
     recorded = np.cumsum(protocol.recorded) - 1.0
     place = recorded[:, None] + inside
-    noise = np.hypot(own["sensor_sd"], sample.resolution / np.sqrt(12.0))
-    return Curve(place, quantiles, at_readings, float(np.median(noise)))
+    rounding_sd = sample.resolution / np.sqrt(12.0)
+    noise = np.hypot(own["sensor_sd"], rounding_sd)
+    typical = float(np.median(noise))
+    return Curve(place, quantiles, at_readings, typical)
 
 
 def _some(stored: Stored) -> dict[str, Floats]:

@@ -95,6 +95,13 @@ def _added(verdict: ExperimentFindings) -> str:
     return " + ".join(names) or "what may be missing"
 
 
+def _join_bars(axis: Axes, heights: Sequence[float]) -> None:
+    """From where one bar ends to where the next begins."""
+    for x, height in enumerate(heights):
+        ends = [x + 0.35, x + 0.65]
+        axis.plot(ends, [height, height], color="0.4", lw=0.8)
+
+
 def waterfall(verdict: ExperimentFindings) -> Figure:
     """The rms error on held-out holds, from the plain model down: a bar for each named effect, and for what is left.
 
@@ -115,9 +122,7 @@ def waterfall(verdict: ExperimentFindings) -> Figure:
     labels = _sizes(heights, floor, unit)
     least = 0.002 * max(heights)
     _draw_bars(axis, bars, labels, least)
-    for x, height in enumerate([*heights, floor]):
-        ends = [x + 0.35, x + 0.65]
-        axis.plot(ends, [height, height], color="0.4", lw=0.8)
+    _join_bars(axis, [*heights, floor])
     effects = [spoken(step["model"]) for step in steps[1:]]
     names = ["plain model", *effects, "left over", "noise"]
     wrapped = [textwrap.fill(name, 12) for name in names]
@@ -172,22 +177,26 @@ def pictures_of_findings(stored: Stored, verdict: ExperimentFindings) -> dict[st
     shown: dict[str, Callable[[], Figure]] = {}
     for finding in verdict["where"]:
         covariate = finding["covariate"]
-        values = np.broadcast_to(COVARIATES[covariate](sample), left.shape)
+        value_of = COVARIATES[covariate]
+        values = np.broadcast_to(value_of(sample), left.shape)
         along = values[sample.protocol.mask]
         if finding["p"] <= _SHOWN and np.ptp(along) > 0.0:
-            file = f"where-{covariate.replace(' ', '-')}.svg"
-            shown[file] = partial(_along, sample, left, finding, along)
+            dashed = covariate.replace(" ", "-")
+            shown[f"where-{dashed}.svg"] = partial(_along, sample, left, finding, along)
     return shown
 
 
 def _along(sample: Sample, left: Floats, finding: Disagreement, x: Floats) -> Figure:
     """What is left over, (H, R), along a covariate (m,) of all readings, with the mean of neighbours."""
-    mask = sample.protocol.mask
+    protocol = sample.protocol
+    mask = protocol.mask
     covariate = finding["covariate"]
-    label = f"measured − plain model ({READ_UNIT[sample.protocol.control]})"
+    unit = READ_UNIT[protocol.control]
+    label = f"measured − plain model ({unit})"
     if covariate == "time in hold":  # a pattern within holds is hidden by their levels
         readings = np.maximum(mask.sum(axis=1, keepdims=True), 1)
-        left = left - left.sum(axis=1, keepdims=True) / readings
+        mean = left.sum(axis=1, keepdims=True) / readings
+        left = left - mean
         label += ",\nless its hold's mean"
     each = left[mask]
     figure = Figure(figsize=_PANEL, layout="constrained")
@@ -243,6 +252,7 @@ def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
     bands = _left_with_band(stored)
     shown = np.flatnonzero(protocol.recorded)
     numbers = [int(number) for number in protocol.number[shown]]
+    labels = {"held": "kept out to test it", "band": "90 % band", "left": "measured"}  # each once in the legend
     for place, (hold, number) in enumerate(zip(shown, numbers, strict=True)):
         keep = protocol.mask[hold]
         left, low, high = (values[hold][keep] for values in bands)
@@ -250,11 +260,9 @@ def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
         duration = max(float(protocol.duration_s[hold]), 1e-9)
         x = place + 0.1 + 0.8 * time / duration
         if number in held:
-            shading = "kept out to test it" if number == held[0] else None
-            axis.axvspan(place, place + 1, color=_HELD, zorder=0, label=shading)
-        band, measured = ("90 % band", "measured") if place == 0 else (None, None)
-        axis.fill_between(x, low, high, color=_BAND, alpha=0.3, lw=0, label=band)
-        axis.plot(x, left, "o-", color=_MEASURED, ms=3, lw=0.8, label=measured)
+            axis.axvspan(place, place + 1, color=_HELD, zorder=0, label=labels.pop("held", None))
+        axis.fill_between(x, low, high, color=_BAND, alpha=0.3, lw=0, label=labels.pop("band", None))
+        axis.plot(x, left, "o-", color=_MEASURED, ms=3, lw=0.8, label=labels.pop("left", None))
     axis.axhline(0.0, color="0.5", lw=0.6)
     middles = np.arange(len(shown)) + 0.5
     axis.set_xticks(middles, list(map(str, numbers)))

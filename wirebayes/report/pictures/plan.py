@@ -31,7 +31,10 @@ def widths_and_effects(plan: PlanJson, target: Path) -> None:
     """
     rows = plan["protocols"][:_MOST]
     quantities = [*_uncertain(rows), "creep_1h_mm"]
-    effects = sorted({effect for row in rows for effect in row["effects"]})
+    shown: set[str] = set()
+    for row in rows:
+        shown.update(row["effects"])
+    effects = sorted(shown)
     height = 4.0 + 0.13 * len(effects)
     figure = Figure(figsize=(9.0, height), layout="constrained")
     left, right = figure.subplots(1, 2)

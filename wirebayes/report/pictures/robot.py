@@ -45,20 +45,20 @@ def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: PoseAnswe
     found : Answer
         What was computed for it.
     """
-    if not found.courses or not found.courses[0.0].found.any():
+    course = found.courses.get(0.0)
+    if course is None or not course.found.any():
         return
     content = found.content
-    course = found.courses[0.0]
-    pictures = {
-        "robot": scene(robot, request.position_m, request.rotation, course),
-        "drift": in_time(content["drift"], "distance_mm", "distance from the pose, mm", "Drift"),
-    }
+    drift, shares = content["drift"], content["variance_shares"]
+    pictures = {}
+    pictures["robot"] = scene(robot, request.position_m, request.rotation, course)
+    pictures["drift"] = in_time(drift, "distance_mm", "distance from the pose, mm", "Drift")
     if robot.degrees == 6:
         title = "Drift of the orientation"
-        pictures["rotation"] = in_time(content["drift"], "rotation_deg", "rotation, degrees", title)
+        pictures["rotation"] = in_time(drift, "rotation_deg", "rotation, degrees", title)
     pictures["pose-error"] = error_in_time(content["pose_error"])
-    if "shared_draw" in content["variance_shares"]:
-        pictures["error-budget"] = error_budget(content["variance_shares"])
+    if "shared_draw" in shares:
+        pictures["error-budget"] = error_budget(shares)
     pictures |= _maps(found.maps)
     for name, figure in pictures.items():
         save_figure(figure, folder / f"{name}.svg")
@@ -77,9 +77,7 @@ def _maps(maps: Sequence[Map]) -> dict[str, Figure]:
     return figures
 
 
-def scene(
-    robot: Robot, position_m: Floats, rotation: Floats, course: Course, exaggeration: float | None = None
-) -> Figure:
+def scene(robot: Robot, position_m: Floats, rotation: Floats, course: Course) -> Figure:
     """The robot in 3-D, at rest and drifted; the drift enlarged by a factor that the title states.
 
     Parameters
@@ -87,10 +85,8 @@ def scene(
     position_m, rotation : (3,), (3, 3) arrays
     course : Course
         Its mean over the draws at the last time is drawn.
-    exaggeration : float, optional
-        Default: a round factor that makes the drift a twentieth of the robot.
     """
-    view = scene_points(robot, position_m, rotation, course, exaggeration)
+    view = scene_points(robot, position_m, rotation, course)
     enlarged = view["exaggeration"]
     here = np.asarray(view["platform"])
     there = here + enlarged * (view["drifted"][-1] - here)
@@ -139,9 +135,7 @@ def _label_axes(axes: Any, points: Floats, position_m: Floats, size_m: float) ->
     axes.set_box_aspect(axes._box_aspect, zoom=0.94)
 
 
-def scene_points(
-    robot: Robot, position_m: Floats, rotation: Floats, course: Course, exaggeration: float | None = None
-) -> SceneJson:
+def scene_points(robot: Robot, position_m: Floats, rotation: Floats, course: Course) -> SceneJson:
     """What a view of the robot draws: exit points, platform points and edges, and the mean drift at each time.
 
     Parameters
@@ -149,27 +143,25 @@ def scene_points(
     position_m, rotation : (3,), (3, 3) arrays
     course : Course
         Its mean over the draws is taken.
-    exaggeration : float, optional
-        Default: a round factor that makes the last drift a twentieth of the robot.
 
     Returns
     -------
     SceneJson
         At nine times or fewer.
     """
-    position = course.position_m[course.found].mean(0)
-    turned = course.rotation[course.found].mean(0)
+    found = course.found
+    position = course.position_m[found].mean(0)
+    turned = course.rotation[found].mean(0)
     shown = evenly(len(position), _MOST_TIMES)
-    if exaggeration is None:
-        exaggeration = _exaggeration(robot, position[-1] - position_m)
+    last_drift = position[-1] - position_m
     platform = np.einsum("tij,wj->twi", turned[shown], robot.platform_m)
-    tensions = course.tension_N[course.found][:, shown]
-    return still_points(robot, position_m, rotation) | {
-        "drifted": position[shown, None] + platform,
-        "times": [_seconds(time) for time in course.times_s[shown]],
-        "tensions_N": np.median(tensions, axis=0),
-        "exaggeration": exaggeration,
-    }
+    tensions = course.tension_N[found][:, shown]
+    points = still_points(robot, position_m, rotation)
+    points["drifted"] = position[shown, None] + platform
+    points["times"] = [_seconds(time) for time in course.times_s[shown]]
+    points["tensions_N"] = np.median(tensions, axis=0)
+    points["exaggeration"] = _exaggeration(robot, last_drift)
+    return points
 
 
 def _exaggeration(robot: Robot, drift_m: Floats) -> float:
@@ -211,23 +203,22 @@ def platform_edges(points: Floats) -> Iterator[tuple[int, int]]:
     """Pairs of platform points that an edge joins: the hull's edges, without those inside a flat face."""
     spread = points - points.mean(0)
     extent = max(np.abs(spread).max(), 1e-12)
-    singular = np.linalg.svd(spread, compute_uv=False)
-    rank = int((singular > 1e-3 * extent).sum())
+    _, singular, axes = np.linalg.svd(spread)
+    is_flat = (singular > 1e-3 * extent).sum() < 3
     try:
-        if rank < 3:
-            _, _, axes = np.linalg.svd(spread)
-            across = spread @ axes[:2].T
-            outline = ConvexHull(across)
-            yield from ((int(i), int(j)) for i, j in outline.simplices)
-            return
-        hull = ConvexHull(points)
+        hull = ConvexHull(spread @ axes[:2].T if is_flat else points)
     except (QhullError, ValueError):  # all points in one place or on a line
+        return
+    if is_flat:
+        yield from ((int(i), int(j)) for i, j in hull.simplices)
         return
     normals: dict[tuple[int, int], list[Floats]] = {}
     for simplex, equation in zip(hull.simplices, hull.equations, strict=True):
+        normal = equation[:3]
         for k in range(3):
             i, j = sorted((int(simplex[k]), int(simplex[k - 1])))
-            normals.setdefault((i, j), []).append(equation[:3])
+            of_edge = normals.setdefault((i, j), [])
+            of_edge.append(normal)
     for edge, (one, other) in normals.items():
         if one @ other < 0.99:
             yield edge

@@ -121,16 +121,18 @@ def _draw_payload(axes: Any, history: History) -> None:
 def _shapes(robot: Robot, found: HistoryAnswer, rows: Indices) -> tuple[Floats, Floats, float]:
     """Platform points meant and drifted, ``(r, w, 3)``, the drift enlarged by a round factor."""
     assert found.found is not None and found.to is not None
+    track = found.found.track
     meant_position = found.to.position_m[rows]
     meant_rotation = found.to.rotation[rows]
-    position, rotation = _mean_pose(found.found.track, rows)
+    position, rotation = _mean_pose(track, rows)
     shift = position - meant_position
     turn = rotation - meant_rotation
     factor = _enlarged(robot, shift)
-    meant = _platform_points(robot, meant_position, meant_rotation)
     moved_position = meant_position + factor * shift
     moved_rotation = meant_rotation + factor * turn
-    return meant, _platform_points(robot, moved_position, moved_rotation), factor
+    meant = _platform_points(robot, meant_position, meant_rotation)
+    moved = _platform_points(robot, moved_position, moved_rotation)
+    return meant, moved, factor
 
 
 def _enlarged(robot: Robot, shift_m: Floats) -> float:
@@ -171,15 +173,19 @@ def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
     """
     rows = evenly(len(history.times_s), _PANELS)
     meant, moved, factor = _shapes(robot, found, rows)
-    figure = Figure(figsize=(2.1 * len(rows), 2.75), layout="constrained")
-    figure.suptitle(f"{robot.name}: mean drift enlarged {factor:g} times", fontsize=10.5, color=INK, x=0.01, ha="left")
-    panels = np.atleast_1d(figure.subplots(1, len(rows)))
+    count = len(rows)
+    width = 2.1 * count
+    figure = Figure(figsize=(width, 2.75), layout="constrained")
+    head = f"{robot.name}: mean drift enlarged {factor:g} times"
+    figure.suptitle(head, fontsize=10.5, color=INK, x=0.01, ha="left")
+    panels = np.atleast_1d(figure.subplots(1, count))
+    carries = history.payload_kg.max() > 0
     for i, (axes, row) in enumerate(zip(panels, rows, strict=True)):
         here = meant[i] @ _OBLIQUE.T
         there = moved[i] @ _OBLIQUE.T
         _draw_robot(axes, robot, here, there)
         title = f"{history.times_s[row]:g} s"
-        if history.payload_kg.max() > 0:
+        if carries:
             title += f", {history.payload_kg[row]:g} kg"
         axes.set_title(title, fontsize=9, color=INK)
     return figure

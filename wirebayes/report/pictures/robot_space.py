@@ -34,9 +34,11 @@ def workspace_maps(result: WorkspaceDrift, title: str = "") -> dict[str, Figure]
         del values["tilt"]  # parallel lines: nothing tilts
     figures = {}
     for name, value in values.items():
-        figure, image = _slices(position_m, value, plane, _headed(name, title))
+        headline = _headed(name, title)
+        figure, image = _slices(position_m, value, plane, headline)
         if image is not None:
-            figure.colorbar(image, ax=figure.axes, label=f"{name}, {units[name]}")
+            label = f"{name}, {units[name]}"
+            figure.colorbar(image, ax=figure.axes, label=label)
         figures[name] = figure
     return figures
 
@@ -63,10 +65,10 @@ def _slices(position_m: Floats, value: Floats, plane: _Plane, headline: str) -> 
     x, y, z = ("xyz"[axis] for axis in plane)
     ends = _ends(value)
     image: Any = None
+    in_plane = position_m[:, [plane.across, plane.along]]
     for axes, level in zip(panels, levels[::-1], strict=True):
         here = height == level
-        places = position_m[here][:, [plane.across, plane.along]]
-        field = _field(across, along, places, value[here])
+        field = _field(across, along, in_plane[here], value[here])
         image = _draw_slice(axes, across, along, field, ends) or image
         axes.set_title(f"{z} = {level:.3g} m", fontsize=9.5)
         axes.set_ylabel(f"{y}, m")
