@@ -23,7 +23,7 @@ def test_a_parameter_that_moves_is_said_to_by_how_much(amplitude: float, words: 
     assert "no dependence on displacement" in _sentence(pattern, amplitude, 0.2, "wire")
 
 
-@pytest.mark.parametrize(("counts_as", "unit", "size"), [(2e3, "N", "1e+03 N"), (0.25, "mm", "0.125 mm")])
+@pytest.mark.parametrize(("counts_as", "unit", "size"), [(2e3, "N", "1000 N"), (0.25, "mm", "0.125 mm")])
 def test_a_hold_that_lies_off_is_said_to_in_the_unit_of_what_is_read(counts_as: float, unit: str, size: str) -> None:
     pattern = Pattern("hold", hold=3, counts_as=counts_as, unit=unit)
     assert f"hold 3 lies {size} below what the others predict" in _sentence(pattern, -0.5, 0.01, "wire")
