@@ -140,3 +140,19 @@ def test_a_pose_off_the_plane_is_refused(sled):
     with pytest.raises(InputError, match="off the plane"):
         _refuse_off_plane(sled, sled.home_m, rotation.matrix(np.array([0.1, 0.0, 0.0])))
     _refuse_off_plane(sled, sled.home_m, rotation.matrix(np.array([0.0, 0.0, 0.1])))
+
+
+@pytest.mark.parametrize(
+    ("normal", "choice", "refused"),
+    [("[0, 0, 2]", "minimum_norm", True), ("[0, 0.1, 1]", "minimum_norm", False), ("[0, 0, 1]", "middle", False)],
+)
+def test_wires_that_need_not_pull_hold_nothing_on_a_level_plane(normal, choice, refused):
+    text = schema.robot_text("sled-4").replace("lowest_N = 4.0", "lowest_N = 0").replace("minimum_norm", choice)
+    text = text.replace("normal = [0.0, 0.0, 1.0]", f"normal = {normal}")
+    if not refused:
+        schema.parse(text, "sled.toml")
+        return
+    with pytest.raises(
+        InputError, match=r"sled.toml, line \d+, key tension.lowest_N: found 0, expected a number above 0"
+    ):
+        schema.parse(text, "sled.toml")

@@ -55,6 +55,13 @@ def test_shipped_robots_are_light():
         assert sag.sag_warnings(robot, robot.home_m, np.eye(3), middle) == [], file.name
 
 
+def test_a_wire_that_weighs_more_than_it_is_pulled_with_hangs_in_an_arc():
+    (text,) = _said(_stadium(np.full(4, 0.2)), pull_N=100.0)
+    assert text.startswith("wire 1 weighs more than it is pulled with: it hangs in an arc") and " mm" not in text
+    place, tension = np.array([0.0, 0.0, 8.0]), np.array([1000.0, 1000.0, 1000.0, 1e-13])
+    assert sag.sag_warnings(_stadium(np.full(4, 0.02)), place, np.eye(3), tension) == []  # slack but for rounding
+
+
 @pytest.mark.parametrize(("usual_N", "said"), [(40.0, True), (1000.0, False)])
 def test_over_a_log_the_middle_tension_of_each_wire_counts(usual_N, said):
     robot = _stadium()

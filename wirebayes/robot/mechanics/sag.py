@@ -22,12 +22,15 @@ _REPORTED = 0.05
 # Least mass by length and highest tension: of the lightest ropes, Dyneema, at a fifth of the tension that breaks them
 # (2 mm: 2.3 g/m, 4.1 kN). A rope of steel has ten times as much.
 _LIGHTEST_KG_M_N = 2.8e-6
+_ROUNDING = 1e-9  # of the largest tension: one so small is none
+_SMALL = 1.0  # weight by tension up to which the first order says how a wire hangs
 
 
 def sag(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> tuple[Floats, Floats, Floats]:
     """Weight by tension ``w L / T``, depth below the chord and extra length of every wire, ``(w,)``, 1, m and m.
 
-    A wire whose mass is not stated has that of the lightest rope for the robot's highest tension; a slack one has none.
+    A wire whose mass is not stated has that of the lightest rope for the robot's highest tension. One that is slack, to
+    rounding, does not count.
 
     Parameters
     ----------
@@ -39,7 +42,7 @@ def sag(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -
     shape = geometry(robot, position_m[:, None], rotation[..., None])
     length, direction = shape.distance_m[:, 0], shape.direction[:, :, 0]
     level = np.hypot(direction[0], direction[1])
-    taut = tension_N > 0
+    taut = tension_N > _ROUNDING * tension_N.max()
     share = np.where(taut, mass * GRAVITY * length / np.where(taut, tension_N, 1.0), 0.0)
     return share, share * level * length / 8.0, length * (share * level) ** 2 / 24.0
 
@@ -110,11 +113,14 @@ def sag_warnings(robot: Robot, position_m: Floats, rotation: Floats, tension_N: 
             f"no mass_kg_m above 0 is stated of wire {i + 1}, and even the lightest rope for tension.highest_N, of "
             f"{lightest} g/m, weighs"
         )
-    percent = short(100 * share[i], 2)
-    depth_mm = short(1e3 * depth[i], 2)
-    extra_mm = short(1e3 * extra[i], 2)
-    text = (
-        f"{weighs} {percent} % of its tension: it sags by {depth_mm} mm "
-        f"and is {extra_mm} mm longer than the straight line it is taken for{others}"
-    )
-    return [Notice("sag", text)]
+    if share[i] > _SMALL:
+        hangs = "more than it is pulled with: it hangs in an arc, far from the straight line it is taken for"
+    else:
+        percent = short(100 * share[i], 2)
+        depth_mm = short(1e3 * depth[i], 2)
+        extra_mm = short(1e3 * extra[i], 2)
+        hangs = (
+            f"{percent} % of its tension: it sags by {depth_mm} mm and is {extra_mm} mm longer than the straight line "
+            "it is taken for"
+        )
+    return [Notice("sag", f"{weighs} {hangs}{others}")]

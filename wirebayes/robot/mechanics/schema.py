@@ -98,6 +98,7 @@ def _robot(top: Keys) -> Robot:
     lower, upper = _workspace(top.inside("workspace"))
     bias = _bias(top.inside("sensors", {}))
     plane = _plane(top)
+    _check_wires_pull(top, plane, tension)
     given, declared, masses = _wires(top)
     legs, winch = _legs(top, declared)
     top.finish()
@@ -147,6 +148,14 @@ def _check_ball_joint(top: Keys, plane: Plane | None, corners_m: Floats, legs: i
         raise top.complain("workspace", "corners beside the ball joint", "both at pose.position_m, where it is")
     if legs < _TURNING:
         raise top.complain("leg", f"{legs} legs", f"at least {_TURNING}, to hold a platform about its ball joint")
+
+
+def _check_wires_pull(top: Keys, plane: Plane | None, rule: TensionRule) -> None:
+    """On a level plane no weight pulls at the wires: at no tension they hold the platform nowhere."""
+    level = plane is not None and not plane.normal[:2].any()
+    if level and rule.choice == "minimum_norm" and not rule.lowest_N:
+        expected = "a number above 0: a level plane carries the weight, and wires that do not pull hold no place on it"
+        raise top.inside("tension").complain("lowest_N", "0", expected)
 
 
 def _check_version(top: Keys) -> None:

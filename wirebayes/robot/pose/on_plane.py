@@ -78,6 +78,6 @@ def _sentence(robot: Robot, known: Plane, force: float, width: Floats, turn: Flo
         return f"{said}."
     middle = 1e3 * np.median(width, axis=0)
     along = ", ".join(f"±{short(v, 2)} mm along {axis}" for v, axis in zip(middle, "xyz", strict=True) if v > 1e-9)
-    about = f" and turned by ±{np.degrees(np.median(turn)):.2g}°" if turn.any() else ""
+    about = f" and turned by ±{short(np.degrees(np.median(turn)), 2)}°" if turn.any() else ""
     most = short(known.friction * abs(force), 3)
     return f"{said}; its friction, {most} N at most, can hold the platform {along}{about}."
