@@ -73,6 +73,9 @@ def test_a_leg_without_a_posterior_is_refused_in_one_line():
     robot = _mixed(schema.read_robot_file("linear-6"), (3,))
     with pytest.raises(InputError, match="linear-6: leg 4, key wire: found 'thick' and posteriors of default"):
         draws.for_robot(robot, _line(2))
+    with pytest.raises(InputError, match="linear-6: leg 1, key wire: found 'default' and posteriors of thick"):
+        draws.for_robot(robot, replace(_line(2), name=THICK))
+    draws.for_robot(schema.read_robot_file("linear-6"), replace(_line(2), name=THICK))  # the only line, by any name
 
 
 def test_unknowns_hold_the_parameters_of_every_line():

@@ -233,10 +233,11 @@ def lines_of(robot: Robot, line: WireDraws) -> list[WireDraws]:
         A leg's wire has neither parameters in the robot's file nor a posterior.
     """
     out = []
+    is_of_every_leg = not line.others and line.name not in robot.wire  # whatever it is called
     for i, name in enumerate(robot.wire):
         if name in robot.given:
             out.append(given(robot.given[name]))
-        elif name in line.each or (name == "default" and not line.others):
+        elif name in line.each or (name == "default" and is_of_every_leg):
             out.append(line.each.get(name, line))
         else:
             known = " or ".join(line.each)
