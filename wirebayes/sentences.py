@@ -20,6 +20,13 @@ def some_of(names: Sequence[str], most: int = 6) -> str:
     return listed([*names[:most], *more])
 
 
+def holds_in_words(numbers: Iterable[object]) -> str:
+    """Holds by their numbers: hold 3, holds 3 and 4."""
+    names = [str(number) for number in numbers]
+    plural = "s" if len(names) > 1 else ""
+    return f"hold{plural} {listed(names)}"
+
+
 def counted(count: int, what: str) -> str:
     """How many there are of something, in words: 1 hold, 2 holds."""
     return f"{count} {what}{'s' * (count != 1)}"

@@ -12,10 +12,10 @@ from wirebayes.commands.options import above_zero, check_choice, names_given, wi
 from wirebayes.errors import InputError
 from wirebayes.io import data_checks, gross_events
 from wirebayes.io.bench.about import About, common_name, default_name
-from wirebayes.io.bench.as_experiment import toml_of
 from wirebayes.io.bench.convert import Converted, convert, convert_joined, lacks_a_setting
 from wirebayes.io.bench.joined import HOLD, TEST, in_natural_order, name_settings, path_of_all
 from wirebayes.io.bench.undecided import Choices, Decimal, Specimens, TimeSince, Undecided
+from wirebayes.io.experiment_file import toml_of
 from wirebayes.io.readings import READ
 from wirebayes.io.run_folder import open_run, write_csv, write_json, write_text
 from wirebayes.json_files.imported import ImportedExperiment, ImportJson

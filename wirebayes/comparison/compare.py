@@ -249,7 +249,8 @@ def side_by_side(models: Sequence[ModelJson], base: str, about: Sequence[Notice]
         rows.append(row)
     rows.sort(key=_order)
     of_models = from_json(notices_by_part(known))
-    return {"base": base, "models": rows, "warnings": to_json([*about, *of_models])}
+    warnings = to_json([*about, *of_models])
+    return {"base": base, "models": rows, "warnings": warnings}
 
 
 def _weights(models: Sequence[ModelJson], reference: ModelJson) -> dict[str, float]:

@@ -96,14 +96,22 @@ def from_arrays(
         columns = {column: columns[column] for column in names_of(columns)}
         columns["temperature_C"] = temperature_C
     about: dict[str, Any] = {"name": name, "material": material, "length_mm": length_mm, "control": control}
-    resolutions = {"resolution_N": resolution_N or None, "resolution_mm": resolution_mm or None}
-    about |= _stated({**resolutions, "preload_mm": preload_mm})
+    if resolution_N:
+        about["resolution_N"] = resolution_N
+    if resolution_mm:
+        about["resolution_mm"] = resolution_mm
+    if preload_mm is not None:
+        about["preload_mm"] = preload_mm
     if unrecorded_holds is not None and len(unrecorded_holds):
         about["unrecorded_holds"] = [dict(each) for each in unrecorded_holds]
     experiment_name = name if isinstance(name, str) else ""
     keys = _Arguments(SOURCE, "", None, _plain(about), experiment_name)
     empty = (READ.get(control, ""), "temperature_C")
-    return experiment_of(keys, lambda: table_of(columns, SOURCE, REQUIRED, OPTIONAL, may_be_empty=empty))
+
+    def readings() -> CsvTable:
+        return table_of(columns, SOURCE, REQUIRED, OPTIONAL, may_be_empty=empty)
+
+    return experiment_of(keys, readings)
 
 
 def _stated(values: Mapping[str, Any]) -> dict[str, Any]:

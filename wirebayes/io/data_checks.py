@@ -198,16 +198,19 @@ def outlier(readings: CheckedTest) -> str:
     hold's last one counts beyond the range of all others once more; creep may be over after the first.
     """
     each, unit = readings.each, readings.unit
-    long_enough = [j for j, row in enumerate(each) if len(row) >= 3]
-    if not long_enough:
-        return ""
     places: list[tuple[int, int]] = []
-    for j in long_enough:
-        places += [(j, i) for i in range(len(each[j]))]
-    distance = np.concatenate([_apart(each, j) for j in long_enough])
+    distances = []
+    for j, row in enumerate(each):
+        if len(row) >= 3:
+            places += [(j, i) for i in range(len(row))]
+            distances.append(_apart(each, j))
+    if not distances:
+        return ""
+    distance = np.concatenate(distances)
     worst = int(distance.argmax())
     hold, at = places[worst]
-    usual = max(float(np.quantile(np.delete(distance, worst), 0.9)), readings.noise)
+    others = np.delete(distance, worst)
+    usual = max(float(np.quantile(others, 0.9)), readings.noise)
     span = np.ptp(_others(each, hold, at))
     if distance[worst] <= max(ISOLATED * usual, GROSS * span):
         return ""
@@ -238,21 +241,21 @@ def _others(each: Sequence[Floats], j: int, at: int) -> Floats:
 def rising(readings: CheckedTest) -> str:
     """Tension that rises within holds on loading, where creep lets it fall."""
     each, noise = readings.each, readings.noise
-    loading = []
+    rises = []
     for j, row in enumerate(each):
         # a hold that begins below the end of the one before has creep to give back
         goes_up = j == 0 or (_is_furthest(readings.setting, j) and row[0] > each[j - 1][-1])
         is_taut = len(row) > 1 and row[0] > FLAT * noise
         if goes_up and is_taut:
-            loading.append(row)
-    if len(loading) < RISING_HOLDS:
+            rises.append(row[-1] - row[0])
+    if len(rises) < RISING_HOLDS:
         return ""
-    rise = np.array([row[-1] - row[0] for row in loading])
-    rises = rise > 0
-    if rises.mean() < RISING_SHARE or np.median(rise) <= RISE * noise:
+    found = _in_most(rises, noise)
+    if found is None:
         return ""
+    holds, middle = found
     return (
-        f"tension rises within {int(rises.sum())} of {len(rise)} holds on loading, by {short(np.median(rise), 3)} N in "
+        f"tension rises within {holds} of {len(rises)} holds on loading, by {short(middle, 3)} N in "
         "the middle, while a held wire relaxes: check that time_s runs forward, and the sensor and the room for drift"
     )
 
@@ -262,19 +265,30 @@ def _is_furthest(setting: Floats, j: int) -> bool:
     return j == 0 or bool(setting[j] > setting[:j].max())
 
 
+def _in_most(changes: Sequence[float], noise: float) -> tuple[int, float] | None:
+    """In how many holds something grows, and by how much in the middle; None where in few, or by little."""
+    grown = sum(change > 0 for change in changes)
+    middle = float(np.median(changes))
+    if grown / len(changes) < RISING_SHARE or middle <= RISE * noise:
+        return None
+    return int(grown), middle
+
+
 def creeping_back(readings: CheckedTest) -> str:
     """Displacement that falls within holds of ever larger weights, under which a wire creeps on."""
-    each, noise = readings.each, readings.noise
-    loading = [row for j, row in enumerate(each) if len(row) > 1 and _is_furthest(readings.setting, j)]
-    if len(loading) < SHRINKING_HOLDS:
+    falls = []
+    for j, row in enumerate(readings.each):
+        if len(row) > 1 and _is_furthest(readings.setting, j):
+            falls.append(row[0] - row[-1])
+    if len(falls) < SHRINKING_HOLDS:
         return ""
-    fall = np.array([row[0] - row[-1] for row in loading])
-    falls = fall > 0
-    if falls.mean() < RISING_SHARE or np.median(fall) <= RISE * noise:
+    found = _in_most(falls, readings.noise)
+    if found is None:
         return ""
+    holds, middle = found
     return (
-        f"the displacement falls within {int(falls.sum())} of {len(fall)} holds under ever larger weights, by "
-        f"{short(np.median(fall), 3)} mm in the middle, while a loaded wire creeps on: check that displacement and "
+        f"the displacement falls within {holds} of {len(falls)} holds under ever larger weights, by "
+        f"{short(middle, 3)} mm in the middle, while a loaded wire creeps on: check that displacement and "
         "tension are not interchanged, that time_s runs forward, and the gauge and the room for drift"
     )
 
@@ -310,7 +324,8 @@ def _jump(row: Floats, time_s: Floats, noise: float) -> int | None:
     speed = sizes / np.diff(time_s)
     for i in range(1, len(change) - 1):
         beside = [i - 1, i + 1]
-        if sizes[i] <= max(ISOLATED * noise, JUMP * sizes[beside].max()):
+        usual = max(ISOLATED * noise, JUMP * sizes[beside].max())
+        if sizes[i] <= usual:
             continue
         others = change.sum() - change[i]
         against = others * way[i] <= FLAT * noise
@@ -319,23 +334,28 @@ def _jump(row: Floats, time_s: Floats, noise: float) -> int | None:
         if speed[i] <= faster * speed[beside].max():
             continue
         later = (row[i + 1 :] - row[i]) * way[i]
-        if (later > JUMP_STAYS * sizes[i]).all():
+        stays = later > JUMP_STAYS * sizes[i]
+        if stays.all():
             return i
     return None
 
 
 def off_grid(readings: CheckedTest) -> str:
     """Readings finer than the resolution they are said to have."""
+    resolution = readings.resolution
     changes = np.concatenate([np.abs(np.diff(row)) for row in readings.each])
-    if not readings.resolution or len(changes) < 3:
+    if not resolution or len(changes) < 3:
         return ""
-    finer = (changes > 0.01 * readings.resolution) & (changes < 0.5 * readings.resolution)
-    if finer.mean() <= OFF_GRID and not 0.0 < np.ptp(np.concatenate(readings.each)) <= readings.resolution:
+    finer = (changes > 0.01 * resolution) & (changes < 0.5 * resolution)
+    span = np.ptp(np.concatenate(readings.each))
+    in_a_step = 0.0 < span <= resolution
+    if finer.mean() <= OFF_GRID and not in_a_step:
         return ""
     key = f"resolution_{readings.unit}"
+    column = READ[readings.protocol.control]
     return (
-        f"readings change by less than {key} = {readings.resolution:g}: check {key}, and that both it and "
-        f"{READ[readings.protocol.control]} are in {readings.unit}"
+        f"readings change by less than {key} = {resolution:g}: check {key}, and that both it and "
+        f"{column} are in {readings.unit}"
     )
 
 

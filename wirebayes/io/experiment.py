@@ -208,19 +208,25 @@ def protocol_of(holds: tuple[Hold, ...], length_mm: float, reference_C: float | 
     Protocol
         With H holds and R columns, R the largest number of readings in a hold.
     """
+    numbers = [-1 if hold.number is None else hold.number for hold in holds]
+    read = [np.ones(hold.time_s.size) for hold in holds]
     warming = None
     if reference_C is not None:
-        empty = frozen([])
-        warming = _padded([empty if hold.temperature_C is None else hold.temperature_C - reference_C for hold in holds])
+        reference_C = float(reference_C)
+        above = []
+        for hold in holds:
+            logged = hold.temperature_C
+            above.append(frozen([]) if logged is None else logged - reference_C)
+        warming = _padded(above)
     return Protocol(
         length_mm=length_mm,
         setting=np.array([hold.setting for hold in holds]),
         time_s=_padded([hold.time_s for hold in holds]),
-        mask=_padded([np.ones(hold.time_s.size) for hold in holds]) > 0,
+        mask=_padded(read) > 0,
         duration_s=np.array([hold.duration_s for hold in holds]),
-        number=np.array([-1 if hold.number is None else hold.number for hold in holds], dtype=np.int64),
+        number=np.array(numbers, dtype=np.int64),
         warming_K=warming,
-        reference_C=None if reference_C is None else float(reference_C),
+        reference_C=reference_C,
         control=holds[0].control if holds else "displacement",
     )
 

@@ -1,8 +1,9 @@
 """Experiment files: TOML that says what was done, beside a CSV of the readings."""
 
+import json
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,13 @@ from typing import Any
 from wirebayes.errors import InputError, shown
 from wirebayes.io import mistaken_table
 from wirebayes.io.experiment import ENOUGH, Experiment, enough, holds_and_readings, in_sequence
-from wirebayes.io.readings import SET, STRETCH, Hold, checked_readings, readings_table
+from wirebayes.io.readings import READ, SET, STRETCH, Hold, checked_readings, readings_table
 from wirebayes.numeric.frozen import frozen
 from wirebayes.strict.files import read_text
 from wirebayes.strict.hint import hint
 from wirebayes.strict.table import LARGEST, CsvTable
 from wirebayes.strict.toml_keys import Keys
+from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Control
 
 _KEYS = (
@@ -30,11 +32,8 @@ _KEYS = (
     "unrecorded_holds",
     "prior",
 )
-# The key of the resolution of what is read, its unit, and the largest value that the readings may have.
-_RESOLUTION: dict[Control, tuple[str, str, float]] = {
-    "displacement": ("resolution_N", "N", LARGEST["tension_N"]),
-    "force": ("resolution_mm", "mm", LARGEST["displacement_mm"]),
-}
+Entry = dict[str, Any]  # of a hold without a record: before_hold, what was set, duration_s
+RESOLUTION: dict[Control, str] = {"displacement": "resolution_N", "force": "resolution_mm"}
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,100}", re.ASCII)
 # a folder beside the results' own files, and a name beside the key of the warnings
 _TAKEN = re.compile(
@@ -171,8 +170,9 @@ def control_of(keys: Keys) -> Control:
 
 def _resolution(keys: Keys, control: Control) -> float:
     """The step to which readings were rounded; 0 where it is not stated."""
-    key, unit, most = _RESOLUTION[control]
-    for other, _, _ in _RESOLUTION.values():
+    key, unit = RESOLUTION[control], READ_UNIT[control]
+    most = LARGEST[READ[control]]
+    for other in RESOLUTION.values():
         if other != key and other in keys.table:
             raise keys.complain(other, other, f"{key}, because the test has control = {shown(control)}")
     if key not in keys.table:
@@ -211,11 +211,12 @@ def _with_unrecorded(keys: Keys, holds: tuple[Hold, ...], length_mm: float, cont
     """Insert the unrecorded holds, each before the first recorded hold whose number reaches its `before_hold`."""
     entries = keys.elements("unrecorded_holds", f"a list of {{ before_hold, {SET[control]}, duration_s }}")
     numbers = [hold.number for hold in holds if hold.number is not None]
+    last = int(numbers[-1])
     where = str(keys.table.get("readings", "the readings"))
     before: dict[int, list[Hold]] = {}
     known = None
     for index, entry in enumerate(entries):
-        before_hold, unrecorded = _unrecorded(entry, int(numbers[-1]), where, length_mm, control)
+        before_hold, unrecorded = _unrecorded(entry, last, where, length_mm, control)
         if entry.table == known:
             raise keys.complain(f"unrecorded_holds[{index}]", "the hold before it once more", "each hold once")
         known = entry.table
@@ -256,3 +257,39 @@ def _unrecorded_setting(keys: Keys, length_mm: float, control: Control) -> float
         return keys.number("tension_N", f"a tension above 0 N, at most {most:.0e} N", above=0.0, most=most)
     expected = f"a displacement above -{length_mm:g} mm, the wire's length, and of at most {STRETCH:g} times it"
     return keys.number("displacement_mm", expected, above=-length_mm, most=STRETCH * length_mm)
+
+
+def toml_of(experiment: Experiment, comments: Sequence[str] = (), unrecorded: Sequence[Entry] = ()) -> str:
+    """The experiment file of a test whose readings stand in ``NAME.csv`` beside it.
+
+    Parameters
+    ----------
+    comments : sequence of str
+        Sentences at its head.
+    unrecorded : sequence of dict
+        Holds without a record.
+    """
+    lines = [f"# {comment}" for comment in comments]
+    lines.append("[[experiment]]")
+    lines.append(f"name = {_string(experiment.name)}")
+    lines.append(f"material = {_string(experiment.material)}")
+    lines.append(f"length_mm = {float(experiment.length_mm)!r}")
+    if experiment.control != "displacement":
+        lines.append(f"control = {_string(experiment.control)}")
+    if experiment.resolution:
+        lines.append(f"{RESOLUTION[experiment.control]} = {float(experiment.resolution)!r}")
+    lines.append(f"readings = {_string(experiment.name + '.csv')}")
+    if unrecorded:
+        entries = ", ".join(map(_toml_of_entry, unrecorded))
+        lines.append(f"unrecorded_holds = [{entries}]")
+    return "\n".join(lines) + "\n"
+
+
+def _toml_of_entry(entry: Entry) -> str:
+    """A hold without a record, as a table in a line."""
+    values = ", ".join(f"{key} = {value!r}" for key, value in entry.items())
+    return f"{{ {values} }}"
+
+
+def _string(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)

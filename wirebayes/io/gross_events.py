@@ -14,7 +14,7 @@ from wirebayes.io.checked_test import reading_noise
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold
 from wirebayes.numeric.typing import Floats, Ints
-from wirebayes.sentences import counted, listed, short
+from wirebayes.sentences import counted, holds_in_words, short
 from wirebayes.wire.protocol import Protocol
 
 NOTHING = 0.03  # of the reading before: no wire relaxes so far from one reading to the next
@@ -80,7 +80,7 @@ class _Test:
         numbers = np.unique(self.number[readings])
         if len(numbers) > 2 and np.isin(self.number[readings[0] : readings[-1] + 1], numbers).all():
             return f"holds {numbers[0]} to {numbers[-1]}"
-        return f"hold{'s' * (len(numbers) > 1)} {listed([str(n) for n in numbers])}"
+        return holds_in_words(numbers)
 
 
 def of_readings(protocol: Protocol, readings: Floats, resolution: float) -> list[Event]:
@@ -170,15 +170,16 @@ def without_gross_events(experiment: Experiment, events: Sequence[Event]) -> Exp
     begin = 0
     for hold in experiment.holds:
         end = begin + hold.time_s.size
-        kept = [reading not in dropped for reading in range(begin, end)]
-        holds.append(hold.of_readings(np.array(kept, dtype=bool)))
+        kept = np.array([reading not in dropped for reading in range(begin, end)], dtype=bool)
+        holds.append(hold.of_readings(kept))
         begin = end
     while holds and not holds[-1].recorded:
         holds.pop()
     last_reading = begin - 1
     if holds and last_reading in dropped:  # how long the last one was as it should be, its last reading says
-        last = holds[-1]
-        holds[-1] = replace(last, duration_s=float(last.time_s[-1]))
+        last = holds.pop()
+        duration_s = float(last.time_s[-1])
+        holds.append(replace(last, duration_s=duration_s))
     return replace(experiment, holds=tuple(holds))
 
 
@@ -259,22 +260,24 @@ def _jumps(test: _Test) -> list[Event]:
     What a further weight adds is taken from the holds before. A hold with less weight than the one before may give back
     what it likes, and the first two holds have nothing to compare with.
     """
-    for i in np.flatnonzero(test.hold >= 2).tolist():
-        begins = test.hold[i] != test.hold[i - 1]
-        sudden = begins or test.time_s[i] <= SUDDEN * test.time_s[i - 1]
+    hold, time_s, setting, read = test.hold, test.time_s, test.setting, test.read
+    for i in np.flatnonzero(hold >= 2).tolist():
+        begins = hold[i] != hold[i - 1]
+        sudden = begins or time_s[i] <= SUDDEN * time_s[i - 1]
         if not sudden:
             continue
         jump = _beyond_weight(test, i)
-        weight_before = test.setting[test.hold < test.hold[i]][-1]
-        if jump < 0.0 and test.setting[i] < weight_before:
+        weight_before = setting[hold < hold[i]][-1]
+        if jump < 0.0 and setting[i] < weight_before:
             continue
-        before = np.ptp(test.read[:i])
-        if abs(jump) > max(JUMP * before, MOVED * test.noise) and _stays_away(test.read, i, jump):
+        before = np.ptp(read[:i])
+        usual = max(JUMP * before, MOVED * test.noise)
+        if abs(jump) > usual and _stays_away(read, i, jump):
             text = (
                 f"displacement jumps by {short(jump, 3)} mm in {test.place(i)} and stays there: did the wire break "
                 "or slip? leave these readings out"
             )
-            return [Event("break", text, np.arange(i, len(test.read)))]
+            return [Event("break", text, np.arange(i, len(read)))]
     return []
 
 
@@ -296,20 +299,21 @@ def _stays_away(read: Floats, i: int, jump: float) -> bool:
 
 def _limits(test: _Test, resolution: float) -> list[Event]:
     """The same extreme value again and again while the setting moves."""
+    read, unit = test.read, test.unit
     events = []
-    set_what = "displacement" if test.unit == "N" else "tension"
+    set_what = "displacement" if unit == "N" else "tension"
     step = max(resolution, test.noise)
-    largest, smallest = test.read.max(), test.read.min()
-    nothing = max(NOTHING * float(np.abs(test.read).max()), MOVED * step)
-    for kind, value, word in (("saturation", largest, "largest"), ("clipped", smallest, "smallest")):
-        at = np.flatnonzero(test.read == value)
+    nothing = max(NOTHING * float(np.abs(read).max()), MOVED * step)
+    for kind, value, word in (("saturation", read.max(), "largest"), ("clipped", read.min(), "smallest")):
+        at = np.flatnonzero(read == value)
         if len(at) < AT_LIMIT or value <= nothing:  # a slack wire rightly reads nothing, or a little less
             continue
-        expected = _slope_beside(test, at) * float(np.ptp(test.setting[at]))
+        moved = float(np.ptp(test.setting[at]))
+        expected = _slope_beside(test, at) * moved
         if expected <= MOVED * step:
             continue
         text = (
-            f"{len(at)} readings in {test.holds(at)} all read {value:g} {test.unit}, the {word} of the test, while the "
+            f"{len(at)} readings in {test.holds(at)} all read {value:g} {unit}, the {word} of the test, while the "
             f"{set_what} changes: the sensor or its amplifier is at its limit; leave these readings out"
         )
         events.append(Event(kind, text, at))

@@ -23,20 +23,23 @@ def write_next_hold(experiment: Experiment, folder: Path, *, hold_by_hold: bool 
         Whether it was fitted so: a hold is then predicted from its first reading, and the example is a tested hold
         once more, from where that began.
     """
+    control = experiment.control
     last = example = experiment.recorded_holds[-1]
     setting = _one_step_further(experiment)
     if hold_by_hold:
         example = max(experiment.recorded_holds, key=lambda hold: float(hold.readings[0]))
         setting = example.setting
     number = int(last.number or 0) + 1
-    header = ["hold", SET[experiment.control], "time_s"]
-    rows: list[list[object]] = [[number, setting, time] for time in _some_of_its_times(example)]
+    header = ["hold", SET[control], "time_s"]
+    rows: list[list[object]] = []
+    for time in _some_of_its_times(example):
+        rows.append([number, setting, time])
     if last.temperature_C is not None:
         header.append("temperature_C")
         for row in rows:
             row.append(float(last.temperature_C[-1]))
     if hold_by_hold:
-        header.append(READ[experiment.control])
+        header.append(READ[control])
         first, *others = rows
         first.append(float(example.readings[0]))
         for row in others:

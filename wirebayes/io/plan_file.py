@@ -155,6 +155,7 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
 
 def _planned(keys: Keys, index: int) -> PlannedTest:
     control = control_of(keys)
+    by_weights = control == "force"
     of_settings, step, of_resolution = _SET[control]
     keys.only((*_KEYS, of_settings, step, of_resolution))
     name = keys.string("name", "a name", f"protocol-{index + 1}")
@@ -165,7 +166,7 @@ def _planned(keys: Keys, index: int) -> PlannedTest:
     if of_resolution in keys.table:
         expected = f"a step of 0 {READ_UNIT[control]} or more"
         resolution = keys.number(of_resolution, expected, least=0.0, most=LARGEST[READ[control]])
-    path = _weights(keys) if control == "force" else _displacements(keys, length)
+    path = _weights(keys) if by_weights else _displacements(keys, length)
     if "unload" in keys.table:
         most = len(path) - 1
         back = keys.whole("unload", f"a whole number of holds on the way back, 0 to {most}", 0, most)

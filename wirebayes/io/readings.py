@@ -202,15 +202,18 @@ class _Rows:
         """Whether a hold begins in a row; otherwise it has the setting of the row before, and a later time."""
         if not row:
             return True
-        before, column = row - 1, SET[self.control]
+        before = row - 1
         number, last = self.number[row], self.number[before]
         if number > last:
             return True
         if number < last:
-            together = " (its rows must stand together)" if number in self.number[:row] else ""
+            seen = number in self.number[:row]
+            together = " (its rows must stand together)" if seen else ""
             raise self.complain(row, "hold", f"a hold number above {last}{together}")
         if self.setting[row] != self.setting[before]:
-            raise self.complain(row, column, f"{self.table.cell(before, column)} as before in hold {number}")
+            column = SET[self.control]
+            cell = self.table.cell(before, column)
+            raise self.complain(row, column, f"{cell} as before in hold {number}")
         if self.time_s[row] <= self.time_s[before]:
             earlier = self.table.cell(before, "time_s")
             raise self.complain(row, "time_s", f"a time after {earlier} s in hold {number}")
@@ -329,10 +332,13 @@ def times_run_on(times_s: Sequence[Floats]) -> float:
 
 def _check_sign(table: CsvTable, holds: Sequence[Hold]) -> None:
     """Refuse tensions that are clearly a push: a wire only pulls, and a slack one reads nothing but noise."""
+    if len(holds) < 3:
+        return
     tension = np.concatenate([hold.tension_N for hold in holds])
     means = np.array([hold.tension_N.mean() for hold in holds])
     place = np.array([hold.displacement_mm for hold in holds])
-    if len(holds) < 3 or np.ptp(place) == 0 or np.ptp(means) == 0:
+    span = np.ptp(means)
+    if np.ptp(place) == 0 or span == 0:
         return
     largest_pull = max(tension.max(), 0.0)
     if -tension.min() < PUSH * largest_pull:
@@ -340,11 +346,14 @@ def _check_sign(table: CsvTable, holds: Sequence[Hold]) -> None:
     variances = [hold.tension_N.var() for hold in holds]
     within = np.sqrt(np.mean(variances))
     follows = float(np.corrcoef(place, means)[0, 1])
-    if abs(follows) <= FOLLOWS or np.ptp(means) <= PUSH * within:
+    if abs(follows) <= FOLLOWS or span <= PUSH * within:
         return
-    change = "change the sign of tension_N" if follows < 0 else "undo the zeroing of tension_N"
-    if follows > 0 and place.max() <= 0:  # a machine that counts compression positive
+    if follows < 0:
+        change = "change the sign of tension_N"
+    elif place.max() <= 0:  # a machine that counts compression positive
         change = "change the signs of displacement_mm and of tension_N"
+    else:
+        change = "undo the zeroing of tension_N"
     row = int(tension.argmin())
     expected = f"a pull counted positive: {change} (a slack wire reads 0 N)"
     raise table.complain(row, "tension_N", table.cell(row, "tension_N"), expected)

@@ -76,21 +76,21 @@ def zero_shift(readings: CheckedTest) -> str:
 
 def _moves(readings: CheckedTest, way: float) -> _Moves:
     """The moves of one way; a move after a reversal shows friction, and one of a slack wire nothing."""
-    each, forces = readings.each, readings.protocol.control == "displacement"
+    each, setting = readings.each, readings.setting
     first = np.array([row[0] for row in each])
     last = np.array([row[-1] for row in each])
     # where there is a single reading, that one
-    second = np.array([row[min(1, len(row) - 1)] for row in each])
-    last_but_one = np.array([row[max(-2, -len(row))] for row in each])
-    moved = np.diff(readings.setting)
+    second = np.array([row[:2][-1] for row in each])
+    last_but_one = np.array([row[-2:][0] for row in each])
+    moved = np.diff(setting)
     used = _of_one_way(readings, moved, way)
-    if forces:
+    if readings.protocol.control == "displacement":
         weakest = np.minimum(first[1:], last[:-1])
         used &= weakest > slack_below(readings)
     at = np.flatnonzero(used)
     added = first[1:] - last[:-1]
     inner = second[1:] - last_but_one[:-1]
-    middle = readings.setting[:-1] + 0.5 * moved
+    middle = setting[:-1] + 0.5 * moved
     return _Moves(at + 1, added[at], inner[at], moved[at], middle[at])
 
 
@@ -119,20 +119,24 @@ def _late(readings: CheckedTest) -> Bools:
 
 def _shift(moves: _Moves, noise: float) -> tuple[float, int, float, float] | None:
     """How far the step that stands out most does so, its hold, what it adds, and what was expected of it."""
-    if len(moves.hold) < FEWEST:
+    added = moves.added
+    if len(added) < FEWEST:
         return None
-    off, inner = moves.off(moves.added), moves.off(moves.inner)
+    off = moves.off(added)
+    inner = moves.off(moves.inner)
     sizes = np.abs(off)
-    expected = moves.added - off
-    scatter = _scatter(moves.added, sizes, noise)
-    usual = float(np.median(np.abs(moves.added)))
-    large = sizes > OF_A_MOVE * np.maximum(usual, np.abs(expected))
+    expected = added - off
+    scatter = _scatter(added, sizes, noise)
+    usual = float(np.median(np.abs(added)))
+    of_a_move = np.maximum(usual, np.abs(expected))
+    large = sizes > OF_A_MOVE * of_a_move
     found = []
     for i in np.flatnonzero(large).tolist():
         others = float(np.quantile(np.delete(sizes, i), 0.9))
         excess = float(sizes[i] / max(others, scatter))
         if excess > STANDS_OUT and _stays(moves.hold, off, inner, i):
-            found.append((excess, int(moves.hold[i]), float(moves.added[i]), float(expected[i])))
+            hold = int(moves.hold[i])
+            found.append((excess, hold, float(added[i]), float(expected[i])))
     return max(found, default=None)
 
 

@@ -43,11 +43,12 @@ def claim_step_rows(
         Median drift, mm, its 5 and 95 % quantiles over draws (and poses), and whether the median is within the claim.
     """
     robot = schema.read_robot_file(robot_name)
+    length_mm = 1e3 * draws.nominal_length(robot)[:, None]
     out = []
     for wire, line in chains.items():
         published = {name: np.array([table_4[wire][name]]) for name in draws.CORE}
         strain = draws.for_robot(robot, WireDraws(published, lengths_mm[wire]))
-        literal = replace(strain, length_mm=1e3 * draws.nominal_length(robot)[:, None])
+        literal = replace(strain, length_mm=length_mm)
         known = draws.for_robot(robot, line)
         space = claim.over_workspace(robot, known, claim.grid(robot, _GRID))
         drifts_mm = (
@@ -57,7 +58,8 @@ def claim_step_rows(
             1e3 * space.distance_m.ravel(),
         )
         for step, drift_mm in zip(STEPS, drifts_mm, strict=True):
-            out.append({"experiment": wire, "robot": robot_name, "step": step, **_quantiles(drift_mm)})
+            row = {"experiment": wire, "robot": robot_name, "step": step}
+            out.append(row | _quantiles(drift_mm))
     return out
 
 

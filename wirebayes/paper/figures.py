@@ -103,17 +103,21 @@ def drifts(rows: Sequence[Mapping[str, Any]], limit_mm: float, title: str) -> Fi
     """
     figure, axes = panel("drift within a minute, mm", "", title)
     names = column_values(rows, "experiment")
-    shown = [row for row in rows if row["specimen_spread"] > 0]
-    for row in shown:
-        loaded = row["loaded_before_s"] > 0
-        shift, colour = (-0.14, CHAIN) if loaded else (0.14, HOLD)
+    hours = set()
+    for row in rows:
+        if row["specimen_spread"] <= 0:
+            continue
+        shift, colour = 0.14, HOLD
+        loaded_s = row["loaded_before_s"]
+        if loaded_s > 0:
+            shift, colour = -0.14, CHAIN
+            hours.add(loaded_s / 3600.0)
         y = len(names) - names.index(row["experiment"]) + shift
         ends = [row["q05_drift_mm"], row["q95_drift_mm"]]
         axes.plot(ends, [y, y], lw=3.2, color=colour, solid_capstyle="butt")
         axes.plot([row["q50_drift_mm"]], [y], "o", ms=5, color=colour)
     axes.plot([], [], color=HOLD, lw=3.2, label="new wires")
-    hours = sorted({row["loaded_before_s"] / 3600.0 for row in shown if row["loaded_before_s"] > 0})
-    for time_h in hours:
+    for time_h in sorted(hours):
         axes.plot([], [], color=CHAIN, lw=3.2, label=f"after {time_h:g} h under load")
     axes.axvline(limit_mm, color=INK, lw=1, ls="--", label=f"the paper: less than {limit_mm:g} mm")
     logarithmic(axes)

@@ -71,12 +71,12 @@ def forecast_held_out(stored: Stored, experiment: Experiment, rng: Generator) ->
     unused = protocol.recorded.copy()
     unused[:trained] = False
     wanted = protocol.mask & unused[:, None]
+    first = np.full(len(measured), np.nan)
     if stored.likelihood == "hold":
-        request = PredictionRequest(protocol, 0, unused, measured[:, 0])
+        first = measured[:, 0]
+        trained = 0
         wanted[:, 0] = False
-    else:
-        nothing = np.full(len(measured), np.nan)
-        request = PredictionRequest(protocol, trained, unused, nothing)
+    request = PredictionRequest(protocol, trained, unused, first)
     drawn = draw_predictive(stored.problem, some(stored.theta), stored.sample, request, rng)
     number = np.broadcast_to(protocol.number[:, None], wanted.shape)
     return Forecast(number[wanted], protocol.time_s[wanted], measured[wanted], drawn[wanted])

@@ -75,17 +75,21 @@ def tension_residuals(experiment: Experiment, theta: Mapping[str, Array], varian
     (H, R, n) array, N
         NaN where nothing is predicted: padding, and hold by hold the first reading of each hold.
     """
-    protocol, measured = experiment.protocol(), experiment.tension()[..., None]
+    protocol = experiment.protocol()
+    measured = experiment.tension()[..., None]
     model = Model(variant.law, variant.history)
-    if variant.likelihood == "hold":
-        predicted = np.full((*measured.shape[:2], len(theta["k1"])), np.nan)
-        for j, course in enumerate(hold_courses(protocol, dict(theta), model, measured[:, 0])):
+    if variant.likelihood != "hold":
+        predicted = simulate(protocol, theta, model)
+    else:
+        n = len(theta["k1"])
+        predicted = np.full((*protocol.mask.shape, n), np.nan)
+        courses = hold_courses(protocol, dict(theta), model, measured[:, 0])
+        for j, course in enumerate(courses):
             if course is not None:
                 tension, _, valid = course
                 predicted[j, 1:] = np.where(valid, tension[1:], np.nan)
-    else:
-        predicted = simulate(protocol, theta, model)
-    return np.where(protocol.mask[..., None], measured - predicted, np.nan)
+    read = protocol.mask[..., None]
+    return np.where(read, measured - predicted, np.nan)
 
 
 def rms(residuals_N: Array) -> float:
@@ -120,13 +124,20 @@ def identify(
     search = _Search(experiment, variant, known, names, logarithmic)
     prior = default_prior(experiment.length_mm, scales_of([experiment]), {})
     columns = [prior.names.index(name) for name in names]
-    low, high = _bounds(search, prior.rvs(_WIDE, rng)[:, columns])
-    points = _logged(prior.rvs(_DRAWS, rng)[:, columns], logarithmic)
+
+    def drawn(n: int) -> Array:
+        return prior.rvs(n, rng)[:, columns]
+
+    low, high = _bounds(search, drawn(_WIDE))
+    points = _logged(drawn(_DRAWS), logarithmic)
     end, cost = _best_descent(search.misfit, points, low, high)
     found = search.natural(end[None])
-    ordered = {name: float(found[name][0]) for name in adjusted(variant)}
+    ordered = {}
+    for name in adjusted(variant):
+        ordered[name] = float(found[name][0])
     error = cost * _per_unit_misfit(search.misfit, end)
-    return LeastSquaresFit(ordered, cost, _at_an_edge(names, end, low, high, error))
+    at_an_edge = _at_an_edge(names, end, low, high, error)
+    return LeastSquaresFit(ordered, cost, at_an_edge)
 
 
 def _at_an_edge(names: Sequence[str], end: Array, low: Array, high: Array, error: Array) -> tuple[str, ...]:

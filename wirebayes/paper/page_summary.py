@@ -26,15 +26,20 @@ TWO_MINUTES_S = 120.0  # the paper's longest hold
 
 
 def _measured(rows: Rows) -> Points:
-    samples = listed([f"{row['material']} ({row['length_mm'] / 1000:g} m)" for row in rows])
-    readings = sum(row["readings"] for row in rows)
+    samples, losses = [], []
+    readings = 0
+    for row in rows:
+        length_m = row["length_mm"] / 1000
+        samples.append(f"{row['material']} ({length_m:g} m)")
+        losses.append(row["median_loss_percent"])
+        readings += row["readings"]
     low = min(row["smallest_tension_N"] for row in rows)
     high = max(row["largest_tension_N"] for row in rows)
-    losses = [row["median_loss_percent"] for row in rows]
+    loss = _percent(min(losses), max(losses))
     points = [
-        f"{counted(len(rows), 'sample')}: {samples}.",
+        f"{counted(len(rows), 'sample')}: {listed(samples)}.",
         f"Each was stretched step by step and held: {readings} tensions, from {low:.2f} to {high:.2f} N.",
-        f"Within one hold a wire typically lost {_percent(min(losses), max(losses))} of its tension.",
+        f"Within one hold a wire typically lost {loss} of its tension.",
     ]
     return Points("What was measured", points)
 
@@ -86,9 +91,15 @@ def _open(tables: dict[str, Rows]) -> Points:
 
 def _not_determined(rows: Rows) -> list[str]:
     """The parameters that the readings leave open, hold by hold and as one history."""
-    loose = [row for row in rows if row["verdict"] == "not determined" and "*" not in row["parameter"]]
-    alone = list(dict.fromkeys(row["parameter"] for row in loose if row["likelihood"] == "hold"))
-    chain = [f"{row['parameter']} of {unbroken(row)}" for row in loose if row["likelihood"] == "chain"]
+    alone, chain = [], []
+    for row in rows:
+        name = row["parameter"]
+        if row["verdict"] != "not determined" or "*" in name:
+            continue
+        if row["likelihood"] == "chain":
+            chain.append(f"{name} of {unbroken(row)}")
+        elif name not in alone:
+            alone.append(name)
     points = []
     if alone:
         factor = min(row["q95"] / row["q05"] for row in _of(rows, "hold", "k1"))

@@ -60,7 +60,8 @@ def interval_table(rows: Rows, caption: str) -> Table:
         header += [f"{likelihood}: 90 % interval", "contraction", "verdict"]
     lines = []
     for chain, alone in _pairs(rows, "parameter"):
-        name = with_unit(chain["parameter"].replace("*", "·"), chain["unit"])
+        parameter = chain["parameter"].replace("*", "·")
+        name = with_unit(parameter, chain["unit"])
         line = [chain["experiment"], name, number(chain["published"], 4)]
         for row in (chain, alone):
             line += [span(row["q05"], row["q95"]), percent(row["contraction"]), row["verdict"]]
@@ -86,11 +87,14 @@ def creep(rows: Rows, caption: str) -> Table:
     for likelihood in LIKELIHOOD.values():
         header += [f"{likelihood}, mm", "90 % interval"]
     lines = []
-    for r, s in _pairs(rows, "time_s"):
-        line = [r["experiment"], f"{r['tension_N']:.2f}", _TIMES.get(r["time_s"], f"{r['time_s']:g} s")]
-        line.append(number(r["published_mm"]))
-        for q in (r, s):
-            line += [number(q["q50_mm"]), span(q["q05_mm"], q["q95_mm"])]
+    for of_chain, alone in _pairs(rows, "time_s"):
+        time_s = of_chain["time_s"]
+        after = _TIMES.get(time_s, f"{time_s:g} s")
+        tension = f"{of_chain['tension_N']:.2f}"
+        line = [of_chain["experiment"], tension, after, number(of_chain["published_mm"])]
+        for row in (of_chain, alone):
+            interval = span(row["q05_mm"], row["q95_mm"])
+            line += [number(row["q50_mm"]), interval]
         lines.append(line)
     return Table(header, lines, caption)
 

@@ -24,6 +24,7 @@ from wirebayes.report.blocks import number, svg
 from wirebayes.results.read_back import Stored
 from wirebayes.wire.laws import creep_fraction
 
+_ByKind = Mapping[str, Mapping[str, Array]]  # draws of each parameter, hold by hold and of the chain
 INDEX = "index.json"
 
 
@@ -122,34 +123,24 @@ class Gallery:
         self._amount_and_rate(e, published, draws, full["hold"].draws)
 
     def _stiffness_and_amount(
-        self,
-        e: Experiment,
-        published: Mapping[str, float],
-        draws: Mapping[str, Mapping[str, Array]],
-        by_hold: Mapping[str, Array],
+        self, e: Experiment, published: Mapping[str, float], draws: _ByKind, by_hold: Mapping[str, Array]
     ) -> None:
         stiffness = published["k1"]
-        mark = (stiffness, published["B"])
         k1 = {kind: own["k1"] for kind, own in draws.items()}
         amount = {kind: own["B"] for kind, own in draws.items()}
-        xlabel, ylabel = figures.axis_label("k1"), figures.axis_label("B")
+        xlabel = figures.axis_label("k1")
+        ylabel = figures.axis_label("B")
+        mark = (stiffness, published["B"])
         figure = figures.joint(k1, amount, xlabel, ylabel, e.name, mark)
         low, high = np.quantile(by_hold["k1"], [0.05, 0.95])
-        caption = f"Hold by hold, k1 may be anything from {number(low, 2)} to {number(high, 2)} N if B changes with it."
-        jump = stiffest_step(e)
-        relative = jump / stiffness - 1
-        if abs(relative) < 0.02:
-            nearest = f"{number(stiffness, 4)} N is within 2 % of the stiffest single step between two holds"
-            caption += f" The published {nearest}, {number(jump, 4)} N."
+        span = f"{number(low, 2)} to {number(high, 2)} N"
+        caption = f"Hold by hold, k1 may be anything from {span} if B changes with it."
+        caption += _near_the_stiffest_step(e, stiffness)
         alt = f"Posterior draws of k1 and B of {e.name}: a long ridge hold by hold, a small cloud as a chain."
         self.add("ridge", e.name, figure, alt, caption)
 
     def _amount_and_rate(
-        self,
-        e: Experiment,
-        published: Mapping[str, float],
-        draws: Mapping[str, Mapping[str, Array]],
-        by_hold: Mapping[str, Array],
+        self, e: Experiment, published: Mapping[str, float], draws: _ByKind, by_hold: Mapping[str, Array]
     ) -> None:
         rate = {kind: own["k2"] for kind, own in draws.items()}
         amount = {kind: own["k1"] * own["B"] for kind, own in draws.items()}
@@ -161,12 +152,10 @@ class Gallery:
         correlations = np.corrcoef(log_amount, log_rate)
         correlation = number(float(correlations[0, 1]), 3)
         time_s = e.recorded_holds[-1].duration_s
-        their_rate, their_shape = np.asarray(published["k2"]), np.asarray(published["N"])
-        fraction = creep_fraction(np.asarray(time_s), their_rate, their_shape)
-        share = f"{100 * float(fraction):.0f} %"
+        percent = 100 * _published_fraction(published, time_s)
         caption = (
             f"Correlation hold by hold {correlation} (of logarithms). By the paper's own numbers a hold of "
-            f"{time_s:g} s shows {share} of the final creep."
+            f"{time_s:g} s shows {percent:.0f} % of the final creep."
         )
         alt = f"Posterior draws of k2 and k1 B of {e.name}: much slow creep looks like little fast creep."
         self.add("amount-and-rate", e.name, figure, alt, caption)
@@ -186,6 +175,21 @@ def _published_at(e: Experiment, published: Mapping[str, float], out: Forecast) 
     left = tension_residuals(e, at(published), ModelSpec(likelihood="hold"))[..., 0]
     wanted = np.isfinite(left) & np.isin(e.protocol().number, out.hold)[:, None]
     return np.asarray((e.tension() - left)[wanted])
+
+
+def _near_the_stiffest_step(e: Experiment, stiffness: float) -> str:
+    """That a published stiffness is that of the stiffest single step, in a sentence; empty where it is not."""
+    jump = stiffest_step(e)
+    if abs(jump / stiffness - 1) >= 0.02:
+        return ""
+    nearest = f"{number(stiffness, 4)} N is within 2 % of the stiffest single step between two holds"
+    return f" The published {nearest}, {number(jump, 4)} N."
+
+
+def _published_fraction(published: Mapping[str, float], time_s: float) -> float:
+    """The share of the final creep that shows after a time, by the paper's numbers."""
+    rate, shape = np.asarray(published["k2"]), np.asarray(published["N"])
+    return float(creep_fraction(np.asarray(time_s), rate, shape))
 
 
 def stiffest_step(e: Experiment) -> float:

@@ -191,15 +191,18 @@ def _rows(
 ) -> dict[str, list[Row]]:
     """What each table says of one experiment."""
     out: dict[str, list[Row]] = {"posterior": [], "creep": [], "held_out": [], "sampling": []}
+    name = e.name
     for likelihood in LIKELIHOODS:
-        draws = full[likelihood].draws
-        tension = full[likelihood].sample.tested_tension_N
+        stored = full[likelihood]
+        draws = stored.draws
+        tension = stored.sample.tested_tension_N
         prior = _prior_draws(e, likelihood, seed)
-        out["posterior"] += verdicts.verdict_rows(e.name, likelihood, draws, prior, published)
-        out["creep"] += verdicts.creep_rows(e.name, likelihood, draws, published, tension, e.length_mm)
-        out["held_out"].append(_forecast_row(e.name, likelihood, seen[likelihood]))
+        out["posterior"] += verdicts.verdict_rows(name, likelihood, draws, prior, published)
+        out["creep"] += verdicts.creep_rows(name, likelihood, draws, published, tension, e.length_mm)
+        out["held_out"].append(_forecast_row(name, likelihood, seen[likelihood]))
         for suffix in ("", f"-first-{training}"):
-            out["sampling"].append(_sampling_row(directory, e.name, likelihood, suffix))
+            sampling = _sampling_row(directory, name, likelihood, suffix)
+            out["sampling"].append(sampling)
     return out
 
 

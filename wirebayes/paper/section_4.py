@@ -44,15 +44,17 @@ def drift_rows(chains: Mapping[str, Stored], seed: int) -> list[Row]:
     ----------
     chains : mapping of wire name to Stored
     """
+    robots = {name: schema.read_robot_file(name) for name in ROBOTS}
     out = []
     for wire, stored in chains.items():
         line = as_line(stored)
-        for name in ROBOTS:
-            robot = schema.read_robot_file(name)
+        for name, robot in robots.items():
+            places = claim.grid(robot, _GRID)
             for spread, loaded_s in CASES:
-                rng = np.random.default_rng(seed_of(seed, "robot", wire, name, f"{spread} {loaded_s}"))
+                own_seed = seed_of(seed, "robot", wire, name, f"{spread} {loaded_s}")
+                rng = np.random.default_rng(own_seed)
                 wires = draws.for_robot(robot, line, spread, rng)
-                found = claim.over_workspace(robot, wires, claim.grid(robot, _GRID), loaded_s=loaded_s)
+                found = claim.over_workspace(robot, wires, places, loaded_s=loaded_s)
                 case: Row = {"experiment": wire, "robot": name, "specimen_spread": spread, "loaded_before_s": loaded_s}
                 out.append(case | _drift_row(found))
     return out
@@ -93,10 +95,11 @@ def draw_maps(gallery: Gallery, chains: Mapping[str, Stored]) -> None:
     for wire, stored in chains.items():
         wires = draws.for_robot(robot, as_line(stored, _FEW))
         found = claim.over_workspace(robot, wires, claim.grid(robot, _MAP))
-        median_m = np.nanmedian(found.distance_m, 1)
-        low, high = 1e3 * np.min(median_m), 1e3 * np.max(median_m)
+        median_mm = 1e3 * np.nanmedian(found.distance_m, 1)
+        low = number(np.min(median_mm), 2)
+        high = number(np.max(median_mm), 2)
         captions = {
-            "drift": f"Median drift from {number(low, 2)} to {number(high, 2)} mm across the workspace.",
+            "drift": f"Median drift from {low} to {high} mm across the workspace.",
             "tilt": f"The tilt of {MAPPED} on {wire}, same places.",
         }
         for quantity, figure in workspace_maps(found, wire).items():
@@ -115,14 +118,17 @@ def draw_poses(gallery: Gallery, chains: Mapping[str, Stored], limit_mm: float) 
         The paper's claim, drawn as a line.
     """
     robot = schema.read_robot_file(MAPPED)
-    home_m, rotation = robot.home_m, matrix(robot.home_rotation_rad)
+    home_m = robot.home_m
+    rotation = matrix(robot.home_rotation_rad)
     moved: dict[str, Floats] = {}
     budget: dict[str, dict[str, float]] = {}
     for wire, stored in chains.items():
         line = as_line(stored)
-        course = drift.from_command(robot, draws.for_robot(robot, line), home_m, rotation, _TIMES_S)
+        wires = draws.for_robot(robot, line)
+        course = drift.from_command(robot, wires, home_m, rotation, _TIMES_S)
         if not moved:
-            write_json(gallery.folder / "scene.json", scene_points(robot, home_m, rotation, course))
+            scene = scene_points(robot, home_m, rotation, course)
+            write_json(gallery.folder / "scene.json", scene)
         distance = 1e3 * np.linalg.norm(course.position_m - home_m, axis=-1)
         moved[wire] = np.where(course.found[:, None], distance, np.nan)
         material = {name: line.parameters[name] for name in draws.CORE}

@@ -84,11 +84,11 @@ def sensitivity(
     x = expand(block.target, block.z, trials)
     alike = power.similarity([x], trials, [float(x.ratio[0])])
     strength = np.median(null.norm, axis=0)
-    seen = power.detectable(null, trials, candidates, level)
     effects = {}
-    for name, (trial, amplitude) in seen.items():
+    for name, (trial, amplitude) in power.detectable(null, trials, candidates, level).items():
         found = _power(block, trials[trial].effect, amplitude, float(strength[trial]))
-        found["confused_with"] = [other for other in power.group_of([name], alike) if other != name]
+        group = power.group_of([name], alike)
+        found["confused_with"] = [other for other in group if other != name]
         effects[name] = found
     return Sensitivity(effects, alike, hidden)
 

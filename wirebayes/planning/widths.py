@@ -144,13 +144,22 @@ def expected_widths(
     draws = list[dict[str, Array]]()
     for part in _posteriors(target, found, good, y, rng):
         values = part.of_tests(_quantities(problem, part.theta, creep))
-        widths.append({name: _row_widths(rows, part.weight) for name, rows in values.items()})
+        own = {}
+        for name, rows in values.items():
+            own[name] = _row_widths(rows, part.weight)
+        widths.append(own)
         volumes.append(_log_volume(part, problem))
         draws += _kept(part, values, kept_draws - len(draws), rng)
     before = _quantities(problem, truth, creep)
-    expected = _expected(widths, before, test)
-    bits = _bits(problem, np.concatenate(volumes))
-    return Expected(expected, creep.tension_N, creep.length_mm, creep.longest_s, bits, len(good), tuple(draws))
+    return Expected(
+        _expected(widths, before, test),
+        creep.tension_N,
+        creep.length_mm,
+        creep.longest_s,
+        _bits(problem, np.concatenate(volumes)),
+        len(good),
+        tuple(draws),
+    )
 
 
 @dataclass(frozen=True)
@@ -239,18 +248,20 @@ def _weighted(target: LogPosterior, z: Array, covariance: Array, y: Array, rng: 
     before them lie.
     """
     density, _ = target.rowwise([y])
+    to_natural = target.coordinates.to_natural
     centre = z
     for count in _DRAWS:
-        points, weight = _round(target, density, centre, _WIDER**2 * covariance, count, rng)
+        wide = _WIDER**2 * covariance
+        points, weight = _round(target, density, centre, wide, count, rng)
         centre = np.einsum("mk,mkd->md", weight, points)
         away = points - centre[:, None]
         spread = np.einsum("mk,mki,mkj->mij", weight, away, away)
         covariance = spread + _LEAST * covariance
     flat = points.reshape(-1, z.shape[1])
     with np.errstate(over="ignore"):
-        theta = target.coordinates.to_natural(flat)
+        theta = to_natural(flat)
     # a draw without weight stands for the mode: infinity times nothing would be no number
-    modes = np.repeat(target.coordinates.to_natural(z), _DRAWS[-1], axis=0)
+    modes = np.repeat(to_natural(z), _DRAWS[-1], axis=0)
     counts = weight.reshape(-1, 1) > 0
     return np.where(counts, theta, modes), weight
 
@@ -326,12 +337,14 @@ def _row_widths(values: Array, weight: Array) -> Array:
 
 def _log_volume(part: _Posteriors, problem: Problem) -> Array:
     """(m,) half the log determinant of the covariance of the material's parameters, positive ones as logarithms."""
-    columns = [i for i, name in enumerate(problem.names) if name in MATERIAL]
-    positive = [problem.names[i] in problem.prior.logarithmic for i in columns]
+    names, logarithmic = problem.names, problem.prior.logarithmic
+    columns = [i for i, name in enumerate(names) if name in MATERIAL]
+    positive = [names[i] in logarithmic for i in columns]
     weight = part.weight
-    x = part.theta.reshape(*weight.shape, -1)[..., columns]
-    logs = np.log(np.where(positive, np.maximum(x, 1e-300), 1.0))
-    x = np.where(positive, logs, x)
+    theta = part.theta.reshape(*weight.shape, -1)
+    x = theta[..., columns]
+    above_zero = np.where(positive, np.maximum(x, 1e-300), 1.0)
+    x = np.where(positive, np.log(above_zero), x)
     mean = np.einsum("mk,mkd->md", weight, x)
     away = x - mean[:, None]
     covariance = np.einsum("mk,mki,mkj->mij", weight, away, away)

@@ -181,17 +181,20 @@ def _from_first_readings(test: _HeldOutTest, rng: np.random.Generator) -> Scores
 
 def _along_the_chain(test: _HeldOutTest, rng: np.random.Generator) -> tuple[Scores, Scores]:
     """The holds predicted from the training alone, and each given its first reading."""
-    nothing = np.full(len(test.requested), np.nan)
+    holds = len(test.requested)
+    nothing = np.full(holds, np.nan)
     drawn = test.predicted(nothing, rng)
     elpd, elpd_given, together = _chain_scores(test)
     free = test.scores(drawn, test.unseen, elpd, together)
     # Each hold given its own first reading alone, as the paper's figures were made.
-    positions = np.arange(len(test.requested))
+    positions = np.arange(holds)
     for hold in np.flatnonzero(test.requested):
         only = positions == hold
         first = np.where(only, test.tension[:, 0], np.nan)
-        drawn = given_first(drawn, test.request(only, first))
-    return free, test.scores(drawn, test.later, elpd_given)
+        request = test.request(only, first)
+        drawn = given_first(drawn, request)
+    given = test.scores(drawn, test.later, elpd_given)
+    return free, given
 
 
 def _scores(
@@ -233,16 +236,17 @@ def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[
     """
     rows, n = draws.shape
     levels = np.linspace(0.0, 1.0, 101)
-    ranks = np.argsort(np.argsort(draws, axis=1), axis=1)
+    order = np.argsort(draws, axis=1)
+    ranks = np.argsort(order, axis=1)
     pit = (ranks + 0.5) / n
-    observed_pit = (draws < observed[:, None]).mean(axis=1)
+    below = draws < observed[:, None]
+    observed_pit = below.mean(axis=1)
     # how many readings lie below each level, in each draw and in what was observed
     counts = np.stack([(pit <= level).sum(axis=0) for level in levels])
     own = (observed_pit[:, None] <= levels).sum(axis=0)
     extreme = _most_extreme(counts, own, rows)
     of_draws, of_observed = extreme[:-1], extreme[-1]
-    pointwise = np.quantile(of_draws, 1.0 - probability)
-    half = pointwise / 2.0
+    half = np.quantile(of_draws, 1.0 - probability) / 2.0
     shares = [min(half, 0.5), max(1.0 - half, 0.5)]
     ends = np.quantile(counts / rows, shares, axis=1)
     band = np.vstack([levels, ends])
@@ -282,21 +286,22 @@ def _chain_scores(test: _HeldOutTest) -> tuple[Array, Array, float]:
 
 def _chain_densities(test: _HeldOutTest, theta: Array) -> tuple[Array, Array, Array]:
     """Log densities (holds, n) of whole holds and of their first readings, and (n,) of all together, at draws."""
-    protocol = test.protocol
+    protocol, here = test.protocol, test.here
     read = test.tension[..., None]
     later = test.unseen
     firsts = later.copy()
     firsts[:, 1:] = False
     trained_on = protocol.mask & ~test.requested[:, None]
-    own = test.fitted.problem.parameters(theta, test.here)
-    line = linearise(protocol, own, test.here.model)
-    noise = test.here.variance(own), own["setting_sd"]
+    own = test.fitted.problem.parameters(theta, here)
+    line = linearise(protocol, own, here.model)
+    noise = here.variance(own), own["setting_sd"]
     with np.errstate(all="ignore"):
         before = likelihoods.chain(line, read, trained_on, *noise)
         whole = likelihoods.held_out_density(line, before, read, later, *noise)
         first = likelihoods.held_out_density(line, before, read, firsts, *noise)
         every = likelihoods.chain(line, read, protocol.mask, *noise)
-    together = every.log_likelihood[test.requested].sum(axis=0)
+    of_requested = every.log_likelihood[test.requested]
+    together = of_requested.sum(axis=0)
     return whole, first, together
 
 

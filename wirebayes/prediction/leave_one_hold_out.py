@@ -216,15 +216,17 @@ def log_mean(log_p: Floats, log_p_weighted: Floats) -> tuple[float, float]:
     other = log_p_weighted
 
     def unbalanced(middle: float) -> float:
-        return float(expit(one - middle).sum() - expit(middle - other).sum())
+        above = expit(one - middle).sum()
+        below = expit(middle - other).sum()
+        return float(above - below)
 
     low = min(one.min(), other.min())
     high = max(one.max(), other.max())
     span = high - low + np.log(len(log_p) + len(other)) + 1.0
     middle = brentq(unbalanced, low - span, high + span, maxiter=1000)
-    bridge = float(middle + np.log(len(other) / len(log_p)))
-    shared = float(expit(one - middle).sum())
-    return bridge, shared
+    shared = expit(one - middle).sum()
+    bridge = middle + np.log(len(other) / len(log_p))
+    return float(bridge), float(shared)
 
 
 def standard_error(values: Floats) -> float:

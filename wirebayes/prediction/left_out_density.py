@@ -52,19 +52,23 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int, doubt
     elpd = -pool.log_ratio[1:]
     settled = pool.settled[0] & pool.settled[1:]
     _bear_witness(target, holds, pool, settled, doubtful, rng)
-    missing = np.flatnonzero(~settled & (whole_settled | doubtful)).tolist()
-    if missing:
+    missing = ~settled & (whole_settled | doubtful)
+    if missing.any():
         log_whole, known = float(pool.log_integral[0]), whole_settled
         if not whole_settled:
             log_whole, known = _evidence(own, seed_of(seed, "whole"))
-        for m in missing:
-            sample, row = holds[m]
-            without = without_hold(own, sample, row)
-            own_seed = seed_of(seed, str(sample), str(row))
-            log_without, converged = _evidence(without, own_seed)
+        for m in np.flatnonzero(missing).tolist():
+            log_without, converged = _evidence_without(own, holds[m], seed)
             elpd[m] = log_whole - log_without
             settled[m] = known and converged
     return elpd - _log_units(problem, own, holds), settled
+
+
+def _evidence_without(problem: Problem, hold: tuple[int, int], seed: int) -> tuple[float, bool]:
+    """Log evidence of the readings of all holds but one, sample and row, and whether it is known."""
+    sample, row = hold
+    own_seed = seed_of(seed, str(sample), str(row))
+    return _evidence(without_hold(problem, sample, row), own_seed)
 
 
 def _evidence(problem: Problem, seed: int) -> tuple[float, bool]:
@@ -86,16 +90,15 @@ def _bear_witness(
     if not told:
         return
     problem = target.problem
-    told_holds = [holds[m] for m in told]
-    without = without_holds(problem, told_holds)
+    without = without_holds(problem, [holds[m] for m in told])
     found_of_each = searches(target, rng, len(told), without)
     for m, found in zip(told, found_of_each, strict=True):
         column = 1 + m
         left = copy(target)  # in the same coordinates, under the same prior
         left.problem = without_hold(problem, *holds[m])
-        log_integral = pool.log_integral[0] + pool.log_ratio[column]
+        log_integral = float(pool.log_integral[0] + pool.log_ratio[column])
         others = importance.widened(found)
-        overlooked = overlooked_share(left, pool, column, float(log_integral), others, rng)
+        overlooked = overlooked_share(left, pool, column, log_integral, others, rng)
         settled[m] = abs(overlooked) <= _MISSED
 
 
@@ -157,14 +160,17 @@ def joined_densities(target: LogPosterior, holds: Holds) -> Function:
     def densities(z: Array) -> Array:
         theta = target.coordinates.to_natural(z)
         whole, without = target.problem.without_each_hold(theta)
-        of_holds = [without[s][j] for s, j in holds]
+        of_holds = [without[sample][row] for sample, row in holds]
         with np.errstate(all="ignore"):
             prior = target.sampled_prior(theta, z)
             value = prior[:, None] + np.column_stack([whole, *of_holds])
         return or_impossible(value)
 
     def in_chunks(z: Array) -> Array:
-        return np.concatenate([densities(z[start : start + _ROWS]) for start in range(0, len(z), _ROWS)])
+        chunks = []
+        for start in range(0, len(z), _ROWS):
+            chunks.append(densities(z[start : start + _ROWS]))
+        return np.concatenate(chunks)
 
     return in_chunks
 

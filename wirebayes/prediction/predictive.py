@@ -110,10 +110,9 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: Ge
     (H, R, n) array
         Readings of all holds of the protocol.
     """
-    protocol = request.protocol
-    trained = request.trained
+    protocol, trained, requested = request.protocol, request.trained, request.requested
     n = len(own["B"])
-    error = rng.normal(size=(len(request.requested), n)) * own["setting_sd"]
+    error = rng.normal(size=(len(requested), n)) * own["setting_sd"]
     error_again = error.copy()
     if trained:
         error[:trained] = settings_given_readings(own, sample, rng)
@@ -122,9 +121,9 @@ def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: Ge
     walk = Walk(protocol, own, sample.model)
     creep, beside = walk.begin(n)
     out = []
-    for j, requested in enumerate(request.requested):
+    for j, is_requested in enumerate(requested):
         replicate = None
-        if j < trained and requested:
+        if j < trained and is_requested:
             past = list(walk.past)
             replicate, _, _ = walk.hold(j, setting_again[j], creep, beside)
             walk.past = past
@@ -160,20 +159,20 @@ def _normal_equations(own: Theta, sample: Sample) -> tuple[Floats, Floats]:
 
     Hold by hold, so that the whole Jacobian is never in memory.
     """
-    protocol = sample.protocol
-    line = linearise(protocol, own, sample.model)
+    line = linearise(sample.protocol, own, sample.model)
     sensor_sd = np.sqrt(sample.variance(own))
     unit = own["setting_sd"] / sensor_sd
     holds, _, n = line.reading.shape
     carried = np.zeros((holds, n))
     square = np.zeros((n, holds, holds))
     right = np.zeros((n, holds))
-    for j, keep in enumerate(protocol.mask):
+    for j, keep in enumerate(sample.protocol.mask):
         by_error = line.by_creep[j][:, None, :] * carried[None]
         by_error[:, j] = line.by_setting[j]
-        scaled = np.moveaxis(by_error[keep] * unit, -1, 0)
-        left = (sample.readings[j] - line.reading[j])[keep]
-        residual = (left / sensor_sd).T
+        kept = by_error[keep] * unit
+        scaled = np.moveaxis(kept, -1, 0)
+        left = sample.readings[j] - line.reading[j]
+        residual = (left[keep] / sensor_sd).T
         square += np.swapaxes(scaled, 1, 2) @ scaled
         right += np.einsum("nrh,nr->nh", scaled, residual)
         carried = line.carry_by_creep[j] * carried

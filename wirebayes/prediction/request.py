@@ -86,12 +86,18 @@ def _of_tested_sample(file: "_File", stored: Stored) -> ProtocolRequest:
     trained = stored.sample.protocol
     row_of = {int(number): row for row, number in enumerate(trained.number) if number >= 0}
     file.check_repeats(trained, row_of)
-    numbers = [int(hold.number or 0) for hold in file.holds]
-    repeated = np.array([number in row_of for number in numbers])
-    rows = np.array([row_of[number] for number in numbers if number in row_of], int)
-    later = [number for number in numbers if number not in row_of]
-    prediction = _continued(file, trained, rows, repeated)
-    replicates = tuple(trained.number[rows])
+    rows, later, repeated = [], [], []
+    for hold in file.holds:
+        number = int(hold.number or 0)
+        is_known = number in row_of
+        repeated.append(is_known)
+        if is_known:
+            rows.append(row_of[number])
+        else:
+            later.append(number)
+    own_rows = np.array(rows, int)
+    prediction = _continued(file, trained, own_rows, np.array(repeated))
+    replicates = tuple(trained.number[own_rows])
     sentence = _tested(replicates, later, max(row_of), stored.likelihood)
     return ProtocolRequest(stored, prediction, file.holds, sentence)
 
@@ -110,11 +116,13 @@ def _continued(file: "_File", trained: Protocol, rows: Ints, repeated: Bools) ->
     requested[rows] = True
     first = np.full(holds, np.nan)
     first[rows] = file.first[repeated]
-    each = zip(file.holds, repeated, strict=True)
-    after = tuple(hold for hold, known in each if not known)
+    after = []
+    for hold, known in zip(file.holds, repeated, strict=True):
+        if not known:
+            after.append(hold)
     whole = trained
     if after:
-        later = protocol_of(after, trained.length_mm, trained.reference_C)
+        later = protocol_of(tuple(after), trained.length_mm, trained.reference_C)
         whole = _joined(trained, later)
     all_later = np.ones(len(after), bool)
     requested = np.append(requested, all_later)
@@ -248,9 +256,8 @@ class _File:
         hold = self.holds[i]
         setting = trained.setting[row]
         if hold.setting != setting:
-            found = f"{hold.setting:g}"
             expected = f"{setting:g}, as hold {hold.number} was trained on"
-            raise self.complain(i, 0, SET[hold.control], found, expected)
+            raise self.complain(i, 0, SET[hold.control], f"{hold.setting:g}", expected)
         mask = trained.mask[row]
         times = read = trained.time_s[row][mask]
         ends = trained.duration_s[row]
@@ -259,9 +266,10 @@ class _File:
         if one_more and ends > read[-1]:
             times = np.append(read, ends)  # the row that says when the hold ended
         self._check_times(i, times)
-        if trained.warming_K is not None and trained.reference_C is not None:
-            warming = trained.warming_K[row][:count]
-            logged = trained.reference_C + warming
+        reference_C = trained.reference_C
+        if trained.warming_K is not None and reference_C is not None:
+            warming = trained.warming_K[row]
+            logged = reference_C + warming[:count]
             self._check_temperatures(i, logged)
 
     def _check_times(self, i: int, times: Floats) -> None:

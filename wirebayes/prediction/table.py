@@ -27,6 +27,7 @@ from wirebayes.wire.protocol import Control
 FAR_OFF = 5.0  # standard deviations of a first reading: one in a million by chance, a wrong unit is at hundreds
 FAR_UP, FAR_ON = 2.0, 10.0  # times the largest tested tension, and the longest tested hold: nothing there was tested
 _FEW = 500  # draws, enough for a standard deviation
+Members = Sequence[tuple[float, ProtocolRequest]]  # of a mixture: probability and request, one or several
 DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
 
 
@@ -37,9 +38,7 @@ def header(control: Control) -> tuple[str, ...]:
     return ("experiment", "hold", SET[control], "time_s", *figures)
 
 
-def mixture_table(
-    members: Sequence[tuple[float, ProtocolRequest]], seed: int = 0, draws: int = DRAWS
-) -> list[list[Any]]:
+def mixture_table(members: Members, seed: int = 0, draws: int = DRAWS) -> list[list[Any]]:
     """Mean, sd and quantiles of the requested readings, in the file's order.
 
     Parameters
@@ -50,17 +49,23 @@ def mixture_table(
         In all, evenly spread over the stored ones.
     """
     drawn = _drawn(members, seed, draws)
-    request = members[0][1]
+    _, request = members[0]
     experiment = request.stored.sample.name
     positions = np.flatnonzero(request.prediction.requested)
     rows: list[list[Any]] = []
     for hold, position in zip(request.holds, positions, strict=True):
         here = drawn[position, : len(hold.time_s)]
         for time, readings, figures in zip(hold.time_s, here, _figures(here), strict=True):
-            about = readings - readings[0]  # so that a given reading comes back to the last digit
-            moments = [float(readings[0] + about.mean()), float(about.std(ddof=1))]
-            rows.append([experiment, hold.number, hold.setting, float(time), *moments, *figures])
+            mean, sd = _moments(readings)
+            rows.append([experiment, hold.number, hold.setting, float(time), mean, sd, *figures])
     return rows
+
+
+def _moments(readings: Floats) -> tuple[float, float]:
+    """Mean and standard deviation, about the first: so that a given reading comes back to the last digit."""
+    first = readings[0]
+    about = readings - first
+    return float(first + about.mean()), float(about.std(ddof=1))
 
 
 def _figures(readings: Floats) -> list[list[float]]:
@@ -69,7 +74,7 @@ def _figures(readings: Floats) -> list[list[float]]:
     return quantiles.T.tolist()
 
 
-def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: int = 0) -> list[Notice]:
+def unlikely_readings(members: Members, seed: int = 0) -> list[Notice]:
     """A warning for every given first reading that is far from what is expected where it is not given.
 
     Parameters
@@ -77,15 +82,16 @@ def unlikely_readings(members: Sequence[tuple[float, ProtocolRequest]], seed: in
     members : sequence of (probability, ProtocolRequest)
         As for `mixture_table`.
     """
-    request = members[0][1]
+    _, request = members[0]
     prediction = request.prediction
     given = np.isfinite(prediction.first) & prediction.requested
     if request.stored.likelihood == "hold" or not given.any():  # each hold starts from its own reading
         return []
     blind = [(probability, _blind(member)) for probability, member in members]
     first = _drawn(blind, seed, _FEW)[:, 0]
+    positions = np.flatnonzero(prediction.requested)
     out = []
-    for hold, position in zip(request.holds, np.flatnonzero(prediction.requested), strict=True):
+    for hold, position in zip(request.holds, positions, strict=True):
         if not given[position]:
             continue
         doubt = _far_off(hold, prediction.first[position], first[position])
@@ -128,17 +134,18 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
     """
     protocol = stored.sample.protocol
     recorded = protocol.recorded
+    tested = stored.sample.readings[..., 0][protocol.mask]
+    tension_column = "q50_N"
     if protocol.control == "force":
         tested = protocol.setting[recorded]
         tension_column = "tension_N"
-    else:
-        tested = stored.sample.readings[..., 0][protocol.mask]
-        tension_column = "q50_N"
     highest = float(tested.max())
     longest = float(protocol.duration_s[recorded].max())
     columns = header(protocol.control)
-    tension = max(row[columns.index(tension_column)] for row in rows)
-    time = max(row[columns.index("time_s")] for row in rows)
+    of_tension = columns.index(tension_column)
+    of_time = columns.index("time_s")
+    tension = max(row[of_tension] for row in rows)
+    time = max(row[of_time] for row in rows)
     out = []
     if tension > FAR_UP * highest:
         out.append(
@@ -151,7 +158,7 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
     return [Notice("extrapolation", text) for text in out]
 
 
-def _drawn(members: Sequence[tuple[float, ProtocolRequest]], seed: int, draws: int) -> Floats:
+def _drawn(members: Members, seed: int, draws: int) -> Floats:
     """Readings (H, R, n) of all models, each with as many draws as it is probable."""
     experiment = members[0][1].stored.sample.name
     rng = np.random.default_rng(seed_of(seed, "predict", experiment))
@@ -180,7 +187,9 @@ class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __ini
     def summary(self) -> PredictionJson:
         """The prediction as plain values: what was predicted, a row for each reading, and the warnings."""
         columns = {str(name): values.values.tolist() for name, values in self.reset_coords().data_vars.items()}
-        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        rows = []
+        for cells in zip(*columns.values(), strict=True):
+            rows.append(dict(zip(columns, cells, strict=True)))
         kinds = self.attrs.get("warning_kinds", ())
         texts = self.attrs.get("warnings", ())
         return {

@@ -37,28 +37,38 @@ def groups_of(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rn
     rng : numpy Generator
         Draws from the prior and of the predictive distribution.
     """
-    problem = fit.problem
-    chains, draws, d = fit.theta.shape
+    problem, theta = fit.problem, fit.theta
+    chains, draws, d = theta.shape
     members = list(problem.samples) if sample is None else [sample]
-    few = np.unique(np.linspace(0, draws - 1, min(draws, _PREDICTIVE_DRAWS)).astype(int))
-    chosen = fit.theta[:, few].reshape(-1, d)
+    kept = min(draws, _PREDICTIVE_DRAWS)
+    few = np.unique(np.linspace(0, draws - 1, kept).astype(int))
+    chosen = theta[:, few].reshape(-1, d)
     groups = _of_parameters(fit, sample, members, rng)
-    replicated, measured = {}, {}
-    for member in members:
-        predicted = replicate(problem, chosen, member, rng)
-        replicated[member.name] = np.moveaxis(predicted, -1, 0)
-        measured[member.name] = np.moveaxis(member.readings, -1, 0)
+    replicated, measured = _replicated_and_measured(problem, chosen, members, rng)
     labels = _hold_coordinates(members, apart=sample is not None)
     steps = _steps(chains, np.arange(draws))
     predictive = _readings(members, replicated, (chains, len(few)))
     groups["posterior_predictive"] = Group(predictive, labels | _steps(chains, few))
     groups["log_likelihood"] = Group(_log_likelihood(fit, members), labels | steps)
     groups["observed_data"] = Group(_readings(members, measured, ()), labels)
-    groups["constant_data"] = Group(_protocols(members), labels)
+    constant = Group(_protocols(members), labels)
+    groups["constant_data"] = constant
     _label(groups, members)
-    groups["constant_data"].attributes["reference_C"] = _listed(s.protocol.reference_C for s in members)
+    constant.attributes["reference_C"] = _listed(s.protocol.reference_C for s in members)
     groups["posterior"].attributes.update(_about(fit, members, provenance))
     return groups
+
+
+def _replicated_and_measured(
+    problem: Problem, theta: Array, members: Sequence[Sample], rng: Generator
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """(n, H, R) readings of each sample at draws (n, d), and (1, H, R) what was read."""
+    replicated, measured = {}, {}
+    for member in members:
+        predicted = replicate(problem, theta, member, rng)
+        replicated[member.name] = np.moveaxis(predicted, -1, 0)
+        measured[member.name] = np.moveaxis(member.readings, -1, 0)
+    return replicated, measured
 
 
 def _of_parameters(fit: Fit, sample: Sample | None, members: Sequence[Sample], rng: Generator) -> dict[str, Group]:
@@ -165,14 +175,17 @@ def _hold_coordinates(members: Sequence[Sample], *, apart: bool) -> dict[str, Va
     Unrecorded holds have no readings, so they are no part of this dimension: what is a missing value for one function
     of ArviZ is an observation for another.
     """
-    number = np.concatenate([s.protocol.number[s.protocol.recorded] for s in members])
+    protocols = [s.protocol for s in members]
+    number = np.concatenate([protocol.number[protocol.recorded] for protocol in protocols])
     if apart or len(members) == 1:
         return {"hold": Variable(("hold",), number)}
-    holds = [s.protocol.recorded.sum() for s in members]
+    holds = [protocol.recorded.sum() for protocol in protocols]
     names = np.repeat([s.name for s in members], holds)
-    labels = np.array([f"{name}:{n}" for name, n in zip(names, number, strict=True)])
+    labels = []
+    for name, own in zip(names, number, strict=True):
+        labels.append(f"{name}:{own}")
     return {
-        "hold": Variable(("hold",), labels),
+        "hold": Variable(("hold",), np.array(labels)),
         "experiment": Variable(("hold",), names),
         "number": Variable(("hold",), number),
     }
@@ -219,16 +232,18 @@ def _protocols(members: Sequence[Sample]) -> dict[str, Variable]:
     set_as = _name(members, SET, SETTING)
     setting = _of_all(protocols, "setting")[recorded]
     duration = _of_all(protocols, "duration_s")[recorded]
-    times = {s.name: s.protocol.time_s[None] for s in members}
+    times = _stacked(members, {s.name: s.protocol.time_s[None] for s in members})[0]
     out = {
         set_as: Variable(("hold",), setting),
         "duration_s": Variable(("hold",), duration),
-        "time_s": Variable(("hold", "time"), _stacked(members, times)[0]),
+        "time_s": Variable(("hold", "time"), times),
     }
     if any(protocol.warming_K is not None for protocol in protocols):
-        out["warming_K"] = Variable(("hold", "time"), _stacked(members, _warming(members))[0])
+        warming = _stacked(members, _warming(members))[0]
+        out["warming_K"] = Variable(("hold", "time"), warming)
     if set_as == SETTING:
-        controls = np.repeat([protocol.control for protocol in protocols], _holds(protocols))
+        control = [protocol.control for protocol in protocols]
+        controls = np.repeat(control, _holds(protocols))
         out["control"] = Variable(("hold",), controls[recorded])
     if not recorded.all():
         for name, values in _unrecorded(members, set_as).items():

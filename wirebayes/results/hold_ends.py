@@ -21,7 +21,8 @@ from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
-from wirebayes.sentences import lasting, listed, number, unit_text
+from wirebayes.results.parameters import parameter_of
+from wirebayes.sentences import holds_in_words, lasting, listed, number, unit_text
 from wirebayes.wire.protocol import Protocol
 
 COVERED = 0.9  # of each hold, by its readings: a tenth is a rest of 13 s after two minutes, as moving by hand takes
@@ -58,21 +59,21 @@ def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
     """
     if problem.likelihood != "chain":
         return None
-    protocols = [sample.protocol for sample in problem.samples]
-    recorded = [are_recorded(protocol) for protocol in protocols]
+    samples = list(problem.samples)
+    recorded = [are_recorded(sample.protocol) for sample in samples]
     if not all(recorded):
-        each = zip(problem.samples, recorded, strict=True)
-        samples = [sample if is_recorded else _longer(sample) for sample, is_recorded in each]
+        for i, is_recorded in enumerate(recorded):
+            if not is_recorded:
+                samples[i] = _longer(samples[i])
         covered, supposed, advice = COVERED, _LONGER, _RECORD
-    elif any(unread_after_s(protocol).any() for protocol in protocols):
-        samples = [_shorter(sample) for sample in problem.samples]
+    elif any(unread_after_s(sample.protocol).any() for sample in samples):
+        samples = [_shorter(sample) for sample in samples]
         covered, supposed, advice = 1.0, _rests(problem.samples), _LET_GO
     else:
         return None
     otherwise = replace(problem, samples=tuple(samples))
     before, after = _modes(problem, otherwise, best)
-    shifts = after - before
-    moved = _moved(problem, shifts, spread)
+    moved = _moved(problem, after - before, spread)
     sentence = hold_ends_sentence(moved, supposed, advice)
     return {"covered": covered, "moved": moved, "sentence": sentence}
 
@@ -115,12 +116,10 @@ def _rests(samples: Sequence[Sample]) -> str:
     for sample in samples:
         unread = unread_after_s(sample.protocol)
         numbers = sample.protocol.number[unread > 0.0]
-        which = [str(number) for number in numbers]
-        if which:
-            holds = f"hold{'s' * (len(which) > 1)} {listed(which)}"
+        if len(numbers):
             of = f" of {sample.name}" if len(samples) > 1 else ""
             longest = lasting(float(unread.max()))
-            each.append(f"{holds}{of} (up to {longest})")
+            each.append(f"{holds_in_words(numbers)}{of} (up to {longest})")
     return (
         f"{listed(each)} went on long after the last reading, and what was set is taken to have stayed until the next "
         "move: had nothing followed that reading,"
@@ -129,13 +128,13 @@ def _rests(samples: Sequence[Sample]) -> str:
 
 def _is_told(column: str) -> bool:
     """The creep rate, which unseen creep distorts most, and amplitudes of effects that have a meaning."""
-    if column.split("[")[0] == "k2":
+    if parameter_of(column) == "k2":
         return True
     return "." in column and not column.startswith("discrepancy.")
 
 
 def _unit(column: str, problem: Problem) -> str:
-    return UNITS.get(column.split("[")[0]) or unit_of_column(column, problem.samples)
+    return UNITS.get(parameter_of(column)) or unit_of_column(column, problem.samples)
 
 
 def hold_ends_sentence(moved: dict[str, MovedByHoldEnds], supposed: str = _LONGER, advice: str = _RECORD) -> str:
@@ -183,11 +182,11 @@ def _modes(problem: Problem, longer: Problem, best: Array) -> tuple[Array, Array
     own = problem.in_units(problem.own_units)
     target = _density(problem, own)
     other = _density(longer, own)
-    other.coordinates.steps = target.coordinates.steps  # so that both modes are of one density
+    coordinates = target.coordinates
+    other.coordinates.steps = coordinates.steps  # so that both modes are of one density
     columns = [problem.names.index(name) for name in target.problem.names]
     theta = problem.theta_in(own.units, best[None])
-    near = theta[:, columns]
-    start = target.coordinates.to_sampled(near)
+    start = coordinates.to_sampled(theta[:, columns])
     ends = []
     for each in (target, other):
         density, residuals = each.rowwise()

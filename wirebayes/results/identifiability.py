@@ -56,12 +56,14 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
     out: dict[str, Identifiability] = {}
     for i, name in enumerate(names):
         is_factor = bool(positive[i])
+        before, after = drawn[:, i], theta[:, i]
+        (by_prior,) = distances_per_doubling(z[:, [i]], own_prior[:, i])
         figures: IdentifiabilityFigures = {
-            "contraction": contraction(theta[:, i], drawn[:, i]),
-            "prior_range_90": _range(_prior_ends(prior, name, drawn[:, i]), is_factor),
-            "posterior_range_90": _range(np.quantile(theta[:, i], _ENDS), is_factor),
+            "contraction": contraction(after, before),
+            "prior_range_90": _range(_prior_ends(prior, name, before), is_factor),
+            "posterior_range_90": _range(np.quantile(after, _ENDS), is_factor),
             "range_is_factor": is_factor,
-            "prior_sensitivity": distances_per_doubling(z[:, [i]], own_prior[:, i])[0],
+            "prior_sensitivity": by_prior,
             "likelihood_sensitivity": by_likelihood[i],
             "ridges": _ridges(names, correlation, i),
         }

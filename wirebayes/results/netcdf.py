@@ -109,8 +109,10 @@ def _write(node: Any, group: Group, numbers: Iterator[int]) -> None:
                 axis.attach_scale(node[dim])
         if name in group.units:
             dataset.attrs["units"] = group.units[name]
+        if name not in group.variables:
+            continue
         labelling = [other for other, dims in auxiliary.items() if dims <= set(variable.dims)]
-        if labelling and name in group.variables:  # as the conventions for climate and forecast (CF) have it
+        if labelling:  # as the conventions for climate and forecast (CF) have it
             dataset.attrs["coordinates"] = " ".join(labelling)
 
 
@@ -162,8 +164,11 @@ def _read(node: Any) -> Group:
         labels.update(_dims(dataset))
         labels.update(named.split())
     for name, dataset in stored.items():
-        place = found.coordinates if name in labels else found.variables
-        place[name] = Variable(_dims(dataset), _values(dataset))
+        variable = Variable(_dims(dataset), _values(dataset))
+        if name in labels:
+            found.coordinates[name] = variable
+        else:
+            found.variables[name] = variable
         if "units" in dataset.attrs:
             found.units[name] = _entry(dataset.attrs["units"])
     return found

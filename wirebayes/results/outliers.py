@@ -41,9 +41,11 @@ def outliers(rows: Iterable[Row]) -> list[OutlierRow]:
     found: list[OutlierRow] = []
     for material, members in materials.items():
         parameters = len(members[0]["parameters"])
-        names = dict.fromkeys(parameter for row in members for parameter in row["parameters"])
-        for name in names:
-            specimens = [row for row in members if name in row["parameters"]]
+        with_parameter: dict[str, list[Row]] = {}
+        for row in members:
+            for name in row["parameters"]:
+                with_parameter.setdefault(name, []).append(row)
+        for name, specimens in with_parameter.items():
             if len(specimens) >= LEAST_SPECIMENS:
                 limit = threshold(len(specimens), parameters)
                 found += _far_off(material, name, specimens, limit)

@@ -15,6 +15,11 @@ from wirebayes.wire.effect import Effect
 from wirebayes.wire.protocol import Control
 
 
+def parameter_of(column: str) -> str:
+    """Of which parameter a column is, whatever sample or material it belongs to."""
+    return column.split("[")[0]
+
+
 def variables(problem: Problem, theta: Array, sample: Sample | None) -> dict[str, Array]:
     """Parameters (chains, draws), of one sample, or of all with those of one sample each along a last axis.
 
@@ -59,15 +64,17 @@ def by_length(
 def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:
     """Columns under their plain names; those of one sample each, or of one instrument, by sample along a last axis."""
     columns = dict(zip(problem.names, np.moveaxis(theta, -1, 0), strict=True))
+    fixed = {name: np.full(theta.shape[:-1], value) for name, value in problem.prior.fixed.items()}
+    known = columns | fixed
     out: dict[str, Array] = {}
     for name in problem.names:
-        plain = name.split("[")[0]
+        plain = parameter_of(name)
         if plain == name:
             out[plain] = columns[name]
         elif plain not in out:
             of_samples = [problem.column(plain, sample) for sample in problem.samples]
-            fixed = {c: np.full(theta.shape[:-1], value) for c, value in problem.prior.fixed.items() if c in of_samples}
-            out[plain] = np.stack([(columns | fixed)[c] for c in of_samples], axis=-1)
+            values = [known[column] for column in of_samples]
+            out[plain] = np.stack(values, axis=-1)
     return out
 
 

@@ -127,16 +127,20 @@ def near_slack(own: Mapping[str, Floats], sample: Sample) -> str:
     with np.errstate(all="ignore"):
         line = linearise(protocol, few, sample.model)
         taut = line.reading > NEAR * few["setting_sd"] * line.by_setting
-    read = np.where(protocol.mask, sample.readings[..., 0], np.inf).min(axis=1)
-    test = CheckedTest(protocol, sample.readings[..., 0], sample.resolution)
-    share = 1.0 - (taut | ~protocol.mask[..., None]).all(axis=1).mean(axis=1)
-    near = (share > OFTEN) & (read > slack_below(test))
+    readings, mask = sample.readings[..., 0], protocol.mask
+    least = np.where(mask, readings, np.inf).min(axis=1)
+    stays = (taut | ~mask[..., None]).all(axis=1)
+    share = 1.0 - stays.mean(axis=1)
+    test = CheckedTest(protocol, readings, sample.resolution)
+    near = (share > OFTEN) & (least > slack_below(test))
     if not near.any():
         return ""
     holds = some_of([str(number) for number in protocol.number[near]])
+    plural = "s" if near.sum() > 1 else ""
+    percent = 100 * share[near].max()
     return (
-        f"in hold{'s' * bool(near.sum() > 1)} {holds} the wire is within {NEAR:g} setting errors of being slack "
-        f"({100 * share[near].max():.0f} % of the draws): a slack wire is not linear in such errors, as the likelihood "
+        f"in hold{plural} {holds} the wire is within {NEAR:g} setting errors of being slack "
+        f"({percent:.0f} % of the draws): a slack wire is not linear in such errors, as the likelihood "
         "is, and intervals may be too narrow; test it where it stays taut"
     )
 
@@ -165,9 +169,13 @@ def unlikely_stiffness(own: Mapping[str, Floats], prior: Mapping[str, Floats]) -
     """A stiffness that the prior all but excludes."""
     if "k1" not in own:
         return ""
-    middle, logs = float(np.median(own["k1"])), np.log(prior["k1"])
+    middle = float(np.median(own["k1"]))
+    logs = np.log(prior["k1"])
     spread = float(logs.std())
-    if not spread or abs(np.log(middle) - np.median(logs)) <= FAR_OUT * spread:
+    if not spread:
+        return ""
+    away = abs(np.log(middle) - np.median(logs))
+    if away <= FAR_OUT * spread:
         return ""
     low, high = np.quantile(prior["k1"], [0.05, 0.95])
     return (

@@ -11,6 +11,7 @@ from wirebayes.model.sample import NOISES, SAMPLE
 from wirebayes.numeric.distributions import HalfNormal, LogitNormal, LogNormal, Normal, log_density_of, ours
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
+from wirebayes.results.parameters import parameter_of
 from wirebayes.sentences import listed
 
 WIDER = 2.0  # times as wide: a prior that two people may well disagree about
@@ -37,20 +38,23 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
     open_ones: set[int] = set()
     intervals = _Intervals.of(known)
     for name in columns:
-        i = prior.names.index(name)
         distribution = prior.distributions[name]
         wide = _wider(distribution)
         if wide is None:
             continue
-        log_weight = log_density_of(wide)(known[:, i]) - log_density_of(distribution)(known[:, i])
-        moved = intervals.moved(np.exp(log_weight - log_weight.max()))
-        of_sample = all(_parameter(prior.names[j]) in SAMPLE for j in moved)
-        if moved and not (_parameter(name) in NOISES and of_sample):
+        own = known[:, prior.names.index(name)]
+        log_weight = log_density_of(wide)(own) - log_density_of(distribution)(own)
+        weight = np.exp(log_weight - log_weight.max())
+        moved = intervals.moved(weight)
+        of_sample = all(parameter_of(prior.names[j]) in SAMPLE for j in moved)
+        is_a_noise = parameter_of(name) in NOISES
+        if moved and not (is_a_noise and of_sample):
             deciding.append(name)
             open_ones.update(moved)
     if not deciding:
         return []
-    return [_notice(deciding, [prior.names[j] for j in sorted(open_ones)])]
+    moved_names = [prior.names[j] for j in sorted(open_ones)]
+    return [_notice(deciding, moved_names)]
 
 
 @dataclass(frozen=True)
@@ -77,11 +81,6 @@ class _Intervals:
         return [int(column) for column in np.flatnonzero(shift > MOVED * self.spread)]
 
 
-def _parameter(column: str) -> str:
-    """Of which parameter a column is, whatever sample or material it belongs to."""
-    return column.split("[")[0]
-
-
 _ENDS = (0.05, 0.95)  # of the interval that is reported
 
 
@@ -105,7 +104,7 @@ def _notice(deciding: Sequence[str], moved: Sequence[str]) -> Notice:
     named = listed(deciding)
     whose, decides = ("prior", "its prior does") if len(deciding) == 1 else ("priors", "their priors do")
     what = f"the interval of {moved[0]}" if len(moved) == 1 else f"the intervals of {listed(moved)}"
-    tables = [f"[prior.{_parameter(name)}]" for name in deciding]
+    tables = [f"[prior.{parameter_of(name)}]" for name in deciding]
     keys = ", ".join(dict.fromkeys(tables))
     return Notice(
         "prior",

@@ -107,12 +107,16 @@ def load_posterior(folder: Path, experiment: str | None = None, own_effects: Pat
         raise InputError(f"{path}: no such file, expected the posterior of a fit")
     with _opened(path, *_MODEL) as groups:
         names = _names_in(groups, path)
-        if experiment is None and len(names) > 1:
-            raise InputError(f"{path}: holds {', '.join(names)}; say which with --experiment")
-        if experiment is not None and experiment not in names:
-            raise InputError(f"--experiment {experiment}: not in {path}; it holds {', '.join(names)}")
-        stored = _stored(groups, path, names.index(experiment or names[0]), own_effects)
-        return replace(stored, doubts=_doubts(groups, stored.sample.name, folder / "summary.json"))
+        listed_names = ", ".join(names)
+        if experiment is None:
+            if len(names) > 1:
+                raise InputError(f"{path}: holds {listed_names}; say which with --experiment")
+            experiment = names[0]
+        if experiment not in names:
+            raise InputError(f"--experiment {experiment}: not in {path}; it holds {listed_names}")
+        stored = _stored(groups, path, names.index(experiment), own_effects)
+        doubts = _doubts(groups, stored.sample.name, folder / "summary.json")
+        return replace(stored, doubts=doubts)
 
 
 def _doubts(groups: Mapping[str, Group], name: str, summary: Path) -> tuple[Notice, ...]:
@@ -155,6 +159,10 @@ def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path 
     about = posterior.attributes
     if "reference_C" not in constant.attributes or "controls" not in about:
         raise InputError(f"{path}: written by an older wirebayes, expected a posterior of this version; fit again")
+
+    def own(key: str, of: Group = posterior) -> Any:
+        return json.loads(of.attributes[key])[at]
+
     model = _model(about, own_effects)
     draws = _one_of(posterior, at)
     exponent = draws.pop(LENGTH_EXPONENT, None)
@@ -166,13 +174,13 @@ def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path 
         draws = at_length(draws, model.effects, length / reference, power)
         draws = by_length(draws, model.effects, length, reference)
     test = _Test(
-        name=json.loads(about["experiments"])[at],
+        name=own("experiments"),
         length_mm=float(length),
-        reference_C=json.loads(constant.attributes["reference_C"])[at],
-        control=json.loads(about["controls"])[at],
+        reference_C=own("reference_C", constant),
+        control=own("controls"),
     )
     protocol, readings = _measured(constant, observed, test)
-    resolution = float(json.loads(about["resolutions"])[at])
+    resolution = float(own("resolutions"))
     sample = Sample(test.name, about["material"], protocol, readings[..., None], resolution, model)
     likelihood = about["likelihood"]
     check_stored(draws, sample, likelihood)
@@ -207,8 +215,12 @@ def _one_of(group: Group, at: int) -> dict[str, Array]:
 
 def _measured(constant: Group, observed: Group, test: _Test) -> tuple[Protocol, Array]:
     """One experiment's holds, unrecorded ones at their place, and its (H, R) readings, padded with zeros."""
-    read_as = READ[test.control] if READ[test.control] in observed else READING
-    set_as = SET[test.control] if SET[test.control] in constant else SETTING
+    read_as = READ[test.control]
+    if read_as not in observed:
+        read_as = READING
+    set_as = SET[test.control]
+    if set_as not in constant:
+        set_as = SETTING
     own = _of_experiment(constant, observed, test.name)
     number = constant["number" if "number" in constant else "hold"][own]
     before, unrecorded = _unrecorded(constant, test.name, set_as)
@@ -216,8 +228,9 @@ def _measured(constant: Group, observed: Group, test: _Test) -> tuple[Protocol, 
     place = np.argsort(np.concatenate([before - 0.5, number]), kind="stable")
 
     def whole(recorded: Array, others: Array | None = None) -> Array:
-        none = np.full((len(before), *recorded.shape[1:]), np.nan) if others is None else others
-        return np.concatenate([none, recorded])[place]
+        if others is None:
+            others = np.full((len(before), *recorded.shape[1:]), np.nan)
+        return np.concatenate([others, recorded])[place]
 
     measured = observed[read_as][own]
     width = int(np.isfinite(measured).sum(axis=1).max())
@@ -226,14 +239,18 @@ def _measured(constant: Group, observed: Group, test: _Test) -> tuple[Protocol, 
     mask = np.isfinite(readings)
     if not np.array_equal(mask, np.isfinite(times)):
         raise ValueError("readings and times that do not belong together")
+    numbers = whole(number, np.full(len(before), -1))
+    warming = None
+    if test.reference_C is not None:
+        warming = _padded(whole(constant["warming_K"][own]), width)
     protocol = Protocol(
         test.length_mm,
         setting=whole(constant[set_as][own], unrecorded.get(set_as)),
         time_s=np.nan_to_num(times),
         mask=mask,
         duration_s=whole(constant["duration_s"][own], unrecorded.get("duration_s")),
-        number=whole(number, np.full(len(before), -1)).astype(np.int64),
-        warming_K=_padded(whole(constant["warming_K"][own]), width) if test.reference_C is not None else None,
+        number=numbers.astype(np.int64),
+        warming_K=warming,
         reference_C=test.reference_C,
         control=test.control,
     )

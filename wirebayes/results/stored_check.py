@@ -53,16 +53,18 @@ def _check_draws(draws: Mapping[str, Array], sample: Sample, likelihood: str) ->
 
 def _check_shapes(sample: Sample) -> None:
     """Arrays of holds and of readings belong together."""
-    protocol, readings = sample.protocol, sample.readings[..., 0]
+    protocol, mask = sample.protocol, sample.protocol.mask
     holds = len(protocol.setting)
     for what, array in (("durations", protocol.duration_s), ("hold numbers", protocol.number)):
         if array.shape != (holds,):
             raise ValueError(f"{len(array)} {what} for {holds} holds")
-    if protocol.mask.ndim != 2 or not protocol.mask.any() or len(protocol.mask) != holds:
+    if mask.ndim != 2 or not mask.any() or len(mask) != holds:
         raise ValueError("no readings")
-    warming = [] if protocol.warming_K is None else [protocol.warming_K]
-    for array in (protocol.time_s, readings, *warming):
-        if array.shape != protocol.mask.shape:
+    of_readings = [protocol.time_s, sample.readings[..., 0]]
+    if protocol.warming_K is not None:
+        of_readings.append(protocol.warming_K)
+    for array in of_readings:
+        if array.shape != mask.shape:
             raise ValueError("readings, times and temperatures that do not belong together")
 
 

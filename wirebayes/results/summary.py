@@ -114,11 +114,10 @@ def _parameters(fit: Fit, sample: Sample | None) -> dict[str, Parameter]:
     parameters: dict[str, Parameter] = {}
     for name, values in variables(fit.problem, fit.theta, sample).items():
         if values.ndim == 2:
-            parameters[name] = {"unit": unit_of(name, effects, controls), **statistics(values)}
+            unit = unit_of(name, effects, controls)
+            parameters[name] = {"unit": unit, **statistics(values)}
             continue
         for i, one in enumerate(samples):
-            own_unit = unit_of(name, effects, [one.protocol.control])
-            own_values = values[..., i]
-            own_name = f"{name}[{one.name}]"
-            parameters[own_name] = {"unit": own_unit, **statistics(own_values)}
+            unit = unit_of(name, effects, [one.protocol.control])
+            parameters[f"{name}[{one.name}]"] = {"unit": unit, **statistics(values[..., i])}
     return parameters

@@ -14,6 +14,7 @@ import numpy as np
 from wirebayes.effects import CATALOGUE, effect_named
 from wirebayes.errors import InputError
 from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import Entry, toml_of
 from wirebayes.io.readings import READ, SET, Hold
 from wirebayes.io.run_folder import write_csv, write_json, write_text
 from wirebayes.json_files.truth import TrueWire, TruthJson
@@ -27,12 +28,11 @@ from wirebayes.numeric.frozen import frozen
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.numeric.typing import Array, Floats
 from wirebayes.strict.hint import hint
-from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.effect import Effect, Kinds
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.model import tension_reference
 from wirebayes.wire.protocol import Control
-from wirebayes.wire.staircase import simulate
+from wirebayes.wire.staircase import Theta, simulate
 
 FILE, TRUTH = "experiments.toml", "truth.json"
 PAPER_TIMES_S = (0.0, 30.0, 60.0, 90.0, 120.0)  # when the paper read its holds
@@ -210,14 +210,23 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     settings, clean, readings = [], [], []
     for sample in samples:
         own = problem.parameters(theta, sample)
-        setting = rng.normal(size=(len(sample.protocol.setting), 1)) * own["setting_sd"]
-        exact = simulate(sample.protocol, own, sample.model, setting)
-        noise = rng.normal(size=exact.shape) * own["sensor_sd"]
-        read = rounded(exact + noise, sample.resolution)
+        setting, exact, read = _read(sample, own, rng)
         settings.append(setting[:, 0])
         clean.append(exact[..., 0])
-        readings.append(np.where(sample.protocol.mask[..., None], read, 0.0))
+        readings.append(read)
     return Simulated(with_readings(problem, readings), theta, settings, clean)
+
+
+def _read(sample: Sample, own: Theta, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """Setting errors (H, 1), what would be read without noise, and what is read, (H, R, 1) each."""
+    protocol = sample.protocol
+    holds = len(protocol.setting)
+    setting = rng.normal(size=(holds, 1)) * own["setting_sd"]
+    exact = simulate(protocol, own, sample.model, setting)
+    noise = rng.normal(size=exact.shape) * own["sensor_sd"]
+    read = rounded(exact + noise, sample.resolution)
+    recorded = protocol.mask[..., None]
+    return setting, exact, np.where(recorded, read, 0.0)
 
 
 def _middle_stiffness(truth: Truth) -> float:
@@ -228,13 +237,18 @@ def _middle_stiffness(truth: Truth) -> float:
 
 def _columns(problem: Problem, name: str, value: float) -> list[int]:
     """Columns of a parameter, one or one a sample, which may have the value."""
+    names = problem.names
     bare = name.split("[")[0]
-    columns = [i for i, column in enumerate(problem.names) if name in (column, column.split("[")[0])]
+    columns = []
+    for i, column in enumerate(names):
+        if name in (column, column.split("[")[0]):
+            columns.append(i)
     if not columns:
-        meant = hint(name, problem.names)
-        raise InputError(f"parameter {name}: no such parameter{meant}; there are {', '.join(problem.names)}")
+        meant = hint(name, names)
+        raise InputError(f"parameter {name}: no such parameter{meant}; there are {', '.join(names)}")
     for i in columns:
-        low, high = problem.prior.distributions[problem.names[i]].support()
+        distribution = problem.prior.distributions[names[i]]
+        low, high = distribution.support()
         if bare == "setting_sd":
             high = np.inf  # a bench may be worse than its prior
         if not low <= value <= high:
@@ -305,8 +319,10 @@ def _referred(problem: Problem, theta: Array, sample: Sample) -> Sample:
 
 
 def _write_readings(path: Path, experiment: Experiment, sample: Sample) -> None:
-    step = Decimal(repr(sample.resolution)).normalize()
-    digits = max(0, -int(step.as_tuple().exponent)) if step else None
+    digits = None
+    if sample.resolution:
+        step = Decimal(repr(sample.resolution)).normalize()
+        digits = max(0, -int(step.as_tuple().exponent))
     rows = []
     for hold, readings in zip(experiment.holds, sample.readings[..., 0], strict=True):
         for i, time in enumerate(hold.time_s):
@@ -325,20 +341,11 @@ def _write_readings(path: Path, experiment: Experiment, sample: Sample) -> None:
 
 
 def _table(bench: Bench) -> str:
-    lines = ["[[experiment]]", f'name = "{bench.name}"', f'material = "{bench.material}"']
-    lines.append(f"length_mm = {float(bench.length_mm)!r}")
-    if bench.control == "force":
-        lines.append('control = "force"')
-    if bench.resolution:
-        lines.append(f"resolution_{READ_UNIT[bench.control]} = {float(bench.resolution)!r}")
-    lines.append(f'readings = "{bench.name}.csv"')
-    gaps = _gaps(bench.experiment())
-    if gaps:
-        lines.append(f"unrecorded_holds = [{', '.join(gaps)}]")
-    return "\n".join(lines) + "\n"
+    experiment = bench.experiment()
+    return toml_of(experiment, unrecorded=_gaps(experiment))
 
 
-def _gaps(experiment: Experiment) -> list[str]:
+def _gaps(experiment: Experiment) -> list[Entry]:
     """Unrecorded holds as an experiment file states them, each by the recorded one that follows it."""
     gaps = []
     following = None
@@ -346,24 +353,30 @@ def _gaps(experiment: Experiment) -> list[str]:
         if hold.recorded:
             following = hold.number
         else:
-            setting = f"{SET[experiment.control]} = {hold.setting!r}"
-            gaps.append(f"{{ before_hold = {following}, {setting}, duration_s = {hold.duration_s!r} }}")
+            setting = SET[experiment.control]
+            gaps.append({"before_hold": following, setting: hold.setting, "duration_s": hold.duration_s})
     return gaps[::-1]
 
 
 def _truth(made: Simulated, i: int) -> TrueWire:
     sample = made.problem.samples[i]
     model, protocol = sample.model, sample.protocol
-    parameters = made.problem.parameters(made.theta, sample)
+    own = made.problem.parameters(made.theta, sample)
+    parameters = {}
+    for name, value in own.items():
+        parameters[name] = float(value[0])
     out: TrueWire = {
         "material": sample.material,
         "elastic_law": model.law,
         "history": model.history,
         "effects": [effect.key for effect in model.effects],
-        "parameters": {name: float(value[0]) for name, value in parameters.items()},
+        "parameters": parameters,
         "tension_ref_N": model.tension_ref_N,
     }
-    noise_free = [row[kept] for row, kept in zip(made.noise_free[i], protocol.mask, strict=True)]
+    noise_free = []
+    for row, kept in zip(made.noise_free[i], protocol.mask, strict=True):
+        noise_free.append(row[kept])
+    error = made.setting_error[i]
     if protocol.control == "force":
-        return {**out, "setting_N": made.setting_error[i], "noise_free_mm": noise_free}
-    return {**out, "setting_mm": made.setting_error[i], "noise_free_N": noise_free}
+        return {**out, "setting_N": error, "noise_free_mm": noise_free}
+    return {**out, "setting_mm": error, "noise_free_N": noise_free}

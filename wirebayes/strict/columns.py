@@ -44,12 +44,14 @@ def columns_table(columns: Any, source: Path, may_be_empty: Callable[[str], bool
     header = [str(key) for key in keys]
     texts: list[list[str]] = []
     for name, key in zip(header, keys, strict=True):
+        where = f"{source}, column {name}"
         values = _objects(columns[key])
-        fits = values.ndim == 1 and (not texts or len(values) == len(texts[0]))
-        if not fits:
-            found = f"an array of shape {values.shape}" if values.ndim != 1 else f"{len(values)} values"
-            expected = f"{len(texts[0])} as in {header[0]}" if texts else "one value for each row"
-            raise InputError(f"{source}, column {name}: found {found}, expected {expected}")
+        count = len(texts[0]) if texts else None
+        expected = "one value for each row" if count is None else f"{count} as in {header[0]}"
+        if values.ndim != 1:
+            raise InputError(f"{where}: found an array of shape {values.shape}, expected {expected}")
+        if count not in (None, len(values)):
+            raise InputError(f"{where}: found {len(values)} values, expected {expected}")
         empty = may_be_empty(name)
         texts.append([_text(value, empty=empty) for value in values])
     rows = [list(row) for row in zip(*texts, strict=True)]

@@ -127,7 +127,8 @@ class CsvTable:
                 raise InputError(f"{where}: found {name} a second time, expected it once")
         self._check_complete(header.required, header)
         for group in header.groups:
-            if any(name in self.header for name in group):
+            is_begun = not set(group).isdisjoint(self.header)
+            if is_begun:
                 self._check_complete(group, header)
 
     def _check_complete(self, names: Sequence[str], header: Header) -> None:
@@ -224,11 +225,14 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> 
     lines = _NEWLINE.split(read_text(path, f"a header of {header} and a line for each reading"))
     while not lines[-1].strip():
         lines.pop()
-    cells = [[_unquoted(cell.strip()) for cell in line.split(",")] for line in lines]
-    table = CsvTable(path, cells[0], cells[1:])
+    cells = []
+    for line in lines:
+        cells.append([_unquoted(cell.strip()) for cell in line.split(",")])
+    names, *rows = cells
+    table = CsvTable(path, names, rows)
     table.check_header(header)
     _check_lengths(table)
-    if not table.rows:
+    if not rows:
         raise InputError(f"{path}, line 2: found no readings, expected at least one")
     return table
 
@@ -248,15 +252,17 @@ def csv_table(source: Path, text: str) -> CsvTable:
     InputError
         It is no CSV, its columns are not divided by commas, or a row is longer or shorter than the header.
     """
-    numbered = [(line, [cell.strip() for cell in row]) for line, row in csv_rows(source, text)]
-    numbered = [(line, row) for line, row in numbered if any(row)]
-    if not numbered:
+    lines, rows = [], []
+    for line, cells in csv_rows(source, text):
+        row = [cell.strip() for cell in cells]
+        if any(row):
+            lines.append(line)
+            rows.append(row)
+    if not rows:
         raise InputError(f"{source}, line 1: found nothing, expected a header and rows of numbers")
-    (header_line, header), rows = numbered[0], numbered[1:]
+    header_line, header = lines.pop(0), rows.pop(0)
     _refuse_other_separators(source, header_line, header)
-    table = CsvTable(
-        source, header, [row for _, row in rows], header_line=header_line, lines=[line for line, _ in rows]
-    )
+    table = CsvTable(source, header, rows, header_line=header_line, lines=lines)
     _check_lengths(table)
     return table
 

@@ -93,14 +93,16 @@ class Keys:
         """
         expected = f"at least {_COUNT[least]} [[{kind}]]"
         given = self.value(kind, expected)
+        if isinstance(given, dict):
+            raise self.complain(kind, "a single table", expected)
         are_tables = isinstance(given, list) and all(isinstance(table, dict) for table in given)
         if not are_tables or len(given) < least:
-            found = "a single table" if isinstance(given, dict) else shown(given)
-            raise self.complain(kind, found, expected)
+            raise self.complain(kind, shown(given), expected)
         tables = []
         for index, table in enumerate(given):
             name = _called(table, index)
-            tables.append(replace(self, index=index, table=table, name=name, kind=kind, asked=set()))
+            own = replace(self, index=index, table=table, name=name, kind=kind, asked=set())
+            tables.append(own)
         return tables
 
     def inside(self, key: str, default: dict[str, Any] | None = None, expected: str = "a table") -> Self:

@@ -1,6 +1,5 @@
 """The experiment out of a raw file, checked as one of an experiment file is, and that file."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,22 +9,19 @@ import numpy as np
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.about import About
-from wirebayes.io.bench.columns import Column
-from wirebayes.io.bench.quantities import UNITS, Role
+from wirebayes.io.bench.columns import Column, Columns
+from wirebayes.io.bench.quantities import UNITS
 from wirebayes.io.bench.recorded import Cycles
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.table_numbers import COLUMN_ROLES
 from wirebayes.io.bench.undecided import Undecided, quoted
 from wirebayes.io.data_checks import falls
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.experiment_file import experiment_of
+from wirebayes.io.experiment_file import RESOLUTION, Entry, experiment_of
 from wirebayes.io.readings import SET
 from wirebayes.strict.table import CsvTable
 from wirebayes.strict.toml_keys import Keys
 from wirebayes.wire.protocol import Control
-
-Entry = dict[str, float]  # of a hold without a record: before_hold, what was set, duration_s
-RESOLUTION: dict[Control, str] = {"displacement": "resolution_N", "force": "resolution_mm"}
 
 
 def check_direction(table: RawTable, column: Column, experiment: Experiment, mapping: Sequence[str]) -> None:
@@ -85,7 +81,7 @@ def _turned(column: Column) -> str:
 
 def as_experiment(
     table: RawTable,
-    columns: dict[Role, Column],
+    columns: Columns,
     header: tuple[str, ...],
     rows: list[list[Any]],
     origin: list[int],
@@ -129,7 +125,7 @@ class _RawReadings(CsvTable):
     """Readings whose complaints name the line and column of the raw file."""
 
     raw: RawTable
-    columns: dict[Role, Column]
+    columns: Columns
     origin: list[int]
 
     def complain(self, row: int, column: str, found: str, expected: str) -> InputError:
@@ -160,39 +156,3 @@ def entries_of(cycles: Sequence[Cycles], control: Control) -> list[Entry]:
         {"before_hold": c.before_hold, SET[control]: c.setting, "duration_s": round(c.end_s - c.begin_s, 3)}
         for c in cycles
     ]
-
-
-def toml_of(experiment: Experiment, comments: Sequence[str] = (), unrecorded: Sequence[Entry] = ()) -> str:
-    """The experiment file of a test whose readings stand in ``NAME.csv`` beside it.
-
-    Parameters
-    ----------
-    comments : sequence of str
-        Sentences at its head.
-    unrecorded : sequence of dict
-        Holds without a record.
-    """
-    lines = [f"# {comment}" for comment in comments]
-    lines.append("[[experiment]]")
-    lines.append(f"name = {_string(experiment.name)}")
-    lines.append(f"material = {_string(experiment.material)}")
-    lines.append(f"length_mm = {experiment.length_mm!r}")
-    if experiment.control != "displacement":
-        lines.append(f"control = {_string(experiment.control)}")
-    if experiment.resolution:
-        lines.append(f"{RESOLUTION[experiment.control]} = {experiment.resolution!r}")
-    lines.append(f"readings = {_string(experiment.name + '.csv')}")
-    if unrecorded:
-        entries = ", ".join(map(_toml_of_entry, unrecorded))
-        lines.append(f"unrecorded_holds = [{entries}]")
-    return "\n".join(lines) + "\n"
-
-
-def _toml_of_entry(entry: Entry) -> str:
-    """A hold without a record, as a table in a line."""
-    values = ", ".join(f"{key} = {value!r}" for key, value in entry.items())
-    return f"{{ {values} }}"
-
-
-def _string(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)

@@ -15,6 +15,8 @@ from wirebayes.io.bench.undecided import Undecided
 from wirebayes.numeric.typing import Array, Bools, Floats
 from wirebayes.sentences import counted
 
+_Moments = Sequence[re.Match[str]]  # the parts of each cell
+_Times = tuple[Floats, bool, list[str]]  # seconds, whether they are moments of a day, and what was done
 _DAY, _HOUR, _MINUTE = 86400.0, 3600.0, 60.0
 _ROUND = 0.5 * _DAY  # of a clock with hands
 _MIDNIGHT = 0.5 * _DAY  # a fall larger than this is a new day
@@ -60,9 +62,7 @@ def is_clock(table: RawTable, column: int, unit: Unit | None) -> bool:
     return (unit is not None and unit.clock is not None) or has_moments(table, column)
 
 
-def seconds(
-    table: RawTable, column: int, unit: Unit | None, *, durations: bool = False
-) -> tuple[Floats, bool, list[str]]:
+def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool = False) -> _Times:
     """Times of a column of clocks or dates.
 
     Parameters
@@ -94,10 +94,7 @@ def seconds(
     leading = _HOUR
     if short is not None:
         leading = _leading(table, column, unit, moments, short)
-    each = []
-    for found, bare in zip(moments, of_clock, strict=True):
-        each.append(_value(found, leading if bare else _HOUR))
-    values = np.array(each)
+    values = _values(moments, of_clock, leading)
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
         return (days - days[0]) + values, True, []
@@ -114,7 +111,15 @@ def seconds(
     return values + _DAY * midnights, of_day, _passed("midnight", midnights)
 
 
-def _first_short(moments: Sequence[re.Match[str]], of_clock: Sequence[bool]) -> int | None:
+def _values(moments: _Moments, of_clock: Sequence[bool], leading: float) -> Floats:
+    """Seconds of each cell; the first part of those of a clock is so many."""
+    values = []
+    for found, is_clock_alone in zip(moments, of_clock, strict=True):
+        values.append(_value(found, leading if is_clock_alone else _HOUR))
+    return np.array(values)
+
+
+def _first_short(moments: _Moments, of_clock: Sequence[bool]) -> int | None:
     """The first clock of two parts, ``a:b``, which may be minutes and seconds."""
     for i, found in enumerate(moments):
         if of_clock[i] and found["third"] is None:
@@ -122,7 +127,7 @@ def _first_short(moments: Sequence[re.Match[str]], of_clock: Sequence[bool]) -> 
     return None
 
 
-def _of_spelt(values: Floats) -> tuple[Floats, bool, list[str]]:
+def _of_spelt(values: Floats) -> _Times:
     """What `seconds` returns of times in two units or more: durations from zero, or a clock on the wall."""
     on_the_wall = values[0] >= _HOUR and values.max() < _DAY
     begins = _days_begin(values, of_day=False)
@@ -182,12 +187,13 @@ def _days_begin(values: Floats, of_day: bool) -> Bools:
 
 def _spelt(table: RawTable, column: int) -> Floats:
     """Seconds of cells that name their units; nothing is zero in every unit."""
-    values = [0.0 if row.cell(column) == "0" else spelt_s(row.cell(column)) for row in table.rows]
-    for row, value in zip(table.rows, values, strict=True):
+    values = []
+    for row in table.rows:
+        cell = row.cell(column)
+        value = 0.0 if cell == "0" else spelt_s(cell)
         if value is None:
-            raise table.complain(
-                row.line, column, shown(row.cell(column)), "a time such as 1 h 30 min, 2 min 5 s or 30 s"
-            )
+            raise table.complain(row.line, column, shown(cell), "a time such as 1 h 30 min, 2 min 5 s or 30 s")
+        values.append(value)
     return np.array(values, dtype=float)
 
 
@@ -268,7 +274,7 @@ def _offset(zone: str | None) -> float:
     return (1.0 if zone[0] == "+" else -1.0) * (3600.0 * int(digits[:2]) + 60.0 * int(digits[2:]))
 
 
-def _leading(table: RawTable, column: int, unit: Unit | None, moments: Sequence[re.Match[str]], short: int) -> float:
+def _leading(table: RawTable, column: int, unit: Unit | None, moments: _Moments, short: int) -> float:
     """Seconds of one of the first part of ``a:b``: as the header says, or as only one reading of the cells has it.
 
     A fraction is one of seconds. Beside cells ``a:b:c`` one of the two makes times fall where the other does not.
@@ -293,13 +299,13 @@ def _leading(table: RawTable, column: int, unit: Unit | None, moments: Sequence[
     raise Undecided(f"{where}: {found}", "which", answers)
 
 
-def _falls(moments: Sequence[re.Match[str]], leading: float) -> int:
+def _falls(moments: _Moments, leading: float) -> int:
     """How often times fall whose first part counts so many seconds."""
     times = [_value(m, leading) for m in moments]
     return int(np.sum(np.diff(times) < 0.0))
 
 
-def _days(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> Floats:
+def _days(table: RawTable, column: int, moments: _Moments) -> Floats:
     """Seconds from the beginning of the calendar to each date."""
     day_first = _day_first(table, column, moments)
     days = []
@@ -333,7 +339,7 @@ def _date_parts(found: re.Match[str], day_first: bool) -> list[int]:
     return [year, month, day]
 
 
-def _day_first(table: RawTable, column: int, moments: Sequence[re.Match[str]]) -> bool:
+def _day_first(table: RawTable, column: int, moments: _Moments) -> bool:
     """Whether days stand before months between slashes or dashes: a number above 12 decides for the whole column.
 
     Dates between points are written in countries that begin with the day. Where nothing decides and there are several

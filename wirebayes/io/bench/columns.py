@@ -58,7 +58,10 @@ class Column:
     by_unit_alone: bool = False
 
 
-def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
+Columns = dict[Role, Column]  # by what each holds
+
+
+def understand(table: RawTable, mapping: Sequence[str]) -> Columns:
     """The columns that are read.
 
     Parameters
@@ -92,9 +95,9 @@ def understand(table: RawTable, mapping: Sequence[str]) -> dict[Role, Column]:
     return _complete(table, roles, free)
 
 
-def _said(table: RawTable, mapped: Sequence[tuple[int, str, str]]) -> tuple[dict[Role, Column], dict[Role, Undecided]]:
+def _said(table: RawTable, mapped: Sequence[tuple[int, str, str]]) -> tuple[Columns, dict[Role, Undecided]]:
     """The columns that the user names, and the questions that are left about others of them."""
-    roles: dict[Role, Column] = {}
+    roles: Columns = {}
     open_questions: dict[Role, Undecided] = {}
     for index, role, unit in mapped:
         if role == IGNORE:
@@ -121,7 +124,7 @@ def _likely(table: RawTable, free: Sequence[int], role: Role) -> list[int]:
     return [i for i in free if are_moments(table, i)]
 
 
-def _complete(table: RawTable, roles: dict[Role, Column], free: Sequence[int]) -> dict[Role, Column]:
+def _complete(table: RawTable, roles: Columns, free: Sequence[int]) -> Columns:
     """The columns of quantities, with those that units alone name; all that are needed are among them."""
     missing = [role for role in _NEEDED if role not in roles]
     if not missing:
@@ -139,11 +142,12 @@ def _one(table: RawTable, likely: Sequence[int], role: Role) -> Column:
     """The column of a quantity among those that may be it."""
     of_wire = [i for i in likely if not is_of_sample(table, i, role)]  # a force before a stress
     different = _without_copies(table, of_wire or likely)
-    if len(different) > 1 and role == "tension":
+    if role == "tension" and len(different) > 1:
         different = _only_varying(table, different)
     if len(different) > 1:
         different = _without_errors(table, different, role)
-    if len(different) > 1 and role in ("tension", "displacement"):
+    is_measured = role in ("tension", "displacement")
+    if is_measured and len(different) > 1:
         different = finest_of_same(table, different, role)
     if len(different) == 1:
         (only,) = different
@@ -260,14 +264,16 @@ def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Colu
 def _unit_in_table(table: RawTable, index: int, role: Role, stated: str | None, moments: bool) -> Unit | None:
     """The unit in a column's header or in the row under it, which must not contradict each other."""
     header = table.header[index]
-    from_header = name_and_unit(header, role)[1]
+    _, from_header = name_and_unit(header, role)
     if from_header is None and stated is not None and not speaks_of(header, role):
         from_header = quantity_unit(header, role)  # --map "kg=tension": the name is nothing but a unit
-    row_text = table.units[index]
-    from_row = unit_in_header(row_text, role) if row_text else None
-    if row_text not in NO_UNIT and from_row is None and not moments:
+    text = table.units[index]
+    if not text:
+        return from_header
+    from_row = unit_in_header(text, role)
+    if text not in NO_UNIT and from_row is None and not moments:
         expected = f"one of {role}{_units(role)}"
-        raise table.complain(table.header_line + 1, index, f"the unit {row_text!r}", expected)
+        raise table.complain(table.header_line + 1, index, f"the unit {text!r}", expected)
     if from_header and from_row and not _are_alike(from_header, from_row):
         found = f"the units {from_header.text} in the header and {from_row.text} under it"
         raise table.complain(table.header_line, index, found, "one unit")

@@ -4,7 +4,7 @@ import re
 from dataclasses import replace
 from itertools import pairwise
 
-from wirebayes.io.bench.columns import Column
+from wirebayes.io.bench.columns import Columns
 from wirebayes.io.bench.quantities import Role
 from wirebayes.io.bench.sheet import SheetRow, is_value
 from wirebayes.io.bench.stamps import is_coarse
@@ -19,9 +19,7 @@ _WORD = re.compile(r"(?<![^\W\d_])(?!nan|null|none)[^\W\d_]{3,}", re.IGNORECASE)
 WHERE_MISSING = "; where a reading is missing, delete its row, or leave all such rows out by --drop-breaks"
 
 
-def complete_rows(
-    table: RawTable, columns: dict[Role, Column], drop_breaks: bool = False
-) -> tuple[RawTable, list[str]]:
+def complete_rows(table: RawTable, columns: Columns, drop_breaks: bool = False) -> tuple[RawTable, list[str]]:
     """Without rows that hold nothing of what is read, exact repetitions, and empty cells of a hold's later rows.
 
     Parameters
@@ -77,7 +75,7 @@ def _without_what_is_below(table: RawTable, indices: list[int]) -> tuple[list[Sh
     return [row for row in rows if any(row.cell(i) for i in indices)], below
 
 
-def _without_words(rows: list[SheetRow], columns: dict[Role, Column]) -> tuple[list[SheetRow], list[SheetRow]]:
+def _without_words(rows: list[SheetRow], columns: Columns) -> tuple[list[SheetRow], list[SheetRow]]:
     """Rows without those that name a part of the test, such as ``Cycle 2``, or a statistic below; and these.
 
     Those are rows without a time, in which words stand where numbers are read: ``Points: | 9`` between blocks; or where
@@ -92,7 +90,7 @@ def _without_words(rows: list[SheetRow], columns: dict[Role, Column]) -> tuple[l
     return [row for row in rows[:end] if row.line not in lines], [*words, *rows[end:]]
 
 
-def _is_of_words(row: SheetRow, columns: dict[Role, Column]) -> bool:
+def _is_of_words(row: SheetRow, columns: Columns) -> bool:
     cells = [row.cell(column.index) for column in columns.values()]
     time, displacement, tension = (row.cell(columns[role].index) for role in ("time", "displacement", "tension"))
     if is_value(displacement) or is_value(tension):
@@ -109,7 +107,7 @@ def _is_title(cell: str) -> bool:
     return bool(_WORD.search(cell)) and (speaks_of_a_quantity(cell) or speaks_of_specimens(cell))
 
 
-def _is_missing(row: SheetRow, columns: dict[Role, Column]) -> bool:
+def _is_missing(row: SheetRow, columns: Columns) -> bool:
     """Whether nothing, a word or a dash stands where a time, a setting or a reading belongs."""
     cells = [row.cell(columns[role].index) for role in ("time", "displacement", "tension")]
     return not all(any(c.isdigit() for c in cell) for cell in cells)
@@ -122,7 +120,7 @@ def _lines_of(rows: list[SheetRow], table: RawTable) -> str:
     return f"line{'s' * (len(rows) > 1)} {listed([*shown, *more])}"
 
 
-def _weights_are_written_once(rows: list[SheetRow], columns: dict[Role, Column]) -> bool:
+def _weights_are_written_once(rows: list[SheetRow], columns: Columns) -> bool:
     """Whether a weight stands in the first row of its hold only, while the displacement is read in every row.
 
     Where most tensions are missing the displacement is what was read, if it changes where they are.
@@ -155,7 +153,7 @@ def _without_repetitions(rows: list[SheetRow], table: RawTable, time: int) -> li
     return rows if repeating and is_coarse(replace(table, rows=tuple(rows)), time) else kept
 
 
-def _check_no_cell_is_empty(rows: list[SheetRow], table: RawTable, columns: dict[Role, Column]) -> None:
+def _check_no_cell_is_empty(rows: list[SheetRow], table: RawTable, columns: Columns) -> None:
     for row in rows:
         for role, column in columns.items():
             if not row.cells[column.index]:

@@ -11,7 +11,7 @@ import numpy as np
 from wirebayes.errors import InputError
 from wirebayes.io.bench import workbook
 from wirebayes.io.bench.about import About, name_from
-from wirebayes.io.bench.as_experiment import Entry, as_experiment, check_direction, entries_of
+from wirebayes.io.bench.as_experiment import as_experiment, check_direction, entries_of
 from wirebayes.io.bench.block_titles import with_titles_as_columns
 from wirebayes.io.bench.cell_units import with_units_apart
 from wirebayes.io.bench.clock_parts import with_joined_parts
@@ -39,10 +39,11 @@ from wirebayes.io.bench.undecided import Choices
 from wirebayes.io.bench.unit_names import with_units_beside
 from wirebayes.io.bench.words import known_words
 from wirebayes.io.experiment import Experiment
+from wirebayes.io.experiment_file import Entry
 from wirebayes.io.readings import OPTIONAL, REQUIRED
 from wirebayes.numeric.typing import Floats
 from wirebayes.result_warnings import Notice
-from wirebayes.sentences import listed, short
+from wirebayes.sentences import holds_in_words, short
 from wirebayes.wire.protocol import Control
 
 
@@ -301,8 +302,7 @@ def _rows_of_hold(holds: Cut, hold: int) -> list[tuple[float, int, bool]]:
     end = holds.end_s[hold]
     end_s = last_s if end is None else _tidy(end)
     if holds.number[hold] in holds.unread:
-        latest = max(last_s, end_s)
-        return [(latest, last, False)]
+        return [(max(last_s, end_s), last, False)]
     readings = []
     for time, row in zip(times, rows, strict=True):
         readings.append((time, row, True))
@@ -345,10 +345,10 @@ def _missing_holds(holds: Cut) -> list[str]:
     missing = sorted(set(range(min(holds.number), max(holds.number))) - set(holds.number))
     if not missing or len(missing) > len(holds.number):
         return []
-    one = len(missing) == 1
+    have, they_were = ("has", "it was") if len(missing) == 1 else ("have", "they were")
     return [
-        f"hold{'s' * (not one)} {listed([str(n) for n in missing])} {'has' if one else 'have'} no readings: if "
-        f"{'it was' if one else 'they were'} held, say how long with unrecorded_holds in the TOML file"
+        f"{holds_in_words(missing)} {have} no readings: if "
+        f"{they_were} held, say how long with unrecorded_holds in the TOML file"
     ]
 
 

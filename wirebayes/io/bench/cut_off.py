@@ -39,7 +39,10 @@ def _is_cut(last: Sequence[str], above: Sequence[Sequence[str]]) -> bool:
     if len(digits) > 1:
         return False
     (usual,) = digits
-    return usual > 0 and _decimals(last[-1]) < usual and "e" not in last[-1].lower()
+    cell = last[-1]
+    if "e" in cell.lower():
+        return False
+    return _decimals(cell) < usual
 
 
 def _decimals(cell: str) -> int:

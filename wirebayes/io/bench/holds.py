@@ -33,7 +33,7 @@ from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
 from wirebayes.io.unread_ends import unread_s
 from wirebayes.numeric.typing import Floats
-from wirebayes.sentences import counted, lasting, listed, short
+from wirebayes.sentences import counted, holds_in_words, lasting, listed, short
 
 BY_CHANCE = 0.01  # as `wirebayes.io.data_checks` suspects times that run on
 MOVE_SHARE = 0.2  # of the readings of the usual hold: fewer at one displacement are passed in a move
@@ -289,11 +289,9 @@ def _unread_ends(times: list[Floats], ends: Sequence[float | None], role: str) -
             unread[number] = after
     if not unread:
         return []
-    plural = "s" if len(unread) > 1 else ""
-    numbers = listed([str(number) for number in unread])
     longest = lasting(max(unread.values()))
     return [
-        f"hold{plural} {numbers}: the next one begins up to {longest} after the last reading, and the {role} is "
+        f"{holds_in_words(unread)}: the next one begins up to {longest} after the last reading, and the {role} is "
         "taken to stay until then; a rest in between is one of unrecorded_holds"
     ]
 

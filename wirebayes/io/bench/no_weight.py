@@ -11,7 +11,7 @@ import numpy as np
 
 from wirebayes.io.bench.recorded import Cut
 from wirebayes.numeric.typing import Floats
-from wirebayes.sentences import listed
+from wirebayes.sentences import holds_in_words, listed
 
 NEXT_TO_NOTHING = 1e-6  # of the smallest weight: creep goes with a power of the tension, which has to be above zero
 
@@ -67,9 +67,8 @@ def _notes(before: int, after: int, rests: Sequence[int]) -> list[str]:
         where = listed([place for place, count in outside if count])
         notes.append(f"rows without a weight {where} left out: a wire that hangs free is not straight")
     if rests:
-        numbers = listed([str(number) for number in rests])
         notes.append(
-            f"hold{'s' * (len(rests) > 1)} {numbers} without a weight: the wire recovers meanwhile, and what the gauge "
+            f"{holds_in_words(rests)} without a weight: the wire recovers meanwhile, and what the gauge "
             "shows of it is not read; if a hook hung on it, write the weight of the hook"
         )
     return notes

@@ -283,12 +283,14 @@ def _mapping_of(
     for text in mapping:
         before, _, meaning = text.rpartition("=")
         header = before.strip()
+        is_own = header in own_header
         column = _column_meant(marked, text)
         of_specimen = "" if column is None else marked.mark[column]
         if column is None or not of_specimen:
-            if header in own_header or header not in of_all:
+            if is_own or header not in of_all:
                 out.append(text)
-        elif of_specimen == mark and own_header[column]:
+            continue
+        if of_specimen == mark and own_header[column]:
             added = header.removeprefix(marked.full[column])
             out.append(f"{own_header[column]}{added}={meaning}")
     return tuple(out)

@@ -99,8 +99,7 @@ def _by_hold_numbers(recorded: Recorded, stated: Specimens | None) -> list[RawTa
         names = [str(number) for number in range(1, len(changes) + 2)]
         return _split(table, changes, names)
     row = int(changes[0])
-    around = labels[row - 1 : row + 1]
-    raise _which(table, index, row, around, is_repeated=True)
+    raise _which(table, index, row, labels[row - 1 : row + 1], is_repeated=True)
 
 
 def _tables(table: RawTable, index: int, changes: Ints, names: Sequence[str]) -> list[RawTable]:

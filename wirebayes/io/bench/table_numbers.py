@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from wirebayes.errors import InputError, shown
 from wirebayes.io.bench import clock
 from wirebayes.io.bench.about import About
-from wirebayes.io.bench.columns import Column, understand
+from wirebayes.io.bench.columns import Column, Columns, understand
 from wirebayes.io.bench.complete_rows import WHERE_MISSING, complete_rows
 from wirebayes.io.bench.marks import without_marks
 from wirebayes.io.bench.numerals import check_signs, decimal_sign, plain_number
@@ -65,7 +65,7 @@ class Recorded:
     """
 
     table: RawTable
-    columns: dict[Role, Column]
+    columns: Columns
     texts: dict[Role, list[str]]
     values: dict[Role, Floats]
     hold: NDArray[np.int64] | None
@@ -199,7 +199,7 @@ def _from_zero_on(recorded: Recorded, notes: list[str]) -> tuple[Recorded, list[
     ]
 
 
-def _of_sample(table: RawTable, columns: dict[Role, Column], about: About) -> dict[Role, Column]:
+def _of_sample(table: RawTable, columns: Columns, about: About) -> Columns:
     """Columns whose units are those of this sample: strains times its length, stresses times its area."""
     size = {"displacement": about.length_mm, "tension": about.area_mm2}
     out = dict(columns)
@@ -217,7 +217,7 @@ def _of_sample(table: RawTable, columns: dict[Role, Column], about: About) -> di
     return out
 
 
-def _plain_columns(table: RawTable, columns: dict[Role, Column]) -> dict[Role, Column]:
+def _plain_columns(table: RawTable, columns: Columns) -> Columns:
     """All columns but one of clocks, whose cells are no numbers."""
     plain = dict(columns)
     time = columns["time"]
@@ -226,7 +226,7 @@ def _plain_columns(table: RawTable, columns: dict[Role, Column]) -> dict[Role, C
     return plain
 
 
-def _whose(table: RawTable, columns: dict[Role, Column]) -> list[str]:
+def _whose(table: RawTable, columns: Columns) -> list[str]:
     """Of which specimen these readings are, where there are several."""
     if not table.specimen:
         return []
@@ -235,7 +235,7 @@ def _whose(table: RawTable, columns: dict[Role, Column]) -> list[str]:
     return [f"one of several specimens: {table.whose} in {lines}, columns {listed(places)}"]
 
 
-def _read_as(table: RawTable, columns: dict[Role, Column], decimal: Decimal) -> str:
+def _read_as(table: RawTable, columns: Columns, decimal: Decimal) -> str:
     parts = []
     for role, column in columns.items():
         if table.turned and role == "hold":
@@ -321,7 +321,7 @@ def _times(
     return time, of_day
 
 
-def _check_sizes(table: RawTable, columns: dict[Role, Column], values: Mapping[Any, Floats]) -> None:
+def _check_sizes(table: RawTable, columns: Columns, values: Mapping[Any, Floats]) -> None:
     """Refuse numbers that no bench can mean, before anything is computed with them."""
     for name, role in COLUMN_ROLES.items():
         for row in np.flatnonzero(~(np.abs(values[role]) <= LARGEST[name]))[:1] if role in values else ():

@@ -31,20 +31,20 @@ def with_quantities(table: RawTable) -> RawTable:
     RawTable
         The same where columns have names of their own.
     """
-    cells = tuple(cell.strip("[]() ") for cell in table.header)
+    header = table.header
+    cells = tuple(cell.strip("[]() ") for cell in header)
     labels = {label for label in table.above if label}
     if len(labels) > 1 and _are_named_by_units(cells):
-        header = _quantities(cells, cells)
-        return replace(table, header=header, units=cells, header_line=table.header_line - 1)
-    repeated = {name for name in table.header if name and table.header.count(name) > 1}
+        quantities = _quantities(cells, cells)
+        return replace(table, header=quantities, units=cells, header_line=table.header_line - 1)
+    repeated = {name for name in header if name and header.count(name) > 1}
     if len(repeated) < 2 or any(map(speaks_of_a_quantity, repeated)):
         return table
-    columns = zip(table.header, table.units, strict=True)
-    under_repeated = tuple(unit if name in repeated else "" for name, unit in columns)
-    if not _are_named_by_units(under_repeated):
+    columns = zip(header, table.units, strict=True)
+    units = tuple(unit if name in repeated else "" for name, unit in columns)
+    if not _are_named_by_units(units):
         return table
-    header = _quantities(table.header, under_repeated)
-    return replace(table, header=header, above=table.header)
+    return replace(table, header=_quantities(header, units), above=header)
 
 
 def with_units_beside(table: RawTable) -> RawTable:

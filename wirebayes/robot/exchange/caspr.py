@@ -137,13 +137,18 @@ def _home(joint: Element, moves: tuple[int, ...], turns: tuple[int, ...], base: 
     moved, angles = q[: len(moves)], q[len(moves) :]
     position = np.array(base)
     position[list(moves)] += moved
+    return position, vector(_turned(joint, turns, angles))
+
+
+def _turned(joint: Element, turns: tuple[int, ...], angles: Floats) -> Floats:
+    """The rotation by angles about some axes, fixed or turning along."""
     axes = np.eye(3)
-    fixed = joint.attribute("type") == _FIXED_AXES if turns else False
     turned = np.eye(3)
     for axis, angle in zip(turns, angles, strict=True):
         own = matrix(angle * axes[axis])
-        turned = own @ turned if fixed else turned @ own
-    return position, vector(turned)
+        is_fixed = joint.attribute("type") == _FIXED_AXES
+        turned = own @ turned if is_fixed else turned @ own
+    return turned
 
 
 def _set(cables: Element, name: str | None) -> Element:

@@ -148,9 +148,10 @@ def _anchors(found: _Settings, names: list[str], where: str, expected: str) -> l
 
 def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings) -> ImportedRobot:
     legs = len(anchors)
+    settings = found.values
 
     def each(name: str, missing: float) -> Floats:
-        value = found.values.get(name, [missing])
+        value = settings.get(name, [missing])
         if len(value) not in (1, legs):
             raise InputError(
                 f"{path}, line {found.line[name]}, {name}: found {len(value)} numbers, expected one, or one of each of "
@@ -161,25 +162,45 @@ def _of(path: Path, firmware: str, anchors: list[list[float]], found: _Settings)
     extent = float(np.ptp(anchors, axis=0).max())
     if extent < _SMALLEST_MM:
         raise InputError(f"{path}: found anchors within {short(extent, 3)} of one another, expected millimetres")
-    if "mass" not in found.values:
+    if "mass" not in settings:
         raise InputError(f"{path}: found no weight of the mover, expected M666 W or winch_mover_weight in kg")
     bounds = None
-    if "least" in found.values and "most" in found.values:
-        bounds = float(each("least", 0.0).max()), float(each("most", 0.0).min())
-    notes, winch = ["Spools, motors and the spring constant of the line are left out."], None
-    leg = np.repeat(np.arange(legs), _on_spools(path, found, each("on spool", 1.0)))
+    if "least" in settings and "most" in settings:
+        lowest = each("least", 0.0).max()
+        highest = each("most", 0.0).min()
+        bounds = float(lowest), float(highest)
+    notes = ["Spools, motors and the spring constant of the line are left out."]
+    winch = None
+    on_spools = _on_spools(path, found, each("on spool", 1.0))
+    leg = np.repeat(np.arange(legs), on_spools)
     if len(leg) > legs:
-        winch = tuple(_ANCHORS[i] if firmware == "RepRapFirmware" else _STEPPERS[i].upper() for i in leg)
+        names = _ANCHORS if firmware == "RepRapFirmware" else _STEPPERS.upper()
+        winch = tuple(names[i] for i in leg)
         notes.append(
             "The lines of a spool begin and end at one point, all that the firmware knows; give each its exit and "
             "platform point."
         )
+    origin = np.zeros(3)
     zero = np.zeros((len(leg), 3))
     return ImportedRobot(
-        path.stem, f"Imported from {path.name} of {firmware}.", "position", found.values["mass"][0], np.zeros(3),
-        np.array(anchors)[leg] / 1000, zero, np.zeros(len(leg)), zero + [0.0, 0.0, 1.0], bounds, np.zeros(3),
-        np.zeros(3), tuple(notes), each("lines", 1.0)[leg], each("beyond", 0.0)[leg] / 1000, winch=winch, on_bed=True,
-    )  # fmt: skip
+        path.stem,
+        f"Imported from {path.name} of {firmware}.",
+        "position",
+        settings["mass"][0],
+        origin,
+        np.array(anchors)[leg] / 1000,
+        zero,
+        np.zeros(len(leg)),
+        zero + [0.0, 0.0, 1.0],
+        bounds,
+        origin,
+        origin,
+        tuple(notes),
+        each("lines", 1.0)[leg],
+        each("beyond", 0.0)[leg] / 1000,
+        winch=winch,
+        on_bed=True,
+    )
 
 
 def _on_spools(path: Path, found: _Settings, count: Floats) -> Indices:

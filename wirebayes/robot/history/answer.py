@@ -99,6 +99,8 @@ def history_report(
         return HistoryAnswer(_without_answer(robot, content, _NEVER_HELD), {}, rows)
     to = corrections.target(robot, history, found)
     change = corrections.wanted(robot, history, found, to) - joint
+    left = corrections.error_left(robot, history, found, to, _corrected(joint, change), rows)
+    of_winches = winches.of_each_winch(robot, change)[:, rows]
     course = _course(history, found, rows)
     content |= {
         "history": content["history"] | {"holds": int(found.track.hold[-1]) + 1},
@@ -107,15 +109,17 @@ def history_report(
         "rotation_vector_rad": _bands(rotation_vectors(course.rotation)) if robot.degrees == 6 else None,
         "corrections": {
             "times_s": course.times_s,
-            "change_mm": _bands(1e3 * winches.of_each_winch(robot, change)[:, rows]),
-            "left_mm": _bands(1e3 * corrections.error_left(robot, history, found, to, _corrected(joint, change), rows)),
+            "change_mm": _bands(1e3 * of_winches),
+            "left_mm": _bands(1e3 * left),
         },
         "clock": _clock(line, again),
     }
     if history.read:
         content["readings"] = _with_agreement(content["readings"], found)
-    missed = [*unreached(history, found, to, change), *turned_rows(robot, asked_rotations, history)]
-    content["warnings"] = to_json([*missed, *history_warnings(robot, line, history, found, joint, content)])
+    warnings = unreached(history, found, to, change)
+    warnings += turned_rows(robot, asked_rotations, history)
+    warnings += history_warnings(robot, line, history, found, joint, content)
+    content["warnings"] = to_json(warnings)
     tables = {
         "poses.csv": pose_table(robot, history, found, to),
         "corrections.csv": correction_table(robot, history, joint, change),
@@ -134,7 +138,7 @@ class _Asked:
     seed: int
 
     @property
-    def near(self) -> tuple[Floats, Floats]:
+    def near(self) -> Poses:
         """Where the first pose is sought: at the commanded one where there is one."""
         history = self.history
         if history.position_m is None or history.rotation is None:

@@ -60,13 +60,15 @@ def drift_along(
     fine, kept = refined_poses(robot, history)
     fine = balanced(robot, fine)
     assert fine.position_m is not None and fine.rotation is not None
-    known = unknowns(robot, line, replace(errors, reference_m=0.0), rng)
+    exact = replace(errors, reference_m=0.0)
+    known = unknowns(robot, line, exact, rng)
     wires, error = known.columns(known.draws)
     if errors.calibrated is None:
         error = np.zeros_like(error)  # of lengths that nobody measured nothing but creep is followed
     carried = known.carried(known.draws)
     tau = _held_tensions(robot, fine)
-    joint = _commanded_joints(robot, fine, wires, tau, carried.strain(wires), error)
+    strain = carried.strain(wires)
+    joint = _commanded_joints(robot, fine, wires, tau, strain, error)
     starts = clock_starts(fine, tau, restart)
     start = fine.position_m[0], fine.rotation[0]
 
@@ -76,7 +78,8 @@ def drift_along(
     track = follow_log(robot, wires, fine, joint, start, starts, error, watched, carried)
     plain = _without_drift(fine, tau, track.hold)
     found = Estimate(track.at_rows(kept), plain.at_rows(kept), wires, error, starts)
-    return found, np.swapaxes(joint[kept], 0, 1)
+    commanded = np.swapaxes(joint[kept], 0, 1)
+    return found, commanded
 
 
 def _without_drift(history: History, tau: Floats, hold: Ints) -> Track:

@@ -257,7 +257,7 @@ def _without_clocks(state: CreepState, wires: Wires) -> CreepState:
     return state if wires.effects else replace(state, past=())
 
 
-def _pose(walk: CreepingHold) -> tuple[Floats, Floats]:
+def _pose(walk: CreepingHold) -> Poses:
     """Where the next hold starts from; NaN where the platform has fallen, so that nothing more is solved there."""
     lost = ~walk.live[:, None]
     return np.where(lost, np.nan, walk.here.position_m), walk.here.rotation

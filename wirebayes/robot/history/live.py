@@ -89,14 +89,17 @@ class LiveEstimator:
 
     def _prepare_columns(self, known: LogUnknowns) -> None:
         """Wires of the draws, of differences for derivatives where readings come, and the one that never creeps."""
-        white, legs = known.draws, self.robot.legs
+        legs = self.robot.legs
+        white = known.draws
         if self._reads:
-            differences = known.differences(np.zeros(known.count))
-            white = np.concatenate([white, differences])
+            at_zero = np.zeros(known.count)
+            white = np.concatenate([white, known.differences(at_zero)])
         wires, error = known.columns(white)
+        carried = known.carried(white)
+        none = np.zeros((1, legs))
         self._wires = beside(wires, known.plain)
-        self._error = np.concatenate([error, np.zeros((1, legs))])
-        self._state = beside_fresh(known.carried(white), legs)
+        self._error = np.concatenate([error, none])
+        self._state = beside_fresh(carried, legs)
         self._columns = len(self._error)
         self._live = np.ones(self._columns, bool)
         self._joint = np.empty((self._columns, legs))

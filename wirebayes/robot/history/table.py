@@ -133,19 +133,31 @@ def _allowed(name: str) -> Numbers:
 
 
 def _history(robot: Robot, joints: Sequence[str], names: Sequence[str], cells: Floats) -> History:
-    def some(wanted: Sequence[str]) -> Floats | None:
-        return cells[:, [names.index(name) for name in wanted]] if wanted and wanted[0] in names else None
-
     rows = len(cells)
-    position, turn = some(POSITION), some(TURN)
-    payload, centre, hold, tilt = some((PAYLOAD,)), some(CENTRE), some(("hold",)), some(TILT)
-    joint = some(joints)
-    vector = np.tile(robot.home_rotation_rad, (rows, 1)) if turn is None else turn
+
+    def some(wanted: Sequence[str]) -> Floats | None:
+        if not wanted or wanted[0] not in names:
+            return None
+        return cells[:, [names.index(name) for name in wanted]]
+
+    joint_m = some(joints)
+    if joint_m is not None:
+        joint_m = joint_values(robot, joints, joint_m)
+    position = some(POSITION)
+    turn = some(TURN)
+    rotation = None
+    if position is not None:
+        home = np.tile(robot.home_rotation_rad, (rows, 1))
+        rotation = matrix(home if turn is None else turn)
+    payload = some((PAYLOAD,))
+    centre = some(CENTRE)
+    hold = some(("hold",))
+    tilt = some(TILT)
     return History(
         times_s=cells[:, names.index("time_s")],
-        joint_m=None if joint is None else joint_values(robot, joints, joint),
+        joint_m=joint_m,
         position_m=position,
-        rotation=None if position is None else matrix(vector),
+        rotation=rotation,
         payload_kg=np.zeros(rows) if payload is None else payload[:, 0],
         payload_m=np.tile(robot.centre_of_mass_m, (rows, 1)) if centre is None else centre,
         hold=None if hold is None else hold[:, 0].astype(np.int64),

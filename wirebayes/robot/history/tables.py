@@ -15,8 +15,10 @@ from wirebayes.robot.mechanics import winches
 from wirebayes.robot.mechanics.description import Drums, Robot
 from wirebayes.robot.mechanics.drums import motor_angle
 
+HeadedRows = tuple[list[str], list[list[Any]]]  # the header of a table, and its rows
 
-def pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> tuple[list[str], list[list[Any]]]:
+
+def pose_table(robot: Robot, history: History, found: Estimate, to: Target) -> HeadedRows:
     """Mean, sd and quantiles of every coordinate, of the distance from the target, and the tensions.
 
     Parameters
@@ -59,14 +61,12 @@ def _with_bands(quantity: str, unit: str, values: Floats) -> dict[str, Floats]:
     return {f"{quantity}_{label}_{unit}": value for label, value in _described(values).items()}
 
 
-def _as_table(columns: dict[str, Any]) -> tuple[list[str], list[list[Any]]]:
+def _as_table(columns: dict[str, Any]) -> HeadedRows:
     """Header and rows of columns."""
     return list(columns), [list(row) for row in zip(*columns.values(), strict=True)]
 
 
-def correction_table(
-    robot: Robot, history: History, joint_m: Floats, change_m: Floats
-) -> tuple[list[str], list[list[Any]]]:
+def correction_table(robot: Robot, history: History, joint_m: Floats, change_m: Floats) -> HeadedRows:
     """Corrected joint values (motor angles too), and what they change, with its standard deviation.
 
     Parameters
@@ -92,10 +92,12 @@ def correction_table(
     for i in range(robot.joints):
         columns[f"joint_{i + 1}_m"] = joint[:, i]
     if robot.drums is not None:
-        columns |= _motor_columns(robot, robot.drums, joint_m + described["mean"])
+        corrected = joint_m + described["mean"]
+        columns |= _motor_columns(robot, robot.drums, corrected)
     for i in range(robot.joints):
-        columns[f"change_{i + 1}_mm"] = 1e3 * mean[:, i]
-        columns[f"change_{i + 1}_sd_mm"] = 1e3 * sd[:, i]
+        change = f"change_{i + 1}"
+        columns[f"{change}_mm"] = 1e3 * mean[:, i]
+        columns[f"{change}_sd_mm"] = 1e3 * sd[:, i]
     return _as_table(columns)
 
 

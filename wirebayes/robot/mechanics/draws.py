@@ -335,7 +335,9 @@ _VANISHES = 1e-3  # share of the largest value: its third digit
 
 
 def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[Notice]:
-    out = [Notice("extrapolation", text) for text in _beyond(line, tension_N, time_s, zero_m)]
+    out = []
+    for text in _beyond(line, tension_N, time_s, zero_m):
+        out.append(Notice("extrapolation", text))
     kept = line.material()
     for effect in kept:
         if effect.place == "zero_length":

@@ -28,14 +28,18 @@ def joint_columns(robot: Robot, header: Sequence[str] = ()) -> tuple[str, ...]:
     turned = np.zeros(robot.joints, bool)
     if _has(header, _MOTOR) and robot.drums is not None:
         turned = of_each_winch(robot, robot.drums.radius_m) > 0
-    straight = _has(header, _STRAIGHT) & ~of_each_winch(robot, robot.is_linear)
-
-    def name(joint: int) -> str:
+    is_linear = of_each_winch(robot, robot.is_linear)
+    straight = _has(header, _STRAIGHT) & ~is_linear
+    names = []
+    for joint in range(robot.joints):
+        number = joint + 1
         if turned[joint]:
-            return f"{_MOTOR}{joint + 1}_rad"
-        return f"{_STRAIGHT}{joint + 1}_mm" if straight[joint] else f"joint_{joint + 1}_m"
-
-    return tuple(name(joint) for joint in range(robot.joints))
+            names.append(f"{_MOTOR}{number}_rad")
+        elif straight[joint]:
+            names.append(f"{_STRAIGHT}{number}_mm")
+        else:
+            names.append(f"joint_{number}_m")
+    return tuple(names)
 
 
 def column_of_leg(robot: Robot, names: Sequence[str], leg: int) -> str:

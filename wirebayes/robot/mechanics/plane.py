@@ -17,11 +17,11 @@ import numpy as np
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
-from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.description import GRAVITY, Poses, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 
 
-def onto(robot: Robot, position_m: Floats, rotation: Floats) -> tuple[Floats, Floats]:
+def onto(robot: Robot, position_m: Floats, rotation: Floats) -> Poses:
     """Poses moved into the plane through the home pose, or onto the ball joint; the same where there is neither.
 
     Parameters

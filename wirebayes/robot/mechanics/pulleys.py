@@ -53,7 +53,8 @@ class WireRun:
 
 def wire_run(pulleys: Pulleys, line_m: Floats) -> WireRun:
     """The way of wires to platform points that lie at ``(3, w, n)`` from their exit points."""
-    rho, s = pulleys.radius_m[:, None], pulleys.axis.T[:, :, None]
+    rho = pulleys.radius_m[:, None]
+    s = pulleys.axis.T[:, :, None]
     along = dot(line_m, s)
     beside = line_m - along * s
     tiny = 1e-12 * (rho + 1e-300)
@@ -61,17 +62,21 @@ def wire_run(pulleys: Pulleys, line_m: Floats) -> WireRun:
     outward = beside / away
     tangent = _tangent(away - rho, along, rho, tiny)
     straight, wrap = tangent.straight_m, tangent.wrap_rad
+    leaves = tangent.sine * outward + tangent.cosine * s
+    swing = tangent.sine / away - 1.0 / straight
+    clear = tangent.clear & (away > _LEAST * rho)
     # A leg without a pulley is a straight line, whatever its axis.
     point = rho == 0
     distance = norm(line_m)
+    towards = line_m / np.maximum(distance, 1e-300)
     return WireRun(
         np.where(point, distance, rho * wrap + straight),
         np.where(point, distance, straight),
-        np.where(point, line_m / np.maximum(distance, 1e-300), tangent.sine * outward + tangent.cosine * s),
+        np.where(point, towards, leaves),
         cross(s, outward),
-        np.where(point, 0.0, tangent.sine / away - 1.0 / straight),
+        np.where(point, 0.0, swing),
         np.where(point, 0.0, wrap),
-        (tangent.clear & (away > _LEAST * rho)) | point,
+        clear | point,
     )
 
 

@@ -319,8 +319,7 @@ def _winches(tables: list[Keys], legs: list[dict[str, Any]]) -> Indices | None:
     number: dict[object, int] = {}
     numbers = []
     for i, leg in enumerate(legs):
-        own = number.setdefault(leg["winch"] or i, len(number))
-        numbers.append(own)
+        numbers.append(number.setdefault(leg["winch"] or i, len(number)))
     if len(number) == len(legs):
         return None
     shared = {"actuator": "actuator", "ratio": "pulley_ratio", **_DRUM}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wirebayes.numeric.typing import Floats, Indices
-from wirebayes.robot.mechanics.description import Robot
+from wirebayes.robot.mechanics.description import Lengths, Robot
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -62,7 +62,7 @@ def turned_by(robot: Robot) -> Floats:
     return np.eye(robot.legs) if robot.winch is None else np.eye(robot.joints)[robot.winch]
 
 
-def lengths(robot: Robot, joint_m: Floats) -> tuple[Floats, Floats]:
+def lengths(robot: Robot, joint_m: Floats) -> Lengths:
     """Zero-tension lengths before creep and offsets of joint values, ``(n, w)`` each: what forward kinematics needs.
 
     Parameters

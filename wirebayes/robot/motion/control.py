@@ -190,5 +190,4 @@ def after_calibration(
         return joint_of(before + growth)
 
     still = error(robot, wires, lambda time_s: joint, position_m, rotation, times_s, carried)
-    compensated = error(robot, wires, expected, position_m, rotation, times_s, carried)
-    return still, compensated
+    return still, error(robot, wires, expected, position_m, rotation, times_s, carried)

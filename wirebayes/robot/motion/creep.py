@@ -173,8 +173,7 @@ class HoldCreep:
         hold.grown = creep
         beside = law.beside(carried.beside_mm, hold)
         elongation = law.elongation(creep, beside, hold)
-        clock_s = carried.clock_s + self.time_s
-        return CreepState(creep, beside, carried.holds + 1, clock_s, past, elongation)
+        return CreepState(creep, beside, carried.holds + 1, carried.clock_s + self.time_s, past, elongation)
 
     def _onward(self, progress: Floats, tension_N: Floats) -> Floats:
         """Tension half-way through the step: it goes on as over the step before, per share of creep done.

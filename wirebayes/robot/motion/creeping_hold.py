@@ -6,7 +6,7 @@ import numpy as np
 
 from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats
-from wirebayes.robot.mechanics.description import Poses, Robot
+from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import forward, inverse, one_sided, outcome, path
 from wirebayes.robot.motion.course import Falls
@@ -58,7 +58,10 @@ class CreepingHold:
         tolerance: float = TOLERANCE,
         error_m: Floats | float = 0.0,
     ) -> None:
-        self.robot, self.wires, self.joint, self.tolerance = robot, wires, joint_m, tolerance
+        self.robot = robot
+        self.wires = wires
+        self.joint = joint_m
+        self.tolerance = tolerance
         self.error_m = error_m
         self.n = wires.count
         state = carried or fresh(robot.legs, self.n)
@@ -87,7 +90,7 @@ class CreepingHold:
         self.stiff = self._stiffness()
         self.left = np.full(self.n, np.nan)  # of the stiffness, at the last pose before a fall
 
-    def _lengths(self, time_s: float, state: CreepState) -> tuple[Floats, Floats]:
+    def _lengths(self, time_s: float, state: CreepState) -> Lengths:
         joint = self.joint(time_s) if callable(self.joint) else self.joint
         each = np.broadcast_to(joint, (self.n, self.robot.legs))
         bare, offset = inverse.lengths(self.robot, each)

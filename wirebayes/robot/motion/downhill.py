@@ -376,12 +376,17 @@ def _evaluate(robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Float
     tau, slope = tension(wires, stretched, zero)
     derivatives = statics.unbalance_and_stiffness(robot, shape, R, tau, slope)
     gradient, H = in_metres(*derivatives, robot.edge_scale[:, None])
+    elastic = energy(wires, stretched, zero).sum(0)
+    potential = robot.mass_kg * GRAVITY * _height_of_mass(robot, x, R)
+    size = np.abs(gradient).max(0)
+    return _Point(elastic + potential, gradient, H, tau, size)
+
+
+def _height_of_mass(robot: Robot, x: Floats, R: Floats) -> Floats:
+    """(n,) Height of the centre of mass."""
     height = x[2]
     if robot.degrees == 6:
         a, b, c = robot.centre_of_mass_m
         above = R[2, 0] * a + R[2, 1] * b + R[2, 2] * c
         height = height + above
-    elastic = energy(wires, stretched, zero).sum(0)
-    potential = robot.mass_kg * GRAVITY * height
-    size = np.abs(gradient).max(0)
-    return _Point(elastic + potential, gradient, H, tau, size)
+    return height

@@ -19,7 +19,7 @@ def equilibria(
     offset_m: Floats,
     rng: np.random.Generator,
     starts: int = 64,
-    known: tuple[Floats, Floats] | None = None,
+    known: Poses | None = None,
 ) -> Equilibria:
     """Every stable equilibrium that many random starts find for one set of lengths.
 

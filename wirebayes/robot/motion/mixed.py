@@ -176,9 +176,7 @@ def _falls(energy: _Quadratic, there: Floats, way: Floats) -> Bools:
     return np.asarray((energy.unbalance(there) * way).sum(0) <= 0)
 
 
-def approach(
-    robot: Robot, wires: Wires, pose: Poses, tension_N: Floats, lengths: Lengths
-) -> tuple[tuple[Floats, Floats], Floats]:
+def approach(robot: Robot, wires: Wires, pose: Poses, tension_N: Floats, lengths: Lengths) -> tuple[Poses, Floats]:
     """Poses near equilibrium at lengths, and the first step towards them.
 
     Parameters

@@ -16,7 +16,7 @@ from wirebayes.numeric.rows import chosen_rows, rows_of
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
-from wirebayes.robot.mechanics.description import GRAVITY, Robot
+from wirebayes.robot.mechanics.description import GRAVITY, Poses, Robot
 from wirebayes.robot.motion.loose_balance import DEPENDENT, equations, largest_imbalance, slope_by_place, vector_by_turn
 
 _STEPS = 80  # of linearisation; a dozen are usual, and a family of solutions that bends much takes more
@@ -64,11 +64,13 @@ def nearest_balances(
         rows = search.going_on()
         if not rows.size:
             break
+        here = search.at(rows)
         goal = position_m[rows], target[rows]
-        step = aim.step(search.at(rows), goal, search.bound[rows])
-        lost = ~np.isfinite(step.change).all(1)
-        search.dead[rows[lost]] = True
-        search.take(rows[~lost], rows_of(step, ~lost))
+        step = aim.step(here, goal, search.bound[rows])
+        known = np.isfinite(step.change).all(1)
+        lost = rows[~known]
+        search.dead[lost] = True
+        search.take(rows[known], rows_of(step, known))
     return search.balances(target)
 
 
@@ -233,7 +235,7 @@ class _Aim:
         """In which forces are counted, N."""
         return float(max(self.robot.mass_kg * GRAVITY, self.robot.rule.lowest_N))
 
-    def step(self, at: tuple[Floats, Floats, Floats], goal: tuple[Floats, Floats], bound: Ints) -> _Step:
+    def step(self, at: tuple[Floats, Floats, Floats], goal: Poses, bound: Ints) -> _Step:
         """The smallest step from poses and tensions that solves the linearised equations and comes nearest to a goal.
 
         Parameters
@@ -267,7 +269,7 @@ class _Aim:
         extra, more = self._side_conditions(at[1], at[2], bound)
         return np.concatenate([A, extra], 1), np.concatenate([force / self.unit, more], 1)
 
-    def _wish(self, at: tuple[Floats, Floats, Floats], goal: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    def _wish(self, at: tuple[Floats, Floats, Floats], goal: Poses) -> tuple[Floats, Floats]:
         """What the step (n, 6 + w) should be if nothing had to balance, and how much each part (6 + w,) weighs."""
         x, R, tau = at
         place = goal[0] - x if self.movable else np.zeros_like(x)

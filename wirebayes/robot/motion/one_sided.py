@@ -64,13 +64,14 @@ def _bounds(robot: Robot, wires: Wires, pose: Poses, lengths: Lengths) -> tuple[
     values = np.asarray(np.linalg.eigvalsh(both), np.float64)
     least = values[:, 0].copy()
     largest = values[:, -1]
-    touched = np.asarray(balance.touching.any(axis=0))
-    known = np.isfinite(pose[0]).all(axis=1)
+    position, _ = pose
+    known = np.isfinite(position).all(axis=1)
     decided = known & np.isfinite(one_way).all(axis=(0, 1))
+    touched = np.asarray(balance.touching.any(axis=0))
     small = least <= _APART * largest
     for k in np.flatnonzero(decided & touched & small):
-        touching = balance.touching[:, k]
-        least[k] = _least_of(both[k], one_way[:, touching, k])
+        touching = one_way[:, balance.touching[:, k], k]
+        least[k] = _least_of(both[k], touching)
     return touched, np.where(known, least, np.nan), largest
 
 

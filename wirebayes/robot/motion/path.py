@@ -67,8 +67,8 @@ def follow(
     robot: Robot,
     wires: Wires,
     start: Poses,
-    old: tuple[Floats, Floats],
-    new: tuple[Floats, Floats],
+    old: Lengths,
+    new: Lengths,
     smallest: float = SMALLEST,
 ) -> Followed:
     """Follow equilibria from old lengths to new ones, in a straight line.

@@ -51,11 +51,12 @@ def wrong(robot: Robot, joint_m: Floats) -> tuple[tuple[int, int], str] | None:
     (row, leg), expected
         Where it is, from 0, and what was expected there; None where all can be meant.
     """
-    wires = robot.lines * np.maximum(_straight_at_home(robot), robot.span_m) + robot.beyond_m
+    reach = np.maximum(_straight_at_home(robot), robot.span_m)
+    wires = robot.lines * reach + robot.beyond_m
     most = _FAR * float(wires.max())
-    none = ~(joint_m > 0) & ~robot.is_linear
-    if none.any():
-        return _first(none), "a length above 0"
+    not_positive = ~(joint_m > 0) & ~robot.is_linear
+    if not_positive.any():
+        return _first(not_positive), "a length above 0"
     far = np.abs(joint_m) > most
     if far.any():
         return _first(far), f"metres, at most {short(most, 3)}, {_FAR:g} times the robot's size"

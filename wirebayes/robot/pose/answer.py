@@ -340,8 +340,8 @@ def _shares(robot: Robot, line: WireDraws, courses: dict[float, Course], x: Floa
     if held.sum() < 30:
         result["sentence"] = "Fewer than 30 draws that hold the platform: no shares are computed."
         return result
-    parameters = {name: values[held] for name, values in _parameters(line).items()}
-    result["shared_draw"] = variance_shares.shares(parameters, shared[held])
+    of_held = {name: values[held] for name, values in _parameters(line).items()}
+    result["shared_draw"] = variance_shares.shares(of_held, shared[held])
     result["sd_mm"] = []
     for spread, distance_m in size.items():
         result["sd_mm"].append({"specimen_spread": spread, "sd_mm": _sd_mm(distance_m)})

@@ -105,18 +105,21 @@ def _hung(robot: Robot, position_m: Floats, near: Floats, asked: Floats) -> Orie
     """The orientation in balance that has the components asked for, or those of them that can be had."""
     had = np.isfinite(asked)
     found = hanging.hang(robot, position_m[None], near, asked)
+    if found.held[0]:
+        return _described(robot, position_m, found, asked, had)
+    position_m = _cleared(robot, position_m, near)
+    found = hanging.hang(robot, position_m[None], near)
     if not found.held[0]:
-        position_m = _cleared(robot, position_m, near)
-        found = hanging.hang(robot, position_m[None], near)
-        if not found.held[0]:
-            return _nowhere(robot, position_m, near)
-        choice = hanging.chosen(robot, position_m, found.rotation[0], found.tension_N[0])
-        had = _to_be_had(choice, had)
-        if had.any():
-            part = hanging.hang(robot, position_m[None], near, np.where(had, asked, np.nan))
-            if not part.held[0]:
-                return Orientation(position_m, near, None, _out_of_reach(asked, had, found))
-            found = part
+        return _nowhere(robot, position_m, near)
+    choice = hanging.chosen(robot, position_m, found.rotation[0], found.tension_N[0])
+    had = _to_be_had(choice, had)
+    if had.any():
+        part_asked = np.where(had, asked, np.nan)
+        part = hanging.hang(robot, position_m[None], near, part_asked)
+        if not part.held[0]:
+            out_of_reach = _out_of_reach(asked, had, found)
+            return Orientation(position_m, near, None, out_of_reach)
+        found = part
     return _described(robot, position_m, found, asked, had)
 
 
@@ -162,7 +165,7 @@ def _held(robot: Robot, x: Floats, R: Floats) -> bool:
     return bool(np.isfinite(inverse.tensions(robot, x[None], R[None])).all())
 
 
-def _to_be_had(ways: Floats, asked: Floats) -> Floats:
+def _to_be_had(ways: Floats, asked: Bools) -> Bools:
     """Of the components asked for, those that a platform can be given, which turns in so many ways (k, 3)."""
     out = np.zeros(3, bool)
     left = ways * asked
@@ -245,7 +248,7 @@ def _summary(robot: Robot, degrees: int, places: int, left: int, free: list[str]
     return said + "."
 
 
-def _out_of_reach(asked: Floats, had: Floats, found: hanging.Hanging) -> str:
+def _out_of_reach(asked: Floats, had: Bools, found: hanging.Hanging) -> str:
     """That components cannot have the values asked for, and what hangs in balance instead."""
     wanted = ", ".join(f"{COMPONENTS[i]} = {asked[i]:g}" for i in np.flatnonzero(had))
     return (

@@ -173,17 +173,22 @@ class Balance:
 
     def _over_pulley(self, line: list[Any], axis: list[Any], rho: Any) -> Span:
         """A line that leaves a pulley of radius `rho` which swivels about an axis."""
-        s = [a / _square(axis).sqrt() for a in axis]
+        size = _square(axis).sqrt()
+        s = [a / size for a in axis]
         z = _dot(line, s)
         beside = [a - z * b for a, b in zip(line, s, strict=True)]
         away = _square(beside).sqrt()
         e = [a / away for a in beside]
         tangent = self._tangent(away - rho, z, rho)
         cosine, sine = tangent.cosine, tangent.sine
-        u = [sine * a + cosine * b for a, b in zip(e, s, strict=True)]
-        normal = [cosine * a - sine * b for a, b in zip(e, s, strict=True)]
-        bends = _bends(normal, tangent.straight, _cross(s, e), sine, away)
-        return Span(rho * tangent.wrap + tangent.straight, u, bends)
+        u, normal = [], []
+        for a, b in zip(e, s, strict=True):
+            u.append(sine * a + cosine * b)
+            normal.append(cosine * a - sine * b)
+        across = _cross(s, e)
+        bends = _bends(normal, tangent.straight, across, sine, away)
+        length = rho * tangent.wrap + tangent.straight
+        return Span(length, u, bends)
 
     def _tangent(self, h: Any, z: Any, rho: Any) -> "_RimTangent":
         """The tangent from a rim to the point ``(h, z)``, seen from the pulley's centre."""

@@ -85,10 +85,11 @@ def enclosed(robot: Robot, wires: Wires, course: Course, position_m: Floats, rot
         return nothing
     mean = control.known(wires)
     commands = inverse.commands_at(robot, mean, position_m, rotation)
-    bands = _band(robot, wires.theta["k1"], course), _band(robot, course.end.strain(wires), course)
+    stiffness = _band(robot, wires.theta["k1"], course)
+    creep = _band(robot, course.end.strain(wires), course)
     for share in SHARES:
         try:
-            proof = _proved_share(robot, mean, commands, bands, share, position_m)
+            proof = _proved_share(robot, mean, commands, (stiffness, creep), share, position_m)
         except ImportError:
             return {}
         if proof is not None:
@@ -124,7 +125,7 @@ def _proved_share(
     return way.proved(position_m, commands.rotation[0], known)
 
 
-def _middle(low: Floats, high: Floats, share: float) -> tuple[Floats, Floats]:
+def _middle(low: Floats, high: Floats, share: float) -> _Band:
     middle, half = 0.5 * (low + high), 0.5 * share * (high - low)
     return middle - half, middle + half
 
@@ -144,8 +145,8 @@ class _Way:
         self,
         robot: Robot,
         law: ElasticLaw,
-        k1_N: tuple[Floats, Floats],
-        strain: tuple[Floats, Floats],
+        k1_N: _Band,
+        strain: _Band,
         bare_m: Floats,
         offset_m: Floats,
     ) -> None:
@@ -168,10 +169,15 @@ class _Way:
         Reach or None
             None where a piece of the way is not proved.
         """
-        here, at = self._certain((x, R), k1_N, np.zeros(self.robot.legs)), k1_N
-        if here is None or np.abs(here[0] - x).max() > 1e-6 * self.robot.span_m:  # not held stably
+        commanded = self._certain((x, R), k1_N, np.zeros(self.robot.legs))
+        if commanded is None:
             return None
-        pieces, strain = [(0.0, 1.0)], np.zeros(self.robot.legs)
+        away_m = np.abs(commanded[0] - x).max()
+        if away_m > 1e-6 * self.robot.span_m:  # not held stably
+            return None
+        here, at = commanded, k1_N
+        strain = np.zeros(self.robot.legs)
+        pieces = [(0.0, 1.0)]
         while pieces:
             a, b = pieces.pop()
             ahead = self._ahead(a, b)
@@ -180,12 +186,15 @@ class _Way:
                 if b - a < _STEP:  # what varies now is not the creep: smaller pieces are as wide
                     return None
                 middle = 0.5 * (a + b)
-                pieces += [(middle, b), (a, middle)]
+                pieces.append((middle, b))
+                pieces.append((a, middle))
                 continue
-            at, strain = 0.5 * (self.k1[0] + self.k1[1]), 0.5 * b * (self.strain[0] + self.strain[1])
-            here = self._certain((here[0], here[1]), at, strain)
-            if here is None or not self._joined(piece, here, at, strain, ahead):
+            at = 0.5 * (self.k1[0] + self.k1[1])
+            strain = 0.5 * b * (self.strain[0] + self.strain[1])
+            there = self._certain((here[0], here[1]), at, strain)
+            if there is None or not self._joined(piece, there, at, strain, ahead):
                 return None
+            here = there
         return self._reach(here, at, strain, self.strain)
 
     def _ahead(self, a: float, b: float) -> _Band:
@@ -202,7 +211,7 @@ class _Way:
         proof = certify(self.robot, self.law, (k1_N, k1_N), (zero, zero), self.offset, *pose, how_alone=False)
         return (*pose, proof.radius_m) if proof.proved else None
 
-    def _solved(self, near: Poses, k1_N: Floats, strain: Floats) -> tuple[Floats, Floats] | None:
+    def _solved(self, near: Poses, k1_N: Floats, strain: Floats) -> Poses | None:
         modulus = Wires(self.law, "saturating", {"k1": k1_N[:, None]}, np.full((self.robot.legs, 1), 1000.0))
         zero = self.bare * (1 + strain)
         found = forward.solve_equilibrium(self.robot, modulus, zero[None], self.offset, *near)
@@ -211,7 +220,7 @@ class _Way:
         left, _, right = np.linalg.svd(found.rotation[0])
         return found.position_m[0], left @ right
 
-    def _reach(self, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> Reach | None:
+    def _reach(self, here: _Pose, k1_N: Floats, strain: Floats, band: _Band) -> Reach | None:
         """A piece's proof about its middle, if the pose here is the equilibrium that it proves."""
         stiff, grown = _centre(self.k1), _centre(band)
         middle = self._solved((here[0], here[1]), stiff, grown)
@@ -224,7 +233,7 @@ class _Way:
         joined = proof.proved and self._joined(proof, here, k1_N, strain, band)
         return proof if joined else None
 
-    def _joined(self, proof: Reach, here: _Pose, k1_N: Floats, strain: Floats, band: tuple[Floats, Floats]) -> bool:
+    def _joined(self, proof: Reach, here: _Pose, k1_N: Floats, strain: Floats, band: _Band) -> bool:
         p = []
         for value, (low, high) in ((k1_N, self.k1), (strain, band)):
             if not np.all((low <= value) & (value <= high)):  # of wires that the proof does not cover

@@ -26,6 +26,7 @@ from wirebayes.robot.proof.ball_arithmetic import (
 from wirebayes.robot.proof.krawczyk import box_around_image, image_of_centre, preconditioner
 from wirebayes.wire.laws import ElasticLaw
 
+Generators = tuple[Floats, Floats]  # by how much each parameter varies stiffness and zero-tension length, (w, q) each
 _UP = 1.0 + 1e-12  # more than the few roundings of a sum
 
 
@@ -77,7 +78,7 @@ class Reach:
         return bool(np.all(off + slack_m <= self.beside_m))
 
 
-def each_on_its_own(half_k1_N: Floats, half_zero_m: Floats) -> tuple[Floats, Floats]:
+def each_on_its_own(half_k1_N: Floats, half_zero_m: Floats) -> Generators:
     """Generators for wires that vary each on its own: half widths ``(w,)`` of stiffness and of length."""
     none = np.zeros((len(half_k1_N), len(half_k1_N)))
     return np.hstack([np.diag(half_k1_N), none]), np.hstack([none, np.diag(half_zero_m)])
@@ -88,7 +89,7 @@ def reach(
     law: ElasticLaw,
     k1_N: Floats,
     zero_m: Floats,
-    generators: tuple[Floats, Floats],
+    generators: Generators,
     offset_m: Floats,
     position_m: Floats,
     rotation: Floats,
@@ -140,7 +141,7 @@ def _bounds(middle: Floats, generators: Floats) -> tuple[Floats, Floats]:
     return np.nextafter(middle - half, -np.inf), np.nextafter(middle + half, np.inf)
 
 
-def _linear_answer(middle: Balance, C: Floats, generators: tuple[Floats, Floats]) -> Floats:
+def _linear_answer(middle: Balance, C: Floats, generators: Generators) -> Floats:
     """Approximate change of the pose by each parameter, (d, q)."""
     d = len(C)
     still = [middle.arb(0)] * d
@@ -178,7 +179,7 @@ def _image(
     wide: Balance,
     C: Floats,
     Y: Floats,
-    generators: tuple[Floats, Floats],
+    generators: Generators,
     along: Floats,
     beside: Floats,
 ) -> Floats:

@@ -192,12 +192,14 @@ def _contradicted(robot: Robot, prior: LengthPrior, session: Session, known: Len
     """A warning for each hold whose requested pose is not where the joint values lead, for any plausible lengths."""
     if not known.converged[0]:
         return []
-    shift = np.linalg.norm(known.begun_m[0] - session.position_m, axis=1)
-    turn = rotation.vector(session.rotation.mT @ known.begun_rotation[0])
+    begun_m, begun_rotation = known.begun_m[0], known.begun_rotation[0]
+    shift = np.linalg.norm(begun_m - session.position_m, axis=1)
+    turn = rotation.vector(session.rotation.mT @ begun_rotation)
     angle = np.linalg.norm(turn, axis=1)
     apart = np.maximum(shift, robot.size_m * angle)
-    creep_m = float((known.creep[0] * known.length_m[0]).max())
-    plausible = _FAR * (prior.reference_sd_m + creep_m)
+    creep_m = known.creep[0] * known.length_m[0]
+    error_m = prior.reference_sd_m + float(creep_m.max())
+    plausible = _FAR * error_m
     out = []
     for i in np.flatnonzero(apart > plausible):
         text = (
@@ -257,10 +259,12 @@ def _observed(robot: Robot, prior: LengthPrior, session: Session, rng: np.random
     mean, _ = prior.moments(robot.legs)
     wires, _ = prior.wires(robot, mean[None])
     wires = control.known(wires)
-    zero, offset = inverse.lengths(robot, session.joint_m[session.read])
-    read = session.position_m[session.read], session.rotation[session.read]
-    _, done = observability.length_sensitivity(robot, wires, *read, zero, offset)
+    was_read = session.read
+    zero, offset = inverse.lengths(robot, session.joint_m[was_read])
+    position, turn = session.position_m[was_read], session.rotation[was_read]
+    _, done = observability.length_sensitivity(robot, wires, position, turn, zero, offset)
     seen = observability.observe(done, session.tension_sd_N, prior.reference_sd_m, prior.bias_sd_N, session.bias_sign)
+    next_m = _next_positions(robot, wires, prior, session, rng, visits)
     return {
         "observability": {
             "rank": seen.rank,
@@ -268,7 +272,7 @@ def _observed(robot: Robot, prior: LengthPrior, session: Session, rng: np.random
             "weakest_combination": seen.weakest,
             "sentence": seen.sentence,
         },
-        "next_positions_m": _next_positions(robot, wires, prior, session, rng, visits),
+        "next_positions_m": next_m,
     }
 
 

@@ -48,13 +48,14 @@ def _jump(passed: Sequence[State], sd: Floats, tension_sd_N: float) -> State | N
     for state in passed:
         pull = state.pull_N.ravel() / tension_sd_N
         places.append(np.concatenate([state.white / sd, pull]))
-    steps = _steps_on(*np.diff(places, axis=0))
+    first, second = np.diff(places, axis=0)
+    steps = _steps_on(first, second)
     if not steps:
         return None
     _, before, last = passed
-    white = last.white + steps * (last.white - before.white)
-    pull = last.pull_N + steps * (last.pull_N - before.pull_N)
-    return replace(last, white=white, pull_N=pull)
+    moved = last.white - before.white
+    pulled = last.pull_N - before.pull_N
+    return replace(last, white=last.white + steps * moved, pull_N=last.pull_N + steps * pulled)
 
 
 def _steps_on(first: Floats, second: Floats) -> float:

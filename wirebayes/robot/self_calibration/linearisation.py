@@ -203,17 +203,19 @@ def _errors_apart(robot: Robot) -> Floats | None:
 def _balance(out: Equations, about: _About) -> None:
     """The wires carry the platform."""
     robot, noise = about.here, about.noise
-    scale, d = robot.edge_scale, robot.degrees
-    balance = out.rows["balance"]
+    d = robot.degrees
+    scale = robot.edge_scale
     pull, taut = pulled(about.state.pull_N, noise.soft_N)
     none = np.zeros_like(pull.T)
     gradient, hessian = statics.unbalance_and_stiffness(robot, about.shape, about.turn, pull.T, none)
     stiffness = batch_first(hessian) * scale * scale[:, None]
     by_pull = about.J.mT * taut[:, None]
     force = noise.balance * robot.mass_kg * GRAVITY
-    out.residual[:, balance] = gradient.T * scale / force
-    out.by_hold[:, balance, :d] = stiffness / force
-    out.by_hold[:, balance, d:] = by_pull / force
+    rows = out.rows["balance"]
+    out.residual[:, rows] = gradient.T * scale / force
+    by_hold = out.by_hold[:, rows]
+    by_hold[..., :d] = stiffness / force
+    by_hold[..., d:] = by_pull / force
     _balance_by_points(out, about, pull, force)
 
 
@@ -230,16 +232,18 @@ def _points(out: Floats, unknowns: Unknowns, by_exit: Floats, by_platform: Float
     `by_exit` and `by_platform` are ``(p, w, 3)`` of equations that speak of one leg each, or ``(p, d, w, 3)``.
     """
     errors = unknowns.errors
+    leg = np.arange(unknowns.robot.legs)
     for name, slope, sd in (("exit", by_exit, errors.exit_m), ("platform", by_platform, errors.platform_m)):
         at = unknowns.slices[name]
         if at.stop == at.start:
             continue
+        scaled = slope * sd
         if slope.ndim == 3:
-            leg = np.arange(slope.shape[1])
+            first = at.start + 3 * leg
             for axis in range(3):
-                out[:, leg, at.start + 3 * leg + axis] = slope[..., axis] * sd
+                out[:, leg, first + axis] = scaled[..., axis]
         else:
-            out[:, :, at] = slope.reshape(*slope.shape[:2], -1) * sd
+            out[:, :, at] = scaled.reshape(*slope.shape[:2], -1)
 
 
 def _swing(robot: Robot, shape: statics.Geometry, rotation: Floats, pull: Floats) -> tuple[Floats, Floats]:

@@ -187,8 +187,9 @@ def choose_poses(change_N: Floats, count: int, tension_sd_N: float, prior_sd_m: 
     if not len(information):
         return chosen
     for _ in range(count):
-        gain = np.linalg.slogdet(total + information)[1]
+        together = total + information
+        _, gain = np.linalg.slogdet(together)
         best = int(np.argmax(gain))
         chosen.append(best)
-        total = total + information[best]
+        total = together[best]
     return chosen

@@ -107,7 +107,7 @@ def _standardised(session: Session, tension_N: Floats, turn: Floats) -> Floats:
     return np.concatenate([readings, normals / session.tilt_sd_rad], 1)
 
 
-def _poses(solved: Sequence[forward.Equilibria]) -> tuple[Floats, Floats]:
+def _poses(solved: Sequence[forward.Equilibria]) -> Poses:
     """Positions (n, p, 3) and rotations (n, p, 3, 3) of solved holds."""
     return np.stack([one.position_m for one in solved], 1), np.stack([one.rotation for one in solved], 1)
 

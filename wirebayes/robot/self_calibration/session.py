@@ -150,8 +150,7 @@ class LengthPrior:
         references = self.reference_sd_m**2 * np.eye(legs)
         specimens = self.own_sd**2 * np.eye(own)
         sensors = self.bias_sd_N**2 * np.eye(biased)
-        covariance = block_diag(references, fitted, specimens, sensors)
-        return mean, covariance
+        return mean, block_diag(references, fitted, specimens, sensors)
 
     def wires(self, robot: Robot, unknowns: Floats) -> tuple[Wires, Floats]:
         """Wires, and reference errors ``(n, w)``, of unknowns ``(n, d)``."""

@@ -117,8 +117,7 @@ def grown(
     tensions = np.maximum(pull_N[..., None] * factor, 0.0)
     strain, course = crept(wires.part(rows), loaded(tensions), known)
     by_wires = by_unknown(unknowns, strain[..., :-2])
-    by_pull = _by_pull(strain, pull_N)
-    return Grown(strain[..., 0], by_wires, by_pull, course)
+    return Grown(strain[..., 0], by_wires, _by_pull(strain, pull_N), course)
 
 
 def _by_pull(strain: Floats, pull_N: Floats) -> Floats:

@@ -110,26 +110,36 @@ def _slope_of_lengths(found: Whole) -> Floats:
 
 
 def _standard_deviations(found: Whole) -> dict[str, Floats]:
-    unknowns, robot, prior = found.unknowns, found.unknowns.robot, found.unknowns.prior
+    unknowns, errors = found.unknowns, found.unknowns.errors
+    robot, prior = unknowns.robot, unknowns.prior
     w, d = robot.legs, robot.degrees
     sd = np.sqrt(np.diag(found.covariance))
-    hold = np.sqrt(np.maximum(np.einsum("pii->pi", found.hold_covariance), 0.0))
+    variance = np.einsum("pii->pi", found.hold_covariance)
+    hold = np.sqrt(np.maximum(variance, 0.0))
 
     def unknown(name: str, error: float, shape: tuple[int, ...]) -> Floats:
         own = sd[unknowns.slices[name]]
-        return np.asarray(error * own.reshape(shape) if len(own) else np.zeros(shape))
+        if not len(own):
+            return np.zeros(shape)
+        return np.asarray(error * own.reshape(shape))
 
     slope = _slope_of_lengths(found)
-    drum = unknown("drum", unknowns.errors.drum, (robot.joints,))
-    bias = prior.bias_sd_N * sd[unknowns.slices["wires"]][-w:]
+    length = np.sqrt(np.einsum("wi,ij,wj->w", slope, found.covariance, slope))
+    drum = unknown("drum", errors.drum, (robot.joints,))
+    bias = np.zeros(w)
+    if prior.bias_sd_N > 0:
+        bias = prior.bias_sd_N * sd[unknowns.slices["wires"]][-w:]
+    turn = np.zeros((len(hold), 3))
+    if d == 6:
+        turn = hold[:, 3:d] / robot.size_m
     return {
-        "exit_m": unknown("exit", unknowns.errors.exit_m, (w, 3)),
-        "platform_m": unknown("platform", unknowns.errors.platform_m, (w, 3)),
+        "exit_m": unknown("exit", errors.exit_m, (w, 3)),
+        "platform_m": unknown("platform", errors.platform_m, (w, 3)),
         "reference_m": prior.reference_sd_m * sd[unknowns.references],
-        "length_m": np.sqrt(np.einsum("wi,ij,wj->w", slope, found.covariance, slope)),
+        "length_m": length,
         "drum": of_each_leg(robot, drum),
-        "bias_N": bias if prior.bias_sd_N > 0 else np.zeros(w),
+        "bias_N": bias,
         "position_m": hold[:, :3],
-        "turn_rad": hold[:, 3:d] / robot.size_m if d == 6 else np.zeros((len(hold), 3)),
+        "turn_rad": turn,
         "pull_N": hold[:, d:],
     }

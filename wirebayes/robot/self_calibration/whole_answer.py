@@ -231,6 +231,14 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
     """Where the platform is after the last hold; joint values of the home pose where they can be used."""
     if not found.converged:
         return {"pose_now": None, "joint_values_for_home_m": None}
+    joint = np.full(robot.legs, np.nan)
+    if usable:
+        joint = _joint_values_for_home(robot, found, s)
+    return pose_and_home(robot, s.position_m.mean[-1], s.turn_rad.mean[-1], joint)
+
+
+def _joint_values_for_home(robot: Robot, found: Whole, s: Summary) -> Floats:
+    """(w,) The joint values that bring the platform to its home pose, by the geometry that was found."""
     unknowns = found.unknowns
     parts = unknowns.parts(found.state.white)
     wires, _ = unknowns.prior.wires(robot, parts.wires[None])
@@ -238,10 +246,7 @@ def _now(robot: Robot, found: Whole, s: Summary, usable: bool) -> CalibratedPose
     home = robot.home_m[None], rotation.matrix(robot.home_rotation_rad)[None]
     tau = inverse.tensions(there, *home)
     strain, reference = s.strain[:, None], parts.reference_m[:, None]
-    joint = inverse.commands(there, wires, *home, tau, strain, reference).joint_m[0]
-    if not usable:
-        joint = np.full(robot.legs, np.nan)
-    return pose_and_home(robot, s.position_m.mean[-1], s.turn_rad.mean[-1], joint)
+    return inverse.commands(there, wires, *home, tau, strain, reference).joint_m[0]
 
 
 def _warnings(verdict: _Verdict) -> list[Notice]:
