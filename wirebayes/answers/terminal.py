@@ -71,12 +71,13 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     if verdict == "unknown" and candidates:
         lines.append(f"  its largest part may be {candidates}; nothing is established")
     sentences = list(said_beside(report))
-    sentences += [_effect_size(effect, size) for effect, size in report["amplitudes"].items()]
+    for effect, size in report["amplitudes"].items():
+        sentences.append(_effect_size(effect, size))
     sentences += in_other_tests(report)
     lines += [f"  {sentence}" for sentence in sentences]
-    named = (*effects, "unknown")
-    alike = [spoken(other) for other in report["group"] if other not in named]
     if verdict in ("named", "ambiguous"):
+        named = (*effects, "unknown")
+        alike = [spoken(other) for other in report["group"] if other not in named]
         lines += _list("hard to distinguish on this protocol", alike)
     gain = _gain(report)
     if effects and gain:

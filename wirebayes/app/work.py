@@ -52,10 +52,12 @@ def do_step(send: Connection, folder: Path, step: str, options: dict[str, Any]) 
 
 def _read(test: Test, step: str, options: dict[str, Any], progress: Progress) -> dict[str, Any]:
     """Turn what was dropped into an experiment file, or take the one that was dropped, and draw what was understood."""
+    folder = test.folder
     for name in test.steps():  # of an earlier reading
-        (test.folder / f"{name}.json").unlink(missing_ok=True)
-        shutil.rmtree(test.folder / name, ignore_errors=True)
-    target = test.folder / READ
+        record = folder / f"{name}.json"
+        record.unlink(missing_ok=True)
+        shutil.rmtree(folder / name, ignore_errors=True)
+    target = folder / READ
     shutil.rmtree(target, ignore_errors=True)
     if test.is_experiment_file:
         return _read_experiment_file(test, target)

@@ -136,20 +136,21 @@ def _holds(setting: Array, times: Array, length_mm: float, control: Control) -> 
 
 def _another_length(problem: Problem) -> tuple[str, Problem]:
     """The test repeated, beside what there is, on a sample twice as long as the longest, whose preload it shares."""
-    longest = max(problem.samples, key=lambda s: s.protocol.length_mm)
+    samples = problem.samples
+    longest = max(samples, key=lambda s: s.protocol.length_mm)
     more = _twice_as_long(longest)
     prior = problem.prior
     if LENGTH_EXPONENT not in prior.names:
         fixed = {LENGTH_EXPONENT: 1.0} | prior.fixed
         prior = replace(prior, fixed=fixed)
-    lengths = {s.protocol.length_mm for s in problem.samples}
+    lengths = {s.protocol.length_mm for s in samples}
     which = "a second" if len(lengths) == 1 else "another"
     protocol = more.protocol
     length = problem.units.length_mm * protocol.length_mm
     alike = "the same weights" if protocol.control == "force" else "steps scaled alike"
     words = f"repeat the test at {which} length, {length:g} mm, with {alike}"
-    samples = (*problem.samples, more)
-    return words, replace(problem, samples=samples, prior=prior)
+    with_it = replace(problem, samples=(*samples, more), prior=prior)
+    return words, with_it
 
 
 def _twice_as_long(sample: Sample) -> Sample:

@@ -66,13 +66,15 @@ def preview(experiment: Experiment, kinds: Kinds, rng: Generator) -> Preview:
     rng : Generator
     """
     block = fitted((experiment,), (), PLAIN_SPEC, rng)
-    problem = block.target.problem
-    draws = rough_draws.draws(block.target, block.modes, rng)
+    target = block.target
+    problem = target.problem
+    draws = rough_draws.draws(target, block.modes, rng)
     theta = problem.theta_in(NATURAL, draws)
     prior_draws = problem.prior.rvs(4000, rng)
     before = problem.theta_in(NATURAL, prior_draws)
     problem = problem.in_units(NATURAL)
-    best = np.array(list(block.best.values()))
+    at_best = list(block.best.values())
+    best = np.array(at_best)
     sd = theta.std(axis=0, ddof=1)
     ends = hold_ends.cost(problem, best, sd)
     parameters = _parameters(problem, theta, before)
@@ -130,7 +132,8 @@ def _effects(block: LaplaceFit, kinds: Kinds, rng: Generator) -> dict[str, Effec
     level = screening.chance_level(candidates, [null])
     found = power.detectable(null, trials, candidates, level)
     for name, (number, amplitude) in found.items():
-        effects[name] = _shown(block, trials[number].effect, amplitude)
+        effect = trials[number].effect
+        effects[name] = _shown(block, effect, amplitude)
     return effects
 
 

@@ -95,12 +95,12 @@ def top_of(profile: Profile, per_delta: float) -> Top | None:
     if not 0 < best < len(profile.amplitude) - 1:
         return None
     near = _about_best(profile)
-    highest = profile.value[best]
-    y = profile.value[near] - highest
+    amplitude, value = profile.amplitude, profile.value
+    middle, highest = amplitude[best], value[best]
+    y = value[near] - highest
     if not np.isfinite(y).all():
         return None
-    middle = profile.amplitude[best]
-    away = (profile.amplitude[near] - middle) / per_delta
+    away = (amplitude[near] - middle) / per_delta
     scale = np.abs(away).max()
     x = away / scale
     bend, slope, height = np.polyfit(x, y, 2)
@@ -109,9 +109,10 @@ def top_of(profile: Profile, per_delta: float) -> Top | None:
     vertex = -0.5 * slope / bend
     summit = float(np.clip(vertex, x.min(), x.max()))
     rise = height + slope * summit + bend * summit**2
-    amplitude = middle + summit * scale * per_delta
+    at_top = middle + summit * scale * per_delta
     sd = per_delta * scale / np.sqrt(-2.0 * bend)
-    return Top(float(amplitude), float(sd), float(highest + rise))
+    top = highest + rise
+    return Top(float(at_top), float(sd), float(top))
 
 
 def _about_best(profile: Profile) -> Bools:

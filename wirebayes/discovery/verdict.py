@@ -233,15 +233,16 @@ def _families(decision: Decision, block: int) -> list[FamilyEvidence]:
     together = {}
     for family, probability in zip(found.families, found.together, strict=True):
         together[family] = float(probability[block])
-    accepted = list(decision.gains)
+    gains = decision.gains
+    accepted = list(gains)
     if best is not None:
         accepted = [found.family(name) for name in best.effects.names]
     ranked = sorted(found.families, key=lambda family: -together[family])
     out = []
     for family in dict.fromkeys([*accepted, *ranked]):
         members = _members(found, family, block)
-        gain = decision.gains.get(family)
-        out.append(FamilyEvidence(members, together[family], gain))
+        evidence = FamilyEvidence(members, together[family], gains.get(family))
+        out.append(evidence)
     return out
 
 

@@ -220,7 +220,9 @@ def from_draws(
 
     found = climb(density, begin, iterations=_STEPS, tolerance=1e-2)
     found = distinct([found])
-    start = mixture.from_modes(found.z, _WIDER * found.covariance, np.zeros(len(found.z)))
+    covariance = _WIDER * found.covariance
+    equal_weights = np.zeros(len(found.z))
+    start = mixture.from_modes(found.z, covariance, equal_weights)
     return importance_sample(densities, start, draws, order, rng, ess)
 
 

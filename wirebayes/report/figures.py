@@ -252,13 +252,12 @@ def creep_ahead(ahead: ExtrapolatedCreep, title: str) -> Figure:
     title = f"{title}, {ahead['tension_N']:g} N"
     figure, axes = panel("time under constant tension, s", "creep, mm", title)
     times = ahead["time_s"]
-    prior, weaker, posterior = ahead["prior_mm"], ahead["weaker_prior_mm"], ahead["posterior_mm"]
-    _fill(axes, times, prior, QUIET, "prior alone")
+    posterior, weaker = ahead["posterior_mm"], ahead["weaker_prior_mm"]
+    _fill(axes, times, ahead["prior_mm"], QUIET, "prior alone")
     _fill(axes, times, posterior, CHAIN, "posterior, 90 %")
     axes.plot(times, posterior["q50"], color=CHAIN, lw=1.2)
-    low, high = weaker["q05"], weaker["q95"]
-    axes.plot(times, low, color=HOLD, lw=1, ls="--", label="prior at half weight")
-    axes.plot(times, high, color=HOLD, lw=1, ls="--")
+    axes.plot(times, weaker["q05"], color=HOLD, lw=1, ls="--", label="prior at half weight")
+    axes.plot(times, weaker["q95"], color=HOLD, lw=1, ls="--")
     _mark_time(axes, 3600.0, "1 h")
     _mark_time(axes, 86400.0, "1 day")
     logarithmic(axes, "both")

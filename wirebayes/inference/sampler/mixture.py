@@ -125,7 +125,8 @@ def fit_mixture(
     numpy.linalg.LinAlgError
         If the points do not span their space.
     """
-    share = points.weight / points.weight.sum()
+    weight = points.weight
+    share = weight / weight.sum()
     middle = share @ points.z
     away = points.z - middle
     scale = (away * share[:, None]).T @ away
@@ -147,7 +148,7 @@ def fit_mixture(
 
     for start in starts():
         try:
-            found = _em(x, points.weight, start)
+            found = _em(x, weight, start)
         except np.linalg.LinAlgError:
             continue
         centres = middle + found.centres @ root.T

@@ -35,7 +35,8 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
     state : Sampling
     policy : Policy
     """
-    z = by_ensemble(state.all_kept.z, policy)
+    kept = state.all_kept
+    z = by_ensemble(kept.z, policy)
     values = _judged_by(target, z)
     before = state.earlier.steps
     if before and _contradicted(state, policy, z, values):

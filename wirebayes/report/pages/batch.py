@@ -45,7 +45,8 @@ def batch_page(folder: Path, configuration: Configuration) -> Page:
     lead, *others = batch_in_sentences(found)
     summary = _summary(others, rows, fitted, far)
     sections = [Section("Summary", summary)]
-    warned: list[Block] = [*before_the_answer(found), *beside_the_answer(found)]
+    warned: list[Block] = before_the_answer(found)
+    warned += beside_the_answer(found)
     if warned:
         many = len(found["warnings"]) > _MOST_WARNINGS
         sections.append(Section("Warnings", warned, folded=many))
@@ -54,7 +55,8 @@ def batch_page(folder: Path, configuration: Configuration) -> Page:
     sections.append(Section("Experiments", _table(rows), folded=is_long))
     sections.append(files_beside(folder, _FILES))
     terms = ("90 % interval", "p", "robust z")
-    sections.append(meaning(terms, _effects_in(fitted)))
+    effects = _effects_in(fitted)
+    sections.append(meaning(terms, effects))
     footer = seed_of_page(configuration)
     return Page("Many experiments", lead, sections, footer)
 

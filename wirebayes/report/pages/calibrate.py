@@ -39,7 +39,10 @@ def calibrate_page(folder: Path, configuration: Configuration) -> Page:
     found: CalibrateJson = read_json(folder / "calibration.json")
     creep, hooke = found["with_creep_model"], found["by_hooke_alone"]
     columns = Columns([_done(found), _known(found), _unknown(creep, hooke)])
-    first = [*before_the_answer(found), *_errors(found), *beside_the_answer(found), columns]
+    first: list[Block] = before_the_answer(found)
+    first += _errors(found)
+    first += beside_the_answer(found)
+    first.append(columns)
     lengths = [_lengths(creep, hooke), *_biases(creep)]
     view = robot_view(folder)
     sections = [Section("Summary", first)]

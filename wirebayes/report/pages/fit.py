@@ -337,8 +337,8 @@ def _residuals(stored: Stored) -> Figure:
     wanted = protocol.mask.copy()
     if kind == "hold":
         wanted[:, 0] = False
-    replicates = _replicates(stored)
-    band = np.quantile(replicates[wanted], [0.05, 0.5, 0.95], axis=1)
+    replicates = _replicates(stored)[wanted]
+    band = np.quantile(replicates, [0.05, 0.5, 0.95], axis=1)
     numbers = np.broadcast_to(protocol.number[:, None], wanted.shape)
     hold = numbers[wanted]
     time_s = protocol.time_s[wanted]

@@ -37,7 +37,9 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
     if recording is not None:
         starts = recording.start_s.tolist()
     ends = [start + hold.duration_s for start, hold in zip(starts, holds, strict=True)]
-    scale, unit = (60.0, "min") if max(ends) > _MINUTES else (1.0, "s")
+    scale, unit = 1.0, "s"
+    if max(ends) > _MINUTES:
+        scale, unit = 60.0, "min"
     time = f"time of the test, {unit}"
     if recording is None:
         time += " (moves take none)"
@@ -45,8 +47,9 @@ def understood(experiment: Experiment, target: Path, recording: Recording | None
         _draw_recording(upper, lower, recording, scale, experiment.control)
     _draw_holds(upper, lower, holds, starts, scale)
     lower.set_xlabel(time)
-    what = f"{experiment.name}: {experiment.length_mm:g} mm of {verbatim(experiment.material)}"
-    upper.set_title(f"{what}; hold numbers above", fontsize=10.5, loc="left", color=INK, pad=16)
+    material = verbatim(experiment.material)
+    title = f"{experiment.name}: {experiment.length_mm:g} mm of {material}; hold numbers above"
+    upper.set_title(title, fontsize=10.5, loc="left", color=INK, pad=16)
     _name_lines(figure, upper, lower)
     save_figure(figure, target)
 

@@ -36,11 +36,12 @@ def save_pictures(folder: Path, name: str, table: ComparedModels, models: list[M
         return
     errors = held_out_errors(name, table)
     save_figure(errors, folder / "held-out-errors.svg")
+    model = spoken(str(best))
     for way, words in WORDS.items():
         scores = held_out[way]
         if not scores:
             continue
-        title = f"{name} under {spoken(str(best))}:\n{words}"
+        title = f"{name} under {model}:\n{words}"
         file = way.replace("_", "-")
         save_figure(bands(title, scores), folder / f"held-out-{file}.svg")
         save_figure(pit(title, scores), folder / f"pit-{file}.svg")

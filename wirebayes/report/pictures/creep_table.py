@@ -18,11 +18,12 @@ def growth(rows: Sequence[Mapping[str, float]]) -> Figure:
         Of ``creep-table.csv``.
     """
     figure, axes = panel("time under constant tension, s", "growth, mm per m")
-    every = [row["tension_N"] for row in rows]
-    tensions = list(dict.fromkeys(every))
-    colours = cycle(len(tensions))
-    for tension, colour in zip(tensions, colours, strict=True):
-        own = [row for row in rows if row["tension_N"] == tension]
+    by_tension: dict[float, list[Mapping[str, float]]] = {}
+    for row in rows:
+        own = by_tension.setdefault(row["tension_N"], [])
+        own.append(row)
+    colours = cycle(len(by_tension))
+    for (tension, own), colour in zip(by_tension.items(), colours, strict=True):
         _draw_course(axes, own, colour, f"{tension:g} N")
     logarithmic(axes)
     axes.set_ylim(bottom=0)

@@ -53,12 +53,13 @@ def before_and_after(plain: Stored, final: Stored, verdict: ExperimentFindings) 
     if verdict["verdict"] != "nothing-missing":
         shown.append((f"with {_added(verdict)}", final, _BAND))
     panels = len(shown)
-    heights = (1.4, *[1] * panels)
+    ratios = [1.4] + [1.0] * panels
     height = 3.2 + 2.4 * panels
     figure = Figure(figsize=(9.0, height), layout="constrained")
-    above, *axes = figure.subplots(1 + panels, 1, sharex=True, height_ratios=heights)
+    above, *axes = figure.subplots(1 + panels, 1, sharex=True, height_ratios=ratios)
     _draw_curves(above, plain, shown)
-    name, control = plain.sample.name, plain.sample.protocol.control
+    sample = plain.sample
+    name, control = sample.name, sample.protocol.control
     unit = READ_UNIT[control]
     held = verdict["held_out"]["holds"]
     for axis, (title, stored, _) in zip(axes, shown, strict=True):
@@ -176,11 +177,13 @@ def pictures_of_findings(stored: Stored, verdict: ExperimentFindings) -> dict[st
     left = left_over(stored)
     shown: dict[str, Callable[[], Figure]] = {}
     for finding in verdict["where"]:
+        if finding["p"] > _SHOWN:
+            continue
         covariate = finding["covariate"]
         value_of = COVARIATES[covariate]
         values = np.broadcast_to(value_of(sample), left.shape)
         along = values[sample.protocol.mask]
-        if finding["p"] <= _SHOWN and np.ptp(along) > 0.0:
+        if np.ptp(along) > 0.0:
             dashed = covariate.replace(" ", "-")
             shown[f"where-{dashed}.svg"] = partial(_along, sample, left, finding, along)
     return shown

@@ -120,11 +120,11 @@ def _draw_payload(axes: Any, history: History) -> None:
 
 def _shapes(robot: Robot, found: HistoryAnswer, rows: Indices) -> tuple[Floats, Floats, float]:
     """Platform points meant and drifted, ``(r, w, 3)``, the drift enlarged by a round factor."""
-    assert found.found is not None and found.to is not None
-    track = found.found.track
-    meant_position = found.to.position_m[rows]
-    meant_rotation = found.to.rotation[rows]
-    position, rotation = _mean_pose(track, rows)
+    followed, to = found.found, found.to
+    assert followed is not None and to is not None
+    meant_position = to.position_m[rows]
+    meant_rotation = to.rotation[rows]
+    position, rotation = _mean_pose(followed.track, rows)
     shift = position - meant_position
     turn = rotation - meant_rotation
     factor = _enlarged(robot, shift)
@@ -306,7 +306,8 @@ def _moving_platform(robot: Robot, exits: Floats, points: Floats, colour: str, w
         parts.append(_moving_line(frames, wire))
     edges = list(platform_edges(robot.platform_m))
     for i, j in edges:
-        parts.append(_moving_line([frame[[i, j]] for frame in points], edge))
+        frames = [frame[[i, j]] for frame in points]
+        parts.append(_moving_line(frames, edge))
     if not edges:  # a point: a short stroke
         stroke = np.array([[-4.0, 0.0], [4.0, 0.0]])
         frames = [frame[0] + stroke for frame in points]
