@@ -12,7 +12,7 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import modes
 
 jax.config.update("jax_enable_x64", True)
-CHAINS = 4
+CHAINS, PILOT = 4, 100
 _COMPILING = {f"/jax/core/compile/{part}_duration" for part in ("jaxpr_to_mlir_module", "backend_compile")}
 _compiled = []
 jax.monitoring.register_event_duration_secs_listener(
@@ -81,7 +81,7 @@ def numpyro_nuts(problem, seed, seconds, natural=True):
         kernel = NUTS(potential_fn=lambda z: -density(z), dense_mass=True)
     _compiled.clear()
     mcmc = MCMC(
-        kernel, num_warmup=500, num_samples=100, num_chains=CHAINS, chain_method="vectorized", progress_bar=False
+        kernel, num_warmup=500, num_samples=PILOT, num_chains=CHAINS, chain_method="vectorized", progress_bar=False
     )
     start = None
     if not natural:
@@ -90,18 +90,25 @@ def numpyro_nuts(problem, seed, seconds, natural=True):
     with costs.part("burn"):
         mcmc.warmup(jax.random.PRNGKey(seed), init_params=start)
     _settled(costs, "burn")
-    blocks, divergences, began = [], 0, time.process_time()
-    mcmc.post_warmup_state = mcmc.last_state
-    while time.process_time() - began < seconds or not blocks:
-        with costs.part("sample"):
-            mcmc.run(mcmc.post_warmup_state.rng_key)
-            draws = jax.tree.map(np.asarray, mcmc.get_samples(group_by_chain=True))
-        _settled(costs, "sample")
-        mcmc.post_warmup_state = mcmc.last_state
-        divergences += int(np.asarray(mcmc.get_extra_fields()["diverging"]).sum())
-        blocks.append(np.stack([draws[name] for name in problem.names], -1) if natural else draws)
-    values = _values(problem, target, np.concatenate(blocks, axis=1)[:, :, None], natural)
+    # a run compiles anew: a first one, which is not counted, tells how many draws a single one can make in the time
+    pilot = Costs()
+    _sampled(mcmc, pilot, PILOT)
+    steps = max(int(PILOT * seconds / pilot.cpu["sample"]), PILOT)
+    draws = _sampled(mcmc, costs, steps)
+    x = np.stack([draws[name] for name in problem.names], -1) if natural else draws
+    divergences = int(np.asarray(mcmc.get_extra_fields()["diverging"]).sum())
+    values = _values(problem, target, x[:, :, None], natural)
     return judged(costs, values, divergences=divergences), values
+
+
+def _sampled(mcmc, costs, steps):
+    """So many draws of each chain after the last of them."""
+    mcmc.num_samples, mcmc.post_warmup_state = steps, mcmc.last_state
+    with costs.part("sample"):
+        mcmc.run(mcmc.post_warmup_state.rng_key)
+        draws = jax.tree.map(np.asarray, mcmc.get_samples(group_by_chain=True))
+    _settled(costs, "sample")
+    return draws
 
 
 def _starts(target, seed, n):
