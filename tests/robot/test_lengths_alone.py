@@ -75,16 +75,29 @@ def test_wires_that_nobody_read_are_not_thought_slack(tmp_path):
     assert np.mean(held) > 0.8
 
 
-@pytest.mark.parametrize("read", [False, True])
-def test_an_unusual_error_of_the_lengths_is_as_improbable_as_an_f_test_says(read):
-    worth, free, span = residuals._BLIND_DEGREES, 20.0, 3.0
-    usual = residuals.USUAL * span
-    ratio = f.isf(0.01, free, worth)
-    noise = np.sqrt((free * ratio + worth) / (free + worth)) * usual
-    found = SimpleNamespace(
-        degrees=free + worth,
-        noise=SimpleNamespace(joint_m=noise),
-        unknowns=SimpleNamespace(robot=SimpleNamespace(span_m=span)),
+_WORTH, _SPAN_M = residuals._BLIND_DEGREES, 3.0
+_USUAL_M = residuals.USUAL * _SPAN_M
+
+
+def _with_loops_off_by(noise_m, free, read=False):
+    """What a calibration found, as far as the test of its loops asks."""
+    return SimpleNamespace(
+        degrees=free + _WORTH,
+        noise=SimpleNamespace(joint_m=noise_m),
+        unknowns=SimpleNamespace(robot=SimpleNamespace(span_m=_SPAN_M)),
         equations=SimpleNamespace(rows={"tension": slice(0, 4)}, known=np.full((5, 4), read)),
     )
-    assert residuals._usual_noise(found) == pytest.approx(1.0 if read else 0.01)
+
+
+@pytest.mark.parametrize("read", [False, True])
+def test_an_unusual_error_of_the_lengths_is_as_improbable_as_an_f_test_says(read):
+    free = 20.0
+    ratio = f.isf(0.01, free, _WORTH)
+    noise_m = np.sqrt((free * ratio + _WORTH) / (free + _WORTH)) * _USUAL_M
+    assert residuals._usual_noise(_with_loops_off_by(noise_m, free, read)) == pytest.approx(1.0 if read else 0.01)
+
+
+@pytest.mark.parametrize("free", [1e-9, 1e-3, 0.1])
+def test_loops_that_do_not_check_each_other_contradict_nothing(free):
+    assert residuals._usual_noise(_with_loops_off_by(_USUAL_M * (1.0 + 1e-6), free)) > 0.9
+    assert residuals._usual_noise(_with_loops_off_by(9.0 * _USUAL_M, free)) < 0.01  # but for these

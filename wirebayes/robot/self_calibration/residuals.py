@@ -172,6 +172,6 @@ def _usual_noise(found: Whole) -> float:
     if read or not np.isfinite(found.degrees):
         return 1.0
     usual = USUAL * found.unknowns.robot.span_m
-    free = max(found.degrees - _BLIND_DEGREES, 1e-9)
+    free = max(found.degrees - _BLIND_DEGREES, 1.0)  # where loops hardly check each other, rounding is no evidence
     shown = (found.degrees * found.noise.joint_m**2 - _BLIND_DEGREES * usual**2) / free
     return float(fdtrc(free, _BLIND_DEGREES, max(shown, 0.0) / usual**2))
