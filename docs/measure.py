@@ -21,7 +21,7 @@ DOCS = Path(__file__).parent
 ROOT = DOCS.parent
 sys.path.insert(0, str(DOCS))
 
-from figure_texts import claims, discovery, intervals, robots, speed  # noqa: E402
+from figure_texts import claims, discovery, intervals, robots, samplers, speed  # noqa: E402
 
 RESULTS = DOCS / "results"
 # what each study is called, with the file that it writes
@@ -73,12 +73,19 @@ STUDIES = {
     # on a machine that does nothing else
     "seconds": ("-m analyses.speed.seconds_of_a_fit --repeats 3 --output {folder}/seconds.json", "seconds.json"),
     "cost": ("-m analyses.benchmarks.cost --output {folder}", "cost.json"),
+    # by a Python that has the extra "benchmark"
+    "samplers": (
+        "-m analyses.benchmarks --minutes 0.8 --likelihoods chain --peers NumPyro compiled ChEES emcee "
+        "--output {folder}",
+        "samplers.json",
+    ),
     "real_wires": ("analyses/discovery/real_wires.py --together --output {folder}/wires.json", "wires.json"),
 }
 REDUCED = {  # of results that hold every file's answer
     "discover_clean": discovery.alarms_in_short,
     "discover_hidden": discovery.hidden_in_short,
     "cost": speed.cost_in_short,
+    "samplers": samplers.samplers_in_short,
 }
 _BLOCK = re.compile(r"(<!-- measured -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -148,6 +155,8 @@ def texts() -> dict[Path, str]:
         DOCS / "discover-clean-said.inc": discovery.false_alarms(kept["discover_clean"]),
         DOCS / "draws.inc": speed.draws_an_evaluation(kept["cost"]),
         DOCS / "evaluation-cost.inc": speed.cost_of_an_evaluation(kept["cost"]),
+        DOCS / "samplers.inc": samplers.against_other_samplers(kept["samplers"]),
+        DOCS / "samplers-agree.inc": samplers.other_samplers_agree(kept["samplers"]),
         DOCS / "seconds.inc": speed.seconds_of_commands(kept["seconds"]),
         DOCS / "discover-hidden-said.inc": discovery.hidden_effects(kept["discover_hidden"]),
     }

@@ -335,3 +335,35 @@ def test_the_page_on_robots_has_every_key_of_a_robots_file(monkeypatch):
     missing = {key for key in asked if key.rpartition(".")[2] not in known and key != "wires.own"}
     assert len(asked) > 40
     assert not missing
+
+
+def test_a_sampler_has_a_ratio_only_where_it_converged_and_is_said_to_be_off_where_its_means_are():
+    texts_of_samplers = load("measure").samplers
+    run = {"ess_of_means": 1e4, "ess": 1e4, "all_costs_per_cpu_s": 5e4, "sampling_per_cpu_s": 9e4, "converged": True}
+    peer = run | {"all_costs_per_cpu_s": 100.0, "sampling_per_cpu_s": 3e3, "divergences": 0, "r_hat": 1.002}
+    peer |= {"ratio_all_costs_cpu": 500.0, "ratio_sampling_cpu": 30.0, "agreement": {"mean_in_sd": 0.01, "log_sd": 0.0}}
+    peers = {
+        "right": peer,
+        "off": peer | {"ratio_all_costs_cpu": 2.0, "agreement": {"mean_in_sd": 0.4, "log_sd": 0.0}},
+        "diverged": peer | {"converged": False, "divergences": 7},
+        "stuck": peer | {"converged": False, "r_hat": 1.2, "ess": 80.0},
+        "absent": {"converged": False, "why": "TimeoutError"},
+    }
+    case = {"case": "nylon", "log_density_difference": 1e-10, "ours": [run] * len(peers), "peers": peers}
+    short = texts_of_samplers.samplers_in_short({"minutes": 1.0, "wanted_ess": 20_000, "cases": [case]})
+    kept = {"command": "c", "commit": "a", "date": "d", "result": short}
+    text = texts_of_samplers.against_other_samplers(kept)
+    cells = dict(re.findall(r"\* - (.*)\n     - (.*)\n", text))
+    assert cells == {
+        "sampler": "nylon",
+        "wirebayes (median)": "50,000",
+        "right": "100 (500; 30)",
+        "off": "100 (2; 30), off by 0.40 sd, a spread by a factor of 1.0",
+        "diverged": "! 7 divergences",
+        "stuck": "! R-hat 1.200, 80 draws",
+        "absent": "! not run",
+    }
+    assert "1 of 5" in text and "500 to 500 times" in text
+    agree = texts_of_samplers.other_samplers_agree(kept)
+    assert "Of 2 runs" in agree and "0.7 standard errors" in agree
+    assert agree.endswith("\noff, is off by 0.40 standard deviations on nylon.\n")

@@ -29,4 +29,4 @@ def percent(share: float) -> str:
 
 def three_digits(value: float) -> str:
     """Three digits, without an exponent where there are few zeros."""
-    return f"{float(f'{value:.3g}'):g}"
+    return f"{float(f'{value:.3g}'):,g}"
