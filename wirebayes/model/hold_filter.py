@@ -52,21 +52,51 @@ def carried_unread(line: Linearised, j: int, m: Array, p: Array, noise: ReadingN
     return mean, var
 
 
+class LinearHold(NamedTuple):
+    """A hold of a staircase at the readings that were taken, (r, n) each: nominal readings, and their slopes."""
+
+    reading: Array
+    by_creep: Array
+    by_setting: Array
+
+    @classmethod
+    def of(cls, line: Linearised, j: int, taken: Array | slice) -> "LinearHold":
+        """A hold of a staircase.
+
+        Parameters
+        ----------
+        line : Linearised
+        j : int
+            Its number.
+        taken : (R,) bool array or slice
+            Which of its readings.
+        """
+        return cls(line.reading[j][taken], line.by_creep[j][taken], line.by_setting[j][taken])
+
+    def along(self, left: Array, weight: Array) -> tuple[Array, Array]:
+        """What residuals (r, n) have along the slopes by creep and by setting error, times 1 / variance, (n,) each."""
+        return summed(self.by_creep, left) * weight, summed(self.by_setting, left) * weight
+
+    def products(self, weight: Array) -> tuple[Array, Array, Array]:
+        """(n,) creep with creep, creep with setting error and setting error with itself, times 1 / variance."""
+        cc, cs = self.along(self.by_creep, weight)
+        ss = summed(self.by_setting, self.by_setting) * weight
+        return cc, cs, ss
+
+
 class HoldRead(NamedTuple):
     """What the readings of one hold say.
 
     The log density (n,) of the readings; mean and variance (n,) of the creep carried on; what the readings leave over
-    (R, n); by how much they pull at the creep carried in and at the setting error, and what they know of either (n,).
+    (R, n); by how much they pull at the creep carried in and at the setting error (n,), and what they know of either.
     """
 
     log_density: Array
     mean: Array
     var: Array
     left: Array
-    pull_c: Array
-    pull_s: Array
-    cc: Array
-    ss: Array
+    pulls: tuple[Array, Array]
+    known: "HoldInformation"
 
 
 def filter_hold(
@@ -85,45 +115,45 @@ def filter_hold(
         Mean and variance of the creep carried into it.
     noise : ReadingNoise
     """
-    keep = slice(None) if mask.all() else mask
-    by_creep = line.by_creep[j][keep]
-    by_setting = line.by_setting[j][keep]
-    measured = np.where(noise.weight > 0, readings[keep], 0.0)
-    surprise = measured - line.reading[j][keep] - by_creep * m
-    known = information_of(by_creep, by_setting, noise.weight, p, noise.setting_var)
-    along_c = summed(by_creep, surprise) * noise.weight
-    along_s = summed(by_setting, surprise) * noise.weight
-    creep, setting = known.errors(along_c, along_s)
-    left = surprise - by_creep * creep - by_setting * setting
-    pull_c, pull_s = known.pulls(along_c, along_s, p, noise.setting_var)
-    log_density = _log_density(left, p * pull_c**2, noise.setting_var * pull_s**2, known.det, noise)
-    mean, var = _carried(line, j, m + creep, setting, known)
-    return HoldRead(log_density, mean, var, left, pull_c, pull_s, known.cc, known.ss)
+    taken = slice(None) if mask.all() else mask
+    hold = LinearHold.of(line, j, taken)
+    measured = np.where(noise.weight > 0, readings[taken], 0.0)
+    surprise = measured - hold.reading - hold.by_creep * m
+    known = information_of(hold, noise.weight, p, noise.setting_var)
+    along = hold.along(surprise, noise.weight)
+    creep, setting = known.errors(*along)
+    pulls = known.pulls(*along, p, noise.setting_var)
+    left = surprise - hold.by_creep * creep - hold.by_setting * setting
+    carry_c = line.carry_by_creep[j]
+    carry_s = line.carry_by_setting[j]
+    return HoldRead(
+        log_density=_log_density(left, pulls, known.det, p, noise),
+        mean=carry_c * (m + creep) + carry_s * setting,
+        var=known.var_along(carry_c, carry_s),
+        left=left,
+        pulls=pulls,
+        known=known,
+    )
 
 
-def _log_density(left: Array, of_creep: Array, of_setting: Array, det: Array, noise: ReadingNoise) -> Array:
+def _log_density(left: Array, pulls: tuple[Array, Array], det: Array, p: Array, noise: ReadingNoise) -> Array:
     """Of a hold's readings, by a sum of squares: the shorter difference of products can turn negative at absurd values.
 
     Parameters
     ----------
     left : (R, n) array
         What they leave over.
-    of_creep, of_setting, det : (n,) arrays
-        What either error adds to the squares; the determinant of `HoldInformation`.
+    pulls : two (n,) arrays
+        At the creep carried in and at the setting error.
+    det, p : (n,) arrays
+        The determinant of `HoldInformation`; the variance of the creep carried in.
     noise : ReadingNoise
     """
+    pull_c, pull_s = pulls
     of_readings = summed(left, left) * noise.weight
-    square = of_readings + of_creep + of_setting
+    square = of_readings + p * pull_c**2 + noise.setting_var * pull_s**2
     log_noise = len(left) * noise.log_variance
     return -0.5 * (square + log_noise + np.log(det))
-
-
-def _carried(line: Linearised, j: int, creep: Array, setting: Array, known: "HoldInformation") -> tuple[Array, Array]:
-    """Mean and variance of the creep carried on, by the creep carried in and the setting error given the readings."""
-    carry_c = line.carry_by_creep[j]
-    carry_s = line.carry_by_setting[j]
-    mean = carry_c * creep + carry_s * setting
-    return mean, known.var_along(carry_c, carry_s)
 
 
 def summed(one: Array, other: Array) -> Array:
@@ -171,21 +201,18 @@ class HoldInformation(NamedTuple):
         return a * a * self.v_cc + 2.0 * a * c * self.v_cs + c * c * self.v_ss
 
 
-def information_of(by_c: Array, by_s: Array, weight: Array, p: Array, q: Array) -> HoldInformation:
+def information_of(hold: LinearHold, weight: Array, p: Array, q: Array) -> HoldInformation:
     """What the readings of a hold say by their slopes.
 
     Parameters
     ----------
-    by_c, by_s : (R, n) arrays
-        Slopes of the readings by the creep carried in and by the setting error.
+    hold : LinearHold
     weight : (n,) array
         1 / variance of a reading.
     p, q : (n,) arrays
         Variances, before, of the creep carried in and of the setting error.
     """
-    cc = summed(by_c, by_c) * weight
-    cs = summed(by_c, by_s) * weight
-    ss = summed(by_s, by_s) * weight
+    cc, cs, ss = hold.products(weight)
     apart = np.maximum(cc * ss - cs * cs, 0.0)  # which may come out below zero by rounding
     det = 1.0 + p * cc + q * ss + p * q * apart
     v_cc = p * (1.0 + q * ss) / det
@@ -227,18 +254,18 @@ class Later:
         """The same with those readings, jointly by the creep carried into their hold and by its setting error."""
         carry_c = line.carry_by_creep[j]
         carry_s = line.carry_by_setting[j]
-        by_creep = line.by_creep[j][mask]
-        by_setting = line.by_setting[j][mask]
-        left = readings - line.reading[j][mask]
-        precise_c = self.precision * carry_c
-        precise_s = self.precision * carry_s
-        cc = summed(by_creep, by_creep) * weight + precise_c * carry_c
-        cs = summed(by_creep, by_setting) * weight + precise_c * carry_s
-        ss = summed(by_setting, by_setting) * weight + precise_s * carry_s
-        pull_c = summed(by_creep, left) * weight + self.pull * carry_c
-        pull_s = summed(by_setting, left) * weight + self.pull * carry_s
-        squares = summed(left, left) * weight
-        return _JointLater(cc, cs, ss, pull_c, pull_s, squares)
+        hold = LinearHold.of(line, j, mask)
+        left = readings - hold.reading
+        cc, cs, ss = hold.products(weight)
+        along_c, along_s = hold.along(left, weight)
+        return _JointLater(
+            cc=cc + self.precision * carry_c * carry_c,
+            cs=cs + self.precision * carry_c * carry_s,
+            ss=ss + self.precision * carry_s * carry_s,
+            pull_c=along_c + self.pull * carry_c,
+            pull_s=along_s + self.pull * carry_s,
+            squares=summed(left, left) * weight,
+        )
 
     def _without_setting(self, joint: "_JointLater", noise: ReadingNoise, count: int) -> "Later":
         """With the setting error of that hold, of so many readings, integrated out."""

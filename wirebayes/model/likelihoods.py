@@ -13,6 +13,7 @@ import numpy as np
 from wirebayes.model.hold_filter import (
     HoldRead,
     Later,
+    LinearHold,
     ReadingNoise,
     carried_unread,
     filter_hold,
@@ -131,11 +132,12 @@ def standardised(
 def _residuals(found: "HoldRead", carried_var: Array, noise: "ReadingNoise") -> list[Array]:
     """The parts of `standardised` from one hold, (r, n) each."""
     in_sensor_errors = found.left * np.sqrt(noise.weight)
-    creep = np.sqrt(carried_var) * found.pull_c
-    setting = np.sqrt(noise.setting_var) * found.pull_s
+    pull_c, pull_s = found.pulls
+    creep = np.sqrt(carried_var) * pull_c
+    setting = np.sqrt(noise.setting_var) * pull_s
     log_sensor = np.sqrt(len(found.left)) * noise.log_variance
-    log_creep = np.log1p(carried_var * found.cc)
-    log_setting = np.log1p(noise.setting_var * found.ss)
+    log_creep = np.log1p(carried_var * found.known.cc)
+    log_setting = np.log1p(noise.setting_var * found.known.ss)
     log_sd = [0.5 * part[None] for part in (log_sensor, log_creep, log_setting)]
     return [in_sensor_errors, creep[None], setting[None], *log_sd]
 
@@ -223,20 +225,19 @@ def seen(
     gram = np.zeros((k, k, n))
     along = np.zeros((k, n))
     mean = np.zeros((k, n))  # of the carried creep, had the shapes been the readings
-    setting_var = setting_sd * setting_sd
-    for j, keep in enumerate(mask):
-        by_creep = line.by_creep[j][keep]
-        by_setting = line.by_setting[j][keep]
-        known = information_of(by_creep, by_setting, 1.0 / variance, filtered.carried_var[j], setting_var)
-        surprise = readings[j][keep] - line.reading[j][keep] - by_creep * filtered.carried_mean[j]
+    noise = ReadingNoise.of(variance, setting_sd)
+    for j, taken in enumerate(mask):
+        hold = LinearHold.of(line, j, taken)
+        known = information_of(hold, noise.weight, filtered.carried_var[j], noise.setting_var)
+        surprise = readings[j][taken] - hold.reading - hold.by_creep * filtered.carried_mean[j]
         # what is left of the shapes beside the creep that they would have carried in
-        left = shapes[j][keep][:, :, None] - by_creep[:, None] * mean
-        along_c = _along(by_creep, left) / variance
-        along_s = _along(by_setting, left) / variance
+        left = shapes[j][taken][:, :, None] - hold.by_creep[:, None] * mean
+        along_c = _along(hold.by_creep, left) / variance
+        along_s = _along(hold.by_setting, left) / variance
         creep, setting = known.errors(along_c, along_s)
         gram += np.einsum("rkn,rln->kln", left, left) / variance
         gram -= _products(along_c, creep) + _products(along_s, setting)
-        left -= creep * by_creep[:, None] + setting * by_setting[:, None]
+        left -= creep * hold.by_creep[:, None] + setting * hold.by_setting[:, None]
         along += _along(surprise, left) / variance
         mean = line.carry_by_creep[j] * (mean + creep) + line.carry_by_setting[j] * setting
     return np.moveaxis(gram, -1, 0), along.T

@@ -60,11 +60,10 @@ class MarginalisedProblem(Problem):
             lines = self._lines(theta)
             seen = self._seen(lines, readings)
             best = seen.amplitudes(seen.along).T
-            for i, sample in enumerate(self.samples):
-                y = sample.readings if readings is None else readings[i]
+            for i, (sample, y) in enumerate(self.observed(readings)):
                 added = np.einsum("hrk,kn->hrn", self.shapes[i] * self.sd, best)
-                line, variance, setting_sd = lines[i]
-                _, left = likelihoods.standardised(line, y - added, sample.protocol.mask, variance, setting_sd)
+                line, *noise = lines[i]
+                _, left = likelihoods.standardised(line, y - added, sample.protocol.mask, *noise)
                 residuals.append(left)
             residuals += [best, np.log(seen.diagonal.T)]
             return self._log_likelihood(seen), np.concatenate(residuals)
@@ -97,17 +96,17 @@ class MarginalisedProblem(Problem):
         square: Any = (expected**2).sum()
         precision: Any = np.eye(len(self.sd))
         pull: Any = expected
-        for i, sample in enumerate(self.samples):
-            y = sample.readings if readings is None else readings[i]
+        for i, (sample, y) in enumerate(self.observed(readings)):
             mask = sample.protocol.mask
-            line, variance, setting_sd = lines[i]
-            filtered = likelihoods.chain(line, y, mask, variance, setting_sd)
-            gram, along = likelihoods.seen(line, filtered, y, self.shapes[i] * self.sd, mask, variance, setting_sd)
-            height = filtered.log_likelihood.sum(axis=0)
-            total = total + height
-            square = square - 2.0 * height - mask.sum() * np.log(2.0 * np.pi * variance)
+            line, *noise = lines[i]
+            filtered = likelihoods.chain(line, y, mask, *noise)
+            gram, along = likelihoods.seen(line, filtered, y, self.shapes[i] * self.sd, mask, *noise)
             precision = precision + gram
             pull = pull + along
+            height = filtered.log_likelihood.sum(axis=0)
+            total = total + height
+            log_volume = mask.sum() * np.log(2.0 * np.pi * noise[0])
+            square = square - 2.0 * height - log_volume
         return _Seen.of(total, square, precision, pull)
 
 
@@ -177,9 +176,10 @@ def integrated(problem: Problem) -> Problem:
     shapes = [_shapes(problem, i, gone) for i in range(len(problem.samples))]
     shows = np.any([(shape != 0).any(axis=(0, 1)) for shape in shapes], axis=0)
     left = {name: prior for name, prior in problem.prior.distributions.items() if name not in gone}
-    samples = tuple(_without(sample, additive) for sample in problem.samples)
+    mean = np.array([prior.mean() for prior in priors])
+    sd = np.array([prior.std() for prior in priors])
     return MarginalisedProblem(
-        samples,
+        tuple(_without(sample, additive) for sample in problem.samples),
         replace(problem.prior, distributions=left),
         "chain",
         scales=problem.scales,
@@ -188,8 +188,8 @@ def integrated(problem: Problem) -> Problem:
         whole=problem,
         columns=tuple(np.array(gone)[shows]),
         shapes=tuple(shape[..., shows] for shape in shapes),
-        mean=np.array([prior.mean() for prior in priors])[shows],
-        sd=np.array([prior.std() for prior in priors])[shows],
+        mean=mean[shows],
+        sd=sd[shows],
     )
 
 
@@ -225,18 +225,16 @@ def completed(problem: Problem, theta: Array, rng: Generator) -> tuple[Problem, 
     """
     if not isinstance(problem, MarginalisedProblem):
         return problem, theta, np.zeros(len(theta))
-    prior = problem.whole.prior
     parts = [problem.drawn(theta[i : i + _ROWS], rng) for i in range(0, len(theta), _ROWS)]
-    amplitudes = np.concatenate([drawn for drawn, _ in parts])
-    log_density = np.concatenate([of_part for _, of_part in parts])
-    values = dict(zip(problem.names, theta.T, strict=True))
-    values |= dict(zip(problem.columns, amplitudes.T, strict=True))
-    for name in prior.names:
+    amplitudes, log_density = map(np.concatenate, zip(*parts, strict=True))
+    known = np.hstack([theta, amplitudes])
+    values = dict(zip((*problem.names, *problem.columns), known.T, strict=True))
+    for name, distribution in problem.whole.prior.distributions.items():
         if name not in values:
-            distribution = prior.distributions[name]
             values[name] = distribution.rvs(len(theta), random_state=rng)
             log_density = log_density + distribution.logpdf(values[name])
-    return problem.whole, np.stack([values[name] for name in prior.names], axis=1), log_density
+    every = np.column_stack([values[name] for name in problem.whole.names])
+    return problem.whole, every, log_density
 
 
 def _shapes(problem: Problem, i: int, columns: list[str]) -> Array:

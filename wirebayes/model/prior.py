@@ -127,11 +127,14 @@ class Prior:
 
     def log_density(self) -> Function:
         """A function of (n, d) parameters that returns the (n,) log density."""
-        forms = [ours(d) for d in self.distributions.values()]
+        forms = dict(enumerate(map(ours, self.distributions.values())))
         # most columns are of this form, and a call for each would take longer than the arithmetic
-        positive = [i for i, d in enumerate(forms) if isinstance(d, LogNormal)]
-        together = log_normal(*(np.array([getattr(forms[i], k) for i in positive]) for k in ("sd_log", "middle")))
-        others = [(i, log_density_of(d)) for i, d in enumerate(forms) if i not in positive]
+        log_normals = {i: d for i, d in forms.items() if isinstance(d, LogNormal)}
+        positive = list(log_normals)
+        sd_log = np.array([d.sd_log for d in log_normals.values()])
+        middle = np.array([d.middle for d in log_normals.values()])
+        together = log_normal(sd_log, middle)
+        others = [(i, log_density_of(d)) for i, d in forms.items() if i not in positive]
         powers = [name for name in self.distributions if name in self.powers]
 
         def evaluate(theta: Array) -> Array:

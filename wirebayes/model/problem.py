@@ -4,7 +4,7 @@ Columns are named ``k1``, ``preload`` …, effect amplitudes ``effect.parameter`
 a column of one sample is ``preload[sample]`` and one of a material ``k1[material]``; the most specific name is used.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -105,16 +105,21 @@ class Problem:
         `readings` replaces the measured ones, per sample (H, R, n), row by row of `theta` (simulated replicates).
         """
         out = []
-        for i, sample in enumerate(self.samples):
+        for sample, y in self.observed(readings):
             own = self.parameters(theta, sample)
-            y = sample.readings if readings is None else readings[i]
             variance = sample.variance(own)
             if self.likelihood == "hold":
                 out.append(single_holds.hold_by_hold(sample.protocol, own, sample.model, y, variance))
             else:
                 line = streamed(sample.protocol, own, sample.model)
-                out.append(likelihoods.chain(line, y, sample.protocol.mask, variance, own["setting_sd"]).log_likelihood)
+                filtered = likelihoods.chain(line, y, sample.protocol.mask, variance, own["setting_sd"])
+                out.append(filtered.log_likelihood)
         return out
+
+    def observed(self, readings: Sequence[Array] | None) -> Iterator[tuple[Sample, Array]]:
+        """Each sample with its readings, or with those that stand in for them."""
+        measured = [sample.readings for sample in self.samples]
+        return zip(self.samples, measured if readings is None else readings, strict=True)
 
     def log_likelihood(self, theta: Array, readings: Sequence[Array] | None = None) -> Array:
         """(n,) log-likelihood; -inf where the model cannot be computed."""
@@ -129,8 +134,7 @@ class Problem:
         """
         values, residuals = [], []
         with np.errstate(all="ignore"):
-            for i, sample in enumerate(self.samples):
-                y = sample.readings if readings is None else readings[i]
+            for sample, y in self.observed(readings):
                 own = self.parameters(theta, sample)
                 variance = sample.variance(own)
                 if self.likelihood == "hold":
@@ -138,10 +142,11 @@ class Problem:
                 else:
                     line = streamed(sample.protocol, own, sample.model)
                     found = likelihoods.standardised(line, y, sample.protocol.mask, variance, own["setting_sd"])
-                values.append(found[0])
-                residuals.append(found[1])
+                value, left = found
+                values.append(value)
+                residuals.append(left)
             total: Any = sum(values)
-        return or_impossible(total), residuals[0] if len(residuals) == 1 else np.concatenate(residuals)
+        return or_impossible(total), np.concatenate(residuals)
 
     def without_each_hold(self, theta: Array) -> tuple[Array, list[Array]]:
         """(n,) log-likelihood, and per sample the (H, n) of the readings of all holds, of all samples, but one."""
@@ -150,13 +155,14 @@ class Problem:
                 own = self.hold_log_likelihood(theta)
                 whole = np.sum([holds.sum(axis=0) for holds in own], axis=0)
                 return whole, [whole - holds for holds in own]
-            each, without = [], []
+            each = []
+            without = []
             for sample in self.samples:
-                line, variance, setting_sd = self.linearised(theta, sample)
-                seen = sample.readings, sample.protocol.mask, variance, setting_sd
-                filtered = likelihoods.chain(line, *seen)
+                line, *noise = self.linearised(theta, sample)
+                filtered = likelihoods.chain(line, sample.readings, sample.protocol.mask, *noise)
+                rest = likelihoods.without_each_hold(line, filtered, sample.readings, sample.protocol.mask, *noise)
                 each.append(filtered.log_likelihood.sum(axis=0))
-                without.append(likelihoods.without_each_hold(line, filtered, *seen))
+                without.append(rest)
             whole = np.sum(each, axis=0)
             return whole, [rest + (whole - own) for rest, own in zip(without, each, strict=True)]
 
@@ -202,12 +208,16 @@ class Problem:
         """(n, d) parameters of this problem in other units."""
         out = theta.copy()
         for i, name in enumerate(self.names):
-            out[:, i] *= units_ratio(unit_of_column(name, self.samples), self.units, units)
+            out[:, i] *= self._ratio(name, units)
         for name, (exponent, log_ratio) in self._exponents(units).items():
             if name in self.names:
                 value = theta[:, self.names.index(exponent)] if isinstance(exponent, str) else exponent
                 out[:, self.names.index(name)] *= np.exp(-log_ratio * value)
         return out
+
+    def _ratio(self, name: str, units: Units) -> float:
+        """What a parameter's value is multiplied by in other units, but for the power of an exponent."""
+        return units_ratio(unit_of_column(name, self.samples), self.units, units)
 
     def _exponents(self, units: Units) -> dict[str, PowerScaled]:
         """For B and k2 of every material the exponent, and the logarithm of the ratio of the units raised to it."""
@@ -227,17 +237,15 @@ class Problem:
 
     def _prior_in(self, units: Units) -> Prior:
         prior = self.prior
-        ratios = {
-            name: units_ratio(unit_of_column(name, self.samples), self.units, units)
-            for name in (*self.names, *prior.fixed)
-        }
-        distributions = {name: scaled(d, ratios[name]) for name, d in prior.distributions.items()}
-        fixed = {name: value * ratios[name] for name, value in prior.fixed.items()}
+        distributions = {name: scaled(d, self._ratio(name, units)) for name, d in prior.distributions.items()}
+        fixed = {name: value * self._ratio(name, units) for name, value in prior.fixed.items()}
         powers = {}
         for name, (exponent, log_ratio) in self._exponents(units).items():
-            log_base = prior.powers[name].log_base if name in prior.powers else 0.0
-            if log_base + log_ratio != 0.0:
-                powers[name] = PowerScaled(exponent, log_base + log_ratio)
+            log_base = log_ratio
+            if name in prior.powers:
+                log_base += prior.powers[name].log_base
+            if log_base != 0.0:
+                powers[name] = PowerScaled(exponent, log_base)
             if name in fixed and isinstance(exponent, float):
                 fixed[name] *= float(np.exp(-log_ratio * exponent))
         return replace(prior, distributions=distributions, fixed=fixed, powers=powers)

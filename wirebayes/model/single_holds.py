@@ -1,6 +1,7 @@
 """The probability of a hold's readings given its first: every hold is an experiment of its own."""
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,10 +36,10 @@ def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array
     """
     holds, _, n = np.broadcast_shapes(readings.shape, (1, 1, len(variance)))
     out = np.zeros((holds, n))
-    for j, valid, left, best, aa in _single_holds(protocol, theta, model, readings):
-        square = (np.einsum("rn,rn->n", left, left) + best * best) / variance
-        value = -0.5 * (square + len(left) * (np.log(variance) + LOG_2PI) + np.log1p(aa))
-        out[j] = np.where(valid, value, 0.0)
+    for hold in _single_holds(protocol, theta, model, readings):
+        later = np.einsum("rn,rn->n", hold.left, hold.left)
+        square = (later + hold.first * hold.first) / variance
+        out[hold.number] = hold.log_density(square, variance)
     return out
 
 
@@ -59,36 +60,49 @@ def standardised_hold_by_hold(
     sd = np.sqrt(variance)
     total = np.zeros(len(variance))
     residuals = [np.zeros((0, len(variance)))]
-    for _, valid, left, best, aa in _single_holds(protocol, theta, model, readings):
-        every = np.vstack([left, best[None]]) / sd
+    for hold in _single_holds(protocol, theta, model, readings):
+        every = np.vstack([hold.left, hold.first[None]]) / sd
         square = (every**2).sum(axis=0)
-        value = -0.5 * (square + len(left) * (np.log(variance) + LOG_2PI) + np.log1p(aa))
-        total = total + np.where(valid, value, 0.0)
-        log_sd = 0.5 * np.sqrt(len(left)) * np.log(variance)
+        total = total + hold.log_density(square, variance)
+        log_sd = 0.5 * np.sqrt(len(hold.left)) * np.log(variance)
         of_hold = np.vstack([every, log_sd[None]])
-        residuals.append(np.where(valid, of_hold, 0.0))
+        residuals.append(np.where(hold.valid, of_hold, 0.0))
     return total, np.concatenate(residuals)
 
 
-def _single_holds(
-    protocol: Protocol, theta: Theta, model: Model, readings: Array
-) -> Iterator[tuple[int, Array, Array, Array, Array]]:
-    """Of each hold with several readings: where its length is known, residuals and first reading's error at their best.
+class _SingleHold(NamedTuple):
+    """Of one hold: where its length is known (n,), later residuals (r, n) and the first reading's error at their best.
 
-    The last is the squared ratio of slopes, summed over the readings.
+    And the squared ratio (n,) of slopes, summed over the later readings.
     """
+
+    number: int
+    valid: Array
+    left: Array
+    first: Array
+    ratio_square: Array
+
+    def log_density(self, square: Array, variance: Array) -> Array:
+        """(n,) by the sum of squared residuals in variances; zero where the length is not known."""
+        log_noise = len(self.left) * (np.log(variance) + LOG_2PI)
+        value = -0.5 * (square + log_noise + np.log1p(self.ratio_square))
+        return np.where(self.valid, value, 0.0)
+
+
+def _single_holds(protocol: Protocol, theta: Theta, model: Model, readings: Array) -> Iterator[_SingleHold]:
+    """Each hold with several readings."""
     for j, fitted in enumerate(hold_courses(protocol, theta, model, readings[:, 0])):
         if fitted is None:
             continue
         tension, slope, valid = fitted
-        keep = np.flatnonzero(protocol.mask[j])[1:]
-        if not len(keep):
+        later = np.flatnonzero(protocol.mask[j])[1:]
+        if not len(later):
             continue
-        ratio = slope[keep] / np.where(valid, slope[0], 1.0)
-        r = readings[j][keep] - tension[keep]
-        aa = np.einsum("rn,rn->n", ratio, ratio)
-        best = np.einsum("rn,rn->n", ratio, r) / (1.0 + aa)
-        yield j, valid, r - ratio * best, best, aa
+        ratio = slope[later] / np.where(valid, slope[0], 1.0)
+        residual = readings[j][later] - tension[later]
+        ratio_square = np.einsum("rn,rn->n", ratio, ratio)
+        first = np.einsum("rn,rn->n", ratio, residual) / (1.0 + ratio_square)
+        yield _SingleHold(j, valid, residual - ratio * first, first, ratio_square)
 
 
 def hold_courses(

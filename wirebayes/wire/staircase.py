@@ -74,8 +74,8 @@ def simulate(protocol: Protocol, theta: Theta, model: Model = PLAIN, setting_err
     walk = Walk(protocol, theta, model)
     creep, beside = walk.begin(n)
     readings = []
-    for j in range(len(protocol.setting)):
-        row, creep, beside = walk.hold(j, protocol.setting[j] + exact[j], creep, beside)
+    for j, setting in enumerate(protocol.setting[:, None] + exact):
+        row, creep, beside = walk.hold(j, setting, creep, beside)
         readings.append(row)
     return np.array(readings)
 
@@ -92,10 +92,12 @@ def simulate_alone(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> li
     call = compiled.call(protocol, theta, model)
     if call is not None:
         return list(compiled.kernel.simulate(*call, np.zeros((len(protocol.setting), 1)), True))
-    walk, out = Walk(protocol, theta, model), []
+    walk = Walk(protocol, theta, model)
+    out = []
     for j, setting in enumerate(protocol.setting):
         walk.past = []
-        out.append(walk.hold(j, uncrept + setting, uncrept, {})[0])
+        readings, _, _ = walk.hold(j, uncrept + setting, uncrept, {})
+        out.append(readings)
     return out
 
 
@@ -147,14 +149,10 @@ def _by_complex_steps(protocol: Protocol, theta: Theta, model: Model) -> Lineari
     for j, setting in enumerate(protocol.setting):
         creep = np.tile(out.creep[j], 2) + creep_step
         reading, carried, beside = walk.hold(j, setting + setting_step, creep, beside)
-        of_setting = reading[:, :n]
-        of_creep = reading[:, n:]
-        out.reading[j] = of_creep.real
-        out.by_setting[j] = of_setting.imag / _STEP
-        out.by_creep[j] = of_creep.imag / _STEP
+        out.reading[j] = reading[:, n:].real
+        out.by_setting[j], out.by_creep[j] = np.hsplit(reading.imag / _STEP, 2)
         out.creep[j + 1] = carried[n:].real
-        out.carry_by_setting[j] = carried[:n].imag / _STEP
-        out.carry_by_creep[j] = carried[n:].imag / _STEP
+        out.carry_by_setting[j], out.carry_by_creep[j] = np.split(carried.imag / _STEP, 2)
         walk.past = [(start_s, goal.real, k2.real) for start_s, goal, k2 in walk.past]
         beside = {key: value.real for key, value in beside.items()}
     return out
@@ -181,18 +179,23 @@ class Walk:
     """One pass along the holds: what all holds share is computed once here."""
 
     def __init__(self, protocol: Protocol, theta: Theta, model: Model) -> None:
-        self.protocol, self.model = protocol, model
+        self.protocol = protocol
+        self.model = model
         self.past: list[Clock] = []
         self.late: Any = 0.0
         effects = Placed(model.effects, theta)
-        self.at, self.change = effects.at, effects.change
+        self.at = effects.at
+        self.change = effects.change
         self.theta: dict[str, Array] = dict(theta)
         if "sample" in self.at:
             self.theta = self.change("sample", self.theta, self._context(0))
         if "time" in self.at:
             self.late = self.change("time", np.zeros((1, 1)), self._context(0))
-        self.k1, self.B, self.U = self.theta["k1"], self.theta["B"], self.theta["U"]
-        self.k2, self.N = self.theta["k2"], self.theta["N"]
+        self.k1 = self.theta["k1"]
+        self.B = self.theta["B"]
+        self.U = self.theta["U"]
+        self.k2 = self.theta["k2"]
+        self.N = self.theta["N"]
         self.creep = Creep(effects, self.theta, model.history)
         self.kept = self.creep.kept
         self.base = protocol.length_mm + self.theta["preload"]
@@ -227,33 +230,41 @@ class Walk:
         beside : dict of effect key to (1, n) array
             Both carried out.
         """
-        hold, law = self._context(j), self.creep
+        hold = self._context(j)
         held = self.bench.held(setting, hold)
         hold.carried = creep[None]
         hold.initial_tension = self._first(held, sum(beside.values(), hold.carried), hold)
         if "wait" in self.at:
-            beside = self._wait(held, self.change("wait", np.zeros((1, 1)), hold), beside, hold)
-        amount = law.amount(hold.initial_tension, hold)
-        k2 = law.rate(hold)
-        fraction = law.fraction(k2, hold) if self.own_time else self.fraction[self.where[j]]
-        hold.grown = law.creep(hold.carried + amount * fraction, hold)
-        self.past.append((hold.start_s, hold.carried + amount, k2))
-        courses = law.beside(beside, hold)
+            wait_s = self.change("wait", np.zeros((1, 1)), hold)
+            beside = self._wait(held, wait_s, beside, hold)
+        hold.grown = self._grown(j, hold)
+        courses = self.creep.beside(beside, hold)
         total = sum(courses.values(), hold.grown)
         readings = self.bench.read(held, total, hold)
         end = self.protocol.end[j]
         beside = {key: course[end][None] for key, course in courses.items()}
         return readings, hold.grown[end], beside
 
+    def _grown(self, j: int, hold: HoldContext) -> Array:
+        """Creep elongation at the times of a hold, mm, which is then a part of the past."""
+        amount = self.creep.amount(hold.initial_tension, hold)
+        k2 = self.creep.rate(hold)
+        fraction = self.creep.fraction(k2, hold) if self.own_time else self.fraction[self.where[j]]
+        grown = self.creep.creep(hold.carried + amount * fraction, hold)
+        self.past.append((hold.start_s, hold.carried + amount, k2))
+        return grown
+
     def begin(self, n: int) -> tuple[Array, dict[str, Array]]:
         """What the wire brings into the first hold: its creep (n,), and elongations beside it by effect key."""
         if "before" not in self.at:
             return np.zeros(n), {}
         hold = self._context(0)
-        hold.displacement_mm, hold.carried = 0.0, np.zeros((1, n))
+        hold.displacement_mm = 0.0
+        hold.carried = np.zeros((1, n))
         held = self.bench.held(np.zeros(1), hold)
         hold.initial_tension = self._first(held, hold.carried, hold)
-        beside = self._wait(held, self.change("before", np.zeros((1, 1)), hold), {}, hold)
+        before_s = self.change("before", np.zeros((1, 1)), hold)
+        beside = self._wait(held, before_s, {}, hold)
         return np.array(np.broadcast_to(hold.carried[0], (n,))), beside
 
     def _wait(self, held: Array, wait_s: Array, beside: dict[str, Array], hold: HoldContext) -> dict[str, Array]:
@@ -321,11 +332,7 @@ class Walk:
             Creep carried out, mm, and its derivatives by the same two.
         """
         zero = self.protocol.length_mm + creep
-        first, by_stretched, by_zero = self._tension(stretched, zero)
-        target, slope = self._target(first)
-        amount = target - self.kept * creep
-        amount_by_setting = slope * by_stretched
-        amount_by_creep = slope * by_zero - self.kept
+        amount, amount_by_setting, amount_by_creep = self._amount(stretched, zero, creep)
         every = self.fraction[self.where[j]]
         fraction = every[rows]
         tension, by_stretched, by_zero = self._tension(stretched, zero + amount * fraction)
@@ -336,6 +343,18 @@ class Walk:
         carried = creep + amount * end
         carry_by_creep = 1.0 + amount_by_creep * end
         return np.maximum(tension, 0.0), by_setting, by_creep, carried, amount_by_setting * end, carry_by_creep
+
+    def _amount(self, stretched: Array, zero: Array, creep: Array) -> tuple[Array, Array, Array]:
+        """Creep still to come in a hold, mm, and its derivatives by setting error and by carried creep; all (n,).
+
+        Parameters
+        ----------
+        stretched, zero, creep : (n,) arrays
+            Stretched and zero-tension length when it begins, and the creep carried in, mm.
+        """
+        first, by_stretched, by_zero = self._tension(stretched, zero)
+        target, slope = self._target(first)
+        return target - self.kept * creep, slope * by_stretched, slope * by_zero - self.kept
 
     def _target(self, tension: Array) -> tuple[Array, Array]:
         """Final creep (n,) at a tension, mm, and its derivative by the strain; zero when slack."""
