@@ -163,7 +163,7 @@ def test_no_step_is_tried_that_promises_too_little(
     block = block_of(tmp_path, {}, [], 3)
     trials, candidates, data = scanned(block, {"strain_stiffening": CATALOGUE["strain_stiffening"]})
     way = ladders([block], trials, candidates, [data])[0]
-    weigh, follow, tried = ascent.weigh, ascent._follow, []
+    weigh, follow, tried = ascent.weigh, ascent.stepped, []
 
     def promising(*arguments: Any) -> Any:
         found = weigh(*arguments)
@@ -174,7 +174,7 @@ def test_no_step_is_tried_that_promises_too_little(
         return follow(*arguments)
 
     monkeypatch.setattr(ascent, "weigh", promising)
-    monkeypatch.setattr(ascent, "_follow", followed)
+    monkeypatch.setattr(ascent, "stepped", followed)
     begin = start(block, block.z)
     assert bool(tried) == goes_on
     tried.clear()

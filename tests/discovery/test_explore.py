@@ -35,7 +35,7 @@ def explored(
     """What the search makes of sets whose evidence is written down, and the order in which it fitted them."""
     order: list[str] = []
 
-    def fit(parent: Any, name: str, *others: Any) -> stepwise.FittedSet:
+    def fit(parent: Any, name: str, *others: Any, **common: Any) -> stepwise.FittedSet:
         names = (*parent.effects.names, name)
         order.append("".join(sorted(names)))
         left = np.array([(remainders or {}).get(order[-1], -20.0)])
@@ -284,7 +284,9 @@ class Fits:
         monkeypatch.setattr(stepwise.screening, "log_bayes", lambda c, scans: [[scanned]])
 
     def fit(self) -> stepwise.FittedSet:
-        return stepwise._fit(self.parent, "b", [("b", "twin")], [[], []], self.settings, np.random.default_rng(0))
+        rng = np.random.default_rng(0)
+        families = [("b", "twin")]
+        return stepwise._fit(self.parent, "b", rng, families=families, references=[[], []], settings=self.settings)
 
 
 def test_one_more_effect_is_fitted_from_where_its_refit_ended(monkeypatch: pytest.MonkeyPatch) -> None:

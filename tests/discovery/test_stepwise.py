@@ -42,7 +42,8 @@ def test_two_effects_have_one_evidence_in_either_order(truth: dict[str, float], 
     root = stepwise.FittedSet(EffectSet((), 0.0, {}, None), plain, (), found, ([], []))
     values = []
     for one, other in ((first, second), (second, first)):
-        added = stepwise._fit(root, one, (), references, settings, np.random.default_rng(1))
+        rng = np.random.default_rng(1)
+        added = stepwise._fit(root, one, rng, families=(), references=references, settings=settings)
         blocks, (probes, further) = added.blocks, added.probed
         scans = [scan(expand(b.target, b.z, probes)) for b in blocks]
         beside = weigh_names(blocks, probes, further, scans, reach=found.reach)

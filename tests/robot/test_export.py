@@ -13,6 +13,7 @@ from tests.robot.lines import CORE
 from wirebayes.effects import effect_named
 from wirebayes.errors import InputError
 from wirebayes.robot.export import files
+from wirebayes.robot.export.working_spring import working_spring
 from wirebayes.robot.mechanics import draws, rotation, schema
 from wirebayes.robot.mechanics.description import GivenWire
 from wirebayes.robot.mechanics.wires import tension
@@ -52,7 +53,7 @@ def test_the_spring_constant_is_the_slope_of_the_whole_law_at_the_working_tensio
     step = 1e-7
     up, down = (tension(wires, high + move, np.ones_like(high))[0] for move in (step, -step))
     slope = (up - down) / (2 * step)
-    spring = files.working_spring(robot, line)
+    spring = working_spring(robot, line)
     np.testing.assert_allclose(spring.stiffness_N, slope[0], rtol=1e-6)
     assert np.abs(slope[0] / line.parameters["k1"] - 1).min() > 1e-3  # k1 would be wrong
     for text, setting in (

@@ -7,19 +7,16 @@ import numpy as np
 
 from wirebayes.discovery.ladders import FIRST, LAST, AmplitudePath
 from wirebayes.discovery.path_weights import Weighed, weigh, without_last
-from wirebayes.discovery.tangent import Tangent, damp, moving_columns, residuals, tangent
+from wirebayes.discovery.tangent import Tangent, moving_columns, tangent
+from wirebayes.discovery.tangent_step import stepped
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.numeric.distributions import Normal
-from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.typing import Array, Bools, Ints
 
 _STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
-# of a Gauss-Newton step, tried in one batch: whole, and shorter where the tangent does not reach so far
-_LENGTHS = np.array([1.0, 0.4, 0.1])
 _SETTLED, _HOPELESS = 0.05, -15.0  # nats: a gain too small to go on for, a rung from which none leads up again
 _NEVER = -1e300  # log Bayes factor of what cannot be computed: finite, so that sums of it stay numbers
-_LONGEST = 3.0  # of a step, in any sampled coordinate
 
 
 @dataclass(frozen=True)
@@ -96,7 +93,7 @@ def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) 
             break
         rows = rows[go]
         own = _of_rows(readings, rows)
-        y[rows] = _follow(target, y[rows], own, x.of(go), here.of(go), free, x.degrees)
+        y[rows] = stepped(target, y[rows], own, x.of(go), here.of(go), free, x.degrees)
     return Start(best, height, readings, x.degrees)
 
 
@@ -244,7 +241,6 @@ class _Ascent:
         -------
         _Places
         """
-        degrees = self.begin.degrees
         at, first, last = self._stretch(amplitude)
         z = z.copy()
         z[:, self.column] = (self.neutral + at) / self._scale
@@ -252,14 +248,11 @@ class _Ascent:
         starts = len(z) // len(alive)
         rows = np.flatnonzero(np.tile(alive, starts))
         for step in range(steps + 1):
-            with np.errstate(all="ignore"):
-                both = tangent(self.target, z[rows], self._seen(rows), [*free, self.column])
+            both = self._tangent(z[rows], rows, free)
             signature = both.parameters[..., -1] / self._scale
-            here = weigh(without_last(both), signature, first[rows], last[rows], degrees)
-            log_bayes = here.height + both.prior - self.nothing[rows]
-            log_bayes = np.nan_to_num(log_bayes, nan=_NEVER, neginf=_NEVER)
-            gain = log_bayes - best.log_bayes[rows]
-            hope = np.minimum(gain, here.promise)
+            here = weigh(without_last(both), signature, first[rows], last[rows], self.begin.degrees)
+            log_bayes = self._log_bayes(here, both, rows)
+            hope = np.minimum(log_bayes - best.log_bayes[rows], here.promise)
             moved = at[rows] + here.move
             better = best.improve(rows, _Places(z[rows], log_bayes, moved, here.norm))
             # A step that led down, where the wire went slack say, is the last one.
@@ -267,8 +260,19 @@ class _Ascent:
             if step == steps or not len(go):
                 break
             rows = rows[go]
-            z[rows] = _follow(self.target, z[rows], self._seen(rows), both.of(go), here.of(go), free, degrees)
+            readings = self._seen(rows)
+            z[rows] = stepped(self.target, z[rows], readings, both.of(go), here.of(go), free, self.begin.degrees)
         return best
+
+    def _tangent(self, z: Array, rows: Ints, free: list[int]) -> Tangent:
+        """Of some climbs at their places, by the parameters that follow and the amplitude, which comes last."""
+        with np.errstate(all="ignore"):
+            return tangent(self.target, z, self._seen(rows), [*free, self.column])
+
+    def _log_bayes(self, here: Weighed, x: Tangent, rows: Ints) -> Array:
+        """Log Bayes factors of the effect at some climbs' places, finite everywhere."""
+        value = here.height + x.prior - self.nothing[rows]
+        return np.nan_to_num(value, nan=_NEVER, neginf=_NEVER)
 
     def _is_hopeful(self, rows: Ints, hope: Array) -> Bools:
         """Whether the data sets of some climbs may gain something, by what each climb hopes for."""
@@ -332,15 +336,20 @@ def _with_effect(block: LaplaceFit, ladder: AmplitudePath, z: Array) -> tuple[Lo
     column = column_of(problem, effect)
     # A prior that is not felt, in whose standard deviations the column counts.
     largest = float(np.abs(ladder.amplitudes).max())
-    wide = Normal(0.0, 100.0 * largest)
-    distributions = problem.prior.distributions | {problem.names[column]: wide}
-    prior = replace(problem.prior, distributions=distributions)
+    wide = {problem.names[column]: Normal(0.0, 100.0 * largest)}
+    prior = replace(problem.prior, distributions=problem.prior.distributions | wide)
     target = LogPosterior(replace(problem, prior=prior), for_draws=False)
-    plain = block.target.coordinates.to_natural(z)
-    known = dict(zip(block.target.problem.names, plain.T, strict=True))
-    without_effect = {effect.columns()[0]: effect.amplitudes[0].neutral}
-    theta = [_extended(known, problem.names, probe.own | without_effect) for probe in ladder.probes]
-    return target, column, target.coordinates.to_sampled(np.concatenate(theta))
+    theta = _at_each_start(ladder, block.target, z, problem.names)
+    return target, column, target.coordinates.to_sampled(theta)
+
+
+def _at_each_start(ladder: AmplitudePath, plain: LogPosterior, z: Array, names: Sequence[str]) -> Array:
+    """(starts n, d) parameters of some names with the effect at its neutral value, by points (n, d) without it."""
+    effect = ladder.effect
+    theta = plain.coordinates.to_natural(z)
+    known = dict(zip(plain.problem.names, theta.T, strict=True))
+    neutral = {effect.columns()[0]: effect.amplitudes[0].neutral}
+    return np.concatenate([_extended(known, names, probe.own | neutral) for probe in ladder.probes])
 
 
 def _extended(known: Mapping[str, Array], names: Sequence[str], added: Mapping[str, float]) -> Array:
@@ -354,41 +363,3 @@ def _extended(known: Mapping[str, Array], names: Sequence[str], added: Mapping[s
             value = added[name.split("[")[0]]
             columns.append(np.full(n, value))
     return np.stack(columns, axis=1)
-
-
-def _follow(
-    target: LogPosterior,
-    z: Array,
-    readings: Sequence[Array] | None,
-    x: Tangent,
-    here: Weighed,
-    columns: list[int],
-    degrees: int,
-) -> Array:
-    """Move the parameters a step, or as much of it as is best, or not at all."""
-    size = np.abs(here.step).max(axis=1, keepdims=True)
-    step = here.step * np.minimum(1.0, _LONGEST / np.maximum(size, 1e-300))
-    many = len(_LENGTHS)
-    trial = np.repeat(z[None], 1 + many, axis=0)
-    trial[1:, :, columns] += _LENGTHS[:, None, None] * step
-    flat = trial[1:].reshape(-1, z.shape[1])
-    tiled = None
-    if readings is not None:
-        tiled = [np.tile(of_sample, (1, 1, many)) for of_sample in readings]
-    moved, prior = residuals(target, flat, tiled)
-    residual = np.concatenate([x.residual[None], moved.reshape(many, len(z), -1)])
-    priors = np.concatenate([x.prior[None], prior.reshape(many, -1)])
-    square = _squares(x, here.ratio, residual)
-    with np.errstate(invalid="ignore"):
-        value = priors - 0.5 * degrees * np.log(np.maximum(square, x.least))
-    best = np.argmax(or_impossible(value), axis=0)
-    rows = np.arange(len(z))
-    return np.asarray(trial[best, rows])
-
-
-def _squares(x: Tangent, ratio: Array, residual: Array) -> Array:
-    """(k, n) sums of squares of residuals (k, n, N) in the metric of the noise, at its ratio (n,)."""
-    levels = residual.transpose(1, 0, 2) @ x.left
-    shrink = damp(x.singular, ratio[:, None])
-    whole_holds = (levels**2 @ shrink[..., None])[..., 0]
-    return np.asarray((residual**2).sum(axis=2) - whole_holds.T)

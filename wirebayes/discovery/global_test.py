@@ -99,16 +99,14 @@ def examine(
     trials, candidates = screening.candidate_probes(blocks, kinds)
     if not candidates:
         raise InputError("no effect of the catalogue could show in these holds; at least one must be left to look for")
-    struck: list[GrossError] = []
-    for i, block in enumerate(blocks):
-        blocks[i], gone = _strike_gross_errors(block, trials, candidates, i, rng)
-        struck += gone
-    data, patterns, expansions = [], [], []
+    blocks, struck = _without_gross_errors(blocks, trials, candidates, rng)
+    patterns = []
+    expansions = []
     for block in blocks:
         listed, columns = residual_patterns.patterns(block.target.problem)
-        expansions.append(expand(block.target, block.z, trials, columns=columns))
-        data.append(scan(expansions[-1]))
         patterns.append(listed)
+        expansions.append(expand(block.target, block.z, trials, columns=columns))
+    data = [scan(x) for x in expansions]
     simulated: list[Replicates] = []
     larger: Continuation | None = None
     while True:
@@ -245,6 +243,19 @@ def _pieces(n: int) -> list[int]:
     return [n // count + (number < n % count) for number in range(count)]
 
 
+def _without_gross_errors(
+    blocks: Sequence[LaplaceFit], trials: list[Probe], candidates: list[Candidate], rng: Generator
+) -> tuple[list[LaplaceFit], list[GrossError]]:
+    """The blocks refitted without their gross errors, and these."""
+    refitted = []
+    struck = []
+    for i, block in enumerate(blocks):
+        kept, gone = _strike_gross_errors(block, trials, candidates, i, rng)
+        refitted.append(kept)
+        struck += gone
+    return refitted, struck
+
+
 def _strike_gross_errors(
     block: LaplaceFit, trials: list[Probe], candidates: list[Candidate], i: int, rng: Generator
 ) -> tuple[LaplaceFit, list[GrossError]]:
@@ -253,10 +264,7 @@ def _strike_gross_errors(
     struck: list[GrossError] = []
     share = gross_errors.MOST * gross_errors.readings_of(block.experiments)
     while len(struck) < max(1, int(share)):
-        here = scan(expand(block.target, block.z, trials))
-        by_effect = max((float(here.effects[0, k]) for k in own), default=0.0)
-        rival = max(by_effect, float(here.flexible[0]))
-        found = gross_errors.suspect(block, rival)
+        found = gross_errors.suspect(block, _best_rival(block, trials, own))
         if found is None:
             break
         name, hold, reading, value = found
@@ -264,3 +272,10 @@ def _strike_gross_errors(
         block = fitted(members, block.effects, block.spec, rng, scales=block.scales)
         struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
     return block, struck
+
+
+def _best_rival(block: LaplaceFit, trials: list[Probe], own: Sequence[int]) -> float:
+    """Log Bayes factor of the best effect, by the probes of some numbers, or of a smooth remainder, if larger."""
+    here = scan(expand(block.target, block.z, trials))
+    by_effect = max((float(here.effects[0, k]) for k in own), default=0.0)
+    return max(by_effect, float(here.flexible[0]))

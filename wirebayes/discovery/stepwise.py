@@ -9,7 +9,8 @@ amplitude is the same in every set, so the order of the chain does not matter.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import chain, repeat
+from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.random import Generator
@@ -77,13 +78,11 @@ def explore(
     frontier = Frontier(len(settings.kinds), families)
     _add_singles(frontier, root, found, _credits(expansions, trials))
     frontier.lead_to(_leading_pair(expansions, trials))
-    common = repeat(families), repeat(references), repeat(settings)
+    fit = partial(_fit, families=families, references=references, settings=settings)
     while wave := frontier.next_looks(_looks(len(frontier.fitted))):
-        origins = [frontier.parents[key] for key in wave]
-        parents = [frontier.fitted.get(before, start) for before, _ in origins]
-        names = [name for _, name in origins]
-        generators = rng.spawn(len(wave))
-        fitted_sets = parallel_map(_fit, parents, names, *common, generators)
+        before, names = zip(*(frontier.parents[key] for key in wave), strict=True)
+        parents = [frontier.fitted.get(key, start) for key in before]
+        fitted_sets = parallel_map(fit, parents, names, rng.spawn(len(wave)))
         for key, new in zip(wave, fitted_sets, strict=True):
             own_fit = _log_evidence(new.blocks) - _log_evidence(plain)
             _keep(frontier, key, new, own_fit)
@@ -175,10 +174,11 @@ def _leading_pair(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> K
 def _fit(
     parent: FittedSet,
     name: str,
+    rng: Generator,
+    *,
     families: Sequence[Family],
     references: Sequence[Reference],
     settings: Settings,
-    rng: Generator,
 ) -> FittedSet:
     """The parent's blocks refitted with one more effect in its best form, and what could be added then."""
     blocks, effects = added(parent, name, settings, rng)

@@ -173,12 +173,11 @@ def points_of(target: LogPosterior, around: Around, readings: Sequence[Array] | 
         Replicates that stand in for the measured readings, an array a sample.
     """
     theta = around.theta[: around.points]
-    for at, sample in enumerate(target.problem.samples):
+    for sample, y in target.problem.observed(readings):
         mask = sample.protocol.mask
         own = target.problem.parameters(theta, sample)
         sd = np.sqrt(sample.variance(own))
         line = linearise(sample.protocol, own, sample.model)
-        y = sample.readings if readings is None else readings[at]
         residual = (y - line.reading)[mask] / sd
         slopes = _slopes(target, around, sample)
         by_parameters = slopes[mask] / sd[:, None]
@@ -270,10 +269,9 @@ def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None =
     theta = target.coordinates.to_natural(z)
     parts = []
     with np.errstate(all="ignore"):
-        for at, sample in enumerate(target.problem.samples):
+        for sample, y in target.problem.observed(readings):
             own = target.problem.parameters(theta, sample)
             sd = np.sqrt(sample.variance(own))
-            y = sample.readings if readings is None else readings[at]
             left = y - simulate(sample.protocol, own, sample.model)
             scaled = left[sample.protocol.mask] / sd
             parts.append(scaled.T)
@@ -338,10 +336,12 @@ def whitened(x: Tangent, columns: Array, ratio: float) -> Array:
 
 def block_diagonal(blocks: Sequence[Array]) -> Array:
     """Batched (n, rows, columns) blocks along a diagonal."""
-    n = max(b.shape[0] for b in blocks)
-    out = np.zeros((n, sum(b.shape[1] for b in blocks), sum(b.shape[2] for b in blocks)))
+    batches, rows, columns = zip(*(block.shape for block in blocks), strict=True)
+    out = np.zeros((max(batches), sum(rows), sum(columns)))
     row = column = 0
-    for b in blocks:
-        out[:, row : row + b.shape[1], column : column + b.shape[2]] = b
-        row, column = row + b.shape[1], column + b.shape[2]
+    for block in blocks:
+        _, height, width = block.shape
+        out[:, row : row + height, column : column + width] = block
+        row += height
+        column += width
     return out

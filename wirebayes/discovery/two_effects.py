@@ -53,11 +53,12 @@ def log_bayes_of_each_pair(x: Expansion) -> Array:
     _, each = with_each_signature(first_row, found)
     single = log_sum(each, axis=1)
     best = _best_forms(single, groups)
-    value = _log_evidence(first_row, found, best, groups)[0]
+    [value] = _log_evidence(first_row, found, best, groups)
     pairs = np.stack([log_sum(value[:, group], axis=1) for group in groups], axis=1)
     alone = single[0] + _log_shares(x, groups)
     np.fill_diagonal(pairs, [log_sum(alone[group]) for group in groups])
-    return pairs - _log_evidence_of_none(first_row, found)[0]
+    [none] = _log_evidence_of_none(first_row, found)
+    return pairs - none
 
 
 def _log_evidence_of_none(x: Expansion, found: Projected) -> Array:
@@ -119,9 +120,9 @@ def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
         a_first = (square * along_first - cross * along) / determinant
         a = (square_first * along - cross * along_first) / determinant
         explained = a_first * along_first + a * along
-        possible = determinant > LEAST_LEFT * square_first * square
-    any_sign_first = ~x.one_sided[first][:, None, :, None]
-    possible &= np.isfinite(explained)
-    possible &= (a_first >= 0.0) | any_sign_first
-    possible &= (a >= 0.0) | ~x.one_sided
+        are_two = determinant > LEAST_LEFT * square_first * square
+    either_sign = ~x.one_sided
+    allowed_first = (a_first >= 0.0) | either_sign[first][:, None, :, None]
+    allowed = (a >= 0.0) | either_sign
+    possible = are_two & np.isfinite(explained) & allowed_first & allowed
     return np.where(possible, explained, -np.inf)

@@ -45,19 +45,19 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
     if kernel is None or len(model.effects) > kernel.MOST_EFFECTS or model.compiled is None:
         return None
     columns, formulas = model.compiled
-    names = (*_PLAIN, *columns)
-    rows = [theta[name] for name in names]
+    rows = [theta[name] for name in (*_PLAIN, *columns)]
     if any(row.dtype.kind == "c" for row in rows):
         return None
     packed = np.empty((len(rows), len(rows[0])))
     for i, row in enumerate(rows):
         packed[i] = row
-    log_ratio = float(np.log(protocol.length_mm / (model.length_ref_mm or protocol.length_mm)))
+    length_ref_mm = model.length_ref_mm or protocol.length_mm
+    log_ratio = float(np.log(protocol.length_mm / length_ref_mm))
     kept = 1.0 if model.history == "saturating" else 0.0
     law = _law(model.law == "modified", kept, model.tension_ref_N, log_ratio, formulas)
     remembers = any(name == "superposition" for name, _, _ in formulas)
-    test = kernel.Test(**(protocol.flat_with_ages if remembers else protocol.flat))
-    return Call(test, law, packed)
+    flat = protocol.flat_with_ages if remembers else protocol.flat
+    return Call(kernel.Test(**flat), law, packed)
 
 
 @lru_cache(maxsize=256)

@@ -17,6 +17,7 @@ from wirebayes.io.bench.header import (
     may_be,
     name_and_unit,
 )
+from wirebayes.io.bench.mapping import IGNORE, mapped_columns
 from wirebayes.io.bench.multiples import multiple_of_unit, unit_in_header
 from wirebayes.io.bench.numerals import is_count
 from wirebayes.io.bench.quantities import COMMON, OF_SAMPLE, ROLES, UNITS, Role, Unit, quantity_unit
@@ -28,10 +29,7 @@ from wirebayes.io.bench.undecided import Undecided
 from wirebayes.io.bench.unit_names import units_alone
 from wirebayes.io.bench.words import ERRORS, last_named, speaks_of, words_in
 from wirebayes.sentences import listed
-from wirebayes.strict.hint import hint
 
-IGNORE = "ignore"
-_SAYABLE = (*ROLES, IGNORE)
 _NEEDED: tuple[Role, ...] = ("displacement", "time", "tension")
 
 
@@ -75,7 +73,7 @@ def understand(table: RawTable, mapping: Sequence[str]) -> Columns:
         A mapping names no column, a needed column is missing or in a unit of another quantity; `Undecided` where two
         columns could be it, or its unit is not said.
     """
-    mapped = _mapped(table, mapping)
+    mapped = mapped_columns(table, mapping)
     roles, open_questions = _said(table, mapped)
     taken = {index for index, _, _ in mapped}
     free = [i for i, name in enumerate(table.header) if name and i not in taken]
@@ -196,47 +194,6 @@ def _one_clock(table: RawTable, likely: Sequence[int]) -> Column:
                 f", which tell different times from line {table.line_text(table.rows[row].line)} on",
             )
     return columns[best_clock(clocks)]
-
-
-def ignored(table: RawTable, mapping: Sequence[str]) -> set[int]:
-    """The columns that the user leaves out."""
-    return {index for index, role, _ in _mapped(table, mapping) if role == IGNORE}
-
-
-def _mapped(table: RawTable, mapping: Sequence[str]) -> list[tuple[int, str, str]]:
-    """Column, role and unit of each thing the user says; what is said later of a column stands."""
-    out: dict[int, tuple[int, str, str]] = {}
-    for text in mapping:
-        header, equals, rest = text.rpartition("=")
-        if not equals:
-            raise _no_mapping(text, "")
-        header = header.strip()
-        role, _, stated = rest.strip().partition(" ")
-        unit = stated.strip("[]() ")
-        bears_no_unit = role in (IGNORE, "hold")
-        if role not in _SAYABLE or (unit and bears_no_unit):
-            raise _no_mapping(text, hint(role, _SAYABLE))
-        index, unit_in_header = _named(table, header, role)
-        out[index] = index, role, unit or unit_in_header
-    return list(out.values())
-
-
-def _no_mapping(text: str, meant: str) -> InputError:
-    expected = f"HEADER=COLUMN or HEADER=COLUMN [UNIT], COLUMN one of {', '.join(_SAYABLE)}"
-    return InputError(f"--map: found {text!r}{meant}, expected {expected}")
-
-
-def _named(table: RawTable, header: str, role: str) -> tuple[int, str]:
-    """The column of a header as the user writes it, perhaps with the unit that the file leaves out."""
-    if header in table.header:
-        return table.header.index(header), ""
-    if role in UNITS:
-        bare, unit = name_and_unit(header, role)
-        if unit and bare in table.header:
-            return table.header.index(bare), unit.text
-    names = [name for name in table.header if name]
-    found = f"no column {header!r}{hint(header, names)}"
-    raise InputError(f"{table.sheet.path}, line {table.header_line}: found {found}, expected one of {', '.join(names)}")
 
 
 def _column(table: RawTable, index: int, role: Role, stated: str | None) -> Column:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wirebayes.io.bench.columns import IGNORE
 from wirebayes.io.bench.header import header_meant, is_of, name_and_unit
+from wirebayes.io.bench.mapping import IGNORE
 from wirebayes.io.bench.quantities import ROLES, Role
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Specimens, Undecided

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from wirebayes.errors import shown
-from wirebayes.io.bench.columns import ignored
+from wirebayes.io.bench.mapping import ignored
 from wirebayes.io.bench.sheet import is_number
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.table_numbers import Recorded
