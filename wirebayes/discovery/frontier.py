@@ -121,6 +121,16 @@ class Frontier:
             looked.append(kinds)
         return sorted(near, key=lambda key: rank[key])  # the order within a rank stays
 
+    def origins(self, keys: Sequence[Key], root: FittedSet) -> tuple[list[FittedSet], list[str]]:
+        """Of each set the fitted one, at first the `root`, that has one effect less, and the name of that effect."""
+        parents = []
+        names = []
+        for key in keys:
+            before, name = self.parents[key]
+            parents.append(self.fitted.get(before, root))
+            names.append(name)
+        return parents, names
+
     def lead_to(self, pair: Key) -> None:
         """Go towards two effects that only show together: to the better one, and from there to both.
 

@@ -59,9 +59,12 @@ def weigh(
         Readings less parameters.
     """
     n = len(x.residual)
-    near, far = np.broadcast_to(near, n), np.broadcast_to(far, n)
-    pieces = [np.arange(i, min(i + _PIECE, n)) for i in range(0, n, _PIECE)]
-    parts = [_weigh_few(x.of(i), signature[i], near[i], far[i], degrees) for i in pieces]
+    near = np.broadcast_to(near, n)
+    far = np.broadcast_to(far, n)
+    parts = []
+    for first in range(0, n, _PIECE):
+        rows = np.arange(first, min(first + _PIECE, n))
+        parts.append(_weigh_few(x.of(rows), signature[rows], near[rows], far[rows], degrees))
     return Weighed(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Weighed)))
 
 

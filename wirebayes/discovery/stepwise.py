@@ -80,8 +80,7 @@ def explore(
     frontier.lead_to(_leading_pair(expansions, trials))
     fit = partial(_fit, families=families, references=references, settings=settings)
     while wave := frontier.next_looks(_looks(len(frontier.fitted))):
-        before, names = zip(*(frontier.parents[key] for key in wave), strict=True)
-        parents = [frontier.fitted.get(key, start) for key in before]
+        parents, names = frontier.origins(wave, start)
         fitted_sets = parallel_map(fit, parents, names, rng.spawn(len(wave)))
         for key, new in zip(wave, fitted_sets, strict=True):
             own_fit = _log_evidence(new.blocks) - _log_evidence(plain)

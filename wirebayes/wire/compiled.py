@@ -56,8 +56,8 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
     kept = 1.0 if model.history == "saturating" else 0.0
     law = _law(model.law == "modified", kept, model.tension_ref_N, log_ratio, formulas)
     remembers = any(name == "superposition" for name, _, _ in formulas)
-    flat = protocol.flat_with_ages if remembers else protocol.flat
-    return Call(kernel.Test(**flat), law, packed)
+    test = protocol.flat_with_ages if remembers else protocol.flat
+    return Call(kernel.Test(**test), law, packed)
 
 
 @lru_cache(maxsize=256)

@@ -93,12 +93,7 @@ class Protocol:
         """Times of readings (T,), of an unrecorded hold its end, each once, and for every hold where its own stand."""
         time = self._asked_s
         times, where = np.unique(time, return_inverse=True)
-        rows = where.reshape(time.shape)
-        # A slice copies nothing, and most holds are read in the same order.
-        runs = [np.array_equal(row, np.arange(row[0], row[0] + len(row))) for row in rows]
-        return times, tuple(
-            slice(row[0], row[0] + len(row)) if run else row for row, run in zip(rows, runs, strict=True)
-        )
+        return times, tuple(_slice_of(row) for row in where.reshape(time.shape))
 
     @cached_property
     def last_reading(self) -> Ints:
@@ -176,6 +171,13 @@ class Protocol:
         if not later.size:
             return np.inf
         return float(later[0]) if self.number[j] >= 0 else float(later[0]) - 0.5
+
+
+def _slice_of(numbers: Ints) -> slice | Ints:
+    """Numbers in a row as a slice, which copies nothing: most holds are read in the same order. Others as they are."""
+    end = numbers[0] + len(numbers)
+    is_run = np.array_equal(numbers, np.arange(numbers[0], end))
+    return slice(numbers[0], end) if is_run else numbers
 
 
 def _widened(array: Any, columns: int) -> Any:

@@ -67,7 +67,9 @@ def simulate(protocol: Protocol, theta: Theta, model: Model = PLAIN, setting_err
         N, or mm where the tension is set.
     """
     n = np.shape(theta["k1"])[0]
-    exact = np.zeros((len(protocol.setting), 1)) if setting_error is None else np.asarray(setting_error)
+    exact = np.zeros((len(protocol.setting), 1))
+    if setting_error is not None:
+        exact = np.asarray(setting_error)
     call = None if np.iscomplexobj(exact) else compiled.call(protocol, theta, model)
     if call is not None:
         return compiled.kernel.simulate(*call, exact.astype(float))
