@@ -71,13 +71,12 @@ def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) 
     target = block.target
     free = moving_columns(target.problem)
     y = z.copy()
-    best = y.copy()
-    height = np.full(len(y), -np.inf)
-    rows = np.arange(len(y))
+    best = z.copy()
+    height = np.full(len(z), -np.inf)
+    rows = np.arange(len(z))
     for step in range(_STEPS + 1):
-        own = _of_rows(readings, rows)
         with np.errstate(all="ignore"):
-            x = tangent(target, y[rows], own, free)
+            x = tangent(target, y[rows], _of_rows(readings, rows), free)
         no_signature = np.zeros_like(x.residual)
         here = weigh(x, no_signature, 0.0, 0.0, x.degrees)
         value = np.nan_to_num(here.height + x.prior, nan=-np.inf)

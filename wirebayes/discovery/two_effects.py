@@ -111,9 +111,8 @@ def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
     """(n, k, j, m) of the sum of squares by some signatures with each one; -inf where an amplitude has no meaning."""
     along = found.along[:, :, None, :]
     square = found.square[:, :, None, :]
-    own = first[:, None, :]
-    along_first = np.take_along_axis(found.along, own, axis=2)[..., None]
-    square_first = np.take_along_axis(found.square, own, axis=2)[..., None]
+    along_first = np.take_along_axis(found.along, first[:, None], axis=2)[..., None]
+    square_first = np.take_along_axis(found.square, first[:, None], axis=2)[..., None]
     cross = found.form.of(first).products(found.form, found.shrink)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         determinant = square_first * square - cross**2

@@ -239,16 +239,21 @@ class Problem:
         prior = self.prior
         distributions = {name: scaled(d, self._ratio(name, units)) for name, d in prior.distributions.items()}
         fixed = {name: value * self._ratio(name, units) for name, value in prior.fixed.items()}
-        powers = {}
-        for name, (exponent, log_ratio) in self._exponents(units).items():
-            log_base = log_ratio
-            if name in prior.powers:
-                log_base += prior.powers[name].log_base
-            if log_base != 0.0:
-                powers[name] = PowerScaled(exponent, log_base)
+        exponents = self._exponents(units)
+        for name, (exponent, log_ratio) in exponents.items():
             if name in fixed and isinstance(exponent, float):
                 fixed[name] *= float(np.exp(-log_ratio * exponent))
-        return replace(prior, distributions=distributions, fixed=fixed, powers=powers)
+        return replace(prior, distributions=distributions, fixed=fixed, powers=self._powers_with(exponents))
+
+    def _powers_with(self, more: Mapping[str, PowerScaled]) -> dict[str, PowerScaled]:
+        """The prior's powers with those of a change of units; what has become a factor of one is left out."""
+        out = {}
+        for name, (exponent, log_base) in more.items():
+            if name in self.prior.powers:
+                log_base += self.prior.powers[name].log_base
+            if log_base != 0.0:
+                out[name] = PowerScaled(exponent, log_base)
+        return out
 
     def linearised(self, theta: Array, sample: Sample) -> tuple[Linearised, Array, Array]:
         """A sample's staircase with reading variance and setting error, each (n,)."""

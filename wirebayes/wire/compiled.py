@@ -51,13 +51,17 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
     packed = np.empty((len(rows), len(rows[0])))
     for i, row in enumerate(rows):
         packed[i] = row
-    length_ref_mm = model.length_ref_mm or protocol.length_mm
-    log_ratio = float(np.log(protocol.length_mm / length_ref_mm))
-    kept = 1.0 if model.history == "saturating" else 0.0
-    law = _law(model.law == "modified", kept, model.tension_ref_N, log_ratio, formulas)
     remembers = any(name == "superposition" for name, _, _ in formulas)
     test = protocol.flat_with_ages if remembers else protocol.flat
-    return Call(kernel.Test(**test), law, packed)
+    return Call(kernel.Test(**test), _law_of(model, protocol.length_mm, formulas), packed)
+
+
+def _law_of(model: "Model", length_mm: float, formulas: tuple[tuple[str, int, float], ...]) -> Any:
+    """The kernel's law of a model for a wire of this length, with its effects' formulas."""
+    length_ref_mm = model.length_ref_mm or length_mm
+    log_ratio = float(np.log(length_mm / length_ref_mm))
+    kept = 1.0 if model.history == "saturating" else 0.0
+    return _law(model.law == "modified", kept, model.tension_ref_N, log_ratio, formulas)
 
 
 @lru_cache(maxsize=256)
