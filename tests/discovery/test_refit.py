@@ -29,6 +29,9 @@ class Flat:
     def cdf(self, amplitude: float) -> float:
         return float(amplitude > 0)
 
+    def std(self) -> float:
+        return self.width
+
 
 def ends_of(value: np.ndarray, z: np.ndarray, converged: np.ndarray) -> Optimum:
     """Where climbs of one coordinate ended: what the normal approximation adds to the log density is nothing."""
@@ -46,10 +49,11 @@ def refitted(
     effect: Any = TWO_SIDED,
     guess: float = 3.0,
     leap: float = np.inf,
+    per_delta: float = 1e-3,
 ) -> Any:
     """Refitted on blocks whose evidence is normal in δ about these tops; δ = 1 is a thousandth of the amplitude.
 
-    Climbs converge over no more than `leap`.
+    Climbs converge over no more than `leap`; the scan has its own opinion of what amounts to δ = 1.
     """
 
     class Curve:
@@ -81,7 +85,7 @@ def refitted(
 
     monkeypatch.setattr(refit, "Pinned", Curve)
     blocks: Any = [SimpleNamespace(top=top, log_evidence=-0.5 * top**2) for top in tops]
-    return refit.refit(blocks, range(len(tops)), effect, 1e-3, guess * 1e-3)
+    return refit.refit(blocks, range(len(tops)), effect, per_delta, guess * 1e-3)
 
 
 @pytest.mark.parametrize("top", [0.4, -7.0, 30.0, 100.0, -400.0])
@@ -93,6 +97,16 @@ def test_the_top_is_found_within_and_far_beyond_the_first_amplitudes(
     assert found.log_bayes == pytest.approx(0.5 * top**2 + occam(False))
     assert found.sd == pytest.approx(1e-3, rel=1e-6)
     assert found.theta[0] == pytest.approx([found.amplitude / 1e-3, found.amplitude])
+
+
+@pytest.mark.parametrize("per_delta", [1e-2, 1e300])
+def test_an_effect_that_the_scan_does_not_see_is_tried_at_amplitudes_of_its_prior(
+    per_delta: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its unit has no end where the parameters bend themselves to the effect; climbs from afar end nowhere."""
+    found = refitted(monkeypatch, [15.0], guess=0.0, per_delta=per_delta, leap=80.0)
+    assert found.amplitude / 1e-3 == pytest.approx(15.0, abs=0.3)
+    assert found.log_bayes == pytest.approx(0.5 * 15.0**2 + occam(False), abs=0.05)
 
 
 def test_where_climbs_from_afar_end_nowhere_nearer_ones_lead_on(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -27,6 +27,9 @@ _ROUNDING = 1e-9  # of a reach, which a grid may end on
 # δ of the first amplitudes tried, doubling up to `LARGEST`; around the best the grid is refined twice. The scan's unit
 # may be too large where the parameters bend themselves to the effect, so that it begins below what could be seen.
 _DELTAS = np.array([0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
+# of its prior's standard deviation, the most that an amplitude of δ = 1 may be: where the parameters of the fit without
+# the effect bend themselves to it, the scan sees nothing, and its unit has no end
+_LARGEST_UNIT = 0.1
 _SWEEPS = 3  # times that climbs may begin once more where their neighbour nearer to neutral has ended
 _NEWS = 0.1  # nats that such a climb must gain to be followed further
 _FAR = 12.0  # nats below the best amplitude, from which on no climb begins at an amplitude once more
@@ -139,9 +142,11 @@ class _Amplitude:
         least, most = (float(end) for end in main.prior.support())
         low, high = max(least, main.neutral - reach), min(most, main.neutral + reach)
         pinned = [Pinned(block, effect) for block in blocks]
-        log_prior = within(pinned[0].prior, main.neutral, reach)
+        prior = pinned[0].prior
+        unit = min(per_delta, _LARGEST_UNIT * float(prior.std()))
+        log_prior = within(prior, main.neutral, reach)
         without = sum(block.log_evidence for block in blocks)
-        return cls(pinned, main.neutral, low, high, per_delta, lambda amplitudes: log_prior(amplitudes) - without)
+        return cls(pinned, main.neutral, low, high, unit, lambda amplitudes: log_prior(amplitudes) - without)
 
     @property
     def one_sided(self) -> bool:
