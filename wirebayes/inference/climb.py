@@ -17,6 +17,9 @@ _ENOUGH = 0.25  # of what a step promises to gain: with less, damped ones are tr
 _LONGEST = 2.0  # step of a coordinate; they are of order one under the prior
 _NARROW = 1e-2  # standard deviation assumed where none is known yet, so that differences stay inside it
 _NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard deviation
+# nats by which differences may make a normal approximation's volume smaller than the expected information does: of
+# 6,217 places of simulated tests it was 3 at most, but for eleven beside a jump, where it was 4 to 27
+_MOST_CURVED = 3.5
 _NO_DENSITY = 1e3  # how far below its neighbour the log density counts where there is none: downhill, whatever the step
 # added to the curvature (of order one under the prior alone), tried in one batch where a step gains too little
 _DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
@@ -231,7 +234,9 @@ def _best(value: Array, group: Ints) -> Array:
 
 
 def curved(density: Density, found: Optimum, which: Ints | None = None) -> Optimum:
-    """The same places with the curvature of the density itself, where that is finite.
+    """The same places with the curvature of the density itself.
+
+    At a jump of the density, as where a wire goes slack, differences would take the jump for curvature: there it stays.
 
     Parameters
     ----------
@@ -246,10 +251,19 @@ def curved(density: Density, found: Optimum, which: Ints | None = None) -> Optim
     if not len(rows):
         return found
     z, value, curvature = found.z[rows], found.log_density[rows], found.curvature.copy()
-    bend = np.einsum("nii->ni", curvature[rows])
+    before = curvature[rows]
+    bend = np.einsum("nii->ni", before)
     _, hessian = _derivatives(density, z, which[rows], value, _steps(bend), sides=2)
-    curvature[rows] = _composed(*_positive(-hessian))
+    exact = _composed(*_positive(-hessian))
+    is_smooth = _log_volume(before) - _log_volume(exact) < _MOST_CURVED
+    curvature[rows[is_smooth]] = exact[is_smooth]
     return replace(found, curvature=curvature)
+
+
+def _log_volume(curvature: Array) -> Array:
+    """(n,) log volumes of normal approximations with these curvatures (n, d, d), but for a constant."""
+    _, log_determinant = np.linalg.slogdet(curvature)
+    return np.asarray(-0.5 * log_determinant)
 
 
 def _damped(
