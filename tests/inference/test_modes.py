@@ -13,6 +13,7 @@ from wirebayes.inference.climb import climb
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import search
 from wirebayes.inference.optimum import Ends, Optimum
+from wirebayes.inference.weighted_posterior import witnessed
 from wirebayes.io.paper import experiments
 from wirebayes.model.build import build
 from wirebayes.model.linear_amplitudes import integrated
@@ -359,3 +360,16 @@ def test_searches_side_by_side_find_what_each_finds_alone():
         other = modes.searches(target, np.random.default_rng(1), 1, [readings[..., [i]]])[0]
         assert other.log_density[0] == pytest.approx(found.log_density[0], abs=1e-3)
     assert together[1].log_density[0] != pytest.approx(together[0].log_density[0], abs=0.1)
+
+
+def test_where_the_first_hold_is_nearly_slack_the_best_mode_has_the_evidence_that_draws_give():
+    """A threshold of creep beside the edge of slack: climbs that met the edge as a wall ended 13 nats too low."""
+    bench = Bench(displacements_mm=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0))
+    wire = {"k1": 4000.0, "B": 0.4, "U": 0.9, "k2": 0.04, "N": 0.4, "creep_threshold.tau_c": 1.0}
+    truth = Truth(wire | {"preload": -0.9, "setting_sd": 0.05, "sensor_sd": 0.01}, (effect_named("creep_threshold"),))
+    problem = draw([bench], truth, 3).problem
+    target = LogPosterior(integrated(problem.in_units(problem.own_units)))
+    found = modes.modes(target, np.random.default_rng(0))
+    by_draws = witnessed(target, np.random.default_rng(0), 500)
+    assert by_draws.settled[0]
+    assert found.log_evidence.max() == pytest.approx(by_draws.log_integral[0], abs=2.5)

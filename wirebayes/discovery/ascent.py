@@ -337,7 +337,7 @@ def _with_effect(block: LaplaceFit, ladder: AmplitudePath, z: Array) -> tuple[Lo
     largest = float(np.abs(ladder.amplitudes).max())
     wide = {problem.names[column]: Normal(0.0, 100.0 * largest)}
     prior = replace(problem.prior, distributions=problem.prior.distributions | wide)
-    target = LogPosterior(replace(problem, prior=prior), for_draws=False)
+    target = LogPosterior(replace(problem, prior=prior))
     theta = _at_each_start(ladder, block.target, z, problem.names)
     return target, column, target.coordinates.to_sampled(theta)
 

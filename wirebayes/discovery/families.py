@@ -111,7 +111,7 @@ def noise_ratio(block: LaplaceFit, found: Refit, b: int) -> float:
         The block's number, as the refit counts them.
     """
     problem = block.problem_with(found.effect)
-    target = LogPosterior(problem, for_draws=False)
+    target = LogPosterior(problem)
     z = target.coordinates.to_sampled(found.theta[found.blocks.index(b)][None])
     return float(tangent(target, z, None, moving_columns(problem)).ratio[0])
 

@@ -252,7 +252,7 @@ def _remainder_seen(target: LogPosterior, block: LaplaceFit) -> float:
 
 def replace_problem(target: LogPosterior, problem: Any) -> LogPosterior:
     """A target on other holds whose coordinates mean the same."""
-    out = LogPosterior(problem, for_draws=False)
+    out = LogPosterior(problem)
     out.coordinates.steps = target.coordinates.steps
     return out
 

@@ -150,7 +150,7 @@ def fitted(
         In whose units the fit is made; those of the experiments when left out.
     """
     problem = build(experiments, effects, spec, scales=scales)
-    target = LogPosterior(integrated(problem.in_units(problem.own_units)), for_draws=False)
+    target = LogPosterior(integrated(problem.in_units(problem.own_units)))
     extra = None if near is None else target.coordinates.to_sampled(near[None])
     found = modes(target, rng, extra)
     return LaplaceFit(tuple(experiments), tuple(effects), spec, target, found)
@@ -176,7 +176,7 @@ class Pinned:
         named_units = [unit_of_column(problem.names[column], problem.samples) for column in self.common]
         self._units = np.array([problem.units.of(unit) for unit in named_units])
         free = problem.prior.distributions | {problem.names[self.column]: _FLAT}
-        self.target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)), for_draws=False)
+        self.target = LogPosterior(replace(problem, prior=replace(problem.prior, distributions=free)))
         self._plain = block
 
     def starts(self, shapes: Mapping[str, float]) -> Array:

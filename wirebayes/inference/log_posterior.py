@@ -18,16 +18,15 @@ _NUMBERS, _LEAST_ROWS = 100_000, 64  # readings times rows at once: what stays i
 class LogPosterior:
     """The log posterior density in the sampled coordinates, batched, counting its evaluations."""
 
-    def __init__(self, problem: Problem, for_draws: bool = True) -> None:
-        self.problem, self.coordinates = problem, Transformation(problem, for_draws)
-        self._for_draws = for_draws
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.coordinates = problem, Transformation(problem)
         self.log_prior = problem.prior.log_density()
         self.evaluations = 0
         self._rows = max(_LEAST_ROWS, _NUMBERS // sum(s.protocol.mask.size for s in problem.samples))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # what else there is has closures, which no other process can be sent
-        return LogPosterior, (self.problem, self._for_draws)
+        return LogPosterior, (self.problem,)
 
     def __call__(self, z: Array, readings: Any = None) -> Array:
         """(n,) log density of (n, d) sampled coordinates; -inf outside the prior."""

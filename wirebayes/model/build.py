@@ -13,7 +13,7 @@ from wirebayes.model.problem import Problem
 from wirebayes.model.sample import LENGTH_EXPONENT, MATERIAL, SAMPLE, Sample
 from wirebayes.model.scales import Scales, Units, scales_of
 from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
-from wirebayes.numeric.distributions import scaled
+from wirebayes.numeric.distributions import LogUniform, ours, scaled
 from wirebayes.numeric.means import geometric_mean
 from wirebayes.strict.hint import hint
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
@@ -180,9 +180,13 @@ def _in_natural_units(
 
 
 def _positive(free: Mapping[str, Any], effects: Sequence[Effect]) -> frozenset[str]:
-    """Parameters that are sampled by their logarithm: by their nature positive, and not below zero by their prior."""
+    """Parameters that are sampled by their logarithm: by their nature positive, and not below zero by their prior.
+
+    A log-uniform prior ends on both sides, where climbs by the logarithm would run into a wall.
+    """
     positive = _POSITIVE | {c for c, a in _amplitudes(effects) if a.is_shape}
-    return frozenset(n for n, d in free.items() if n.split("[")[0] in positive and d.support()[0] >= 0)
+    by_nature = {n: ours(d) for n, d in free.items() if n.split("[")[0] in positive}
+    return frozenset(n for n, d in by_nature.items() if d.support()[0] >= 0 and not isinstance(d, LogUniform))
 
 
 def _amplitudes(effects: Sequence[Effect]) -> list[tuple[str, Amplitude]]:

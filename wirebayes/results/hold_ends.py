@@ -200,4 +200,4 @@ def _modes(problem: Problem, longer: Problem, best: Array) -> tuple[Array, Array
 
 def _density(problem: Problem, own: Problem) -> LogPosterior:
     """The density of a problem in the units of another, without what can be integrated out."""
-    return LogPosterior(integrated(problem.in_units(own.units)), for_draws=False)
+    return LogPosterior(integrated(problem.in_units(own.units)))

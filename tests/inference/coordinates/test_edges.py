@@ -12,6 +12,7 @@ ENDED = [
     stats.truncnorm(-1.0, np.inf, loc=0.01, scale=0.01),
     stats.truncnorm(0.0, np.inf, loc=0.0, scale=3.0),
     stats.truncnorm(-7.9, np.inf, loc=7.9, scale=1.0),
+    stats.loguniform(2.0, 5.5),
 ]
 
 

@@ -7,9 +7,8 @@ import pytest
 
 from wirebayes.effects import effect_named
 from wirebayes.inference.coordinates.slack_edge import slack_edge
-from wirebayes.inference.coordinates.steps import Power, Preload
+from wirebayes.inference.coordinates.steps import Preload
 from wirebayes.inference.coordinates.transform import Transformation
-from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 from wirebayes.wire.staircase import simulate
 
@@ -104,13 +103,7 @@ def test_a_known_preload_has_no_coordinate():
     assert slack_edge(of, of.samples[0]) is None
 
 
-def test_holds_by_themselves_and_climbs_that_are_compared_do_without():
+def test_holds_by_themselves_do_without():
     of = made()
     assert slack_edge(replace(of.problem, likelihood="hold"), of.problem.samples[0]) is None
     assert preloads(Transformation(of.problem)) == 1
-    plain = LogPosterior(of.problem, for_draws=False)
-    assert not preloads(plain.coordinates) and not any(isinstance(s, Power) for s in plain.coordinates.steps)
-    preload, U = (of.problem.names.index(name) for name in ("preload", "U"))
-    z = plain.coordinates.to_sampled(of.theta)
-    assert z[0, U] == pytest.approx(np.log(TRUTH["U"]))
-    assert z[0, preload] == pytest.approx(TRUTH["preload"] / plain.coordinates.scale[preload])

@@ -108,8 +108,5 @@ def test_several_holds_begin_at_the_tension_of_the_first():
     ],
 )
 def test_only_a_test_of_one_displacement_has_this_coordinate(problem, has_one):
-    def has_it(for_draws):
-        return any(isinstance(step, Level) for step in Transformation(problem, for_draws).steps)
-
-    assert has_it(for_draws=True) == has_one
-    assert not has_it(for_draws=False)
+    has_it = any(isinstance(step, Level) for step in Transformation(problem).steps)
+    assert has_it == has_one

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.special import erf, erfc, erfcinv, erfinv, ndtr, ndtri
 
-from wirebayes.numeric.distributions import HalfNormal, Normal, TruncatedNormal, Uniform, ours
+from wirebayes.numeric.distributions import HalfNormal, LogUniform, Normal, TruncatedNormal, Uniform, ours
 from wirebayes.numeric.typing import Array, Function
 
 _NEAREST = 1e-9  # share of the prior between an edge and a value on it, whose score would be infinite
@@ -35,7 +35,7 @@ class Edge:
 
 
 def edge(distribution: Any) -> Edge | None:
-    """The map for a half-normal at zero, a normal one cut off below or a uniform distribution; none for others."""
+    """The map for a half-normal at zero, a normal one cut off below, and (log-)uniform ones; none for others."""
     match ours(distribution):
         case HalfNormal(sd, 0.0) as known:
             return _half_normal(sd, known.log_density())
@@ -43,6 +43,8 @@ def edge(distribution: Any) -> Edge | None:
             return _cut_off(known)
         case Uniform(low, width) as known:
             return _uniform(low, width, known.log_density())
+        case LogUniform() as known:
+            return _log_uniform(known)
     return None
 
 
@@ -101,3 +103,17 @@ def _uniform(low: float, width: float, log_prior: Function) -> Edge:
         return np.asarray(low + width * ndtr(score))
 
     return Edge(score, value, log_prior, True)
+
+
+def _log_uniform(known: LogUniform) -> Edge:
+    width = np.log(known.high / known.low)
+
+    def score(value: Array) -> Array:
+        share = np.log(value / known.low) / width
+        return np.asarray(ndtri(np.clip(share, _NEAREST, 1.0 - _NEAREST)))
+
+    def value(score: Array) -> Array:
+        found = known.low * np.exp(width * ndtr(score))
+        return np.asarray(np.minimum(found, known.high))  # rounding may lead beyond
+
+    return Edge(score, value, known.log_density(), True)

@@ -194,15 +194,13 @@ _NOTHING = 1e-300  # of a square whose logarithm has to be finite
 _COUNTED = 0.05
 
 
-def ridges_of(problem: Problem, columns: ColumnMap, for_draws: bool) -> list[Ridge]:
+def ridges_of(problem: Problem, columns: ColumnMap) -> list[Ridge]:
     """The ridges of a problem's materials; a column that several samples share follows the first of them.
 
     Parameters
     ----------
     columns : ColumnMap
         How each parameter is measured by itself.
-    for_draws : bool
-        Whether U, and amounts that add to others, have coordinates in which proposals suit them better.
     """
     found: list[Ridge] = []
     taken: set[int] = set()
@@ -213,18 +211,12 @@ def ridges_of(problem: Problem, columns: ColumnMap, for_draws: bool) -> list[Rid
             continue  # a user's prior that allows negative values: leave this material's columns as they are
         free = {name for name, column in where.items() if column not in taken}
         shifted = _shifted(problem, sample, free)
-        if not for_draws:
-            shifted -= {"U"}
-            if sample.protocol.control == "force":
-                shifted -= {"k1"}
         if not shifted:
             continue
         taken |= {where[name] for name in shifted}
-        ridge = _ridge(problem, sample, where, fixed, shifted, for_draws)
-        if for_draws:
-            owned = [column for each in found for column in each.shares]
-            ridge = _with_shares(ridge, problem, sample, columns, owned)
-        found.append(ridge)
+        ridge = _ridge(problem, sample, where, fixed, shifted)
+        owned = [column for each in found for column in each.shares]
+        found.append(_with_shares(ridge, problem, sample, columns, owned))
     return found
 
 
@@ -240,7 +232,7 @@ def for_sample(ridge: Ridge, problem: Problem, sample: Sample) -> Ridge:
     """
     if sample is problem.samples[0]:
         return ridge
-    return _ridge(problem, sample, dict(ridge.where), dict(ridge.fixed), ridge.shifted - {"U"}, for_draws=True)
+    return _ridge(problem, sample, dict(ridge.where), dict(ridge.fixed), ridge.shifted - {"U"})
 
 
 def _parameters(problem: Problem, sample: Sample, columns: ColumnMap) -> tuple[dict[str, int], dict[str, float]]:
@@ -276,7 +268,6 @@ def _ridge(
     where: dict[str, int],
     fixed: dict[str, float],
     shifted: frozenset[str],
-    for_draws: bool,
 ) -> Ridge:
     effects = tuple(e for e in sample.model.at("amount") if e.has_formula)  # others may ask for B
     for column in (c for e in effects for c in e.columns()):
@@ -288,10 +279,8 @@ def _ridge(
     tension = _driving(sample)
     hold_s, duration = sample.typical_hold_s, sample.protocol.duration_s
     durations = np.where(duration > 0, duration, hold_s)
-    seen = np.zeros_like(durations), durations
-    if for_draws:
-        seen = _seen(sample, durations)
-    times, which = np.unique([*seen, durations], return_inverse=True)
+    first_and_last = _seen(sample, durations)
+    times, which = np.unique([*first_and_last, durations], return_inverse=True)
     first, last, end = which.reshape(3, -1)
     pairs = np.column_stack([first, last])
     between, which_pair = np.unique(pairs, axis=0, return_inverse=True)

@@ -13,8 +13,8 @@ measured in standard deviations of their prior. Then, one after the other (`wire
   tension lost, and these amplitudes become their shares of it (`wirebayes.inference.coordinates.shares`);
 - ``SoftenedStiffness``: log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + k1 a / L0)``,
   with a slope a of the elongation by creep over the tensions that holds were last read at
-  (`wirebayes.inference.coordinates.last_readings`); where these are all alike, and for normal approximations, of the
-  tension lost in a hold over the root mean square of the steps between first readings. Where all creep is over before
+  (`wirebayes.inference.coordinates.last_readings`); where these are all alike, of the tension lost in a hold over the
+  root mean square of the steps between first readings. Where all creep is over before
   it is read, the readings see this stiffness alone; where there is little, it is k1. Where a fixture's compliance is
   sampled, k1 is in all this the stiffness of the wire with its fixture, and the compliance becomes its share;
 - ``AddedCompliance``: the same under weights, where elongations are sampled and compliances add up;
@@ -34,11 +34,11 @@ measured in standard deviations of their prior. Then, one after the other (`wire
 - ``Straightened``: beside a toe, the preload becomes what is left of it once the toe is straight.
 
 The map is triangular: to natural parameters the steps go backwards, so that each finds the parameters that it asks for.
-Those but of preloads, shares and the added compliance have unit Jacobian. Those of preloads, shares, the added
-compliance and U are for proposals to draw from, and so is the difference between what is lost and what readings show of
-it: Laplace approximations, as the search for effects compares them, do without. The proposal learns the remaining
-curvature and funnels (`wirebayes.inference.sampler.transport_map`), for which the columns are ordered: errors before
-what they widen, the shape of the creep before its amount and the stiffness.
+Those but of preloads, shares and the added compliance have unit Jacobian. The proposal learns the remaining curvature
+and funnels (`wirebayes.inference.sampler.transport_map`), for which the columns are ordered: errors before what they
+widen, the shape of the creep before its amount and the stiffness. Climbs and the normal approximations that the search
+for effects compares are made in the same coordinates: beside an edge of the prior, or where a wire is nearly slack,
+others would end at a wall.
 """
 
 from collections.abc import Sequence
@@ -101,8 +101,6 @@ class Transformation:
     Parameters
     ----------
     problem : Problem
-    for_draws : bool
-        Whether U and the preload have coordinates in which proposals suit them better.
 
     Attributes
     ----------
@@ -118,7 +116,7 @@ class Transformation:
         Of the standard deviations that are not fixed.
     """
 
-    def __init__(self, problem: Problem, for_draws: bool = True) -> None:
+    def __init__(self, problem: Problem) -> None:
         names = problem.names
         self.problem = problem
         self.columns = columns_of(problem)
@@ -127,19 +125,19 @@ class Transformation:
         self.sensor_columns = _positive("sensor_sd", names, self.columns)
         self.setting_columns = _positive("setting_sd", names, self.columns)
         self.order = np.array(sorted(range(len(names)), key=lambda i: _rank(names[i])))
-        slack = _slack_edges(problem, self.columns) if for_draws else []
-        ridges = ridges_of(problem, self.columns, for_draws)
+        slack = _slack_edges(problem, self.columns)
+        ridges = ridges_of(problem, self.columns)
         levels: list[LevelStep] = []
-        if for_draws and _is_usual(problem, self.columns, ridges):
+        if _is_usual(problem, self.columns, ridges):
             ridge, levels = _of_one_setting(problem, ridges[0], slack, self.scale)
             ridges = [ridge]
         lasts: list[list[LastReadings]] = [[] for _ in ridges]
-        if for_draws and not levels:
+        if not levels:
             lasts = _last_readings(problem, ridges)
         means = _mean_elongations(problem, lasts, self.columns)
         of_levels = {column for step in levels if not isinstance(step, Level) for column in step.preloads}
         edges = [Preload(edge, self.scale[edge.preload]) for edge in slack if edge.preload not in of_levels]
-        toes = _toes(problem, self.columns) if for_draws and not of_levels else []
+        toes = _toes(problem, self.columns) if not of_levels else []
         self.steps = [*_steps(ridges, lasts, levels, means, edges), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
