@@ -33,7 +33,8 @@ _LARGEST_UNIT = 0.1
 _SWEEPS = 3  # times that climbs may begin once more where their neighbour nearer to neutral has ended
 _NEWS = 0.1  # nats that such a climb must gain to be followed further
 _FAR = 12.0  # nats below the best amplitude, from which on no climb begins at an amplitude once more
-_CLOSER = 3  # times that amplitudes are tried closer to the best one
+# times that amplitudes are tried closer to the best one; beside a cliff, as where creep stops, three had missed the top
+_CLOSER = 5
 _COUNTS = 6.0  # nats below the best amplitude, up to which the curvature is computed exactly
 # of a top that is a parabola's, where it is tried: standard deviations
 _ABOUT_TOP = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])

@@ -158,6 +158,7 @@ def fitted(
 
 _HOPELESS = 12.0  # nats below the best amplitude, which no curvature makes up for
 _BEST_MODES = 2  # of the fit without an effect, from which climbs with it start
+_INSIDE = np.array([0.01, 0.99])  # of its prior, where a shape begins: at its ends, a score has no slope
 _TOLERANCE = 1e-2  # nats that a climb may still gain: evidence is compared in tenths of a nat
 
 
@@ -192,9 +193,9 @@ class Pinned:
                 known = plain.problem.names.index(name)
                 theta[:, i] = natural[:, known]
             else:
-                median = problem.prior.distributions[name].median()
-                shape = name.split("[")[0]
-                theta[:, i] = shapes.get(shape, median)
+                prior = problem.prior.distributions[name]
+                given = shapes.get(name.split("[")[0], prior.median())
+                theta[:, i] = np.clip(given, *prior.ppf(_INSIDE))
         with_effect = np.insert(theta, self.column, 0.0, axis=1)
         sampled = self.target.coordinates.to_sampled(with_effect)
         return self._drop(sampled)
