@@ -60,6 +60,7 @@ STUDIES = {
         "--output {folder}",
         "scores.json",
     ),
+    "evidence": ("-m analyses.discovery.evidence --seed 6100 --output {folder}", "evidence.json"),
     "robot_exact_geometry": (
         "-m analyses.robots.whole_calibration exact 200 --seed 3601 --output {folder}/it.json",
         "it.json",
@@ -84,6 +85,7 @@ STUDIES = {
 REDUCED = {  # of results that hold every file's answer
     "discover_clean": discovery.alarms_in_short,
     "discover_hidden": discovery.hidden_in_short,
+    "evidence": discovery.evidence_in_short,
     "cost": speed.cost_in_short,
     "samplers": samplers.samplers_in_short,
 }
@@ -152,6 +154,7 @@ def texts() -> dict[Path, str]:
         + robots.anchors_from_lengths_alone(kept["robot_lengths_alone"])
         + robots.anchors_held_exact(kept["robot_exact_geometry"]),
         DOCS / "real-wires.inc": discovery.papers_wires(kept["real_wires"]),
+        DOCS / "evidence.inc": discovery.evidence_of_refits(kept["evidence"]),
         DOCS / "discover-clean-said.inc": discovery.false_alarms(kept["discover_clean"]),
         DOCS / "draws.inc": speed.draws_an_evaluation(kept["cost"]),
         DOCS / "evaluation-cost.inc": speed.cost_of_an_evaluation(kept["cost"]),

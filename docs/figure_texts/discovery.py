@@ -112,3 +112,29 @@ def papers_wires(kept: dict[str, Any]) -> str:
 def _spoken(names: list[str]) -> str:
     """Names of effects as people say them."""
     return ", ".join(names).replace("_", " ") or "–"
+
+
+def evidence_in_short(found: dict[str, Any]) -> dict[str, Any]:
+    """The summary, and the refits that are a nat or more off."""
+    off = [row for row in found["rows"] if abs(row["refit"] - row["draws"]) >= 1.0]
+    summary = {key: value for key, value in found.items() if key != "rows"}
+    return {**summary, "off": off}
+
+
+def evidence_of_refits(kept: dict[str, Any]) -> str:
+    """A paragraph on how near refits come to integrals by draws."""
+    found = kept["result"]
+    each = [_row_off(row) for row in found["off"]]
+    lines = [
+        f"{run_of(kept)}: of {found['files']} files with one hidden effect, the log Bayes factor of its refit less that of",
+        f"the integrals is {found['median']:+.2f} in the median, {found['q05']:+.2f} and {found['q95']:+.2f} at the ends of",
+        f"90 %. It is off by more than one in {found['farther_than']['1']}, by more than three in",
+        f"{found['farther_than']['3']}" + (": " + "; ".join(each) if each else "") + ".",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _row_off(row: dict[str, Any]) -> str:
+    """An effect, and what the refit and the draws say of it."""
+    name = row["effect"].replace("_", " ")
+    return f"{name} ({row['protocol']}) {row['refit']:.1f} for {row['draws']:.1f}"
