@@ -9,7 +9,6 @@ checked by a second search for modes. Only files in which both integrals can be 
 
 import argparse
 import json
-from collections.abc import Iterator
 from itertools import repeat
 from pathlib import Path
 from typing import Any
@@ -64,11 +63,10 @@ def compared(spec: Spec, folder: Path) -> dict[str, Any] | None:
     refit = _refit(plain, name)
     if refit is None:
         return None
-    with_effect = plain.problem_with(refit.effect)
-    integrals = list(_integrals(plain.target.problem, with_effect))
-    if None in integrals:
+    without = _integral(plain.target.problem)
+    beside = _integral(plain.problem_with(refit.effect))
+    if without is None or beside is None:
         return None
-    without, beside = integrals
     by_draws = beside - without
     return {"key": spec.key, "protocol": spec.protocol, "effect": name, "refit": refit.log_bayes, "draws": by_draws}
 
@@ -84,11 +82,10 @@ def _refit(plain: LaplaceFit, name: str) -> Refit | None:
     return winners[0] if winners else None
 
 
-def _integrals(*problems: Problem) -> Iterator[float | None]:
-    """Log integrals of posterior densities; None where the weights cannot be trusted."""
-    for problem in problems:
-        found = witnessed(LogPosterior(problem), np.random.default_rng(0), DRAWS)
-        yield float(found.log_integral[0]) if found.settled[0] else None
+def _integral(problem: Problem) -> float | None:
+    """Log integral of a posterior density; None where the weights cannot be trusted."""
+    found = witnessed(LogPosterior(problem), np.random.default_rng(0), DRAWS)
+    return float(found.log_integral[0]) if found.settled[0] else None
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from statistics import median
+from textwrap import fill
 from typing import Any
 
 from figure_texts.tables import run_of, table_head, table_row, version_of
@@ -125,13 +126,15 @@ def evidence_of_refits(kept: dict[str, Any]) -> str:
     """A paragraph on how near refits come to integrals by draws."""
     found = kept["result"]
     each = [_row_off(row) for row in found["off"]]
-    lines = [
-        f"{run_of(kept)}: of {found['files']} files with one hidden effect, the log Bayes factor of its refit less that of",
-        f"the integrals is {found['median']:+.2f} in the median, {found['q05']:+.2f} and {found['q95']:+.2f} at the ends of",
-        f"90 %. It is off by more than one in {found['farther_than']['1']}, by more than three in",
-        f"{found['farther_than']['3']}" + (": " + "; ".join(each) if each else "") + ".",
-    ]
-    return "\n".join(lines) + "\n"
+    ends = f"{found['q05']:+.2f} to {found['q95']:+.2f}"
+    far = found["farther_than"]
+    which = f": {'; '.join(each)}" if each else ""
+    said = (
+        f"Of {found['files']} files with one hidden effect, the log Bayes factor of its refit less that of the "
+        f"integrals is {found['median']:+.2f} in the median, and {ends} in nine of ten. It is off by more than three "
+        f"in {far['3']}, by more than one in {far['1']}{which}."
+    )
+    return fill(f"{said} {run_of(kept)}.", 110) + "\n"
 
 
 def _row_off(row: dict[str, Any]) -> str:
