@@ -4,7 +4,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from wirebayes.inference.laplace_fit import fitted
+from wirebayes.effects import CATALOGUE
+from wirebayes.inference.laplace_fit import Pinned, fitted
 from wirebayes.inference.optimum import Optimum
 from wirebayes.io import paper
 from wirebayes.model.spec import PLAIN_SPEC
@@ -20,3 +21,17 @@ def test_of_several_modes_the_best_is_meant():
     assert several.z.shape == best.z.shape
     assert (several.theta == block.theta).all()
     assert several.best == block.best
+
+
+def test_a_shape_at_the_end_of_its_prior_begins_inside():
+    """At the end itself its coordinate has no slope, and a climb would stay there."""
+    (nylon,) = (e for e in paper.experiments() if e.name == "nylon-1.5m")
+    block = fitted([nylon], (), PLAIN_SPEC, np.random.default_rng(0))
+    (screw,) = CATALOGUE["screw_error"].variants([nylon.protocol()])
+    pinned = Pinned(block, screw)
+    names = pinned.target.problem.names
+    prior = pinned.target.problem.prior.distributions["screw_error.P"]
+    for end in prior.support():
+        start = pinned.starts({"screw_error.P": end})
+        (period,) = pinned.natural(start, np.zeros(len(start)))[:, names.index("screw_error.P")]
+        assert 0.005 < prior.cdf(period) < 0.995

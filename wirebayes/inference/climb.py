@@ -234,9 +234,9 @@ def _best(value: Array, group: Ints) -> Array:
 
 
 def curved(density: Density, found: Optimum, which: Ints | None = None) -> Optimum:
-    """The same places with the curvature of the density itself.
+    """The same places with the curvature of the density itself, where that is finite and smooth.
 
-    At a jump of the density, as where a wire goes slack, differences would take the jump for curvature: there it stays.
+    Beside a jump, as where a wire goes slack, differences would take the jump for curvature: there the curvature stays.
 
     Parameters
     ----------
