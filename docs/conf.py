@@ -21,7 +21,14 @@ project = "wirebayes"
 author = "The wirebayes developers"
 copyright = "2026, the wirebayes developers"
 version = release = __version__
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "sphinx_copybutton", "mathml"]
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "fold",
+    "mathml",
+]
 exclude_patterns = ["_build", "generated"]
 templates_path = ["_templates"]
 highlight_language = "text"  # what stands in a plain block is a command or a file

@@ -155,6 +155,7 @@ def texts() -> dict[Path, str]:
         + robots.anchors_held_exact(kept["robot_exact_geometry"]),
         DOCS / "real-wires.inc": discovery.papers_wires(kept["real_wires"]),
         DOCS / "evidence.inc": discovery.evidence_of_refits(kept["evidence"]),
+        DOCS / "discover-answer.inc": claims.answer_of_discover(),
         DOCS / "discover-clean-said.inc": discovery.false_alarms(kept["discover_clean"]),
         DOCS / "draws.inc": speed.draws_an_evaluation(kept["cost"]),
         DOCS / "evaluation-cost.inc": speed.cost_of_an_evaluation(kept["cost"]),
