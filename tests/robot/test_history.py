@@ -555,12 +555,20 @@ def test_the_commands_answer_and_repeat_to_the_byte(fitted, tmp_path, capsys):  
         page = (outs[0] / "report.html").read_text()
         assert "data:image/svg+xml" in page
         assert "<td>" in page
+    centre = tmp_path / "centre.csv"
+    centre.write_text("time_s,x_m,y_m,z_m,payload_x_m,payload_y_m,payload_z_m\n0,0,0,.6,0,0,.1\n60,0,0,.6,0,0,.1\n")
     refused = [
         (["--joints", str(tmp_path / "log.csv"), "--trajectory", str(tmp_path / "way.csv")], "found both"),
         (["--trajectory", str(tmp_path / "log.csv")], "line 1, column 2: found 'joint_1_m'"),
         (["--joints", str(tmp_path / "none.csv")], "found no such file"),
         (["--joints", str(tmp_path / "log.csv"), "--times", "0,9"], "--times"),
+        (["--joints", str(tmp_path / "log.csv"), "--tolerance", "1"], "--tolerance and --tolerance-tilt: found beside"),
+        (["--trajectory", str(centre)], "centre.csv, line 1, column 5: found payload_x_m without payload_kg"),
         (["--payload", "-1"], "--payload: found -1, expected kilograms, 0 or more"),
+        (["--payload-at", "0,0,.1"], "--payload-at: found 0,0,.1 without --payload, expected both"),
+        (["--reference-sd", "2"], "--reference-sd: found beside a single pose"),
+        (["--tension-sd", "2"], "--tension-sd: found beside a single pose"),
+        (["--tilt-sd", "2"], "--tilt-sd: found beside a single pose"),
     ]
     for options, message in refused:
         assert main([*both, *options, "--output", str(tmp_path / "no")]) == 2

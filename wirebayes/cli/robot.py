@@ -49,9 +49,10 @@ TrajectoryFile = Annotated[
     Path | None,
     typer.Option("--trajectory", metavar="FILE.csv", help="Commanded poses and loads over time: where does it go?"),
 ]
-Payload = Annotated[float, typer.Option("--payload", metavar="KG", help="Carried beside the platform's mass.")]
+Payload = Annotated[float | None, typer.Option("--payload", metavar="KG", help="Carried beside the platform's mass.")]
 PayloadAt = Annotated[
-    str | None, typer.Option("--payload-at", metavar="X,Y,Z", help="Its centre in the platform's frame, metres.")
+    str | None,
+    typer.Option("--payload-at", metavar="X,Y,Z", help="Centre of --payload in the platform's frame, metres."),
 ]
 TiltError = Annotated[
     float, typer.Option("--tilt-sd", metavar="RAD", help="Standard error of roll and pitch in --joints.")
@@ -85,7 +86,7 @@ def pose_command(
     other_fit: OtherFit = None,
     joints: JointsFile = None,
     trajectory: TrajectoryFile = None,
-    payload: Payload = 0,
+    payload: Payload = None,
     payload_at: PayloadAt = None,
     tension_sd: TensionError = 0.02,
     tilt_sd: TiltError = 1e-3,

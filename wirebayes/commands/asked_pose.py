@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -110,21 +111,36 @@ def _refuse_off_plane(robot: Robot, position_m: Floats, rotation: Floats) -> Non
         )
 
 
-def loaded(robot: Robot, payload_kg: float, at: Numbers | None) -> Robot:
+def loaded(robot: Robot, payload_kg: float | None, at: Numbers | None) -> Robot:
     """The robot with a payload, at its own centre of mass where no other place is given.
 
     Parameters
     ----------
     robot : Robot
-    payload_kg : float
+    payload_kg : float or None
     at : numbers or None
         Centre of mass of the payload in the platform's frame, m.
+
+    Raises
+    ------
+    InputError
+        No payload of this mass or at this place can be, or a place without a payload is given.
     """
-    if not 0 <= payload_kg < math.inf:
-        raise InputError(f"--payload: found {payload_kg:g}, expected kilograms, 0 or more")
-    return with_payload(robot, payload_kg, robot.centre_of_mass_m if at is None else numbers("--payload-at", at, 3))
+    if payload_kg is None:
+        if at is not None:
+            raise InputError(f"--payload-at: found {text_of(at)} without --payload, expected both")
+        return robot
+    mass_kg = float(payload_kg)
+    if not 0 <= mass_kg < math.inf:
+        raise InputError(f"--payload: found {mass_kg:g}, expected kilograms, 0 or more")
+    return with_payload(robot, mass_kg, robot.centre_of_mass_m if at is None else numbers("--payload-at", at, 3))
 
 
 def spelled(options: Mapping[str, Numbers | None]) -> dict[str, str | None]:
     """Options as the command line spells them; None where they were not given."""
     return {name: None if values is None else text_of(values) for name, values in options.items()}
+
+
+def carried_options(payload_kg: float | None, at: Numbers | None) -> dict[str, Any]:
+    """A payload as options decide a result."""
+    return {"--payload": float(payload_kg or 0.0), **spelled({"--payload-at": at})}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wirebayes.commands.asked_pose import AskedPose, asked_place, loaded, spelled
+from wirebayes.commands.asked_pose import AskedPose, asked_place, carried_options, loaded, spelled
 from wirebayes.commands.options import (
     Numbers,
     above_zero,
@@ -51,6 +51,8 @@ from wirebayes.views.result import ResultFolder
 
 # an option; closest in the minute that the paper speaks of, and on to an hour
 TIMES_S = (0.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1800.0, 3600.0)
+TOLERANCE_MM, TOLERANCE_DEG = 0.3, 0.055  # what the paper claims
+TENSION_SD_N, TILT_SD_RAD = 0.02, 1e-3
 DRAWS, OVER_TIME = 1000, 200  # of the posterior; over time each is followed through every row
 
 
@@ -61,18 +63,18 @@ def pose(
     position: Numbers | None = None,
     rotation: Numbers | None = None,
     times: Numbers = TIMES_S,
-    tolerance: float = 0.3,
-    tolerance_tilt: float = 0.055,
+    tolerance: float = TOLERANCE_MM,
+    tolerance_tilt: float = TOLERANCE_DEG,
     specimen_spread: float = 0.05,
     map_heights: Numbers | None = None,
     map_rotations: Sequence[Numbers] | None = None,
     other_fit: Wires | None = None,
     joints: Any = None,
     trajectory: Any = None,
-    payload: float = 0.0,
+    payload: float | None = None,
     payload_at: Numbers | None = None,
-    tension_sd: float = 0.02,
-    tilt_sd: float = 1e-3,
+    tension_sd: float = TENSION_SD_N,
+    tilt_sd: float = TILT_SD_RAD,
     reference_sd: float = 0.0,
     calibration: PathLike | Calibration | None = None,
     draws: int | None = None,
@@ -101,9 +103,9 @@ def pose(
     times : sequence of float
         Rising times after the command, s.
     tolerance : float
-        Allowed pose error, mm.
+        Allowed error of a single pose, mm.
     tolerance_tilt : float
-        Allowed rotation, degrees.
+        Allowed rotation of a single pose, degrees.
     specimen_spread : float
         Relative difference between wires of one line, where it is not estimated from several tests.
     map_heights : sequence of float, optional
@@ -116,14 +118,14 @@ def pose(
         Joint values over time, and tensions, roll and pitch, payload and commanded poses where they are known.
     trajectory : path of a CSV, DataFrame, or mapping of name to (t,) array, optional
         Commanded poses over time, and payload.
-    payload : float
+    payload : float, optional
         Carried beside the platform's own mass, kg.
     payload_at : (3,) array, optional
-        Its centre of mass in the platform's frame, m; the platform's own when left out.
+        Centre of mass of `payload` in the platform's frame, m; the platform's own when left out.
     tension_sd, tilt_sd : float
-        Standard errors of measured tensions, N, and of roll and pitch, rad.
+        Over time: standard errors of measured tensions, N, and of roll and pitch, rad.
     reference_sd : float
-        Standard error of the lengths that measured joint values stand for, mm.
+        Over time: standard error of the lengths that joint values stand for, mm.
     calibration : Calibration or path of its folder, optional
         What `calibrate` found for this robot: with `joints` or `trajectory`, which then go on where its session ended.
     draws : int, optional
@@ -167,21 +169,21 @@ def pose(
     if draws is None:
         draws = OVER_TIME if over_time else DRAWS
     given = _Given(robot, wires, draws, experiment, path_of(own_effects), check_seed(seed), output, progress)
-    _refuse_calibration(calibration is not None and not over_time)
     bare = robot_of(robot)
-    machine = loaded(bare, float(payload), payload_at)
+    machine = loaded(bare, payload, payload_at)
     allowed = _Allowed(rising_times(times), float(tolerance), float(tolerance_tilt))
     allowed.check()
     specimen_spread = check_spread(specimen_spread, alike=False)
     asked = given.asked(machine, position, rotation)
     specimen_spread = typical_spread(asked.line, specimen_spread)
-    carried = {"--payload": float(payload), **spelled({"--payload-at": payload_at})}
+    carried = carried_options(payload, payload_at)
     at = spelled({"--position": position, "--rotation": rotation})
+    errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
     if over_time:
-        _refuse_single_only(times, map_heights, map_rotations, other_fit)
-        errors = checked_errors(reference_sd, specimen_spread, tension_sd, tilt_sd)
+        _refuse_single_only(allowed, map_heights, map_rotations, other_fit)
         errors = calibrated_errors(errors, calibration, bare, asked.line, wires, experiment)
         return _along(asked, joints, trajectory, errors, given.begun({**carried, **at}))
+    _refuse_over_time_only(errors, calibration)
     slices = _slices(machine, map_heights, map_rotations)
     other, of_other = given.other(other_fit, machine)
     request = _request(asked, allowed, specimen_spread, slices)
@@ -311,21 +313,31 @@ def _write(folder: Path, robot: Robot, request: PoseRequest, found: PoseAnswer) 
 
 
 def _refuse_single_only(
-    times: Numbers, map_heights: Numbers | None, map_rotations: Sequence[Numbers] | None, other_fit: Wires | None
+    allowed: _Allowed, map_heights: Numbers | None, map_rotations: Sequence[Numbers] | None, other_fit: Wires | None
 ) -> None:
     """Refuse, beside poses over time, what is said of a single pose only."""
+    usual = _Allowed(np.array(TIMES_S), TOLERANCE_MM, TOLERANCE_DEG)
     given = {
         "--map-heights and --map-rotation": map_heights is not None or map_rotations is not None,
-        "--times and --other-fit": other_fit is not None or text_of(times) != text_of(TIMES_S),
+        "--times and --other-fit": other_fit is not None or not np.array_equal(allowed.times_s, usual.times_s),
+        "--tolerance and --tolerance-tilt": allowed.options() != usual.options(),
     }
     for options, are_given in given.items():
         if are_given:
             raise InputError(f"{options}: found beside a history, expected them for a single pose only")
 
 
-def _refuse_calibration(alone: bool) -> None:
-    if alone:
-        raise InputError("--calibration: found beside a single pose, expected it beside --joints or --trajectory")
+def _refuse_over_time_only(errors: Uncertain, calibration: PathLike | Calibration | None) -> None:
+    """Refuse, beside a single pose, what would change nothing there."""
+    given = {
+        "--calibration": calibration is not None,
+        "--reference-sd": errors.reference_m != 0.0,
+        "--tension-sd": errors.tension_N != TENSION_SD_N,
+        "--tilt-sd": errors.tilt_rad != TILT_SD_RAD,
+    }
+    for option, is_given in given.items():
+        if is_given:
+            raise InputError(f"{option}: found beside a single pose, expected it beside --joints or --trajectory")
 
 
 def _slices(robot: Robot, heights: Numbers | None, rotations: Sequence[Numbers] | None) -> Slices:

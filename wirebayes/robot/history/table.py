@@ -85,6 +85,7 @@ def parse_log(table: CsvTable, robot: Robot, columns_of: Callable[[Robot, Sequen
     names = table.header
     header = columns_of(robot, names)
     table.check_header(header)
+    _refuse_centre_alone(table)
     cells = table.numbers(_allowed)
     if len(cells) < 2:
         found = counted(len(cells), "row")
@@ -97,6 +98,13 @@ def parse_log(table: CsvTable, robot: Robot, columns_of: Callable[[Robot, Sequen
     history = _history(robot, joints, names, cells)
     _refuse_unlikely(robot, history, table, joints)
     return history
+
+
+def _refuse_centre_alone(table: CsvTable) -> None:
+    """Refuse the place of a payload whose mass no column gives: it would change nothing."""
+    if CENTRE[0] in table.header and PAYLOAD not in table.header:
+        where = table.header_place(table.header.index(CENTRE[0]))
+        raise InputError(f"{table.path}, {where}: found {CENTRE[0]} without {PAYLOAD}, expected both")
 
 
 def _refuse_unlikely(robot: Robot, history: History, table: CsvTable, joints: Sequence[str]) -> None:
