@@ -227,7 +227,7 @@ def test_the_readme_states_no_figure_by_hand():
     """Outside what runs wrote: no number with a unit, no share."""
     by_hand = re.sub(r"```.*?```|<!-- measured -->.*?<!-- end -->", "", README, flags=re.DOTALL)
     assert not re.findall(r"\d[\d.,]* ?(?:%|mm|N|s|min|times|of \d+)\b", by_hand)
-    assert len(README.splitlines()) <= 170
+    assert len(README.splitlines()) <= 110
     assert README.index("my-wire: converged") < README.index("## ")
 
 

@@ -118,14 +118,13 @@ def readme_figures(kept: dict[str, Any]) -> str:
     inside, later = (100 * coverage[f"{of}_coverage"] for of in ("interval", "held_out"))
     wire = kept["real_wires"]["result"]["first holds to the rest"]["roc-line-1m"]
     alarms = share_in_table("discover-clean.inc", "false alarms on clean files")
-    wires = f"{coverage['intervals']} intervals of 90 % from {coverage['wires']} simulated wires"
+    intervals = f"{inside:.0f} % of {coverage['intervals']} intervals of 90 % hold the truth"
+    error = f"on the paper's thin line from {wire['plain_rmse_N']:.3f} to {wire['final_rmse_N']:.3f} N"
+    others = f"MuJoCo or a minimiser of the energy within {robots['largest_m']:.0e} m"
+    suspected = f"`discover` suspects an effect in {alarms} files without one"
     return (
-        f"- [Intervals](docs/intervals-study.rst): of {wires}, {inside:.0f} % contain the truth;\n"
-        f"  {later:.0f} % of the readings of later holds lie in their bands.\n"
-        f"- [False alarms](docs/discover-study.rst): `discover` suspects an effect in {alarms} files that\n"
-        "  have none; 4 % are intended.\n"
-        "- [Real wires](docs/models-study.rst): what `discover` named lowers the error on held-out holds of the\n"
-        f"  paper's thin line from {wire['plain_rmse_N']:.3f} to {wire['final_rmse_N']:.3f} N.\n"
-        f"- [Robots](docs/robot-study.rst): {robots['cases']} random equilibria agree with MuJoCo, or a minimiser of\n"
-        f"  the energy, within {robots['largest_m']:.0e} m.\n"
+        f"- [Intervals](docs/intervals-study.rst): {intervals}; {later:.0f} % of later readings lie in their bands.\n"
+        f"- [False alarms](docs/discover-study.rst): {suspected}; 4 % are intended.\n"
+        f"- [Real wires](docs/models-study.rst): what `discover` named lowers the error {error}.\n"
+        f"- [Robots](docs/robot-study.rst): {robots['cases']} random equilibria agree with {others}.\n"
     )
