@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import linprog, minimize
 
 from tests.robot.cases import HANGING
 from wirebayes.robot.mechanics import schema, statics, tensions
@@ -44,6 +44,24 @@ def test_tensions_carry_the_weight_within_bounds_and_are_the_nearest(name, choic
 def test_impossible_bounds_are_refused():
     _, structure, load = _problem("cogiro-desk")
     assert tensions.minimum_norm(structure, load, 0.5, 1.0) is None
+
+
+@pytest.mark.parametrize("wires", [7, 9, 12])
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("beyond", [0.0, 1e-14, 1e-12, 1e-9])
+def test_the_only_tensions_that_fit_are_found(wires, seed, beyond):
+    """The lowest tension is the highest that the load allows, or beyond it by rounding."""
+    rng = np.random.default_rng(seed)
+    structure = rng.normal(size=(6, wires))
+    load = structure @ rng.uniform(0.5, 3.0, wires)
+    above = np.column_stack([-np.eye(wires), np.ones(wires)])  # the least tension is below each of them
+    carried = np.column_stack([structure, np.zeros(len(load))])
+    best = linprog(-np.eye(wires + 1)[-1], above, np.zeros(wires), carried, load, bounds=(0.0, 1000.0))
+    lowest = float(best.x[-1])
+    tau = tensions.minimum_norm(structure, load, lowest * (1 + beyond), 1000.0)
+    assert tau is not None
+    np.testing.assert_allclose(structure @ tau, load, atol=1e-9 * np.abs(load).max())
+    assert tau.min() >= lowest - 2e-8 * max(tau.max(), np.abs(load).max())
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
@@ -150,12 +168,8 @@ def test_what_the_solver_returns_is_held_against_both_bounds(way, low, high, hel
     null = np.linalg.svd(structure)[2][1]
     moved = np.array([0.5, -0.5]) if way > 0 else np.array([-1.0, 1.0])
 
-    def nnls(E, f, maxiter):
-        outside = max(low - at.min(), at.max() - high) / 10.0  # in units of the load
-        residual = np.array([-(null @ moved) / 10.0 / outside, 1.0])
-        return np.linalg.lstsq(E, residual + f, rcond=None)[0], 0.0
-
-    monkeypatch.setattr(tensions, "nnls", nnls)
+    outside = max(low - at.min(), at.max() - high)
+    monkeypatch.setattr(tensions, "_least_distance", lambda G, h: np.array([null @ moved / outside]))
     tau = tensions.nearest(at, structure, load, low, high)
     assert (tau is not None) is held
     if held:
@@ -170,9 +184,6 @@ def test_what_the_solver_returns_may_miss_a_bound_by_rounding(at, largest, miss,
     end, null = at + [-1.0, 1.0], np.linalg.svd(structure)[2][1]
     for low, high in ((-1e6, end[0] - miss * largest), (end[1] + miss * largest, 1e6)):
         outside = max(low - at.min(), at.max() - high)
-
-        def nnls(E, f, maxiter, outside=outside):
-            return np.linalg.lstsq(E, np.array([-(null @ (end - at)) / outside, 1.0]) + f, rcond=None)[0], 0.0
-
-        monkeypatch.setattr(tensions, "nnls", nnls)
+        step = np.array([null @ (end - at) / outside])
+        monkeypatch.setattr(tensions, "_least_distance", lambda G, h, step=step: step)
         assert (tensions.nearest(at, structure, load, low, high) is not None) is held

@@ -71,22 +71,24 @@ def _brought_inside(tau: Floats, null: Floats, outside: float, lowest: float, hi
     """
     # In units of the worst violation, so that the size of the answer does not look like an answer.
     h = np.concatenate([lowest - tau, tau - highest]) / outside
-    residual = _least_distance(np.vstack([null, -null]), h)
-    if np.abs(residual[-1]) < 1e-10:
-        return None
-    result = tau + null @ (-outside * residual[:-1] / residual[-1])
+    result = tau + null @ (outside * _least_distance(np.vstack([null, -null]), h))
     margin = 1e-8 * _size(result)
     inside = result.min() >= lowest - margin and result.max() <= highest + margin
     return np.asarray(result) if inside else None
 
 
 def _least_distance(G: Floats, h: Floats) -> Floats:
-    """Residuals of the non-negative problem that is dual to the least vector with ``G x >= h``."""
+    """The least vector with ``G x >= h``, if there is one.
+
+    The dual non-negative problem says which rows are equalities. Its residual, over its last component, is the vector
+    too, but where hardly any vector fits that is a ratio of rounding errors.
+    """
     E = np.vstack([G.T, h])
     f = np.zeros(len(E))
     f[-1] = 1.0
-    solution, _ = nnls(E, f, maxiter=50 * E.shape[1])
-    return np.asarray(E @ solution - f)
+    multiplier, _ = nnls(E, f, maxiter=50 * E.shape[1])
+    tight = multiplier > 0
+    return np.asarray(np.linalg.lstsq(G[tight], h[tight], rcond=None)[0])
 
 
 def minimum_norm(structure: Floats, load: Floats, lowest_N: float, highest_N: float) -> Floats | None:
