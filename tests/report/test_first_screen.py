@@ -45,6 +45,23 @@ def test_the_answer_of_a_fit_has_number_unit_and_interval() -> None:
     assert headline.fit_in_a_sentence(failed).startswith("If the model were right: ")  # type: ignore[arg-type]
 
 
+def test_an_answer_of_samples_of_two_lengths_says_of_which_length_it_is() -> None:
+    bands = SUMMARY["derived"] | {"length_mm": 800.0}  # type: ignore[operator]
+    amount = {"B": {"unit": "mm N^-U", "q50": 0.1, "q05": 0.09, "q95": 0.11}}
+    for of_amount, of_creep, of_law in ((1131.371, "in 800 mm of wire", "in 1131 mm of wire"), (800.0 + 1e-12, "", "")):
+        both = SUMMARY | {"derived": bands, "B_length_mm": of_amount, "parameters": amount, "effects": []}
+        said = f" under 4.5 N {of_creep}".rstrip()
+        assert f"{said}; 90 %" in headline.fit_in_a_sentence(both)  # type: ignore[arg-type]
+        lines = "\n".join(terminal.of_fit(both))  # type: ignore[arg-type]
+        assert f" at 4.5 N {of_creep}".rstrip() + ": " in lines
+        assert f"  creep law {of_law}".rstrip() + ": B" in lines
+
+
+def test_a_fit_that_says_nothing_of_stiffness_says_how_much_the_wire_creeps() -> None:
+    said = headline.fit_in_a_sentence(SUMMARY | {"parameters": {}})  # type: ignore[arg-type]
+    assert said == "kite creeps by 1.23 mm (1.10 … 1.40) within 2 min under 4.5 N; 90 % interval in brackets."
+
+
 def test_a_comparison_is_a_ranking_in_words() -> None:
     rows = [
         {"name": "toe", "failed": None, "difference": {"elpd": 12.3, "se": 3.2}},

@@ -284,15 +284,13 @@ def test_a_fit_with_effects_of_the_users_own_runs_none_of_their_code(fitted, tmp
     assert "shows summary.json alone" in read(write_page(copy)).words
 
 
-def test_the_table_of_creep_names_its_tension_and_what_it_includes(fitted, tmp_path):
+def test_the_table_of_creep_names_its_tension_its_length_and_what_it_includes(fitted, tmp_path):
     copy, summary = copied(fitted, tmp_path / "out")
-    derived = summary["derived"] | {"tension_N": 4.25, "final_creep_mm": None, "median_creep_time_s": None}
+    of = {"tension_N": 4.25, "length_mm": 730.0}
+    derived = summary["derived"] | of | {"final_creep_mm": None, "median_creep_time_s": None}
     (copy / "chain" / "summary.json").write_text(json.dumps(summary | {"derived": derived}))
     words = read(write_page(copy)).words
-    assert (
-        "A fresh sample held at 4.25 N, the tension at which one of the holds began. All fitted effects of the wire"
-        in words
-    )
+    assert "A fresh sample of 730 mm held at 4.25 N, the tension at which one of the holds began. All fitted" in words
     assert "grows without end" in words and "stiffness there, N per unit strain" in words
 
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import xarray
 
 from wirebayes.effects.creep import SecondRelaxation, SteadyCreep
 from wirebayes.effects.elastic import LengthDependence
@@ -39,6 +40,18 @@ def test_what_is_read_back_predicts_as_the_joint_fit_does(fitted, sample, apart,
     read = {name: values[:20] for name, values in stored.draws.items()}
     expected = simulate(here.protocol, joint.parameters(theta, here), here.model)
     assert simulate(stored.sample.protocol, read, stored.sample.model) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(("sample", "of_amount", "of_creep"), [(None, (800 * 1700) ** 0.5, 800), (1, 1700, 1700)])
+def test_of_samples_of_two_lengths_it_is_said_to_which_length_creep_belongs(
+    fitted, sample, of_amount, of_creep, tmp_path
+):
+    here = None if sample is None else fitted.problem.samples[sample]
+    summary = store.save_posterior(fitted, tmp_path, {}, sample=here)
+    assert summary["B_length_mm"] == pytest.approx(of_amount)
+    assert summary["derived"]["length_mm"] == of_creep
+    with xarray.open_dataset(tmp_path / "posterior.nc", group="posterior") as posterior:
+        assert posterior.attrs["B_length_mm"] == summary["B_length_mm"]
 
 
 def test_the_summary_s_figures_of_a_fresh_sample_include_all_effects_of_the_wire(fitted, tmp_path):

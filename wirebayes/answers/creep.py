@@ -1,10 +1,11 @@
-"""Which creep an answer speaks of: that within a time as long as the wire was held, if it was held for long."""
+"""Which creep an answer speaks of: within a time as long as the wire was held, if for long, and of which length."""
 
+from math import isclose
 from typing import cast
 
 from wirebayes.json_files.summary import CREEP_TIMES_S, SummaryJson
 from wirebayes.json_files.values import Statistics
-from wirebayes.sentences import lasting
+from wirebayes.sentences import lasting, short
 
 
 def creep_as_long_as_held(summary: SummaryJson) -> tuple[str, Statistics | None]:
@@ -18,3 +19,12 @@ def creep_as_long_as_held(summary: SummaryJson) -> tuple[str, Statistics | None]
     name = [shortest, *(name for name in longer if CREEP_TIMES_S[name] <= held_s)][-1]
     creep = cast(dict[str, Statistics | None], summary["derived"])[name]
     return lasting(CREEP_TIMES_S[name]), creep
+
+
+def lengths_in_words(summary: SummaryJson) -> tuple[str, str]:
+    """Of which length of wire the creep is, and of which B; empty where both are of the one sample's."""
+    of_creep = summary["derived"].get("length_mm")
+    of_amount = summary.get("B_length_mm")
+    if of_creep is None or of_amount is None or isclose(of_creep, of_amount):
+        return "", ""
+    return f" in {short(of_creep)} mm of wire", f" in {short(of_amount)} mm of wire"

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wirebayes.answers.creep import creep_as_long_as_held
+from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
 from wirebayes.answers.terminal import MOST_OUTLIERS, missing_in
 from wirebayes.answers.verdict import verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
@@ -86,15 +86,16 @@ def fit_in_a_sentence(summary: SummaryJson) -> str:
     doubt = "" if trusted else "If the model were right: "
     k1 = summary["parameters"].get("k1")
     time, creep = creep_as_long_as_held(summary)
-    if creep is None or k1 is None:
+    if creep is None:
         return f"{doubt}{name}: the readings do not say how much this wire creeps."
     stretched = quantity(creep["q50"], creep["q05"], creep["q95"], "mm")
-    stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
     tension = short(summary["derived"]["tension_N"])
-    return (
-        f"{doubt}{name} creeps by {stretched} within {time} under {tension} N, and its "
-        f"stiffness is {stiff} per unit of strain; 90 % intervals in brackets."
-    )
+    of_creep, _ = lengths_in_words(summary)
+    creeps = f"{doubt}{name} creeps by {stretched} within {time} under {tension} N{of_creep}"
+    if k1 is None:  # weights hold by hold say nothing of it
+        return f"{creeps}; 90 % interval in brackets."
+    stiff = quantity(k1["q50"], k1["q05"], k1["q95"], "N")
+    return f"{creeps}, and its stiffness is {stiff} per unit of strain; 90 % intervals in brackets."
 
 
 def findings_in_a_sentence(name: str, report: ExperimentFindings) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Literal
 
-from wirebayes.answers.creep import creep_as_long_as_held
+from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
 from wirebayes.answers.verdict import verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.check import CheckedExperiment, EffectSize, HoldUnderstood, ParameterRange
@@ -40,11 +40,12 @@ def of_fit(summary: SummaryJson) -> list[str]:
     time, elongation = creep_as_long_as_held(summary)
     creep = _band(elongation)
     tension = short(summary["derived"]["tension_N"])
+    of_creep, of_amount = lengths_in_words(summary)
     effects = [key.split("@")[0] for key in summary["effects"]]
     lines = [f"{name}: {state}, {checked} (medians, 90 % intervals)"]
     lines += _parameters(summary, "stiffness", ("k1",))
-    lines.append(f"  creep after {time} at {tension} N: {creep} mm")
-    lines += _parameters(summary, "creep law", ("B", "U", "k2", "N"))
+    lines.append(f"  creep after {time} at {tension} N{of_creep}: {creep} mm")
+    lines += _parameters(summary, f"creep law{of_amount}", ("B", "U", "k2", "N"))
     lines += _parameters(summary, "effects", effects)
     return lines
 

@@ -26,12 +26,13 @@ class Parameter(Mixed):
 
 
 class Derived(TypedDict):
-    """Of a fresh sample under a constant `tension_N` that was tested.
+    """Of a fresh sample of `length_mm` under a constant `tension_N` that was tested.
 
     None where a draw has no finite value, as of endless creep.
     """
 
     tension_N: float
+    length_mm: float
     creep_2min_mm: Statistics | None
     creep_1h_mm: Statistics | None
     creep_1day_mm: Statistics | None
@@ -99,10 +100,11 @@ class ModelCheckResult(TypedDict):
 
 
 class SummaryJson(Warned):
-    """The whole file."""
+    """The whole file; `B_length_mm` is the zero-tension length that B among the parameters belongs to."""
 
     model_check: NotRequired[ModelCheckResult]
     experiment: str
+    B_length_mm: float
     likelihood: str
     elastic_law: str
     history: str

@@ -15,7 +15,7 @@ from wirebayes.model.replicate import readings as replicate
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array, Ints
 from wirebayes.results.netcdf import Group, Variable
-from wirebayes.results.parameters import unit_of, variables
+from wirebayes.results.parameters import length_of_creep_amount, unit_of, variables
 from wirebayes.wire.protocol import Control, Protocol
 
 _UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
@@ -152,6 +152,7 @@ def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -
         "experiments": _listed(s.name for s in members),
         "material": first.material,
         "length_mm": first.protocol.length_mm,
+        "B_length_mm": length_of_creep_amount(fit.problem, members[0] if len(members) == 1 else None),
         "lengths_mm": _listed(protocol.length_mm for protocol in protocols),
         "controls": _listed(protocol.control for protocol in protocols),
         "resolutions": _listed(s.resolution for s in members),

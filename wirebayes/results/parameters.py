@@ -35,6 +35,14 @@ def variables(problem: Problem, theta: Array, sample: Sample | None) -> dict[str
     return {name: values.reshape(theta.shape[:2]) for name, values in own.items()}
 
 
+def length_of_creep_amount(problem: Problem, sample: Sample | None) -> float:
+    """Zero-tension length, mm, that B as `variables` has it belongs to; of samples fitted together their mean."""
+    if sample is not None:
+        return sample.protocol.length_mm
+    first = problem.samples[0]
+    return first.model.length_ref_mm or first.protocol.length_mm
+
+
 def _own(problem: Problem, theta: Array, sample: Sample) -> dict[str, Array]:
     """A sample's parameters as they are at its own length, with which it can stand alone."""
     reference = sample.model.length_ref_mm or sample.protocol.length_mm

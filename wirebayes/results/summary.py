@@ -13,7 +13,7 @@ from wirebayes.result_warnings import Notice, NoticeJson, to_json
 from wirebayes.results import hold_ends, posterior_checks
 from wirebayes.results.contraction import interval
 from wirebayes.results.identifiability import extrapolation, identifiability
-from wirebayes.results.parameters import unit_of, variables
+from wirebayes.results.parameters import length_of_creep_amount, unit_of, variables
 from wirebayes.wire.fresh import FreshSample
 
 
@@ -22,6 +22,7 @@ def derived(wire: FreshSample, tension_N: float) -> Derived:
     two_minutes, hour, day = wire.creep_mm(tension_N, np.array(list(CREEP_TIMES_S.values())))
     return {
         "tension_N": tension_N,
+        "length_mm": wire.length_mm,
         "creep_2min_mm": band(two_minutes),
         "creep_1h_mm": band(hour),
         "creep_1day_mm": band(day),
@@ -82,6 +83,7 @@ def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
     ahead = extrapolation(fit, tension, sample=problem.samples.index(first))
     return {
         "experiment": sample.name if sample else first.material.replace(" ", "-"),
+        "B_length_mm": length_of_creep_amount(problem, sample),
         "likelihood": problem.likelihood,
         "elastic_law": model.law,
         "history": model.history,

@@ -322,8 +322,10 @@ def _derived(summary: SummaryJson) -> Table:
         ["half of it after, s", *median_and_interval(derived["median_creep_time_s"])],
         ["stiffness there, N per unit strain", *median_and_interval(derived["stiffness_N"])],
     ]
+    length = derived.get("length_mm")
+    sample = "A fresh sample" if length is None else f"A fresh sample of {number(length)} mm"
     caption = (
-        f"A fresh sample held at {derived['tension_N']:g} N, the tension at which one of the holds began. All fitted "
+        f"{sample} held at {derived['tension_N']:g} N, the tension at which one of the holds began. All fitted "
         "effects of the wire are included, those of the bench are not."
     )
     caption = f"{caption} {summary['extrapolation']['warning']}".strip()
