@@ -39,10 +39,10 @@ def lasting(seconds: float) -> str:
 
 
 def to_be_held(seconds: float) -> str:
-    """A time that somebody is to set, to be read exactly: in hours or minutes where it is a whole number of them."""
+    """A time that somebody is to set, to four digits: in hours or minutes where it is a whole number of them."""
     exact = round(seconds, 6)
     unit, size = next((unit, size) for unit, size in _TIMES if (exact and exact % size == 0) or size == 1.0)
-    return f"{exact / size:g} {unit}"
+    return f"{short(exact / size)} {unit}"
 
 
 _TIMES = (("h", 3600.0), ("min", 60.0), ("s", 1.0))  # s, the longest first
@@ -56,8 +56,11 @@ def specimens_are(spread: float) -> str:
 def spoken(effect: str) -> str:
     """An effect's name as people say it; files and options keep the name itself."""
     name, _, hold = effect.partition("@")
-    at = f" at hold {hold}" if hold.isdigit() else ""
+    at = f" at hold {hold}" if hold.isdigit() else _FORMS.get(hold, "")
     return "something unknown" if name == "unknown" else f"{name.replace('_', ' ')}{at}"
+
+
+_FORMS = {"carried": " (recovered)", "strain": " (all along)"}  # of effects that stand beside their other form
 
 
 def likely(found: SharedFindings) -> str:

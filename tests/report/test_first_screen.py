@@ -2,7 +2,7 @@
 
 from wirebayes import sentences
 from wirebayes.answers import headline, terminal
-from wirebayes.report.blocks import Notices, Page, Section, Table, Text
+from wirebayes.report.blocks import Notices, Page, Section, Table, Text, with_fixed_spaces
 from wirebayes.report.page import render
 from wirebayes.result_warnings import Notice
 
@@ -120,8 +120,21 @@ def test_times_are_said_in_the_unit_that_people_use() -> None:
 
 
 def test_times_to_be_set_are_whole_numbers_of_the_longest_unit_or_stay_seconds() -> None:
-    said = [sentences.to_be_held(seconds) for seconds in (0.0, 0.5, 200.0, 1500.0, 5399.9999999999, 5400.0, 162000.0)]
-    assert said == ["0 s", "0.5 s", "200 s", "25 min", "90 min", "90 min", "45 h"]
+    said = [sentences.to_be_held(seconds) for seconds in (0.0, 0.5, 744.99, 1500.0, 5399.9999999999, 5400.0, 162000.0)]
+    assert said == ["0 s", "0.5 s", "745 s", "25 min", "90 min", "90 min", "45 h"]
+
+
+def test_two_forms_of_an_effect_are_told_apart() -> None:
+    names = ("steady_creep", "steady_creep@carried", "toe", "toe@strain", "grip_slip@4", "unknown")
+    said = [sentences.spoken(name) for name in names]
+    assert said[4:] == ["grip slip at hold 4", "something unknown"]
+    assert len(set(said)) == len(names)
+
+
+def test_the_first_sentence_breaks_neither_an_interval_nor_a_number_from_its_unit() -> None:
+    said = with_fixed_spaces("It creeps by 0.2 mm (0.1 … 0.3) within 2 min; 25 ± 3.8 against 4 %, and then again.")
+    fixed = [piece for piece in said.split(" ") if "\u00a0" in piece]
+    assert [piece.replace("\u00a0", " ") for piece in fixed] == ["0.2 mm", "(0.1 … 0.3)", "2 min;", "25 ± 3.8", "4 %,"]
 
 
 def test_a_large_number_has_the_digits_that_say_something() -> None:

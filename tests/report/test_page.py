@@ -72,7 +72,7 @@ class Reader(HTMLParser):
 
     def handle_data(self, data):
         if not {"style", "script"} & set(self.open):
-            self.words += data
+            self.words += data.replace("\u00a0", " ")
 
 
 def read(path: Path) -> Reader:

@@ -287,18 +287,23 @@ def _holds_table(test: CheckedExperiment, unit: str) -> list[str]:
     for hold in test["holds"]:
         number = "-" if hold["number"] is None else hold["number"]
         place = f"{hold['tension_N']:g} N" if weights else f"{hold['displacement_mm']:g} mm"
-        begins = f"{short(hold['start_s'], 6)} s"
-        lasts = f"{short(hold['duration_s'], 6)} s"
+        begins = _to_the_second(hold["start_s"])
+        lasts = _to_the_second(hold["duration_s"])
         lines.append(f"  {number:>4} {place:>13} {begins:>9} {lasts:>9}  {_course(hold, unit)}")
     return lines
 
 
+def _to_the_second(seconds: float) -> str:
+    """A time of a test, to four digits and a second at least."""
+    return f"{short(seconds, max(4, len(str(int(seconds)))))} s"
+
+
 def _course(hold: HoldUnderstood, unit: str) -> str:
     """What was read in a hold."""
-    if hold["number"] is None:
+    if hold["number"] is None or hold["first_s"] is None:
         return "none: held, not recorded"
     first, last = read_value(hold, "first"), read_value(hold, "last")
-    return f"{hold['readings']} from {hold['first_s']:g} s on, {short(first, 4)} to {short(last, 4)} {unit}"
+    return f"{hold['readings']} from {short(hold['first_s'])} s on, {short(first, 4)} to {short(last, 4)} {unit}"
 
 
 _SHOWS = {

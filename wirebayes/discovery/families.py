@@ -126,7 +126,7 @@ def called(family: Family) -> str:
 def family_sentence(members: Mapping[str, float]) -> str:
     """What a family says of the wire, and the probability of each of its members to be what is missing.
 
-    Those below one in a hundred are left out.
+    Those below one in a hundred are left out; one that is all but certain is named without its probability.
 
     Parameters
     ----------
@@ -135,8 +135,10 @@ def family_sentence(members: Mapping[str, float]) -> str:
     """
     label = called(tuple(members))
     pattern = PATTERNS.get(label, f"there is {label.replace('_', ' ')}")
-    shares = [f"{name.replace('_', ' ')} {100 * p:.0f} %" for name, p in members.items() if p >= _WORTH_SAYING]
-    return f"{pattern}: {', '.join(shares)}" if shares else pattern
+    shares = {name.replace("_", " "): p for name, p in members.items() if p >= _WORTH_SAYING}
+    said = [name if p > _CERTAIN else f"{name} {100 * p:.0f} %" for name, p in shares.items()]
+    return f"{pattern}: {', '.join(said)}" if said else pattern
 
 
 _WORTH_SAYING = 0.01  # probability of a member: less is no candidate
+_CERTAIN = 0.995  # from here on its probability would be shown as one

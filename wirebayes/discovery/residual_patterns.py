@@ -10,11 +10,10 @@ from wirebayes.json_files.discovery import Disagreement
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import NOISES, Sample
 from wirebayes.numeric.typing import Array
-from wirebayes.sentences import short
+from wirebayes.sentences import p_in_words, short
 from wirebayes.wire.control import READ_UNIT
 from wirebayes.wire.protocol import Control
 
-_SMALLEST = 0.001  # of p in a sentence
 _PARAMETERS = {"k1": "the stiffness k1", "B": "the creep amount B", "k2": "the creep rate k2"}
 
 
@@ -208,7 +207,8 @@ def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names
         best = columns[int(np.argmax(data.effects[0, columns]))]
         pattern = listed[best - skip]
         p = _p_value(columns, data, null)
-        sentence = _sentence(pattern, float(data.amplitude[0, best]), p, names)
+        said = _sentence(pattern, float(data.amplitude[0, best]), p)
+        sentence = f"{names}: {said} ({p_in_words(p, len(null.effects))})."
         out.append({"covariate": covariate, "hold": pattern.hold, "p": p, "sentence": sentence})
     return sorted(out, key=lambda item: item["p"])
 
@@ -221,24 +221,21 @@ def _p_value(columns: list[int], data: Scan, null: Scan) -> float:
     return float((1 + as_large) / (1 + len(chance)))
 
 
-def _sentence(pattern: Pattern, amplitude: float, p: float, names: str) -> str:
-    chance = f"p = {p:.3f}" if p >= _SMALLEST else f"p < {_SMALLEST:g}"
+def _sentence(pattern: Pattern, amplitude: float, p: float) -> str:
+    """What a pattern says, without its name and its p."""
     covariate = pattern.covariate
     if p > 0.05:
-        return f"{names}: the residuals show no dependence on {covariate} ({chance})."
+        return f"the residuals show no dependence on {covariate}"
     if pattern.hold is not None:
         side = "above" if amplitude > 0 else "below"
         size = abs(amplitude) * pattern.counts_as
         off = f"{short(size, 3)} {pattern.unit}"
-        return f"{names}: hold {pattern.hold} lies {off} {side} what the others predict ({chance})."
+        return f"hold {pattern.hold} lies {off} {side} what the others predict"
     if pattern.moves is not None:
         parameter = _PARAMETERS[pattern.moves]
         changes = _change(amplitude, covariate)
-        return (
-            f"{names}: the residuals suggest that {parameter} {changes} over two "
-            f"standard deviations of {covariate} ({chance})."
-        )
-    return f"{names}: the residuals of the plain model depend on {covariate} ({chance})."
+        return f"the residuals suggest that {parameter} {changes} over two standard deviations of {covariate}"
+    return f"the residuals of the plain model depend on {covariate}"
 
 
 def _change(amplitude: float, covariate: str) -> str:

@@ -387,6 +387,15 @@ def seed_of_page(configuration: Configuration) -> str:
     return f"Seed {configuration.get('seed')}."
 
 
+# a number and its unit, an interval, a number and its error
+_WHOLE = re.compile(r"(?<=\d) (?=[a-zA-Zµ°%]{1,3}\b|%|± )|(?<=±) | (?=… )|(?<=…) ")
+
+
+def with_fixed_spaces(text: str) -> str:
+    """A text whose lines break neither within an interval nor between a number and its unit."""
+    return _WHOLE.sub("\u00a0", text)
+
+
 def as_sentence(text: str) -> str:
     """A text as a sentence: its first letter large, unless a name and a colon begin it, and a full stop at its end."""
     begins_with_name = text.partition(" ")[0].endswith(":")

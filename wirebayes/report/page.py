@@ -11,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from wirebayes._version import __version__
 from wirebayes.errors import InputError
 from wirebayes.io.run_folder import CONFIGURATION, check_file, read_json, stored_results, writable, write_text
-from wirebayes.report.blocks import Configuration, Page, View, as_sentence
+from wirebayes.report.blocks import Configuration, Page, View, as_sentence, with_fixed_spaces
 from wirebayes.report.pages import PAGES
 
 
@@ -73,6 +73,7 @@ def render(page: Page, files_in: str = "") -> str:
     environment = Environment(loader=PackageLoader("wirebayes.report", "."), undefined=StrictUndefined)
     environment.autoescape = environment.trim_blocks = environment.lstrip_blocks = True
     environment.filters["sentence"] = as_sentence
+    environment.filters["with_fixed_spaces"] = with_fixed_spaces
     views = any(isinstance(block, View) for section in page.sections for block in section.blocks)
     template = environment.get_template("page.html.jinja")
     return template.render(page=page, views=views, version=__version__, files_in=files_in) + "\n"

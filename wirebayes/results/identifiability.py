@@ -19,7 +19,7 @@ from wirebayes.numeric.distributions import log_density_of
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Array
 from wirebayes.results.contraction import contraction, source
-from wirebayes.sentences import number, short
+from wirebayes.sentences import lasting, number, short
 from wirebayes.wire.fresh import FreshSample
 
 SENSITIVE = 0.05  # the threshold that the authors of the method propose
@@ -108,9 +108,9 @@ def parameter_in_words(name: str, figures: IdentifiabilityFigures) -> str:
         verdict = f"data and prior both determine it (sensitivity to the prior {sensitivity:.2f})"
     else:
         verdict = "the data determine it"
-    sign = "×" if figures["range_is_factor"] else ""
     after, before = number(figures["posterior_range_90"]), number(figures["prior_range_90"])
-    text = f"{name}: {verdict}; its 90 % range is {sign}{after}, the prior's {sign}{before}"
+    wide = f"spans a factor of {after}" if figures["range_is_factor"] else f"is {after} wide"
+    text = f"{name}: {verdict}; its 90 % interval {wide}, the prior's {before}"
     with_whom = [f"{other} (r = {number(r, 2)})" for other, r in figures["ridges"].items()]
     if with_whom:
         text += f"; it is correlated with {' and '.join(with_whom)}, and their combination is known better"
@@ -168,8 +168,9 @@ class Extrapolation:
         factor = float(self.time_s[-1] / self.longest_hold_s) if self.longest_hold_s else np.inf
         if factor <= 1.0:
             return ""
+        held = lasting(self.longest_hold_s)
         return (
-            f"{self.time_s[-1] / 3600.0:g} h is {short(factor, 3)} times the longest hold ({self.longest_hold_s:g} s): "
+            f"{self.time_s[-1] / 3600.0:g} h is {short(factor, 3)} times the longest hold ({held}): "
             "this far out the answer rests on the model's form alone, and no reading checks it."
         )
 

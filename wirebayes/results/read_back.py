@@ -26,6 +26,7 @@ from wirebayes.results.content import READING, SETTING
 from wirebayes.results.netcdf import Group
 from wirebayes.results.parameters import by_length
 from wirebayes.results.stored_check import check_stored
+from wirebayes.sentences import p_in_words
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Control, Protocol
 
@@ -127,8 +128,9 @@ def _doubts(groups: Mapping[str, Group], name: str, summary: Path) -> tuple[Noti
         out.append(Notice("not-converged", text))
     check = read_json(summary).get("model_check") if summary.is_file() else None
     if check and check["passed"] is False:
+        sure = p_in_words(check["p"], check["simulations"])
         text = (
-            f"the model fitted to {name} does not describe its readings (p = {check['p']:.2g}): what follows from it "
+            f"the model fitted to {name} does not describe its readings ({sure}): what follows from it "
             "can be wrong by more than is said; wirebayes discover looks for what is missing"
         )
         out.append(Notice("model-check", text))

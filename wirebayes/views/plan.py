@@ -2,14 +2,10 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from wirebayes.answers import terminal
 from wirebayes.json_files.plan import JudgedProtocol, PlanJson
-
-if TYPE_CHECKING:
-    pass
-
 from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
 
 
@@ -39,8 +35,8 @@ class Plan(Result[PlanJson]):
         return [line for row in self.protocols for line in terminal.of_plan(row)]
 
     def next_step(self, given: Given = NOTHING) -> str:
-        best = self.best["words"] or f"the test {self.best['name']}"
-        return f"do {best}, then wirebayes discover FILE.toml"
+        best = self.best["words"] or f"do the test {self.best['name']}"
+        return f"{best}; then wirebayes discover with its file"
 
     def _short_form(self) -> list[str]:
         return [f"{len(self.protocols)} protocols", f"best {self.best['name']}"]

@@ -40,7 +40,7 @@ from wirebayes.result_warnings import warns_of
 from wirebayes.results.contraction import MOST, contraction
 from wirebayes.results.parameters import unit_of
 from wirebayes.results.read_back import Stored, load_with_priors
-from wirebayes.sentences import counted, listed, middle_and_span
+from wirebayes.sentences import counted, lasting, listed, middle_and_span
 from wirebayes.wire.effect import Effect
 
 _MOST_SENTENCES = 3  # at the head of a page; more hide its first picture
@@ -184,7 +184,7 @@ def _continued(summary: SummaryJson, trusted: bool) -> str:
     """What the picture of the creep that goes on says; how far that is stands with the numbers above it."""
     if trusted:
         return summary["extrapolation"]["sentence"]
-    return "The model does not describe the readings, so that its creep later on may be another."
+    return "The model does not describe the readings, so its later creep may be other than this."
 
 
 def _next(summary: SummaryJson) -> str:
@@ -261,7 +261,7 @@ def _measured(stored: Stored, summary: SummaryJson) -> Points:
         f"{sample.material}, {protocol.length_mm:g} mm.",
         f"{holds}, {readings}.",
         f"{pulled} from {number(tension.min())} to {number(tension.max())} N.",
-        f"The longest hold lasted {protocol.duration_s.max():g} s.",
+        f"The longest hold lasted {lasting(float(protocol.duration_s.max()))}.",
     ]
     ends = summary.get("hold_ends")
     if ends and not warns_of(summary, "hold-ends"):

@@ -24,7 +24,7 @@ from wirebayes.report.blocks import (
     span,
 )
 from wirebayes.result_warnings import NoticeJson, Warned
-from wirebayes.sentences import counted, number_within, quantity
+from wirebayes.sentences import counted, number_within, quantity, short
 from wirebayes.wire.control import READ_UNIT, SET_UNIT
 from wirebayes.wire.protocol import Control
 
@@ -104,7 +104,7 @@ def _at(predicted: Prediction, row: int) -> str:
     """Median and interval of one reading, and its time."""
     middle, low, high = _figures(predicted, row)
     unit = READ_UNIT[_control(predicted)]
-    return f"{quantity(middle, low, high, unit)} after {predicted['time_s'].values[row]:g} s"
+    return f"{quantity(middle, low, high, unit)} after {short(predicted['time_s'].values[row])} s"
 
 
 def _figures(predicted: Prediction, row: int) -> tuple[float, float, float]:
