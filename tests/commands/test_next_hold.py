@@ -59,8 +59,9 @@ def test_it_goes_on_at_the_last_temperature_and_has_few_of_many_times(tmp_path) 
 @pytest.mark.parametrize("options", [{"displacements": [1, 2, 3, 2]}, {"weights": [2.0, 5.0, 9.0, 1.0]}])
 def test_hold_by_hold_the_next_hold_has_its_first_reading_and_runs_too(options, tmp_path, capsys) -> None:
     experiment = one_test(**options)
-    found = wb.fit(experiment, likelihood="hold", policy=FEW, check=False, output=tmp_path / "out")
-    command = shlex.split(found.next_step().partition("  (")[0])[1:]
+    found = wb.fit(experiment, likelihood="hold", policy=FEW, check=False, output=tmp_path / "out of holds")
+    (next_step,) = found.next_step().splitlines()  # no robot: it needs the stiffness
+    command = shlex.split(next_step.partition("  (")[0])[1:]
     assert main(command) == 0
     highest = experiment.holds[2]
     assert f"{highest.readings[0]:.3g}" in capsys.readouterr().out
@@ -80,3 +81,15 @@ def test_the_command_that_the_next_line_names_runs_as_it_stands(lengths, togethe
     assert command.pop(0) == "wirebayes"
     assert main(command) == 0
     assert f"Hold 4 of {experiments[0].name}, at 4 mm" in capsys.readouterr().out
+
+
+def test_commands_that_follow_are_given_effects_of_the_user_s_own(tmp_path, capsys) -> None:
+    (tmp_path / "of mine.py").write_text(Path("docs/own_effect.py").read_text())
+    test = one_test(displacements=[1, 2, 3])
+    own = {"effects": "own_power", "own_effects": tmp_path / "of mine.py"}
+    found = wb.fit(test, **own, policy=FEW, check=False, output=tmp_path / "out")
+    for step in found.next_step().splitlines():
+        command = shlex.split(step.partition("  (")[0])[1:]
+        assert main(command[:-2]) == 2
+        assert "posterior.nc: found effects of the user's own, own_power, expected the file" in capsys.readouterr().err
+        assert main([*command, "--output", str(tmp_path / command[0])]) == 0, capsys.readouterr().err

@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 import wirebayes as wb
+from wirebayes.answers.headline import UNUSABLE
 from wirebayes.cli.answer import conclude
 from wirebayes.report.blocks import Notices, Page, Section
 from wirebayes.report.page import render
-from wirebayes.report.pages.fit import _cautions
+from wirebayes.report.pages.fit import _cautions, _next
 from wirebayes.result_warnings import KINDS, Notice, NoticeJson, from_json, to_json
 from wirebayes.views.result import Result
 
@@ -152,9 +153,15 @@ def changed(folder: Path, file: str, warnings: list[NoticeJson]) -> None:
 def test_advice_depends_on_kinds_and_not_on_words(fitted: Any, tmp_path: Path) -> None:
     posterior = wb.load(fitted.save(tmp_path / "fit"))
     file = f"{posterior.within}/summary.json"
-    for kind, advice in (("model-check", "discover"), ("prior", "predict")):
-        changed(posterior.place.path, file, [{"kind": kind, "text": "model-check failed, falls, slack"}])
-        assert advice in posterior.next_step().split()[1]
+    said = "model-check failed, falls, slack"
+    for kind, advice in (
+        ("model-check", "wirebayes discover"),
+        ("not-converged", UNUSABLE),
+        ("prior", "wirebayes pre"),
+    ):
+        changed(posterior.place.path, file, [{"kind": kind, "text": said}])
+        assert posterior.next_step().startswith(advice)
+        assert f"Next: {advice}" in _next(posterior.summary())
 
 
 def test_a_page_shows_first_what_its_kind_says(fitted: Any) -> None:

@@ -34,6 +34,8 @@ from wirebayes.sentences import (
     undecided,
 )
 
+UNUSABLE = "settle the warnings above, then fit again; these numbers are not to be used"
+PREDICT = "Next: wirebayes predict for holds not measured yet."
 USE = "Next: wirebayes predict for holds not measured yet, or wirebayes pose for a robot on this wire."
 
 

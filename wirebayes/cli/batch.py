@@ -52,7 +52,7 @@ def batch_command(
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.commands.batch import batch as run
-    from wirebayes.views.result import Given
+    from wirebayes.views.result import Given, typed
 
     with progress() as report:
         many = run(
@@ -71,4 +71,4 @@ def batch_command(
             output=folder_for("batch", files[0], output),
             progress=report,
         )
-    conclude(many, Given(str(files[0])), as_json=as_json, quiet=quiet)
+    conclude(many, Given(typed(files[0])), as_json=as_json, quiet=quiet)

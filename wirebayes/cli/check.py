@@ -28,7 +28,7 @@ def check_command(
     from wirebayes.cli.answer import print_answer
     from wirebayes.cli.progress import progress
     from wirebayes.commands.check import check as run
-    from wirebayes.views.result import Given
+    from wirebayes.views.result import Given, typed
 
     with progress() as report:
         checked = run(
@@ -40,4 +40,4 @@ def check_command(
             output=output,
             progress=report,
         )
-    print_answer(checked, Given(str(file)), as_json=as_json, quiet=quiet, kept=output is not None)
+    print_answer(checked, Given(typed(file)), as_json=as_json, quiet=quiet, kept=output is not None)

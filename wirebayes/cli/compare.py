@@ -49,7 +49,7 @@ def compare_command(
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.commands.compare import carry_out, plan_comparison
-    from wirebayes.views.result import Given
+    from wirebayes.views.result import Given, typed
 
     planned = plan_comparison(
         file,
@@ -67,4 +67,4 @@ def compare_command(
         typer.echo(line, err=True)
     with progress() as report:
         found = carry_out(planned, folder_for("compare", file, output), report)
-    conclude(found, Given(str(file)), as_json=as_json, quiet=quiet, said=said)
+    conclude(found, Given(typed(file)), as_json=as_json, quiet=quiet, said=said)

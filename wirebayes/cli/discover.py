@@ -35,7 +35,7 @@ def discover_command(
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.commands.discover import discover as run
-    from wirebayes.views.result import Given
+    from wirebayes.views.result import Given, typed
 
     with progress() as report:
         findings = run(
@@ -51,4 +51,4 @@ def discover_command(
             output=folder_for("discover", file, output),
             progress=report,
         )
-    conclude(findings, Given(str(file)), as_json=as_json, quiet=quiet)
+    conclude(findings, Given(typed(file)), as_json=as_json, quiet=quiet)

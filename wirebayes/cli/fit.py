@@ -52,7 +52,7 @@ def fit_command(
     from wirebayes.cli.answer import conclude, page_writer
     from wirebayes.cli.progress import progress
     from wirebayes.commands.fit import fit as run
-    from wirebayes.views.result import Given
+    from wirebayes.views.result import Given, typed
 
     with page_writer() as write_page:
         with progress() as report:
@@ -72,4 +72,4 @@ def fit_command(
                 output=folder_for("fit", file, output),
                 progress=report,
             )
-        conclude(fitted, Given(str(file)), write_page, as_json=as_json, quiet=quiet)
+        conclude(fitted, Given(typed(file)), write_page, as_json=as_json, quiet=quiet)

@@ -18,6 +18,7 @@ def init_command(
 ) -> None:
     """Write a commented experiment file and a small CSV to replace: DIR/my-wire.toml and DIR/my-wire.csv."""
     from wirebayes.commands.new_experiment import new_experiment as run
+    from wirebayes.views.result import typed
 
     given = [folder for folder in (directory, output) if folder is not None]
     if len(given) != 1:
@@ -25,4 +26,4 @@ def init_command(
     file = run(given[0])
     if not quiet:
         print(f"Written: {file} and {file.with_suffix('.csv').name}: a small test, to be replaced by yours")
-        print(f"Next: wirebayes check {file}")
+        print(f"Next: wirebayes check {typed(file)}")

@@ -47,7 +47,7 @@ def plan_command(
     from wirebayes.cli.answer import conclude
     from wirebayes.cli.progress import progress
     from wirebayes.commands.plan import plan as run
-    from wirebayes.views.result import Given
+    from wirebayes.views.result import Given, typed
 
     with progress() as report:
         planned = run(
@@ -63,4 +63,4 @@ def plan_command(
             output=folder_for("plan", source, output),
             progress=report,
         )
-    conclude(planned, Given(str(source)), as_json=as_json, quiet=quiet)
+    conclude(planned, Given(typed(source)), as_json=as_json, quiet=quiet)

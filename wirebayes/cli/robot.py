@@ -109,7 +109,7 @@ def pose_command(
     from wirebayes.cli.progress import progress
     from wirebayes.commands.pose import pose as run
     from wirebayes.commands.wires import named_lines
-    from wirebayes.views.result import Given
+    from wirebayes.views.result import Given, typed
 
     with progress() as report:
         found = run(
@@ -139,7 +139,7 @@ def pose_command(
             output=folder_for("pose", robot, output),
             progress=report,
         )
-    conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
+    conclude(found, Given(typed(robot), typed(wires[0])), as_json=as_json, quiet=quiet)
 
 
 def calibrate_command(
@@ -196,7 +196,7 @@ def calibrate_command(
     from wirebayes.cli.progress import progress
     from wirebayes.commands.calibrate import calibrate as run
     from wirebayes.commands.wires import named_lines
-    from wirebayes.views.result import Given
+    from wirebayes.views.result import Given, typed
 
     with progress() as report:
         found = run(
@@ -221,7 +221,7 @@ def calibrate_command(
             output=folder_for("calibrate", robot, output),
             progress=report,
         )
-    conclude(found, Given(robot, wires[0]), as_json=as_json, quiet=quiet)
+    conclude(found, Given(typed(robot), typed(wires[0])), as_json=as_json, quiet=quiet)
 
 
 def export_command(
@@ -239,7 +239,7 @@ def export_command(
     from wirebayes.cli.answer import print_answer
     from wirebayes.commands.export import export as run
     from wirebayes.commands.wires import named_lines
-    from wirebayes.views.result import Given
+    from wirebayes.views.result import Given, typed
 
     exported = run(
         robot,
@@ -252,4 +252,4 @@ def export_command(
         seed=seed,
         output=folder_for("export", robot, output),
     )
-    print_answer(exported, Given(robot, wires[0]))
+    print_answer(exported, Given(typed(robot), typed(wires[0])))

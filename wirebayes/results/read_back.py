@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wirebayes.effects import catalogue, effect_named
+from wirebayes.effects.unknown import Discrepancy
 from wirebayes.errors import InputError
 from wirebayes.io.readings import READ, SET
 from wirebayes.io.run_folder import read_json, stored_results
@@ -165,7 +166,7 @@ def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path 
     def own(key: str, of: Group = posterior) -> Any:
         return json.loads(of.attributes[key])[at]
 
-    model = _model(about, own_effects)
+    model = _model(about, own_effects, path)
     draws = _one_of(posterior, at)
     exponent = draws.pop(LENGTH_EXPONENT, None)
     lengths = json.loads(about["lengths_mm"])
@@ -189,10 +190,15 @@ def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path 
     return Stored(draws, sample, likelihood, exponent)
 
 
-def _model(about: Mapping[str, Any], own_effects: Path | None) -> Model:
+def _model(about: Mapping[str, Any], own_effects: Path | None, path: Path) -> Model:
     """Law, history and effects of the fit."""
     known = catalogue(own_effects)
-    effects = tuple(effect_named(key, known) for key in json.loads(about["effects"]))
+    keys = json.loads(about["effects"])
+    foreign = [key for key in keys if key.partition("@")[0] not in (*known, Discrepancy.name)]
+    if foreign:
+        found = f"effects of the user's own, {', '.join(foreign)}"
+        raise InputError(f"{path}: found {found}, expected the file that has them, with --own-effects")
+    effects = tuple(effect_named(key, known) for key in keys)
     return Model(about["elastic_law"], about["history"], effects, float(about["tension_ref_N"]))
 
 

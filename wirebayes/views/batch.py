@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 from wirebayes.answers import terminal
 from wirebayes.json_files.batch import BatchJson, OutlierRow, Row
-from wirebayes.views.posterior import POSTERIOR, PlainAndFinal, Posterior, next_prediction
+from wirebayes.views.posterior import POSTERIOR, PlainAndFinal, Posterior, next_prediction, own_effects_option
 from wirebayes.views.result import NOTHING, Given, html_table
 
 _MESSAGES = 20  # lines on standard error: what a terminal shows at once
@@ -61,7 +61,10 @@ class Batch(PlainAndFinal[BatchJson]):
         place = self.place.path
         look = f"look at {place / 'summary.csv'}"
         first = next(iter(self.plain), None)
-        return f"{look}\n{next_prediction(place, place / first, f' --experiment {first}')}" if first else look
+        if first is None:
+            return look
+        options = f" --experiment {first}{own_effects_option(self.own_effects)}"
+        return f"{look}\n{next_prediction(place, place / first, options)}"
 
     def _short_form(self) -> list[str]:
         failed = sum(row["error"] is not None for row in self.rows)

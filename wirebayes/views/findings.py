@@ -8,7 +8,7 @@ from wirebayes.answers import terminal
 from wirebayes.errors import InputError
 from wirebayes.json_files.discovery import DiscoveryJson, ExperimentFindings
 from wirebayes.sentences import p_in_words, quantity, spoken
-from wirebayes.views.posterior import PlainAndFinal, Posterior, next_pose, next_prediction
+from wirebayes.views.posterior import PlainAndFinal, Posterior, next_pose, next_prediction, own_effects_option
 from wirebayes.views.result import NOTHING, Given, html_table
 
 
@@ -80,7 +80,8 @@ class Findings(PlainAndFinal[DiscoveryJson]):
         if report["verdict"] not in ("named", "nothing-missing"):
             return measurement
         place = self.place.path / name
-        use = f"{next_prediction(self.place.path, place)}\n{next_pose(place / 'final')}"
+        own = own_effects_option(self.own_effects)
+        use = f"{next_prediction(self.place.path, place, own)}\n{next_pose(place / 'final', own)}"
         return use if report["verdict"] == "named" else f"{use}\n{measurement}"
 
     def _short_form(self) -> list[str]:

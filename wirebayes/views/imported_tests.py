@@ -13,7 +13,7 @@ from wirebayes.sentences import counted
 if TYPE_CHECKING:
     pass
 
-from wirebayes.views.result import NOTHING, Given, Result, html_table
+from wirebayes.views.result import NOTHING, Given, Result, html_table, typed
 
 IMPORTED = "import.json"
 
@@ -43,7 +43,8 @@ class ImportedTests(Result[ImportJson]):
     def next_step(self, given: Given = NOTHING) -> str:
         names = list(self.summary()["experiments"])
         file = names[0] if len(names) == 1 else "experiments"
-        return f"look at {self.place.path / names[0]}.svg, then wirebayes check {self.place.path / file}.toml"
+        check = f"wirebayes check {typed(self.place.path / f'{file}.toml')}"
+        return f"look at {self.place.path / names[0]}.svg, then {check}"
 
     def _short_form(self) -> list[str]:
         found = self.summary()["experiments"]

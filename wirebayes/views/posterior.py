@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from wirebayes.answers import terminal
+from wirebayes.answers.headline import UNUSABLE
 from wirebayes.errors import InputError
 from wirebayes.io.next_hold import NEXT_HOLD
 from wirebayes.io.run_folder import CONFIGURATION, stored_results
@@ -30,6 +31,7 @@ from wirebayes.views.result import (
     figure,
     html_table,
     short_interval,
+    typed,
 )
 
 POSTERIOR, SUMMARY = "posterior.nc", "summary.json"
@@ -271,11 +273,21 @@ def _after_fit(posterior: Posterior, kinds: frozenset[str], given: Given) -> str
         return f"wirebayes discover {given.file}  (what is the model missing?)"
     several = not posterior.alone or len(posterior.experiments) > 1
     whose = f" --experiment {posterior.experiments[0]}" if several else ""
-    prediction = next_prediction(posterior.place.path, posterior.folder, whose)
-    return f"{prediction}\n{next_pose(posterior.folder)}"
+    if "not-converged" in kinds:
+        return UNUSABLE
+    own = own_effects_option(posterior.own_effects)
+    prediction = next_prediction(posterior.place.path, posterior.folder, whose + own)
+    if posterior.summary()["likelihood"] == "hold":  # k1 is not determined, which a robot needs
+        return prediction
+    return f"{prediction}\n{next_pose(posterior.folder, own)}"
 
 
-def next_prediction(results: Path, around: Path, whose: str = "") -> str:
+def own_effects_option(file: Path | None) -> str:
+    """What a command is given beside results that hold effects of the user's own."""
+    return "" if file is None else f" --own-effects {typed(file)}"
+
+
+def next_prediction(results: Path, around: Path, options: str = "") -> str:
     """The command that predicts the example of a hold to come.
 
     Parameters
@@ -284,12 +296,13 @@ def next_prediction(results: Path, around: Path, whose: str = "") -> str:
         What `predict` reads.
     around : Path
         The folder with the example.
-    whose : str
-        The option that names one of several experiments.
+    options : str
+        Those that name one of several experiments, and the user's own effects.
     """
-    return f"wirebayes predict {results} {around / NEXT_HOLD}{whose}  (one hold more: edit the file for others)"
+    command = f"wirebayes predict {typed(results)} {typed(around / NEXT_HOLD)}{options}"
+    return f"{command}  (one hold more: edit the file for others)"
 
 
-def next_pose(posterior: Path) -> str:
+def next_pose(posterior: Path, options: str = "") -> str:
     """The command that hangs a robot on such wires."""
-    return f"wirebayes pose linear-7 --wires {posterior}  (or the file of your own robot)"
+    return f"wirebayes pose linear-7 --wires {typed(posterior)}{options}  (or the file of your own robot)"

@@ -1,6 +1,7 @@
 """What all results have in common: a folder, a summary, warnings, a few lines and the next step."""
 
 import os
+import shlex
 import shutil
 import weakref
 from dataclasses import dataclass
@@ -27,9 +28,9 @@ class Given:
     Attributes
     ----------
     file : str
-        The experiment file, or the robot.
+        The experiment file, or the robot, as `typed`.
     wires : str
-        Folder of the wires' posterior.
+        Folder of the wires' posterior, as `typed`.
     """
 
     file: str = "FILE.toml"
@@ -37,6 +38,11 @@ class Given:
 
 
 NOTHING = Given()
+
+
+def typed(argument: str | Path) -> str:
+    """A file or folder as it is typed in a command: in quotes where it has spaces."""
+    return shlex.quote(str(argument))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from wirebayes.answers.headline import USE, fit_in_a_sentence
+from wirebayes.answers.headline import PREDICT, UNUSABLE, USE, fit_in_a_sentence
 from wirebayes.io.run_folder import read_json
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.model.sample import Sample
@@ -192,8 +192,8 @@ def _next(summary: SummaryJson) -> str:
     if warns_of(summary, "model-check"):
         return "Next: wirebayes discover with the same file looks for what the model is missing."
     if warns_of(summary, "not-converged"):
-        return "Next: settle the warnings above, then fit again; these numbers are not to be used."
-    return USE
+        return f"Next: {UNUSABLE}."
+    return PREDICT if summary["likelihood"] == "hold" else USE  # a robot needs k1, which is not determined there
 
 
 _CURVE = (
