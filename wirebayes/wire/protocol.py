@@ -121,6 +121,7 @@ class Protocol:
             "order": order,
             "direction": direction,
             "times": times,
+            "log_times": _log(times),
             "which": which,
             "last": self.end.astype(np.intc),
             "recorded": self.recorded.view(np.uint8),
@@ -135,7 +136,8 @@ class Protocol:
         age = np.maximum(np.subtract.outer(start_s, start_s), 0.0)[..., None]
         ages, which = np.unique(np.concatenate([age, age + time_s[:, None]], axis=2), return_inverse=True)
         which = which.reshape(len(age), len(age), -1).astype(np.intc) + np.intc(len(times))
-        return self.flat | {"times": np.concatenate([times, ages]), "which_age": which}
+        all_times = np.concatenate([times, ages])
+        return self.flat | {"times": all_times, "log_times": _log(all_times), "which_age": which}
 
     @cached_property
     def holds(self) -> tuple[dict[str, Any], ...]:
@@ -183,6 +185,12 @@ def _slice_of(numbers: Ints) -> slice | Ints:
 def _widened(array: Any, columns: int) -> Any:
     """A copy with so many columns of nothing behind."""
     return np.pad(array, [(0, 0), (0, columns)])
+
+
+def _log(times: Floats) -> Floats:
+    """Logarithms of times; of none, minus infinity."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(times))
 
 
 def _directions(setting: Floats) -> Floats:
