@@ -16,6 +16,7 @@ READ = "read"  # the step that turns raw files into an experiment file
 STEPS = (READ, "check", "fit", "discover")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,80}")
 _SUFFIXES = (".nc", ".json", ".csv", ".toml", ".html", ".svg")  # of what a user takes away, results first
+_OTHERS = "undecided"  # folder of models that share the probability with the final one: they come last
 _OWN = {"configuration.json", "complete.json"}  # of the folder of a result, not for a user
 
 
@@ -73,7 +74,7 @@ class Test:
     def files(self, step: str) -> list[str]:
         """Files of a step to take away, by their path within the test's folder; results first."""
         found = [path for path in (self.folder / step).rglob("[!.]*") if path.suffix in _SUFFIXES]
-        ranked = sorted(found, key=lambda path: (_SUFFIXES.index(path.suffix), str(path)))
+        ranked = sorted(found, key=lambda path: (_OTHERS in path.parts, _SUFFIXES.index(path.suffix), str(path)))
         return [str(path.relative_to(self.folder)) for path in ranked if path.name not in _OWN]
 
 

@@ -139,13 +139,11 @@ class _TestPage:
         with ui.card():
             _heading("The sample")
             ui.label(", ".join(path.name for path in self.test.raw)).classes("text-sm said")
-            with ui.row().classes("items-end"):
+            with ui.row().classes("items-start"):
                 length = ui.number("Length without tension, mm", value=about.get("length_mm"), min=0)
                 material = ui.input("Material", value=about.get("material", ""))
                 control = ui.select(CONTROLS, value=about.get("control", ""), label="What was set")
-                area = ui.number("Cross-section, mm²", value=about.get("area_mm2"), min=0).props(
-                    'hint="for stresses only"'
-                )
+                area = ui.number("Cross-section, mm² (for stresses)", value=about.get("area_mm2"), min=0)
             if asked:
                 ui.label("The file can be read in more than one way. Please say:").classes("warning")
             menus = [

@@ -13,7 +13,9 @@ from wirebayes.errors import InputError
 def app_command(
     port: Annotated[
         int | None,
-        typer.Option("--port", metavar="N", help="Of the loopback address; 0 for any that is free. Default: 8137."),
+        typer.Option(
+            "--port", metavar="N", help="Port of the address 127.0.0.1; 0 for any that is free. Default: 8137."
+        ),
     ] = None,
     output: Annotated[
         Path, typer.Option("--output", metavar="DIR", help="Folder for all that is dropped and found.")

@@ -48,7 +48,7 @@ def fit_command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Posterior of the wire's parameters: DIR/NAME/posterior.nc and DIR/NAME/summary.json for each experiment."""
+    """Estimate a wire's parameters: DIR/NAME/posterior.nc and DIR/NAME/summary.json for each experiment."""
     from wirebayes.cli.answer import conclude, page_writer
     from wirebayes.cli.progress import progress
     from wirebayes.commands.fit import fit as run

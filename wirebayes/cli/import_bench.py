@@ -27,7 +27,9 @@ def import_command(
     ] = None,
     name: Annotated[
         str | None,
-        typer.Option("--name", metavar="N", help="Of the only experiment; else each file gives its own name."),
+        typer.Option(
+            "--name", metavar="N", help="Name of the experiment, where it is the only one; default: that of its file."
+        ),
     ] = None,
     mapping: Annotated[
         list[str] | None,
@@ -46,7 +48,8 @@ def import_command(
         typer.Option("--time-since", help="What times count from, where it is not evident."),
     ] = None,
     sheet: Annotated[
-        str | None, typer.Option("--sheet", metavar="NAME", help="Of a workbook with readings in several sheets.")
+        str | None,
+        typer.Option("--sheet", metavar="NAME", help="The sheet to read, where a workbook has readings in several."),
     ] = None,
     zero_mm: Annotated[
         float | None,
@@ -64,7 +67,7 @@ def import_command(
         Literal["several", "one"] | None,
         typer.Option(
             "--specimens",
-            help="Whose columns side by side, or tests one below another, these are, where it is not evident.",
+            help="Whether columns side by side, or tests one below another, are of several specimens or of one.",
         ),
     ] = None,
     each_file: Annotated[

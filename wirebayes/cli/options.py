@@ -20,9 +20,20 @@ ExperimentFile = Annotated[
 ]
 Output = Annotated[
     Path | None,
-    typer.Option("--output", metavar="DIR", help="Folder for the results; default: named after file and command."),
+    typer.Option(
+        "--output", metavar="DIR", help="Folder for the results; default: named after the file and the command."
+    ),
 ]
-Seed = Annotated[int, typer.Option("--seed", callback=_seed, help="Same seed, same machine: same bytes.")]
+OutputOfNoFile = Annotated[
+    Path | None,
+    typer.Option("--output", metavar="DIR", help="Folder for the results; default: named after the command."),
+]
+Seed = Annotated[
+    int,
+    typer.Option(
+        "--seed", callback=_seed, help="Of all random numbers: the same seed gives the same bytes on one machine."
+    ),
+]
 ExperimentName = Annotated[str | None, typer.Option("--experiment", metavar="NAME", help="This experiment only.")]
 TrainHolds = Annotated[
     int | None, typer.Option("--train-holds", metavar="K", help="Fit the first K recorded holds only.")

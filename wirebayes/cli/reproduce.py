@@ -3,10 +3,10 @@
 import sys
 from pathlib import Path
 
-from wirebayes.cli.options import Output, Seed
+from wirebayes.cli.options import OutputOfNoFile, Seed
 
 
-def reproduce_command(output: Output = None, seed: Seed = 0) -> None:
+def reproduce_command(output: OutputOfNoFile = None, seed: Seed = 0) -> None:
     """Reproduce the paper from its own tables, with posteriors: DIR/report.html, its tables and pictures."""
     from wirebayes.cli.progress import progress
     from wirebayes.commands.reproduce_paper import reproduce_paper

@@ -49,7 +49,9 @@ TrajectoryFile = Annotated[
     Path | None,
     typer.Option("--trajectory", metavar="FILE.csv", help="Commanded poses and loads over time: where does it go?"),
 ]
-Payload = Annotated[float | None, typer.Option("--payload", metavar="KG", help="Carried beside the platform's mass.")]
+Payload = Annotated[
+    float | None, typer.Option("--payload", metavar="KG", help="Mass that is carried beside the platform's own.")
+]
 PayloadAt = Annotated[
     str | None,
     typer.Option("--payload-at", metavar="X,Y,Z", help="Centre of --payload in the platform's frame, metres."),
@@ -99,7 +101,7 @@ def pose_command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Kinematics on creeping wires; drift and pose error with uncertainty bands.
+    """Predict how far the platform of a robot drifts on creeping wires, and its pose error, with uncertainty bands.
 
     Of one pose, or over time: --joints takes measured values and finds the pose, --trajectory takes commanded poses and
     finds the drift. Give the final fit of discover as --wires and its plain one as --other-fit to see what the effects
@@ -175,7 +177,9 @@ def calibrate_command(
     tension_bias: Annotated[
         float | None,
         typer.Option(
-            "--tension-bias", metavar="N", help="Standard deviation of each tension sensor's bias; estimated."
+            "--tension-bias",
+            metavar="N",
+            help="Estimate a bias of each tension sensor, with this prior standard deviation.",
         ),
     ] = None,
     spread: Spread = 0.05,
@@ -228,14 +232,18 @@ def export_command(
     robot: RobotFile,
     wires: Wires,
     output: Output = None,
-    tensions: Annotated[str, typer.Option(metavar="N,N,…", help="Tensions of the creep table.")] = "1,2,4,8",
-    times: Annotated[str, typer.Option(metavar="T,T,…", help="Times of the creep table, s.")] = "60,600,3600,86400",
+    tensions: Annotated[
+        str, typer.Option(metavar="N,N,…", help="Tensions of the creep table, in newtons.")
+    ] = "1,2,4,8",
+    times: Annotated[
+        str, typer.Option(metavar="T,T,…", help="Times of the creep table, in seconds.")
+    ] = "60,600,3600,86400",
     draws: Draws = 1000,
     experiment: ExperimentName = None,
     own_effects: OwnEffects = None,
     seed: Seed = 0,
 ) -> None:
-    """Spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model."""
+    """Write spring constants and creep in firmware units (Hangprinter), and the robot as a MuJoCo model."""
     from wirebayes.cli.answer import print_answer
     from wirebayes.commands.export import export as run
     from wirebayes.commands.wires import named_lines

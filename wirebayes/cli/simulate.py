@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from wirebayes.cli.options import ElasticLawOption, HistoryOption, Output, OwnEffects, Seed
+from wirebayes.cli.options import ElasticLawOption, HistoryOption, OutputOfNoFile, OwnEffects, Seed
 
 
 def simulate_command(
-    output: Output = None,
+    output: OutputOfNoFile = None,
     seed: Seed = 0,
     tests: Annotated[
         int, typer.Option("--tests", min=1, help="Number of lines tested, each with its own true parameters.")
@@ -30,9 +30,12 @@ def simulate_command(
         ),
     ] = "",
     unload: Annotated[
-        int, typer.Option("--unload", min=0, metavar="K", help="Then K holds back down through the same settings.")
+        int,
+        typer.Option("--unload", min=0, metavar="K", help="Add K holds that go back down through the same settings."),
     ] = 0,
-    times: Annotated[str, typer.Option("--times", metavar="S,…", help="Reading times of a hold.")] = "0,30,60,90,120",
+    times: Annotated[
+        str, typer.Option("--times", metavar="S,…", help="Times of the readings of a hold, in seconds.")
+    ] = "0,30,60,90,120",
     unrecorded: Annotated[
         list[int] | None, typer.Option("--unrecorded", metavar="HOLD", help="A hold without readings; may be repeated.")
     ] = None,
@@ -62,6 +65,7 @@ def simulate_command(
     history: HistoryOption = "saturating",
 ) -> None:
     """Write synthetic tests: DIR/experiments.toml, a CSV for each test, and DIR/truth.json."""
+    from wirebayes.cli.answer import print_answer
     from wirebayes.commands.simulate_tests import simulate_tests
     from wirebayes.simulation.synthetic import finite_number
 
@@ -69,7 +73,7 @@ def simulate_command(
     for text in parameter or ():
         name, _, value = text.partition("=")
         chosen[name] = finite_number(f"--parameter {text}", value)
-    simulate_tests(
+    made = simulate_tests(
         tests=tests,
         lengths=lengths,
         displacements=displacements,
@@ -87,3 +91,4 @@ def simulate_command(
         seed=seed,
         output=Path("simulated") if output is None else output,
     )
+    print_answer(made)
