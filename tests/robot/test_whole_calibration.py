@@ -10,7 +10,7 @@ from tests.robot.test_commands import fitted, session_csv  # noqa: F401
 from wirebayes.cli import main
 from wirebayes.io.run_folder import read_json
 from wirebayes.robot.mechanics import schema
-from wirebayes.robot.self_calibration import descent, summary
+from wirebayes.robot.self_calibration import descent, summary, whole
 
 
 def test_rows_without_a_pose_and_unknown_anchors_are_estimated(fitted, session_csv, tmp_path):  # noqa: F811
@@ -46,6 +46,35 @@ def test_equations_that_are_singular_without_damping_are_damped(fitted, session_
     monkeypatch.setattr(descent, "eliminated", singular)
     found = _calibrated(file, fitted, tmp_path / "out")
     assert asked[:2] == pytest.approx([1e-6, 1e-5])
+    assert _near(found["zero_tension_lengths_m"], truth)
+
+
+def test_a_search_whose_last_descent_was_cut_short_goes_on(fitted, session_csv, tmp_path, monkeypatch):  # noqa: F811
+    """Whatever lay still may only have had too few steps; another descent finds that it had come down."""
+    file, truth = session_csv
+    _without_poses(file)
+    made, searches = whole._Search._round, []
+
+    def watched(search):
+        if search not in searches:
+            searches.append(search)
+        return made(search)
+
+    monkeypatch.setattr(whole._Search, "_round", watched)
+    _calibrated(file, fitted, tmp_path / "whole", "--next-poses", "0")
+    last = len(searches[0].rounds)
+    searches.clear()
+
+    def cut_short(search):
+        found = watched(search)
+        if search is not searches[0] or len(search.rounds) != last:
+            return found
+        search.came_down = False
+        return replace(found, converged=False)
+
+    monkeypatch.setattr(whole._Search, "_round", cut_short)
+    found = _calibrated(file, fitted, tmp_path / "cut", "--next-poses", "0")
+    assert len(searches[0].rounds) > last
     assert _near(found["zero_tension_lengths_m"], truth)
 
 

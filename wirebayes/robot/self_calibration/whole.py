@@ -117,6 +117,8 @@ class _Search:
         Logarithms of the noises that were thought, and of those that the residuals then showed.
     opened_m : list of float
         How far loops were open after each round.
+    came_down : bool
+        Whether the last descent ended at a least sum of squares, not for want of steps.
     """
 
     def __init__(self, unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> None:
@@ -124,6 +126,7 @@ class _Search:
         self.noise, self.state, self.creep = noise, state, creep
         self.passed = [state]
         self.roughly, self.cost = ROUGHLY, np.inf
+        self.came_down = False
         self.rounds: list[tuple[Floats, Floats]] = []
         self.opened_m: list[float] = []
         self.last_m, _ = inverse.lengths(unknowns.robot, holds.session.joint_m[-1])
@@ -154,7 +157,7 @@ class _Search:
         since = self.passed[-1]
         self.creep = creep_of(self.unknowns, self.holds, since, self.creep, self.roughly)
         down = descend(self.unknowns, self.holds, self.noise, self.state, self.creep, since)
-        self.state = down.state
+        self.state, self.came_down = down.state, down.converged
         found = gaussian_posterior(self.unknowns, down, self.noise, self.creep, self.last_m)
         shown, degrees = noise_shown(found, *self.usual)
         thought = np.log([self.noise.joint_m, self.noise.balance])
@@ -162,10 +165,10 @@ class _Search:
         return replace(found, degrees=degrees)
 
     def _settled(self, found: Whole) -> bool:
-        """Whether noise and sum of squares are what they were."""
+        """Whether noise and sum of squares are what they were, and the last descent was not cut short."""
         thought, shown = self.rounds[-1]
         level = np.abs(shown - thought).max() < _SETTLED
-        return bool(level and abs(self.cost - found.cost) < _LEVEL_FIT)
+        return bool(self.came_down and level and abs(self.cost - found.cost) < _LEVEL_FIT)
 
     def _go_on(self, found: Whole, sd: Floats, moved_on: float) -> None:
         """What the next round begins with."""
