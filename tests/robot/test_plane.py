@@ -100,6 +100,31 @@ def test_friction_holds_as_far_as_its_largest_force_moves_the_platform(sled):
     assert width[0, 2] == 0.0
 
 
+@pytest.mark.parametrize(("coefficient", "warned"), [(0.2, 0), (3.0, 1)])
+def test_friction_that_holds_farther_than_the_stiffness_reaches_is_called_extrapolated(sled, coefficient, warned):
+    """By the pull at the end of the half width along x, where wires of a few millimetres of stretch have gone slack."""
+    rough = replace(sled, plane=replace(sled.plane, friction=coefficient, contact_radius_m=0.0))
+    tau, wires, commands = _held(rough, rough.home_m, np.eye(3))
+    said = on_plane.on_plane(rough, wires, commands, rough.home_m, np.eye(3), tau)
+    assert [one.kind for one in on_plane.friction_notices(said)] == warned * ["extrapolation"]
+    zero, offset = commands.zero_m.T, commands.offset_m.T
+    K = statics.stiffness(rough, wires, rough.home_m[:, None], np.eye(3)[..., None], zero, offset)[0]
+    most = coefficient * rough.mass_kg * G
+    free = [0, 1, 5]
+    slack = np.linalg.inv(K[np.ix_(free, free)])[:, :2]
+    push = most * slack[0] / np.linalg.norm(slack[0])  # the friction that takes the platform farthest along x
+    end = np.zeros(6)
+    end[free] = slack @ push
+    turned = rotation.matrix(end[3:])
+    shape = statics.geometry(rough, (rough.home_m + end[:3])[:, None], turned[..., None])
+    stretched = statics.stretched(rough, shape, offset)
+    taut = 5000.0 * np.maximum(stretched / zero - 1.0, 0.0)
+    pull = -(shape.direction * taut).sum(1)[:2, 0]
+    off = np.linalg.norm(-pull - push) / most
+    assert said["friction_departure"] >= off - 1e-9
+    assert (off > 0.2) == bool(warned)
+
+
 def test_wires_that_lift_the_platform_are_refused_on_a_table_and_not_on_a_rail(sled):
     high = replace(sled, exit_m=sled.exit_m + [0.0, 0.0, 1.0], mass_kg=0.1)
     tau, _, _ = _held(high, high.home_m, np.eye(3))

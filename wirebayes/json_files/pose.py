@@ -95,6 +95,7 @@ class OnPlane(TypedDict):
     contact_radius_m: float
     friction_half_width_mm: Band
     friction_half_width_rad: Band
+    friction_departure: float
     sentence: str
 
 

@@ -14,11 +14,13 @@ References
 
 import numpy as np
 
+from wirebayes.numeric.batches import batch_first, batch_last
 from wirebayes.numeric.typing import Floats
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
-from wirebayes.robot.mechanics.description import GRAVITY, Poses, Robot
+from wirebayes.robot.mechanics.description import GRAVITY, Lengths, Poses, Robot
 from wirebayes.robot.mechanics.rotation import matrix
+from wirebayes.robot.mechanics.wires import Wires, tension
 
 
 def onto(robot: Robot, position_m: Floats, rotation: Floats) -> Poses:
@@ -95,13 +97,83 @@ def friction_half_width(robot: Robot, stiffness: Floats, normal_N: float) -> tup
     turn_rad : (n,) array
         About the normal; zeros where parallel lines keep the orientation.
     """
+    plane = robot.plane
+    assert plane is not None
+    square = _held_square(robot, stiffness, normal_N)
+    width = np.sqrt(np.einsum("nii->ni", square)[:, :3])
+    if robot.degrees == 3:
+        return width, np.zeros(len(width))
+    about = plane.normal @ square[:, 3:, 3:] @ plane.normal
+    return width, np.sqrt(about)
+
+
+def _held_square(robot: Robot, stiffness: Floats, normal_N: float) -> Floats:
+    """``(n, d, d)`` matrices ``A`` of the ellipsoids ``x^T A^-1 x <= 1`` of poses at which friction can hold."""
     plane, P = robot.plane, robot.motions
     assert plane is not None and P is not None
     most_N = plane.friction * abs(normal_N)
-    size = np.ones(robot.degrees)
-    size[3:] = plane.contact_radius_m
     # columns: the displacement of each unit force and of each unit moment that the ring can bear
-    answer = np.linalg.inv(stiffness) @ (P * size)
-    width = most_N * np.linalg.norm(answer, axis=2)
-    turn = most_N * np.linalg.norm(plane.normal @ answer[:, 3:], axis=1) if robot.degrees == 6 else np.zeros(len(width))
-    return width[:, :3], turn
+    answer = most_N * np.linalg.inv(stiffness) @ (P * _ring(robot))
+    return np.asarray(answer @ answer.mT)
+
+
+def _ring(robot: Robot) -> Floats:
+    """(d,) What friction of the ring makes of 1 N: a force, or a moment."""
+    assert robot.plane is not None
+    size = np.ones(robot.degrees)
+    size[3:] = robot.plane.contact_radius_m
+    return size
+
+
+def friction_departure(robot: Robot, wires: Wires, poses: Poses, lengths: Lengths, normal_N: float) -> float:
+    """How far the wires' pull at the farthest poses that friction can hold is from what their stiffness foresees.
+
+    Parameters
+    ----------
+    robot : Robot
+        On a plane.
+    wires : Wires
+        ``n`` draws.
+    poses : (n, 3), (n, 3, 3) arrays
+    lengths : (n, w), (n, w) arrays
+        That hold these poses.
+    normal_N : float
+        Force of the plane.
+
+    Returns
+    -------
+    float
+        Of the largest friction, the largest difference at the ends of the ellipsoid, median over draws.
+    """
+    known, (x, R) = robot.plane, poses
+    assert known is not None and robot.motions is not None
+    most_N = known.friction * abs(normal_N)
+    if most_N == 0:
+        return 0.0
+    pull, stiffness = _pull(robot, wires, x, R, lengths)
+    square = _held_square(robot, stiffness, normal_N)
+    ways = np.eye(robot.degrees)
+    if robot.degrees == 6:
+        ways = np.vstack([ways[:3], np.append(np.zeros(3), known.normal)])
+    ring = _ring(robot)
+    unit = np.divide(1.0, ring, out=np.zeros_like(ring), where=ring > 0)
+    off = []
+    for way in ways:
+        across = square @ way
+        half = np.sqrt(across @ way)[:, None]
+        end = np.divide(across, half, out=np.zeros_like(across), where=half > 0)
+        turned = batch_first(turning.compose(end[:, 3:].T, batch_last(R))) if robot.degrees == 6 else R
+        there, _ = _pull(robot, wires, x + end[:, :3], turned, lengths)
+        foreseen = (stiffness @ end[..., None])[..., 0] @ robot.motions
+        off.append(np.linalg.norm((there - pull - foreseen) * unit, axis=1))
+    return float(np.median(np.max(off, axis=0)) / most_N)
+
+
+def _pull(robot: Robot, wires: Wires, x: Floats, R: Floats, lengths: Lengths) -> tuple[Floats, Floats]:
+    """(n, d) forces and moments along the plane that poses need, and (n, d, d) their slopes."""
+    zero_m, offset_m = (length.T for length in lengths)
+    turn = batch_last(R)
+    shape = statics.geometry(robot, x.T, turn)
+    tension_N, slope = tension(wires, statics.stretched(robot, shape, offset_m), zero_m)
+    force, stiffness = statics.unbalance_and_stiffness(robot, shape, turn, tension_N, slope)
+    return force.T, batch_first(stiffness)

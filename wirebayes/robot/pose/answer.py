@@ -145,7 +145,7 @@ def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, cont
     content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
     content["variance_shares"] = _shares(robot, line, courses, x, R)
     warnings = _warnings(held, courses, poses["commanded_stable"], turned)
-    content["warnings"] = to_json(warnings)
+    content["warnings"] = to_json([*warnings, *on_plane.friction_notices(content.get("plane"))])
     spaces = map_slices(robot, line, request.slices)
     content["workspace"] = _workspace(spaces)
     return PoseAnswer(content, courses, spaces)

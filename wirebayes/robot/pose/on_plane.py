@@ -4,6 +4,7 @@ import numpy as np
 
 from wirebayes.json_files.pose import OnPlane
 from wirebayes.numeric.typing import Floats
+from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import plane, statics
 from wirebayes.robot.mechanics.description import GRAVITY, Plane, Robot
 from wirebayes.robot.mechanics.wires import Wires
@@ -12,6 +13,7 @@ from wirebayes.robot.pose.request import band_over_draws
 from wirebayes.sentences import short
 
 _ROUNDING = 1e-9  # of the weight: a force so small is none
+_BENT = 0.2  # of the largest friction: forces that far from what the stiffness foresees make the half widths rough
 
 
 def lifted(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> str:
@@ -57,6 +59,8 @@ def on_plane(
     zero, offset = commands.zero_m[good], commands.offset_m[good]
     K = statics.stiffness(robot, wires.part(good), x, R, zero.T, offset.T)
     width, turn = plane.friction_half_width(robot, K, force)
+    here = x.T, np.moveaxis(R, -1, 0)
+    departure = plane.friction_departure(robot, wires.part(good), here, (zero, offset), force)
     return {
         "normal": known.normal,
         "contact": known.contact,
@@ -65,6 +69,7 @@ def on_plane(
         "contact_radius_m": known.contact_radius_m,
         "friction_half_width_mm": band_over_draws(1e3 * width),
         "friction_half_width_rad": band_over_draws(turn),
+        "friction_departure": departure,
         "sentence": _sentence(robot, known, force, width, turn),
     }
 
@@ -81,3 +86,21 @@ def _sentence(robot: Robot, known: Plane, force: float, width: Floats, turn: Flo
     about = f" and turned by ±{short(np.degrees(np.median(turn)), 2)}°" if turn.any() else ""
     most = short(known.friction * abs(force), 3)
     return f"{said}; its friction, {most} N at most, can hold the platform {along}{about}."
+
+
+def friction_notices(said: OnPlane | None) -> list[Notice]:
+    """A warning where friction can hold the platform farther than the stiffness at its pose reaches.
+
+    Parameters
+    ----------
+    said : dict or None
+        What `on_plane` returned.
+    """
+    if said is None or said["friction_departure"] <= _BENT:
+        return []
+    off = short(100 * said["friction_departure"], 2)
+    text = (
+        "how far friction can hold the platform is extrapolated from the stiffness at the pose: that far from it the "
+        f"wires pull otherwise, by {off} % of the friction"
+    )
+    return [Notice("extrapolation", text)]
