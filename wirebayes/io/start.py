@@ -25,7 +25,7 @@ readings = "my-wire.csv"
 # Positions that were held without being read: each goes before the recorded hold of that number.
 # unrecorded_holds = [{ before_hold = 3, displacement_mm = 2.5, duration_s = 60.0 }]
 
-# What is known of the wire before the test (optional; every parameter has a range for thin lines):
+# What is known of the wire before the test (optional; every parameter has a range in the scales of the test):
 # [experiment.prior.k1]
 # distribution = "log-normal"
 # median = 1500.0
