@@ -17,6 +17,7 @@ from wirebayes.sentences import p_in_words, spoken
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.views.calibration import Calibration
 from wirebayes.views.comparison import Comparison
+from wirebayes.views.export import Export
 from wirebayes.views.findings import Findings
 from wirebayes.views.pose import Pose
 from wirebayes.views.result import Given, ResultFolder
@@ -85,6 +86,16 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
     few = {"warnings": [{"kind": "few-holds", "text": "2 holds: no effect can be established"}]}
     two = stored(Findings, tmp_path, "discovery.json", {"experiments": {"b": CLEAN | few}})
     assert two.lines() == ["b: nothing stands out (p = 0.4)"]
+
+
+def test_files_for_other_programs_say_where_each_belongs(tmp_path: Path) -> None:
+    exported = stored(Export, tmp_path, "export.json", {})
+    assert exported.next_step() == f"read {tmp_path}"
+    (tmp_path / "robot.xml").write_text("")
+    view = f"python -m mujoco.viewer --mjcf={tmp_path / 'robot.xml'}"
+    assert exported.next_step() == view
+    (tmp_path / "klipper.cfg").write_text("")
+    assert exported.next_step() == f"put the lines of {tmp_path / 'klipper.cfg'} into the printer's printer.cfg\n{view}"
 
 
 @pytest.mark.parametrize(

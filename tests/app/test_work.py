@@ -114,6 +114,24 @@ def test_an_experiment_file_without_its_table_is_refused_in_a_line(shelf, jobs):
     assert job.value.startswith("a.toml, line 5, experiment a, key readings: found 'a.csv', which is no file there")
 
 
+def test_a_robot_that_is_dropped_before_a_wire_is_told_where_it_belongs(shelf, jobs):
+    robot = Path(__file__).parents[2] / "data" / "robots" / "linear-6.toml"
+    job = ended(jobs.start(dropped(shelf, "mine.toml", robot.read_bytes()), READ, {}))
+    assert job.state == "refused"
+    assert job.value == "mine.toml: found a robot, expected an experiment; drop it below the results of a fit"
+
+
+def test_models_that_share_the_probability_come_after_the_final_one_and_the_summaries(shelf):
+    test = shelf.new("d")
+    names = ["final/posterior.nc", "final/summary.json", "final/undecided/1/posterior.nc", "plain/posterior.nc"]
+    for name in names:
+        path = test.folder / "discover" / "wire" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    last = f"discover/wire/{names.pop(2)}"
+    assert test.files("discover")[-1] == last
+
+
 def test_a_robot_of_ones_own_is_one_file_and_at_most_one_table(shelf):
     test = dropped(shelf, "b.csv", b"")
     place = test.place_for_robot(["way.csv", "my robot.TOML"])

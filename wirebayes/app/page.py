@@ -143,7 +143,9 @@ class _TestPage:
                 length = ui.number("Length without tension, mm", value=about.get("length_mm"), min=0)
                 material = ui.input("Material", value=about.get("material", ""))
                 control = ui.select(CONTROLS, value=about.get("control", ""), label="What was set")
-                area = ui.number("Cross-section, mm² (for stresses)", value=about.get("area_mm2"), min=0)
+                area = ui.number("Cross-section, mm²", value=about.get("area_mm2"), min=0).props(
+                    'hint="for stresses only"'
+                )
             if asked:
                 ui.label("The file can be read in more than one way. Please say:").classes("warning")
             menus = [

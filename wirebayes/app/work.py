@@ -1,6 +1,7 @@
 """What a process of the app does: one step with one test, by the public functions, and a record of it for the page."""
 
 import shutil
+import tomllib
 import traceback
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -120,6 +121,7 @@ def _read_experiment_file(test: Test, target: Path) -> dict[str, Any]:
     file, *others = [path for path in test.raw if path.suffix.lower() == ".toml"]
     if others:
         raise InputError(f"found {file.name} and {others[0].name}, expected one experiment file at a time")
+    _refuse_a_robot(file)
     experiments = wirebayes.read_experiments(file)
     shutil.copytree(file.parent, target)
     warnings = []
@@ -132,6 +134,16 @@ def _read_experiment_file(test: Test, target: Path) -> dict[str, Any]:
         names.append(name)
     lines = [repr(experiment) for experiment in experiments]
     return _understood(file.name, names, lines, warnings)
+
+
+def _refuse_a_robot(file: Path) -> None:
+    """Say where a robot's file belongs; what else is wrong with a file says the reader of experiments."""
+    try:
+        content = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return
+    if "leg" in content and "experiment" not in content:
+        raise InputError(f"{file.name}: found a robot, expected an experiment; drop it below the results of a fit")
 
 
 def _understood(file: str, names: list[str], lines: list[str], warnings: list[str]) -> dict[str, Any]:
