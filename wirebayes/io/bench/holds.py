@@ -14,6 +14,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.bench.continuous import COVERED, by_plateaus
 from wirebayes.io.bench.control import BY_CHANCE as TREND_BY_CHANCE
 from wirebayes.io.bench.control import trend_by_chance
+from wirebayes.io.bench.flicker import flickers, without_flicker
 from wirebayes.io.bench.plateaus import FEWEST, plateaus
 from wirebayes.io.bench.recorded import (
     BEGUN_BEFORE,
@@ -26,6 +27,7 @@ from wirebayes.io.bench.recorded import (
     groups_between,
     level_of,
     restarts,
+    usual_size,
     wanders,
 )
 from wirebayes.io.bench.resets import joined_at_resets
@@ -63,7 +65,7 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
         groups = groups_between(changes(readings.hold))
         if not wanders(x, groups):
             return _cut_into_groups(readings, groups, time_since, resets)
-        if _usual(groups) < CONTINUOUS:  # moves may have numbers of their own
+        if usual_size(groups) < CONTINUOUS:  # moves may have numbers of their own
             raise _wandering(readings, groups)
         resets = [*resets, f"hold numbers are not used: the {readings.role} changes within them"]
         return by_plateaus(readings, resets)
@@ -76,11 +78,10 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
 def _by_restarts_and_changes(readings: Readings) -> list[Rows]:
     """Rows between restarts of time and changes of what is set; none where these make no holds."""
     x = readings.setting
-    restart, change = restarts(readings), changes(x)
+    restart = restarts(readings)
     if not restart.any():
-        groups = groups_between(change)
-        return groups if _are_holds(groups) else []
-    groups = groups_between(restart | change)
+        return _by_changes(x)
+    groups = without_flicker(x, groups_between(restart | changes(x)), restart)
     shortest = min(map(len, groups))
     most = 2 * (int(restart.sum()) + 1)
     if shortest == 1 and len(groups) > most:
@@ -88,6 +89,15 @@ def _by_restarts_and_changes(readings: Readings) -> list[Rows]:
         if wanders(x, groups):
             raise _wandering(readings, groups)
     return groups
+
+
+def _by_changes(x: Floats) -> list[Rows]:
+    """Rows between changes of what is set; none where these make no holds, as in a recording that flickers."""
+    groups = groups_between(changes(x))
+    steady = without_flicker(x, groups, np.zeros(len(x), bool))
+    if len(steady) == len(groups) and flickers(x, groups):
+        return []
+    return steady if _are_holds(steady) else []
 
 
 def stretches(readings: Readings, fewest: int = FEWEST) -> list[Rows]:
@@ -102,8 +112,8 @@ def stretches(readings: Readings, fewest: int = FEWEST) -> list[Rows]:
     restart = restarts(readings)
     if restart.any():
         candidates.append(groups_between(restart))
-    by_setting = groups_between(changes(x))
-    if _are_holds(by_setting):
+    by_setting = _by_changes(x)
+    if by_setting:
         candidates.append(by_setting)
     for groups in candidates:
         if not wanders(x, groups):
@@ -119,15 +129,9 @@ def stretches(readings: Readings, fewest: int = FEWEST) -> list[Rows]:
 def _are_holds(groups: Sequence[Rows]) -> bool:
     """Whether groups of one setting each are holds as people write them down, without moves between them."""
     sizes = np.array([len(rows) for rows in groups])
-    usual = _usual(groups)
+    usual = usual_size(groups)
     no_moves = sizes.min() > MOVE_SHARE * usual
     return bool(2 * len(groups) <= sizes.sum() and (usual < CONTINUOUS or no_moves))
-
-
-def _usual(groups: Sequence[Rows]) -> float:
-    """How many readings the hold of the usual reading has."""
-    sizes = [len(rows) for rows in groups]
-    return float(np.median(np.repeat(sizes, sizes)))
 
 
 def _check_order(readings: Readings) -> None:

@@ -142,12 +142,18 @@ def is_continuous(groups: Sequence[Rows]) -> bool:
     return float(np.median([len(rows) for rows in groups])) >= CONTINUOUS
 
 
-def wanders(x: Floats, groups: Sequence[Rows]) -> bool:
-    """Whether a setting changes within a hold by more than a measured one scatters."""
+def usual_size(groups: Sequence[Rows]) -> float:
+    """How many readings the hold of the usual reading has."""
+    sizes = [len(rows) for rows in groups]
+    return float(np.median(np.repeat(sizes, sizes)))
+
+
+def wanders(x: Floats, groups: Sequence[Rows], steady: float = STEADY) -> bool:
+    """Whether a setting changes within a hold by more than a measured one scatters, a share of the smallest step."""
     within = max(float(np.ptp(x[rows])) for rows in groups)
     steps = np.abs(np.diff([float(np.median(x[rows])) for rows in groups]))
     steps = steps[steps > within]
-    return within > 0 and (not len(steps) or within > STEADY * float(steps.min()))
+    return within > 0 and (not len(steps) or within > steady * float(steps.min()))
 
 
 def level_of(x: Floats) -> float:
