@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wirebayes.commands.new_experiment import new_experiment
 from wirebayes.errors import InputError
 from wirebayes.io import run_folder
 from wirebayes.io.run_folder import Run, check_file, check_run, open_run, write_bytes, write_csv, write_json
@@ -209,3 +210,16 @@ def test_a_folder_that_vanishes_under_a_run_is_told_in_one_line(tmp_path):
 def test_other_errors_of_the_system_are_not_hidden(tmp_path):
     with pytest.raises(BrokenPipeError), open_run(tmp_path / "out", CONFIGURATION):
         raise BrokenPipeError(errno.EPIPE, "a bug of ours")
+
+
+@pytest.mark.parametrize("below", [".", "results"])
+def test_a_link_that_leads_nowhere_is_no_folder(below, tmp_path):
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "gone")
+    with pytest.raises(InputError, match=r"link: found a link to .*gone, which is not there, expected a folder"):
+        opened(link / below, CONFIGURATION)
+    with pytest.raises(InputError, match="found a link"):
+        new_experiment(link / below)
+    assert not (tmp_path / "gone").exists()
+    (tmp_path / "gone").mkdir()
+    assert opened(link / below, CONFIGURATION).state == "new"

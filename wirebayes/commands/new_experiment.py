@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from wirebayes.errors import InputError
-from wirebayes.io.run_folder import write_text
+from wirebayes.io.run_folder import check_links, write_text
 from wirebayes.io.start import CSV, NAME, TOML
 from wirebayes.strict.files import PathLike
 
@@ -42,6 +42,7 @@ def new_experiment(folder: PathLike) -> Path:
     for path, content in contents.items():
         if path.exists() and not _holds(path, content):
             raise InputError(f"{path}: found a file of this name, expected a folder without it; nothing is overwritten")
+    check_links(target)
     try:
         target.mkdir(parents=True, exist_ok=True)
         for path, content in contents.items():

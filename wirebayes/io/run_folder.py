@@ -259,6 +259,14 @@ def open_run(directory: str | Path, configuration: Mapping[str, Any]) -> Iterato
             yield Run(directory, state)
 
 
+def check_links(directory: Path) -> None:
+    """Refuse a folder to be made where a link leads to nothing."""
+    for place in (directory, *directory.parents):
+        if place.is_symlink() and not place.exists():
+            found = f"a link to {os.readlink(place)}, which is not there"
+            raise InputError(f"{place}: found {found}, expected a folder, or no such link")
+
+
 def check_run(directory: Path, configuration: Mapping[str, Any]) -> Literal["new", "resumed", "done"]:
     """State in which `open_run` would find a folder; writes nothing and raises as `open_run` does."""
     expected = "a new or empty folder, or one made with the same configuration"
@@ -267,6 +275,7 @@ def check_run(directory: Path, configuration: Mapping[str, Any]) -> Literal["new
             path.name for path in directory.iterdir() if path.name != LOCK and not path.name.endswith(_PARTIAL)
         )
     except FileNotFoundError:
+        check_links(directory)
         return "new"
     except NotADirectoryError:
         raise InputError(f"{directory}: found a file, expected a folder") from None
