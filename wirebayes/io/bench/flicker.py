@@ -25,6 +25,15 @@ def without_flicker(x: Floats, groups: list[Rows], restart: Bools) -> list[Rows]
     """Groups without borders at which only the last digit of a measured setting changes; the same where none are.
 
     Beside such a border one of the groups is shorter than a hold, and a move is many times the digit.
+
+    Parameters
+    ----------
+    x : (r,) array
+        What was set.
+    groups : list of Rows
+        Of one setting each.
+    restart : (r,) array of bool
+        Where the clock starts again, which is a border whatever the setting does.
     """
     least, usual = _least_steps(x), usual_size(groups)
     border = np.zeros(len(x), bool)

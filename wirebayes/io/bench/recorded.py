@@ -149,7 +149,17 @@ def usual_size(groups: Sequence[Rows]) -> float:
 
 
 def wanders(x: Floats, groups: Sequence[Rows], steady: float = STEADY) -> bool:
-    """Whether a setting changes within a hold by more than a measured one scatters, a share of the smallest step."""
+    """Whether a setting changes within a hold by more than a measured one scatters.
+
+    Parameters
+    ----------
+    x : (r,) array
+        What was set.
+    groups : sequence of Rows
+        Of each hold.
+    steady : float
+        The share of the smallest step by which it may scatter.
+    """
     within = max(float(np.ptp(x[rows])) for rows in groups)
     steps = np.abs(np.diff([float(np.median(x[rows])) for rows in groups]))
     steps = steps[steps > within]
