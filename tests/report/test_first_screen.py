@@ -79,6 +79,21 @@ def test_a_comparison_is_a_ranking_in_words() -> None:
         assert ("against plain, which may be chance; then" in said) == chance
 
 
+def test_where_the_plain_model_is_the_best_it_is_said_by_how_much() -> None:
+    rows = [
+        {"name": "plain", "failed": None, "difference": {"elpd": 0.0, "se": 0.0}},
+        {"name": "toe", "failed": None, "difference": {"elpd": -9.3, "se": 2.0}},
+        {"name": "ageing", "failed": None, "difference": {"elpd": -20.0, "se": 3.0}},
+    ]
+    ahead = "a: plain predicts left-out holds best, by 9.3 ± 2.0 elpd (log probability of their readings) against toe"
+    for models, rest in ((rows, "; then comes ageing."), (rows[:2], ".")):
+        table = {"base": "plain", "models": models}
+        assert headline.comparison_in_words("a", table) == ahead + rest  # type: ignore[arg-type]
+    rows[1]["difference"] = None  # another likelihood, whose elpd is of something else
+    table = {"base": "plain", "models": rows[:2]}
+    assert headline.comparison_in_words("a", table) == "a: plain predicts left-out holds best; then comes toe."  # type: ignore[arg-type]
+
+
 def test_a_batch_says_a_sentence_a_finding_and_no_plural_of_one() -> None:
     stiff = [{"k1": {"q50": middle, "q05": middle - 20.0, "q95": middle + 20.0}} for middle in (900.0, 930.0, 990.0)]
     row = {"error": None, "check": None, "verdict": "nothing-missing", "material": "m", "converged": True}

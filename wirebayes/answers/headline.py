@@ -181,10 +181,13 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
     best, *others = scored
     model, base = best["name"], table["base"]
     text = f"{name}: {spoken(model)} predicts left-out holds best"
-    gain = best["difference"]
-    if gain is not None and model != base:
-        ahead = _ahead(gain)
-        text += f", {ahead} against {base}"
+    gain, against = best["difference"], base
+    loss = others[0]["difference"] if others else None
+    if model == base and loss is not None:  # all others are compared with it: what it is ahead of is the next
+        second, *others = others
+        gain, against = {**loss, "elpd": -loss["elpd"]}, spoken(second["name"])
+    if gain is not None and against != model:
+        text += f", {_ahead(gain)} against {against}"
         text += _by_chance(gain)
     if others:
         come = "come" if len(others) > 1 else "comes"

@@ -98,8 +98,8 @@ def _next(table: ComparedModels) -> str:
     options = options_of_best(table)
     again = ""
     if options is not None:
-        again = f"wirebayes fit FILE.toml {options}".rstrip() + ", or "
-    return f"Next: {again}wirebayes discover FILE.toml, which names what is missing."
+        again = f"wirebayes fit {options}".rstrip() + " or "
+    return f"Next: {again}wirebayes discover, with the same file; discover names what is missing."
 
 
 def _scores(scored: Sequence[ComparedModel], base: str) -> Table:

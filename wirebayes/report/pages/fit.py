@@ -166,7 +166,7 @@ def _texts(sample: Sample, summary: SummaryJson, trusted: bool) -> dict[str, tup
         measured = f"Displacement of {name} against weight.", _GREW
     else:
         measured = f"Tension of {name} against displacement.", _READ
-    left = f"Measured minus predicted readings of {name}, hold after hold, inside the 90 % band."
+    left = f"Measured minus predicted readings of {name}, hold after hold, with their 90 % band."
     later = f"Creep of {name} from 10 s to a day: posterior, posterior with the prior at half weight, prior alone."
     return {
         "curve": (f"Readings of {name} with the fitted curve through them, hold after hold.", _CURVE),
