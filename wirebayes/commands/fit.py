@@ -79,7 +79,8 @@ def fit(
     together : str, optional
         Fit all samples of this material at once.
     check : bool
-        Check each fit against up to 999 refitted simulations, half of them where these decide.
+        Check each fit against 999 refitted simulations: half of them where these decide, up to four times as many
+        where p is close to the level.
     drop_breaks : bool
         Leave out the readings of breaks, of sensors at their limit, and of dropouts.
     seed : int
