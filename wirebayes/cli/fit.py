@@ -42,9 +42,7 @@ def fit_command(
     ] = None,
     check: Annotated[
         bool,
-        typer.Option(
-            "--check/--no-check", help="Check each fit against 500 to 4,000 refitted simulations (1 to 10 s)."
-        ),
+        typer.Option("--check/--no-check", help="Check each fit against 500 to 4000 refitted simulations (1 to 10 s)."),
     ] = True,
     drop_breaks: DropBreaks = False,
     as_json: AsJson = False,
