@@ -67,11 +67,14 @@ def simulate_command(
     """Write synthetic tests: DIR/experiments.toml, a CSV for each test, and DIR/truth.json."""
     from wirebayes.cli.answer import print_answer
     from wirebayes.commands.simulate_tests import simulate_tests
+    from wirebayes.errors import InputError
     from wirebayes.simulation.synthetic import finite_number
 
     chosen = {}
     for text in parameter or ():
         name, _, value = text.partition("=")
+        if name in chosen:
+            raise InputError(f"--parameter {text}: found {name} a second time, expected it once")
         chosen[name] = finite_number(f"--parameter {text}", value)
     made = simulate_tests(
         tests=tests,

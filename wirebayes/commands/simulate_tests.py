@@ -4,27 +4,32 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from wirebayes._version import __version__
 from wirebayes.commands.options import Numbers, check_seed, check_whole, model_spec, names_given, path_of, text_of
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
+from wirebayes.io.experiment_file import SHORTEST
 from wirebayes.io.run_folder import check_run, open_run
 from wirebayes.simulation.synthetic import Bench, Truth, draw, effect_option, finite_number, write_tests
 from wirebayes.strict.files import PathLike
+from wirebayes.strict.table import LARGEST
 from wirebayes.views.result import ResultFolder
 from wirebayes.views.simulated_tests import SimulatedTests
 from wirebayes.wire.control import READ_UNIT
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Effect, EventEffect
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.protocol import Control
+
+DISPLACEMENTS_MM = tuple(range(1, 13))  # those of the paper
 
 
 def simulate_tests(
     *,
     tests: int = 1,
     lengths: Numbers = (1000.0,),
-    displacements: Numbers = tuple(range(1, 13)),
+    displacements: Numbers = DISPLACEMENTS_MM,
     weights: Numbers = (),
     unload: int = 0,
     times: Numbers = (0.0, 30.0, 60.0, 90.0, 120.0),
@@ -104,6 +109,7 @@ def simulate_tests(
     control, path = _settings(displacements, weights, unload)
     gaps = frozenset(unrecorded)
     _check_protocol(control, path, sizes, moments, gaps)
+    _check_events(found, path, gaps)
     warmth = _temperatures(temperature)
     alike = Bench(times_s=moments, unrecorded=gaps, temperatures_C=warmth).setting(control, path, float(resolution))
     benches = _benches(alike, tests, sizes)
@@ -127,13 +133,20 @@ def simulate_tests(
         "history": history,
     }
     place = ResultFolder.at(output)
-    if check_run(place.path, configuration) == "new":
+    computed = _write(place.path, configuration, benches, truth)
+    return SimulatedTests(place, own, computed=computed)
+
+
+def _write(folder: Path, configuration: Mapping[str, Any], benches: Sequence[Bench], truth: Truth) -> bool:
+    """Draw and write the tests, where that was not done before."""
+    seed = configuration["seed"]
+    if check_run(folder, configuration) == "new":
         draw(benches, truth, seed)  # whatever is wrong with the truth is said before a folder is made
-    with open_run(place.path, configuration) as run:
+    with open_run(folder, configuration) as run:
         if run.state != "done":
-            write_tests(place.path, benches, truth, seed)
+            write_tests(folder, benches, truth, seed)
             run.finish()
-    return SimulatedTests(place, own, computed=run.state != "done")
+        return run.state != "done"
 
 
 def _parameters(given: Mapping[str, float]) -> dict[str, float]:
@@ -152,6 +165,9 @@ def _effects(
     known = catalogue(own)
     for text in texts:
         effect, amplitudes = effect_option(text, known)
+        again = set(amplitudes) & set(given)
+        if again:
+            raise InputError(f"--effect {text}: found {min(again)} a second time, expected it once")
         found[effect.key] = effect
         given |= amplitudes
     return found, given
@@ -170,11 +186,22 @@ def _benches(alike: Bench, lines: int, lengths_mm: Sequence[float]) -> list[Benc
 def _settings(displacements: Numbers, weights: Numbers, unload: int) -> tuple[Control, list[float]]:
     """What is set in each hold, mm or N: up as given, then so many back down."""
     control: Control = "force" if text_of(weights) else "displacement"
+    if control == "force" and _numbers("--displacements", displacements) != list(DISPLACEMENTS_MM):
+        raise InputError("--weights: found --displacements beside it, expected one of the two")
     option, given = ("--weights", weights) if control == "force" else ("--displacements", displacements)
     path = _numbers(option, given)
     if unload >= len(path):
         raise InputError(f"--unload: found {unload}, expected fewer than the {len(path)} {option.removeprefix('--')}")
     return control, path + path[-2 : -2 - unload : -1]
+
+
+def _check_events(effects: Mapping[str, Effect], path: Sequence[float], unrecorded: frozenset[int]) -> None:
+    """Refuse an event at a hold that no test has, or of which nothing is read."""
+    last = len(path)
+    recorded = set(range(1, last + 1)) - unrecorded
+    for key, effect in effects.items():
+        if isinstance(effect, EventEffect) and effect.hold not in recorded:
+            raise InputError(f"--effect {key}: found hold {effect.hold}, expected a recorded one from 1 to {last}")
 
 
 def _check_protocol(
@@ -185,10 +212,13 @@ def _check_protocol(
     unrecorded: frozenset[int],
 ) -> None:
     """Refuse what no bench could do."""
-    shortest, least = min(lengths), min(path)
+    shortest, longest, least = min(lengths), max(lengths), min(path)
     is_repeated = len(set(lengths)) < len(lengths)
     if shortest <= 0 or is_repeated:
         raise InputError(f"--lengths: found {text_of(lengths)!r}, expected different lengths above 0 mm")
+    if shortest < SHORTEST or longest > LARGEST["displacement_mm"]:
+        expected = f"lengths from {SHORTEST:.0e} to {LARGEST['displacement_mm']:.0e} mm"
+        raise InputError(f"--lengths: found {text_of(lengths)!r}, expected {expected}")
     if control == "force" and least <= 0:
         raise InputError(f"--weights: found {least:g}, expected more than 0 N")
     if control == "displacement" and least <= -shortest:

@@ -211,6 +211,7 @@ def draw(benches: Sequence[Bench], truth: Truth = Truth(), seed: int | np.random
     for sample in samples:
         own = problem.parameters(theta, sample)
         setting, exact, read = _read(sample, own, rng)
+        _check_carried(sample, own, read)
         settings.append(setting[:, 0])
         clean.append(exact[..., 0])
         readings.append(read)
@@ -227,6 +228,16 @@ def _read(sample: Sample, own: Theta, rng: np.random.Generator) -> tuple[Array, 
     read = rounded(exact + noise, sample.resolution)
     recorded = protocol.mask[..., None]
     return setting, exact, np.where(recorded, read, 0.0)
+
+
+def _check_carried(sample: Sample, own: Theta, read: Array) -> None:
+    """Refuse a weight under which the wire has no length."""
+    protocol = sample.protocol
+    for weight, readings in zip(protocol.setting, read, strict=True):
+        if not np.isfinite(readings).all():
+            carries = f"a wire with k1 = {own['k1'][0]:g} N, which by the {sample.model.law} law carries less"
+            expected = "smaller weights or a larger k1"
+            raise InputError(f"{sample.name}, hold of {weight:g} N: found {carries}, expected {expected}")
 
 
 def _middle_stiffness(truth: Truth) -> float:
