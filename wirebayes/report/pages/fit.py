@@ -198,13 +198,14 @@ def _next(summary: SummaryJson) -> str:
 
 _CURVE = (
     "Above: every reading, and the curve that the model draws through them, with its 90 % band, given all readings. "
-    "Below: what is left between reading and curve; nine in ten should lie in the band of the readings' own error."
+    "Below: what is left between reading and curve; nine in ten should lie in the band of the readings' own error. The "
+    "curve has the error of each setting in it, and may pass through the readings of a model that is wrong."
 )
 _READ = "What was read at each displacement: blue when the hold begins, red later."
 _GREW = "What was read under each weight: blue when the hold begins, red later."
 _LEFT = (
-    "Measured minus predicted readings. Where they lie outside the band, or show a pattern within it, the model misses "
-    "something."
+    "Measured minus predicted readings, each setting as it was stated. Where they lie outside the band, or show a "
+    "pattern within it, the model misses something."
 )
 _PAIRS = (
     "Every pair of parameters: half of the draws lie in the dark region, 90 % in the light one. A narrow ridge means "
