@@ -15,6 +15,7 @@ from wirebayes.commands.wires import robot_of
 from wirebayes.effects import CATALOGUE
 from wirebayes.io.run_folder import read_json, write_json
 from wirebayes.model.spec import ModelSpec
+from wirebayes.planning import sensitivity
 from wirebayes.robot.mechanics import schema
 
 FIELD = Path(__file__).parents[1] / "robot" / "field"
@@ -51,7 +52,7 @@ readings = 9
 def quick(monkeypatch):
     """Few simulations, and a catalogue of four effects."""
     few = {name: CATALOGUE[name] for name in ("toe", "steady_creep", "sensor_drift", "lost_motion")}
-    monkeypatch.setattr(module, "SIMULATIONS", 40)
+    monkeypatch.setattr(sensitivity, "SIMULATIONS", 40)
     monkeypatch.setattr(module, "_ROBOT_TESTS", 2)
     monkeypatch.setattr(plan_content, "_ROBOT_DRAWS", 20)
     monkeypatch.setattr(module, "catalogue", lambda own: few)

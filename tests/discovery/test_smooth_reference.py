@@ -56,7 +56,7 @@ def test_displacements_count_by_the_range_of_all_holds_read_or_not(tmp_path: Pat
 
     over_holds = 0.5 * smooth(order, 0.3) + 0.5 * np.minimum.outer(order, order) + 0.5 * smooth(place, 0.3)
     expected = over_holds * (0.5 + 0.5 * smooth(time, 0.7))
-    assert covariance(smooth_reference.basis(protocol, 1.0), mask) == pytest.approx(expected, abs=1e-9)
+    assert covariance(smooth_reference.basis(protocol), mask) == pytest.approx(expected, abs=1e-9)
 
 
 def test_of_many_readings_the_covariance_of_some_gives_nearly_the_best_functions(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ from wirebayes.model.spec import ModelSpec
 from wirebayes.numeric.frozen import frozen
 from wirebayes.planning.guess import GuessedWire, from_posterior, from_readings, from_tables
 from wirebayes.planning.ranking import Judged, ranked
-from wirebayes.planning.sensitivity import SIMULATIONS, sensitivity
+from wirebayes.planning.sensitivity import sensitivity
 from wirebayes.planning.widths import at_centre, expected_widths, middle_tension
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
@@ -183,7 +183,7 @@ def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, repo
             expected = expected_widths(test, guess, rng, spec, **stated, kept_draws=kept)
         except ValueError as error:
             raise InputError(f"{test.source}, protocol {test.name}: {error} at this guess") from None
-        seen = sensitivity(test, guess, kinds, rng, spec, simulations=SIMULATIONS)
+        seen = sensitivity(test, guess, kinds, rng, spec)
         judged.append(Judged(test, words, expected, seen))
     report("protocols", len(planned), len(planned))
     return judged

@@ -1,16 +1,15 @@
 """Gross errors: single readings that no effect explains, excluded before the tests that follow."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from wirebayes.discovery.linear_scan import expand, scan
+from wirebayes.discovery.linear_scan import AddedColumns, expand, scan
 from wirebayes.discovery.refit import occam
 from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.io.experiment import Experiment
 from wirebayes.json_files.discovery import GrossError
-from wirebayes.model.problem import Problem
 from wirebayes.numeric.typing import Array
 from wirebayes.result_warnings import Notice
 
@@ -39,10 +38,10 @@ def suspect(block: LaplaceFit, rival: float) -> tuple[str, int, int, float] | No
     return sample.name, number, int(r), value
 
 
-def _one_reading_each(cells: Sequence[tuple[int, int, int]]) -> Callable[[Problem, int, Array, Array], Array]:
+def _one_reading_each(cells: Sequence[tuple[int, int, int]]) -> AddedColumns:
     """What makes the columns (see `expand`) that move one reading each: sample, row of the hold, reading."""
 
-    def columns(problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
+    def columns(at: int, tension: Array, slopes: Array) -> Array:
         out = np.zeros((*tension.shape, len(cells)))
         for i, (of_sample, j, r) in enumerate(cells):
             if of_sample == at:

@@ -22,10 +22,14 @@ from wirebayes.model.problem import Problem
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.typing import Array, Bools, Ints
 
+# Further signatures behind the probes': given the sample's number, its tension (H, R, n) and the derivatives
+# (H, R, n, p), they are (H, R, n, more), N.
+AddedColumns = Callable[[int, Array, Array], Array]
+
 
 def plain_reference(problem: Problem) -> list[list[Array]]:
     """The flexible reference of one process, unit size: functions (H, R, q) of every sample, N."""
-    return [[smooth_reference.basis(sample.protocol, 1.0)] for sample in problem.samples]
+    return [[smooth_reference.basis(sample.protocol)] for sample in problem.samples]
 
 
 def expand(
@@ -33,7 +37,7 @@ def expand(
     z: Array,
     trials: Sequence[Probe],
     readings: Sequence[Array] | None = None,
-    columns: Callable[[Problem, int, Array, Array], Array] | None = None,
+    columns: AddedColumns | None = None,
     shapes: Sequence[Array] | None = None,
     reference: Sequence[Sequence[Array]] | None = None,
 ) -> Expansion:
@@ -48,9 +52,7 @@ def expand(
     trials : sequence of Probe
     readings : sequence of (H, R, n) arrays, optional
         Replicates that stand in for the measured readings, one array a sample, row by row of `z`.
-    columns : callable, optional
-        Adds further signatures behind the probes': given the problem, the sample's number, the tension (H, R, n) and
-        its derivatives (H, R, n, p), it returns (H, R, n, more), N.
+    columns : AddedColumns, optional
     shapes : sequence of (H, R, m) arrays, optional
         Signatures from `forms`, used for all rows: an effect's form hardly differs between refits.
     reference : sequence of lists of (H, R, q) arrays, optional
@@ -72,7 +74,7 @@ def expand(
         sd = point.sd[:, None, None]
         each = [shapes[at][mask][None] / sd]
         if columns is not None:
-            more = columns(problem, at, point.tension, point.slopes)
+            more = columns(at, point.tension, point.slopes)
             each.append(_rows(point, more, mask))
         added.append(np.concatenate(each, axis=-1))
         functions.append([f[mask][None] / sd for f in reference[at]])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wirebayes.discovery.linear_scan import AddedColumns
 from wirebayes.discovery.scans import Scan
 from wirebayes.json_files.discovery import Disagreement
 from wirebayes.model.problem import Problem
@@ -78,7 +79,7 @@ class Pattern:
     unit: str = "N"
 
 
-def patterns(problem: Problem) -> tuple[list[Pattern], Callable[[Problem, int, Array, Array], Array]]:
+def patterns(problem: Problem) -> tuple[list[Pattern], AddedColumns]:
     """The patterns to look for in a block, and the function that makes their columns.
 
     Along each covariate: smooth functions of it as an added tension, and the model's own parameters moving with it.
@@ -130,7 +131,7 @@ class _Columns:
     parameters: list[int]
     holds: list[tuple[int, int]]
 
-    def __call__(self, problem: Problem, at: int, tension: Array, slopes: Array) -> Array:
+    def __call__(self, at: int, tension: Array, slopes: Array) -> Array:
         """(H, R, n, more) of one sample, of its tension and the derivatives."""
         shape = tension.shape
         out: list[Array] = []

@@ -42,7 +42,7 @@ class _Readings:
 _Covariance = Callable[[_Readings, _Readings], Array]
 
 
-def basis(protocol: Protocol, scale_N: float) -> Array:
+def basis(protocol: Protocol) -> Array:
     """(H, R, q) functions whose independent unit-normal combinations are the Gaussian process, N.
 
     The covariance is a product: over the order of holds (smooth, or wandering so that a step is not excluded) and over
@@ -58,7 +58,7 @@ def basis(protocol: Protocol, scale_N: float) -> Array:
         over_hold += 0.5 * _smooth(one.place / reach, other.place / reach, 0.3)
         return np.asarray(over_hold * (0.5 + 0.5 * _smooth(one.time, other.time, 0.7)))
 
-    return _functions(protocol, covariance, FUNCTIONS) * scale_N
+    return _functions(protocol, covariance, FUNCTIONS)
 
 
 def family(protocol: Protocol) -> list[Array]:
@@ -72,7 +72,7 @@ def family(protocol: Protocol) -> list[Array]:
         return lambda one, other: _smooth(one.hold, other.hold, holds) * _smooth(one.time, other.time, times)
 
     kernels = [product(holds, times) for holds in HOLD_LENGTHS for times in TIME_LENGTHS]
-    return [basis(protocol, 1.0), *(_functions(protocol, kernel, SHORT_FUNCTIONS) for kernel in kernels)]
+    return [basis(protocol), *(_functions(protocol, kernel, SHORT_FUNCTIONS) for kernel in kernels)]
 
 
 def _functions(protocol: Protocol, covariance: _Covariance, most: int) -> Array:

@@ -67,7 +67,7 @@ def build(
         mark = f"[{experiment.name}]" if several else ""
         distributions |= _sample_priors(experiment, effects, mark, spec, scales)
     every = _in_natural_units(distributions, effects, samples, scales)
-    stated = _apply_tables(every, experiments, several)
+    stated = _apply_tables(every, experiments)
     fixed = {name: float(d) for name, d in every.items() if isinstance(d, int | float)}
     free = {name: d for name, d in every.items() if name not in fixed}
     logarithmic = _positive(free, effects)
@@ -216,7 +216,7 @@ def _extent(experiment: Experiment) -> float:
     return float(np.ptp(values) if experiment.control == "force" else np.abs(values).max())
 
 
-def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment], several: bool) -> set[str]:
+def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment]) -> set[str]:
     """Put the priors of the files in place of the defaults, and return the columns that have one."""
     stated = set()
     everything = set(MATERIAL) | set(SAMPLE) | {LENGTH_EXPONENT}

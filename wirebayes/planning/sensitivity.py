@@ -21,7 +21,7 @@ from wirebayes.model.spec import PLAIN_SPEC, ModelSpec
 from wirebayes.planning.widths import Guess, central
 from wirebayes.wire.effect import Effect, Kinds
 
-SIMULATIONS = 300  # an amplitude seen in 80 % of tests is then known to some 5 %
+SIMULATIONS = 300  # refitted, behind the level of chance: an amplitude seen in 80 % of tests is then known to some 5 %
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,7 @@ class Sensitivity:
 
 
 def sensitivity(
-    test: Experiment,
-    guess: Guess,
-    kinds: Kinds,
-    rng: np.random.Generator,
-    spec: ModelSpec = PLAIN_SPEC,
-    *,
-    simulations: int = SIMULATIONS,
+    test: Experiment, guess: Guess, kinds: Kinds, rng: np.random.Generator, spec: ModelSpec = PLAIN_SPEC
 ) -> Sensitivity:
     """Find what a planned test would show of missing effects.
 
@@ -70,8 +64,6 @@ def sensitivity(
     rng : numpy Generator
     spec : ModelSpec
         The plain model.
-    simulations : int
-        Refitted tests behind the level of chance.
     """
     block = _fit_at(test, central(guess), spec)
     trials, candidates = screening.candidate_probes([block], kinds)
@@ -79,7 +71,7 @@ def sensitivity(
     hidden = tuple(power.not_identifiable(block, list(kinds.values()), names))
     if not candidates:
         return Sensitivity(hidden=hidden)
-    null = screening.replicated(block, trials, simulations, rng).scan
+    null = screening.replicated(block, trials, SIMULATIONS, rng).scan
     level = screening.chance_level(candidates, [null])
     x = expand(block.target, block.z, trials)
     alike = power.similarity([x], trials, [float(x.ratio[0])])

@@ -18,6 +18,7 @@ from wirebayes.robot.motion.course import Course
 from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh
 
 TIME_S, DISTANCE_M, TILT_RAD = 60.0, 0.3e-3, float(np.radians(0.055))  # section 4 of the paper
+_SPREAD = 0.05  # from specimen to specimen, where it is asked for the largest mass
 
 
 @dataclass(frozen=True)
@@ -219,7 +220,7 @@ def _quantiles(values: Floats) -> list[float]:
     return [float(q) for q in np.quantile(held, [0.05, 0.5, 0.95])] if held.size else [np.nan] * 3
 
 
-def largest_mass(robot: Robot, line: WireDraws, size: float, spread: float = 0.05, steps: int = 9) -> float:
+def largest_mass(robot: Robot, line: WireDraws, size: float, steps: int) -> float:
     """Largest platform mass, kg, for which the claim holds with 95 % at nineteen poses of twenty, by bisection.
 
     Parameters
@@ -228,8 +229,6 @@ def largest_mass(robot: Robot, line: WireDraws, size: float, spread: float = 0.0
     line : WireDraws
     size : float
         Factor on every length of the robot.
-    spread : float
-        From specimen to specimen.
     steps : int
         Halvings of the range from 1 g to 20 kg on a logarithmic scale.
     """
@@ -237,7 +236,7 @@ def largest_mass(robot: Robot, line: WireDraws, size: float, spread: float = 0.0
     for _ in range(steps):
         mass = float(np.sqrt(low * high))
         other = scaled_robot(robot, size, mass)
-        wires = for_robot(other, line, spread, np.random.default_rng(1))
+        wires = for_robot(other, line, _SPREAD, np.random.default_rng(1))
         out = over_workspace(other, wires, grid(other, (3, 3, 2)))
         good = np.mean(out.holds() >= 0.95) >= 0.95
         low, high = (mass, high) if good else (low, mass)

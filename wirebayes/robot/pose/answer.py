@@ -140,7 +140,7 @@ def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, cont
     for spread, course in courses.items():
         content["drift"].append({"specimen_spread": spread, **_drift(course, x, R)})
         content["stability"].append({"specimen_spread": spread, **stability.summary(course)})
-    content["claim"] = _claim(courses, x, R, request)
+    content["claim"] = _claim(courses, x, R)
     content["pose_error"] = controllers.errors(robot, line, request, rng, other)
     content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
     content["variance_shares"] = _shares(robot, line, courses, x, R)
@@ -308,7 +308,7 @@ def _drift(course: Course, x: Floats, R: Floats) -> DriftBands:
     }
 
 
-def _claim(courses: dict[float, Course], x: Floats, R: Floats, request: PoseRequest) -> Claim:
+def _claim(courses: dict[float, Course], x: Floats, R: Floats) -> Claim:
     """Probability, at this pose, of the paper's figures."""
     probability: list[ClaimHolds] = []
     for spread, course in courses.items():

@@ -25,6 +25,7 @@ from wirebayes.robot.self_calibration.trust import joint_test
 # missed by a hundred standard errors. A search is given up after so many steps then; of sessions that fit, however
 # rough, the third step foresees less than a thousandth of it.
 GROSS, PATIENT = 1e4, 5
+_MOST_STEPS = 40  # of Levenberg-Marquardt
 _DIFFERENCE = 1e-3  # of a prior's standard deviation: differences of smooth functions
 
 
@@ -81,7 +82,6 @@ def length_posterior(
     prior: LengthPrior,
     session: Session,
     readings: Floats,
-    iterations: int = 40,
     patience: int = PATIENT,
     progress: ShareDone = lambda share: None,
 ) -> LengthPosterior:
@@ -94,8 +94,6 @@ def length_posterior(
     session : Session
     readings : (m, r) array
         In the order and the units of `Prediction.readings`.
-    iterations : int
-        Levenberg-Marquardt steps at most.
     patience : int
         Steps from which on the search is given up where the readings contradict the robot grossly.
     progress : function of a share between 0 and 1
@@ -111,7 +109,7 @@ def length_posterior(
     white = np.zeros((len(readings), len(mean)))
     references = starting_references(robot, prior, session, readings)
     white[:, : robot.legs] = references / prior.reference_sd_m
-    mode = _mode(target, white, iterations, patience)
+    mode = _mode(target, white, patience)
     progress(1.0)
     return _about(target, mode)
 
@@ -186,7 +184,7 @@ class _Mode:
     converged: Bools
 
 
-def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mode:
+def _mode(target: _Target, white: Floats, patience: int) -> _Mode:
     """Modes by Levenberg-Marquardt, all robots at once, from a start ``(m, d)``; given up where readings are absurd."""
     m, d = white.shape
     here = target.predicted(white)
@@ -195,8 +193,8 @@ def _mode(target: _Target, white: Floats, iterations: int, patience: int) -> _Mo
     damping = np.full(m, 1e-3)
     converged, ended = np.zeros((2, m), bool)
     J = np.zeros((m, target.readings.shape[1], d))
-    for taken in range(iterations):
-        target.progress(taken / iterations)
+    for taken in range(_MOST_STEPS):
+        target.progress(taken / _MOST_STEPS)
         open_ = np.flatnonzero(~ended & moved)  # where a step failed, the derivatives stay: they are the work
         if len(open_):
             J[open_] = target.derivatives(white[open_], rows_of(here, open_))[0]

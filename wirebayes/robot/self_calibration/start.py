@@ -19,6 +19,8 @@ from wirebayes.robot.motion import inverse
 from wirebayes.robot.self_calibration.predicted import PredictedSession, predict_session
 from wirebayes.robot.self_calibration.session import LengthPrior, Session
 
+_MOST_STEPS = 12  # of Gauss-Newton
+
 
 @dataclass(frozen=True)
 class _Loops:
@@ -61,17 +63,13 @@ class _Equations:
     by_length: Floats
 
 
-def starting_references(
-    robot: Robot, prior: LengthPrior, session: Session, readings: Floats, iterations: int = 12
-) -> Floats:
+def starting_references(robot: Robot, prior: LengthPrior, session: Session, readings: Floats) -> Floats:
     """Reference errors ``(m, w)``, m, from closed loops and balance, creep taken as the prior expects it.
 
     Parameters
     ----------
     robot, prior, session, readings
         As for `estimate.calibrate`.
-    iterations : int
-        Gauss-Newton steps at most.
     """
     mean, _ = prior.moments(robot.legs)
     expected = predict_session(robot, prior, session, mean[None])
@@ -79,7 +77,7 @@ def starting_references(
     m = len(readings)
     x, R = _expected_poses(expected, m)
     error = np.zeros((m, robot.legs))
-    for _ in range(iterations):
+    for _ in range(_MOST_STEPS):
         equations = _linearised(robot, loops, x, R, error)
         change, move = _step(equations, error, prior.reference_sd_m)
         error = error + change

@@ -113,7 +113,7 @@ def calibration_report(
         "robot": robot.name,
         "holds": len(session.duration_s),
         "read": int(session.read.sum()),
-        "prior": _prior(robot, prior, errors, session),
+        "prior": _prior(prior, errors, session),
         "exit_points_m": interval_about(*s.exit_m),
         "platform_points_m": interval_about(*s.platform_m),
         "zero_tension_lengths_m": interval_about(*s.length_m),
@@ -170,7 +170,7 @@ class _Verdict:
         return bool(search.found.converged and self.learnt and explained)
 
 
-def _prior(robot: Robot, prior: LengthPrior, errors: StatedErrors, session: Session) -> CalibrationPrior:
+def _prior(prior: LengthPrior, errors: StatedErrors, session: Session) -> CalibrationPrior:
     given: CalibrationPrior = {
         "reference_sd_mm": 1e3 * prior.reference_sd_m,
         "specimen_spread": prior.spread,
