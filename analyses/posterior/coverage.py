@@ -19,6 +19,7 @@ from analyses.resumable import records
 from wirebayes.inference.fit import fit_problem, seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.run_folder import write_json
+from wirebayes.model.hold_filter import Measured
 from wirebayes.model.likelihoods import chain, reading_variance
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import MATERIAL
@@ -76,7 +77,7 @@ def held_out(made: Simulated, theta: Array, count: int, rng: np.random.Generator
     seen = sample.protocol.mask.copy()
     seen[count:] = False
     rounded = variance + sample.resolution**2 / 12.0
-    state = chain(line, sample.readings, seen, rounded, setting_sd)
+    state = chain(line, Measured(sample.readings, seen, rounded, setting_sd))
     carried = state.carried_mean[count] + np.sqrt(state.carried_var[count]) * rng.normal(size=len(theta))
     out = []
     for j in range(count, len(seen)):

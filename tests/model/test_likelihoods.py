@@ -17,6 +17,7 @@ from tests.model.dense import (
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import effect_named
 from wirebayes.model import likelihoods, single_holds
+from wirebayes.model.hold_filter import Measured
 from wirebayes.wire import compiled
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import linearise, simulate
@@ -39,7 +40,7 @@ def measured(p, theta, model=None, seed=0):
 def filtered(p, theta, readings, model=None, resolution=0.0):
     line = linearise(p, columns(theta), model or Model())
     variance = likelihoods.reading_variance(np.array([theta["sensor_sd"]]), resolution)
-    return likelihoods.chain(line, readings[..., None], p.mask, variance, np.array([theta["setting_sd"]]))
+    return likelihoods.chain(line, Measured(readings[..., None], p.mask, variance, np.array([theta["setting_sd"]])))
 
 
 noises = st.fixed_dictionaries({"sensor_sd": st.floats(1e-3, 0.1), "setting_sd": st.floats(1e-3, 0.2)})
@@ -110,7 +111,7 @@ def test_residuals_give_the_log_likelihood_and_its_expected_information():
         own = at(move)
         variance, setting = np.array([own["sensor_sd"] ** 2]), np.array([own["setting_sd"]])
         line = linearise(LOADING, columns(own))
-        return likelihoods.standardised(line, y[..., None], LOADING.mask, variance, setting)
+        return likelihoods.standardised(line, Measured(y[..., None], LOADING.mask, variance, setting))
 
     found = []
     for seed in range(100):
@@ -136,7 +137,7 @@ def test_dropping_the_carried_creep_is_noticed():
     line = linearise(LOADING, columns(theta))
     line.by_creep[:] = 0.0
     variance, setting = np.array([theta["sensor_sd"] ** 2]), np.array([theta["setting_sd"]])
-    broken = likelihoods.chain(line, y[..., None], LOADING.mask, variance, setting).log_likelihood.sum()
+    broken = likelihoods.chain(line, Measured(y[..., None], LOADING.mask, variance, setting)).log_likelihood.sum()
     r, covariance, _ = normal(LOADING, theta, Model(), y)
     assert abs(broken - log_density(r, covariance)) > 0.1
 
@@ -150,9 +151,9 @@ def test_leaving_a_hold_out_is_dense_conditioning(p, theta, errors, seed):
     r, covariance, hold = normal(p, theta, Model(), y, 0.01)
     line = linearise(p, columns(theta))
     variance = likelihoods.reading_variance(np.array([theta["sensor_sd"]]), 0.01)
-    seen = y[..., None], p.mask, variance, np.array([theta["setting_sd"]])
-    filtered = likelihoods.chain(line, *seen)
-    found = (filtered.log_likelihood.sum(axis=0) - likelihoods.without_each_hold(line, filtered, *seen))[:, 0]
+    seen = Measured(y[..., None], p.mask, variance, np.array([theta["setting_sd"]]))
+    filtered = likelihoods.chain(line, seen)
+    found = (filtered.log_likelihood.sum(axis=0) - likelihoods.without_each_hold(line, filtered, seen))[:, 0]
     rounding = 1e-6 + 1e-9 * abs(log_density(r, covariance))  # of the dense answer, a difference of two large numbers
     for j in range(len(found)):
         expected = conditional(r, covariance, hold == j) if p.mask[j].any() else 0.0
@@ -167,10 +168,10 @@ def test_held_out_holds_are_given_those_before_them_alone():
     line = linearise(LOADING, columns(theta))
     noise = np.array([theta["sensor_sd"] ** 2]), np.array([theta["setting_sd"]])
     out = np.isin(np.arange(6), [4, 5])
-    before = likelihoods.chain(line, y[..., None], LOADING.mask & ~out[:, None], *noise)
+    before = likelihoods.chain(line, Measured(y[..., None], LOADING.mask & ~out[:, None], *noise))
     first = np.arange(LOADING.mask.shape[1]) == 0
     for rows in (LOADING.mask & out[:, None], LOADING.mask & out[:, None] & first):
-        found = likelihoods.held_out_density(line, before, y[..., None], rows, *noise)[:, 0]
+        found = likelihoods.held_out_density(line, before, Measured(y[..., None], rows, *noise))[:, 0]
         seen = rows[LOADING.mask]
         for j, value in zip((4, 5), found, strict=True):
             both = ~np.isin(hold, [4, 5]) | (seen & (hold == j))
@@ -302,8 +303,8 @@ def test_residuals_that_are_absurd_say_nothing_of_the_holds_before(times):
     y[1, 2] += 1e6 * times
     y[2, 1] += 3e6 * times
     noise = np.ones(1), np.array([1e-9])
-    filtered = likelihoods.chain(line, y, p.mask, *noise)
-    found = likelihoods.without_each_hold(line, filtered, y, p.mask, *noise)[:, 0]
+    filtered = likelihoods.chain(line, Measured(y, p.mask, *noise))
+    found = likelihoods.without_each_hold(line, filtered, Measured(y, p.mask, *noise))[:, 0]
     assert np.isfinite(found).tolist() == [times < 1.0, True, True]
 
 
@@ -328,13 +329,13 @@ def test_a_hold_whose_readings_are_nan_is_one_without_readings(kernel, hold, mon
     readings = np.repeat(y[..., None], 2, axis=2)
     readings[hold, :, 1] = np.nan
     masks = LOADING.mask, LOADING.mask & (np.arange(6) != hold)[:, None]
-    found = likelihoods.chain(line, readings, LOADING.mask, *noise)
-    value, residuals = likelihoods.standardised(line, readings, LOADING.mask, *noise)
+    found = likelihoods.chain(line, Measured(readings, LOADING.mask, *noise))
+    value, residuals = likelihoods.standardised(line, Measured(readings, LOADING.mask, *noise))
     for row, mask in enumerate(masks):
-        expected = likelihoods.chain(line, y[..., None], mask, *noise)
+        expected = likelihoods.chain(line, Measured(y[..., None], mask, *noise))
         for name in ("log_likelihood", "carried_mean", "carried_var"):
             assert getattr(found, name)[:, row] == pytest.approx(getattr(expected, name)[:, row], rel=1e-12)
-        log_likelihood, rest = likelihoods.standardised(line, y[..., None], mask, *noise)
+        log_likelihood, rest = likelihoods.standardised(line, Measured(y[..., None], mask, *noise))
         assert value[row] == pytest.approx(log_likelihood[row], rel=1e-12)
         assert (residuals[:, row] ** 2).sum() == pytest.approx((rest[:, row] ** 2).sum(), rel=1e-12)
 

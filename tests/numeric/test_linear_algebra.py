@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from wirebayes.model import likelihoods
+from wirebayes.model.hold_filter import Measured
 from wirebayes.numeric.linear_algebra import cholesky, eigh, inv, solve
 from wirebayes.prediction.predictive import _regressed
 from wirebayes.wire.staircase import Linearised
@@ -52,8 +53,8 @@ def test_a_hold_left_out_at_absurd_parameters_is_impossible_and_harms_no_other_d
         by_setting = moves * np.array([0.0, 1.0])[:, None, None]
         carry = np.ones((holds, len(one)))
         line = Linearised(0.0 * moves, by_setting, moves, carry, carry, np.zeros((holds + 1, len(one))))
-        seen = readings, mask, one, one
-        return likelihoods.without_each_hold(line, likelihoods.chain(line, *seen), *seen)
+        seen = Measured(readings, mask, one, one)
+        return likelihoods.without_each_hold(line, likelihoods.chain(line, seen), seen)
 
     both = left_out(slice(0, 2))
     assert np.array_equal(both[:, :1], left_out(slice(0, 1))) and not np.isnan(both).any()
@@ -65,8 +66,8 @@ def test_a_hold_is_not_left_out_where_rounding_would_decide(squared: float, poss
     one, shape = np.ones(1), (2, 1, 1)
     tension = np.array([0.0, np.sqrt(squared)]).reshape(shape)
     line = Linearised(tension, 0.0 * tension, np.ones(shape), np.ones((2, 1)), np.ones((2, 1)), np.zeros((3, 1)))
-    seen = np.zeros(shape), np.ones((2, 1), bool), one, one
-    without = likelihoods.without_each_hold(line, likelihoods.chain(line, *seen), *seen)[:, 0]
+    seen = Measured(np.zeros(shape), np.ones((2, 1), bool), one, one)
+    without = likelihoods.without_each_hold(line, likelihoods.chain(line, seen), seen)[:, 0]
     assert np.isfinite(without).tolist() == [possible, True]
     assert without[1] == pytest.approx(stats.norm.logpdf(0.0))  # its own readings, however far, take no part
 

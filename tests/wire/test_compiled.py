@@ -19,6 +19,7 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.io.paper import experiments
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.build import build
+from wirebayes.model.hold_filter import Measured
 from wirebayes.model.spec import ModelSpec
 from wirebayes.wire import compiled
 from wirebayes.wire.effect import Effect, EventEffect
@@ -118,12 +119,12 @@ def test_filters_are_those_of_numpy(p, row, sensor_sd, setting_sd, seed):
     theta = drawn(Model(), [row, row], seed)
     line = linearise(p, theta)
     readings = line.reading[..., :1] + np.random.default_rng(seed).normal(0.0, sensor_sd, (*p.time_s.shape, 1))
-    seen = readings, p.mask, np.array([sensor_sd**2, 0.01]), np.array([setting_sd, 0.0])
-    found, expected = likelihoods.chain(line, *seen), by_numpy(lambda: likelihoods.chain(line, *seen))
+    seen = Measured(readings, p.mask, np.array([sensor_sd**2, 0.01]), np.array([setting_sd, 0.0]))
+    found, expected = likelihoods.chain(line, seen), by_numpy(lambda: likelihoods.chain(line, seen))
     for name, value in vars(expected).items():
         np.testing.assert_allclose(getattr(found, name), value, rtol=1e-7, atol=1e-9)
     for one, other in zip(
-        likelihoods.standardised(line, *seen), by_numpy(lambda: likelihoods.standardised(line, *seen)), strict=True
+        likelihoods.standardised(line, seen), by_numpy(lambda: likelihoods.standardised(line, seen)), strict=True
     ):
         np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-9)
 
@@ -136,12 +137,13 @@ def test_filtering_a_staircase_as_it_is_computed_gives_the_same_bits_as_one_afte
     readings = rng.normal(3.0, 1.0, (*p.time_s.shape, len(rows)))
     readings[rng.integers(len(readings)), :, 0] = np.nan  # of the first column one hold is not seen
     noise = rng.uniform(0.01, 0.1, len(rows)), rng.uniform(0.0, 1.0, len(rows))
+    seen = Measured(readings, p.mask, *noise)
     assert not isinstance(streamed(p, theta, model), Linearised)
-    at_once = likelihoods.chain(streamed(p, theta, model), readings, p.mask, *noise)
-    for name, value in vars(likelihoods.chain(line, readings, p.mask, *noise)).items():
+    at_once = likelihoods.chain(streamed(p, theta, model), seen)
+    for name, value in vars(likelihoods.chain(line, seen)).items():
         np.testing.assert_array_equal(getattr(at_once, name), value)
-    found = likelihoods.standardised(streamed(p, theta, model), readings, p.mask, *noise)
-    for one, other in zip(found, likelihoods.standardised(line, readings, p.mask, *noise), strict=True):
+    found = likelihoods.standardised(streamed(p, theta, model), seen)
+    for one, other in zip(found, likelihoods.standardised(line, seen), strict=True):
         np.testing.assert_array_equal(one, other)
 
 

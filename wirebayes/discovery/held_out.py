@@ -13,6 +13,7 @@ from wirebayes.inference.laplace_fit import LaplaceFit, fitted
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods
 from wirebayes.model.build import build
+from wirebayes.model.hold_filter import LinearHold, Measured
 from wirebayes.model.linear_amplitudes import completed
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
@@ -110,16 +111,16 @@ def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng
     """The recorded holds of a sample after the first `train`, predicted with draws of its own parameters."""
     protocol = sample.protocol
     line = linearise(protocol, own, model)
-    noise = sample.variance(own), own["setting_sd"]
+    measured = sample.measured(own)
     last = np.flatnonzero(protocol.recorded)[train:]
     trained_on = protocol.mask.copy()
     trained_on[last] = False
     left_out = protocol.mask & ~trained_on
-    carried = likelihoods.chain(line, sample.readings, trained_on, *noise)
-    log_p = likelihoods.held_out_density(line, carried, sample.readings, left_out, *noise)
+    carried = likelihoods.chain(line, replace(measured, mask=trained_on))
+    log_p = likelihoods.held_out_density(line, carried, replace(measured, mask=left_out))
     draws = log_p.shape[1]
     elpd = logsumexp(or_impossible(log_p), axis=1) - np.log(draws)
-    holds = [_scored_hold(sample, line, carried, int(j), noise, rng) for j in last]
+    holds = [_scored_hold(measured, line, carried, int(j), rng) for j in last]
     error = np.concatenate([hold.error for hold in holds])
     floor = np.concatenate([hold.floor for hold in holds])
     inside = np.concatenate([hold.inside for hold in holds])
@@ -144,23 +145,22 @@ class _ScoredHold:
 
 
 def _scored_hold(
-    sample: Sample,
-    line: Linearised,
-    carried: likelihoods.Filtered,
-    j: int,
-    noise: tuple[Array, Array],
-    rng: Generator,
+    measured: Measured, line: Linearised, carried: likelihoods.Filtered, j: int, rng: Generator
 ) -> _ScoredHold:
-    """One hold predicted from the creep that is carried into it; `noise` are reading variance and setting sd."""
-    variance, setting_sd = noise
-    keep = sample.protocol.mask[j]
-    by_creep, by_setting = line.by_creep[j][keep], line.by_setting[j][keep]
-    mean = line.reading[j][keep] + by_creep * carried.carried_mean[j]
-    known = variance + by_setting**2 * setting_sd**2
-    drawn = mean + rng.normal(size=mean.shape) * np.sqrt(known + by_creep**2 * carried.carried_var[j])
+    """One hold predicted from the creep that is carried into it."""
+    keep = measured.mask[j]
+    hold = LinearHold.of(line, j, keep)
+    mean = hold.reading + hold.by_creep * carried.carried_mean[j]
+    by_noise = measured.variance + hold.by_setting**2 * measured.setting_sd**2
+    variance = by_noise + hold.by_creep**2 * carried.carried_var[j]
+    drawn = mean + rng.normal(size=mean.shape) * np.sqrt(variance)
     low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
-    y = sample.readings[j][keep][:, 0]
-    return _ScoredHold(mean.mean(axis=1) - y, known.mean(axis=1), (y >= low) & (y <= high))
+    y = measured.readings[j][keep][:, 0]
+    return _ScoredHold(
+        error=mean.mean(axis=1) - y,
+        floor=by_noise.mean(axis=1),
+        inside=(y >= low) & (y <= high),
+    )
 
 
 def gap_closed(plain: HeldOut, final: HeldOut) -> float | None:

@@ -306,7 +306,7 @@ def discrepancy(experiment: Experiment, size_N: float) -> Discrepancy:
 def residual_rms(block: LaplaceFit, name: str) -> float:
     """Root mean square of what the best parameters leave over in an experiment's readings, N."""
     sample = block.target.problem.samples[block.names.index(name)]
-    line, _, _ = block.target.problem.linearised(block.theta, sample)
+    line, _ = block.target.problem.linearised(block.theta, sample)
     left = float(np.sqrt((((sample.readings - line.reading)[sample.protocol.mask]) ** 2).mean()))
     return left * block.target.problem.read_unit(sample)
 

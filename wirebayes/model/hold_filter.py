@@ -3,6 +3,7 @@
 `line` is what `wirebayes.wire.staircase.linearise` returned; j is the number of a hold in it.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -26,13 +27,43 @@ class ReadingNoise:
     def of(cls, variance: Array, setting_sd: Array) -> "ReadingNoise":
         return cls(1.0 / variance, np.log(variance) + LOG_2PI, setting_sd * setting_sd)
 
-    def where_read(self, readings: Array, mask: Array) -> "ReadingNoise":
-        """The same, with readings (R, n) of a hold that are NaN as if their errors were without bound."""
-        unread = np.isnan(readings[int(np.argmax(mask))])
+    def where_read(self, first: Array) -> "ReadingNoise":
+        """The same, with readings of a hold whose first (n,) is NaN as if their errors were without bound."""
+        unread = np.isnan(first)
         if not unread.any():
             return self
-        weight, log_variance = (np.where(unread, 0.0, v) for v in (self.weight, self.log_variance))
+        weight = np.where(unread, 0.0, self.weight)
+        log_variance = np.where(unread, 0.0, self.log_variance)
         return ReadingNoise(weight, log_variance, self.setting_var)
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Readings of a sequence of holds, and how they err.
+
+    Attributes
+    ----------
+    readings : (H, R, n) or (H, R, 1) array
+        NaN where a row does not see a hold: it is then as one without readings.
+    mask : (H, R) bool array
+        Which of them were taken.
+    variance : (n,) array
+        Of one reading, rounding included.
+    setting_sd : (n,) array
+    """
+
+    readings: Array
+    mask: Array
+    variance: Array
+    setting_sd: Array
+
+    @property
+    def noise(self) -> ReadingNoise:
+        return ReadingNoise.of(self.variance, self.setting_sd)
+
+    def first(self, j: int) -> Array:
+        """(n,) or (1,) the first reading of a hold."""
+        return np.asarray(self.readings[j][int(np.argmax(self.mask[j]))])
 
 
 def carried_unread(line: Linearised, j: int, m: Array, p: Array, noise: ReadingNoise) -> tuple[Array, Array]:
@@ -87,73 +118,96 @@ class LinearHold(NamedTuple):
 class HoldRead(NamedTuple):
     """What the readings of one hold say.
 
-    The log density (n,) of the readings; mean and variance (n,) of the creep carried on; what the readings leave over
+    Mean and variance (n,) of the creep carried on, and the variance of the one carried in; what the readings leave over
     (R, n); by how much they pull at the creep carried in and at the setting error (n,), and what they know of either.
     """
 
-    log_density: Array
     mean: Array
     var: Array
+    var_before: Array
     left: Array
     pulls: tuple[Array, Array]
     known: "HoldInformation"
+    noise: ReadingNoise
+
+    @property
+    def log_density(self) -> Array:
+        """(n,) by a sum of squares: the shorter difference of products can turn negative at absurd values."""
+        pull_c, pull_s = self.pulls
+        of_readings = summed(self.left, self.left) * self.noise.weight
+        square = of_readings + self.var_before * pull_c**2 + self.noise.setting_var * pull_s**2
+        log_noise = len(self.left) * self.noise.log_variance
+        return -0.5 * (square + log_noise + np.log(self.known.det))
+
+    def residuals(self) -> list[Array]:
+        """The parts of `wirebayes.model.likelihoods.standardised` from one hold, (r, n) each."""
+        noise = self.noise
+        pull_c, pull_s = self.pulls
+        in_sensor_errors = self.left * np.sqrt(noise.weight)
+        creep = np.sqrt(self.var_before) * pull_c
+        setting = np.sqrt(noise.setting_var) * pull_s
+        log_sensor = np.sqrt(len(self.left)) * noise.log_variance
+        log_creep = np.log1p(self.var_before * self.known.cc)
+        log_setting = np.log1p(noise.setting_var * self.known.ss)
+        log_sd = [0.5 * part[None] for part in (log_sensor, log_creep, log_setting)]
+        return [in_sensor_errors, creep[None], setting[None], *log_sd]
 
 
-def filter_hold(
-    line: Linearised, j: int, readings: Array, mask: Array, m: Array, p: Array, noise: ReadingNoise
-) -> HoldRead:
+def filter_hold(line: Linearised, j: int, measured: Measured, m: Array, p: Array, noise: ReadingNoise) -> HoldRead:
     """Filter the readings of one hold.
 
     Parameters
     ----------
     line : Linearised
     j : int
-    readings : (R, n) or (R, 1) array
-        Those whose weight is zero do not count, whatever they are.
-    mask : (R,) bool array
+    measured : Measured
     m, p : (n,) arrays
         Mean and variance of the creep carried into it.
     noise : ReadingNoise
+        Readings whose weight is zero do not count, whatever they are.
     """
+    mask = measured.mask[j]
     taken = slice(None) if mask.all() else mask
     hold = LinearHold.of(line, j, taken)
-    measured = np.where(noise.weight > 0, readings[taken], 0.0)
-    surprise = measured - hold.reading - hold.by_creep * m
+    readings = np.where(noise.weight > 0, measured.readings[j][taken], 0.0)
+    surprise = readings - hold.reading - hold.by_creep * m
     known = information_of(hold, noise.weight, p, noise.setting_var)
     along = hold.along(surprise, noise.weight)
     creep, setting = known.errors(*along)
-    pulls = known.pulls(*along, p, noise.setting_var)
-    left = surprise - hold.by_creep * creep - hold.by_setting * setting
     carry_c = line.carry_by_creep[j]
     carry_s = line.carry_by_setting[j]
     return HoldRead(
-        log_density=_log_density(left, pulls, known.det, p, noise),
         mean=carry_c * (m + creep) + carry_s * setting,
         var=known.var_along(carry_c, carry_s),
-        left=left,
-        pulls=pulls,
+        var_before=p,
+        left=surprise - hold.by_creep * creep - hold.by_setting * setting,
+        pulls=known.pulls(*along, p, noise.setting_var),
         known=known,
+        noise=noise,
     )
 
 
-def _log_density(left: Array, pulls: tuple[Array, Array], det: Array, p: Array, noise: ReadingNoise) -> Array:
-    """Of a hold's readings, by a sum of squares: the shorter difference of products can turn negative at absurd values.
+def filter_holds(line: Linearised, measured: Measured) -> Iterator[tuple[Array, Array, HoldRead | None]]:
+    """Mean and variance (n,) of the creep that each hold carries on, and what its readings say if it has any.
 
     Parameters
     ----------
-    left : (R, n) array
-        What they leave over.
-    pulls : two (n,) arrays
-        At the creep carried in and at the setting error.
-    det, p : (n,) arrays
-        The determinant of `HoldInformation`; the variance of the creep carried in.
-    noise : ReadingNoise
+    line : Linearised
+    measured : Measured
     """
-    pull_c, pull_s = pulls
-    of_readings = summed(left, left) * noise.weight
-    square = of_readings + p * pull_c**2 + noise.setting_var * pull_s**2
-    log_noise = len(left) * noise.log_variance
-    return -0.5 * (square + log_noise + np.log(det))
+    noise = measured.noise
+    mean = np.zeros(line.reading.shape[2])
+    var = mean
+    for j, has_readings in enumerate(measured.mask.any(axis=1)):
+        read = None
+        if has_readings:
+            known_noise = noise.where_read(measured.first(j))
+            read = filter_hold(line, j, measured, mean, var, known_noise)
+            mean = read.mean
+            var = read.var
+        else:
+            mean, var = carried_unread(line, j, mean, var, noise)
+        yield mean, var, read
 
 
 def summed(one: Array, other: Array) -> Array:
@@ -239,23 +293,27 @@ class Later:
         square = self.precision * mean**2 - 2.0 * self.pull * mean - self.pull**2 * var
         return np.asarray(self.constant - 0.5 * (square / wider + np.log(wider)))
 
-    def with_hold(self, line: Linearised, j: int, readings: Array, mask: Array, noise: ReadingNoise) -> "Later":
-        """The same with the readings (R, n) of hold j, the one before them, by the creep carried into that hold.
+    def with_hold(self, line: Linearised, j: int, measured: Measured, noise: ReadingNoise) -> "Later":
+        """The same with the readings of hold j, the one before them, by the creep carried into that hold.
 
         Parameters
         ----------
-        readings : (R, n) or (R, 1) array
-        mask : (R,) bool array
+        line : Linearised
+        j : int
+        measured : Measured
+        noise : ReadingNoise
+            Of these readings.
         """
-        joint = self._with_setting(line, j, readings[mask], mask, noise.weight)
-        return self._without_setting(joint, noise, int(mask.sum()))
+        joint = self._with_setting(line, j, measured, noise.weight)
+        return self._without_setting(joint, noise, int(measured.mask[j].sum()))
 
-    def _with_setting(self, line: Linearised, j: int, readings: Array, mask: Array, weight: Array) -> "_JointLater":
+    def _with_setting(self, line: Linearised, j: int, measured: Measured, weight: Array) -> "_JointLater":
         """The same with those readings, jointly by the creep carried into their hold and by its setting error."""
+        taken = measured.mask[j]
         carry_c = line.carry_by_creep[j]
         carry_s = line.carry_by_setting[j]
-        hold = LinearHold.of(line, j, mask)
-        left = readings - hold.reading
+        hold = LinearHold.of(line, j, taken)
+        left = measured.readings[j][taken] - hold.reading
         cc, cs, ss = hold.products(weight)
         along_c, along_s = hold.along(left, weight)
         return _JointLater(

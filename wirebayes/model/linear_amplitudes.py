@@ -51,25 +51,25 @@ class MarginalisedProblem(Problem):
     def log_likelihood(self, theta: Array, readings: Any = None) -> Array:
         """(n,) log-likelihood of the other parameters; -inf where the model cannot be computed."""
         with np.errstate(all="ignore"):
-            return self._log_likelihood(self._seen(self._lines(theta), readings))
+            return self._log_likelihood(self._seen(self._lines(theta, readings)))
 
     def standardised(self, theta: Array, readings: Any = None) -> tuple[Array, Array]:
         """(n,) log-likelihood of the other parameters, and (m, n) residuals with the amplitudes at their best."""
         residuals = []
         with np.errstate(all="ignore"):
-            lines = self._lines(theta)
-            seen = self._seen(lines, readings)
+            lines = self._lines(theta, readings)
+            seen = self._seen(lines)
             best = seen.amplitudes(seen.along).T
-            for i, (sample, y) in enumerate(self.observed(readings)):
-                added = np.einsum("hrk,kn->hrn", self.shapes[i] * self.sd, best)
-                line, *noise = lines[i]
-                _, left = likelihoods.standardised(line, y - added, sample.protocol.mask, *noise)
+            for shapes, (line, measured) in zip(self.shapes, lines, strict=True):
+                added = np.einsum("hrk,kn->hrn", shapes * self.sd, best)
+                without = replace(measured, readings=measured.readings - added)
+                _, left = likelihoods.standardised(line, without)
                 residuals.append(left)
             residuals += [best, np.log(seen.diagonal.T)]
             return self._log_likelihood(seen), np.concatenate(residuals)
 
-    def _lines(self, theta: Array) -> list[tuple[Linearised, Array, Array]]:
-        return [self.linearised(theta, sample) for sample in self.samples]
+    def _lines(self, theta: Array, readings: Any) -> list["_Line"]:
+        return [self.linearised(theta, sample, y) for sample, y in self.observed(readings)]
 
     def _log_likelihood(self, seen: "_Seen") -> Array:
         explained = (seen.along**2).sum(axis=1)
@@ -82,32 +82,33 @@ class MarginalisedProblem(Problem):
 
     def drawn(self, theta: Array, rng: Generator) -> tuple[Array, Array]:
         """(n, k) amplitudes given the other parameters, and (n,) the log density of being drawn."""
-        seen = self._seen(self._lines(theta), None)
+        seen = self._seen(self._lines(theta, None))
         normal = rng.normal(size=seen.along.shape)
         amplitudes = seen.amplitudes(seen.along + normal) * self.sd
         log_densities = np.log(seen.diagonal) - 0.5 * normal**2 - 0.5 * np.log(2.0 * np.pi)
         log_volume = np.log(self.sd).sum()
         return amplitudes, log_densities.sum(axis=1) - log_volume
 
-    def _seen(self, lines: Sequence[tuple[Linearised, Array, Array]], readings: Any) -> "_Seen":
+    def _seen(self, lines: Sequence["_Line"]) -> "_Seen":
         """What the readings say of the amplitudes."""
         expected = self.mean / self.sd
         total: Any = 0.0
         square: Any = (expected**2).sum()
         precision: Any = np.eye(len(self.sd))
         pull: Any = expected
-        for i, (sample, y) in enumerate(self.observed(readings)):
-            mask = sample.protocol.mask
-            line, *noise = lines[i]
-            filtered = likelihoods.chain(line, y, mask, *noise)
-            gram, along = likelihoods.seen(line, filtered, y, self.shapes[i] * self.sd, mask, *noise)
+        for shapes, (line, measured) in zip(self.shapes, lines, strict=True):
+            filtered = likelihoods.chain(line, measured)
+            gram, along = likelihoods.seen(line, filtered, measured, shapes * self.sd)
             precision = precision + gram
             pull = pull + along
             height = filtered.log_likelihood.sum(axis=0)
             total = total + height
-            log_volume = mask.sum() * np.log(2.0 * np.pi * noise[0])
+            log_volume = measured.mask.sum() * np.log(2.0 * np.pi * measured.variance)
             square = square - 2.0 * height - log_volume
         return _Seen.of(total, square, precision, pull)
+
+
+_Line = tuple[Linearised, likelihoods.Measured]
 
 
 @dataclass(frozen=True)

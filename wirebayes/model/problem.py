@@ -107,13 +107,12 @@ class Problem:
         out = []
         for sample, y in self.observed(readings):
             own = self.parameters(theta, sample)
-            variance = sample.variance(own)
             if self.likelihood == "hold":
+                variance = sample.variance(own)
                 out.append(single_holds.hold_by_hold(sample.protocol, own, sample.model, y, variance))
             else:
                 line = streamed(sample.protocol, own, sample.model)
-                filtered = likelihoods.chain(line, y, sample.protocol.mask, variance, own["setting_sd"])
-                out.append(filtered.log_likelihood)
+                out.append(likelihoods.chain(line, sample.measured(own, y)).log_likelihood)
         return out
 
     def observed(self, readings: Sequence[Array] | None) -> Iterator[tuple[Sample, Array]]:
@@ -136,12 +135,12 @@ class Problem:
         with np.errstate(all="ignore"):
             for sample, y in self.observed(readings):
                 own = self.parameters(theta, sample)
-                variance = sample.variance(own)
                 if self.likelihood == "hold":
+                    variance = sample.variance(own)
                     found = single_holds.standardised_hold_by_hold(sample.protocol, own, sample.model, y, variance)
                 else:
                     line = streamed(sample.protocol, own, sample.model)
-                    found = likelihoods.standardised(line, y, sample.protocol.mask, variance, own["setting_sd"])
+                    found = likelihoods.standardised(line, sample.measured(own, y))
                 value, left = found
                 values.append(value)
                 residuals.append(left)
@@ -158,11 +157,10 @@ class Problem:
             each = []
             without = []
             for sample in self.samples:
-                line, *noise = self.linearised(theta, sample)
-                filtered = likelihoods.chain(line, sample.readings, sample.protocol.mask, *noise)
-                rest = likelihoods.without_each_hold(line, filtered, sample.readings, sample.protocol.mask, *noise)
+                line, measured = self.linearised(theta, sample)
+                filtered = likelihoods.chain(line, measured)
                 each.append(filtered.log_likelihood.sum(axis=0))
-                without.append(rest)
+                without.append(likelihoods.without_each_hold(line, filtered, measured))
             whole = np.sum(each, axis=0)
             return whole, [rest + (whole - own) for rest, own in zip(without, each, strict=True)]
 
@@ -255,14 +253,19 @@ class Problem:
                 out[name] = PowerScaled(exponent, log_base)
         return out
 
-    def linearised(self, theta: Array, sample: Sample) -> tuple[Linearised, Array, Array]:
-        """A sample's staircase with reading variance and setting error, each (n,)."""
+    def linearised(
+        self, theta: Array, sample: Sample, readings: Array | None = None
+    ) -> tuple[Linearised, likelihoods.Measured]:
+        """A sample's staircase, and its readings or those that stand in for them.
+
+        Parameters
+        ----------
+        theta : (n, d) array
+        sample : Sample
+        readings : (H, R, n) array, optional
+        """
         own = self.parameters(theta, sample)
-        return (
-            linearise(sample.protocol, own, sample.model),
-            sample.variance(own),
-            own["setting_sd"],
-        )
+        return linearise(sample.protocol, own, sample.model), sample.measured(own, readings)
 
 
 def with_readings(problem: Problem, readings: Sequence[Array]) -> Problem:

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from wirebayes.model.hold_filter import Measured
 from wirebayes.model.likelihoods import reading_variance
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.effect import Effect
@@ -52,6 +53,11 @@ class Sample:
     def variance(self, own: Mapping[str, Array]) -> Array:
         """(n,) variance of one reading, N² or mm², by the sample's own parameters."""
         return reading_variance(own["sensor_sd"], self.resolution)
+
+    def measured(self, own: Mapping[str, Array], readings: Array | None = None) -> Measured:
+        """Its readings, or those that stand in for them, and how they err by the sample's own parameters."""
+        taken = self.readings if readings is None else readings
+        return Measured(taken, self.protocol.mask, self.variance(own), own["setting_sd"])
 
     @property
     def typical_hold_s(self) -> float:

@@ -4,7 +4,7 @@ Freely means from the displacements and the training readings alone; given its f
 were made. The same code serves a single hold left out in the middle and the last third of a test.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -12,6 +12,7 @@ from scipy.special import logsumexp
 from wirebayes.inference.weighted_posterior import Posterior
 from wirebayes.io.experiment import Experiment
 from wirebayes.model import likelihoods, single_holds
+from wirebayes.model.hold_filter import Measured
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.log_sum import or_impossible
 from wirebayes.numeric.means import root_mean_square
@@ -287,22 +288,19 @@ def _chain_scores(test: _HeldOutTest) -> tuple[Array, Array, float]:
 def _chain_densities(test: _HeldOutTest, theta: Array) -> tuple[Array, Array, Array]:
     """Log densities (holds, n) of whole holds and of their first readings, and (n,) of all together, at draws."""
     protocol, here = test.protocol, test.here
-    read = test.tension[..., None]
-    later = test.unseen
-    firsts = later.copy()
+    firsts = test.unseen.copy()
     firsts[:, 1:] = False
     trained_on = protocol.mask & ~test.requested[:, None]
     own = test.fitted.problem.parameters(theta, here)
     line = linearise(protocol, own, here.model)
-    noise = here.variance(own), own["setting_sd"]
+    measured = Measured(test.tension[..., None], protocol.mask, here.variance(own), own["setting_sd"])
     with np.errstate(all="ignore"):
-        before = likelihoods.chain(line, read, trained_on, *noise)
-        whole = likelihoods.held_out_density(line, before, read, later, *noise)
-        first = likelihoods.held_out_density(line, before, read, firsts, *noise)
-        every = likelihoods.chain(line, read, protocol.mask, *noise)
+        before = likelihoods.chain(line, replace(measured, mask=trained_on))
+        whole = likelihoods.held_out_density(line, before, replace(measured, mask=test.unseen))
+        first = likelihoods.held_out_density(line, before, replace(measured, mask=firsts))
+        every = likelihoods.chain(line, measured)
     of_requested = every.log_likelihood[test.requested]
-    together = of_requested.sum(axis=0)
-    return whole, first, together
+    return whole, first, of_requested.sum(axis=0)
 
 
 def _hold_scores(test: _HeldOutTest) -> Array:
