@@ -13,7 +13,7 @@ from wirebayes.inference.laplace_fit import fitted
 from wirebayes.model.scales import scales_of
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.numeric.frozen import frozen
-from wirebayes.planning.sensitivity import sensitivity
+from wirebayes.planning import sensitivity as module
 from wirebayes.planning.widths import at_centre, central
 from wirebayes.simulation.synthetic import Bench, Truth, draw
 
@@ -24,7 +24,9 @@ KINDS = {name: CATALOGUE[name] for name in ("toe", "strain_stiffening", "lost_mo
 
 def seen(bench, kinds=KINDS, simulations=80):
     test = at_centre(bench.experiment(), guess(20), PLAIN_SPEC)
-    return sensitivity(test, guess(20), kinds, np.random.default_rng(0), simulations=simulations)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "SIMULATIONS", simulations)
+        return module.sensitivity(test, guess(20), kinds, np.random.default_rng(0))
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """The way up one path: at every rung the parameters follow, and the evidence of the effect is evaluated."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -68,39 +68,26 @@ def start(block: LaplaceFit, z: Array, readings: Sequence[Array] | None = None) 
     readings : sequence of (H, R, n) arrays, optional
         Their readings, a sample; the measured ones when left out.
     """
-    target = block.target
-    free = moving_columns(target.problem)
-    y = z.copy()
-    best = z.copy()
-    height = np.full(len(z), -np.inf)
-    rows = np.arange(len(z))
-    for step in range(_STEPS + 1):
-        with np.errstate(all="ignore"):
-            x = tangent(target, y[rows], _of_rows(readings, rows), free)
+    problem = block.target.problem
+    free = moving_columns(problem)
+    degrees = sum(int(sample.protocol.mask.sum()) for sample in problem.samples) - len(free)
+    climbs = _Climbs(block.target, readings, len(z), degrees)
+
+    def look(y: Array, rows: Ints) -> _Look:
+        x = climbs.tangent(y, rows, free)
         no_signature = np.zeros_like(x.residual)
-        here = weigh(x, no_signature, 0.0, 0.0, x.degrees)
-        value = np.nan_to_num(here.height + x.prior, nan=-np.inf)
-        with np.errstate(invalid="ignore"):
-            gain = value - height[rows]
-        better = gain > 0
-        improved = rows[better]
-        best[improved] = y[improved]
-        height[improved] = value[better]
-        hope = np.minimum(gain, here.promise)
-        go = np.flatnonzero(hope >= _SETTLED)
-        if step == _STEPS or not len(go):
-            break
-        rows = rows[go]
-        own = _of_rows(readings, rows)
-        y[rows] = stepped(target, y[rows], own, x.of(go), here.of(go), free, x.degrees)
-    return Start(best, height, readings, x.degrees)
+        here = weigh(x, no_signature, 0.0, 0.0, degrees)
+        nothing = np.zeros(len(y))
+        return _Look(x, here, _Places(y, _finite(here.height + x.prior), nothing, nothing))
+
+    best = climbs.follow(look, _Places.unseen(z), np.arange(len(z)), free, _STEPS)
+    height = np.where(best.log_bayes == _NEVER, -np.inf, best.log_bayes)
+    return Start(best.z, height, readings, degrees)
 
 
-def _of_rows(readings: Sequence[Array] | None, rows: Ints) -> list[Array] | None:
-    """The readings of some data sets, a sample each; None for the measured ones."""
-    if readings is None:
-        return None
-    return [of_sample[..., rows] for of_sample in readings]
+def _finite(log_bayes: Array) -> Array:
+    """The same where it can be computed."""
+    return np.nan_to_num(log_bayes, nan=_NEVER, neginf=_NEVER)
 
 
 def lead(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> PathEvidence:
@@ -174,31 +161,110 @@ class _Places:
 
 
 @dataclass(frozen=True)
-class _Ascent:
-    """What does not change on the way up a ladder.
+class _Look:
+    """What is seen from some climbs: the tangents at their places, what its weights say, and what the places are worth."""
+
+    tangent: Tangent
+    weighed: Weighed
+    places: _Places
+
+
+@dataclass(frozen=True)
+class _Climbs:
+    """Climbs from several starts in each of n data sets.
 
     Attributes
     ----------
     target : LogPosterior
-        Of the block with the effect.
+        Of the block, or of the block with the effect.
+    readings : sequence of (H, R, n) arrays or None
+        Of the data sets, a sample; None for the measured ones.
+    data_sets : int
+    degrees : int
+        Readings less parameters, without the effect.
+    """
+
+    target: LogPosterior
+    readings: Sequence[Array] | None
+    data_sets: int
+    degrees: int
+
+    def follow(
+        self, look: Callable[[Array, Ints], _Look], best: _Places, rows: Ints, free: list[int], steps: int
+    ) -> _Places:
+        """Improve places by steps of the parameters; a data set goes on for as long as it gains from any of its starts.
+
+        Parameters
+        ----------
+        look : function of places (m, d) and of the numbers (m,) of their climbs
+        best : _Places
+            Where all climbs begin; changed in place.
+        rows : (m,) array of int
+            The climbs that are followed.
+        free : list of int
+            Columns of the parameters that follow.
+        steps : int
+            Gauss-Newton steps at most.
+        """
+        z = best.z.copy()
+        for step in range(steps + 1):
+            seen = look(z[rows], rows)
+            gain = seen.places.log_bayes - best.log_bayes[rows]
+            hope = np.minimum(gain, seen.weighed.promise)
+            better = best.improve(rows, seen.places)
+            # A step that led down, where the wire went slack say, is the last one.
+            go = np.flatnonzero(better & self._is_hopeful(rows, hope, len(z)))
+            if step == steps or not len(go):
+                break
+            rows = rows[go]
+            on = seen.tangent.of(go), seen.weighed.of(go)
+            z[rows] = stepped(self.target, z[rows], self._readings_of(rows), *on, free, self.degrees)
+        return best
+
+    def tangent(self, z: Array, rows: Ints, moving: list[int]) -> Tangent:
+        """Of some climbs at their places (m, d), by the columns that move."""
+        with np.errstate(all="ignore"):
+            return tangent(self.target, z, self._readings_of(rows), moving)
+
+    def best_start(self, values: Array) -> Array:
+        """(n,) the largest value of each data set."""
+        by_start = values.reshape(-1, self.data_sets)
+        return np.asarray(by_start.max(axis=0))
+
+    def _is_hopeful(self, rows: Ints, hope: Array, climbs: int) -> Bools:
+        """Whether the data sets of some of the climbs may gain something, by what each of these hopes for."""
+        every = np.full(climbs, -np.inf)
+        every[rows] = hope
+        by_set = self.best_start(every) >= _SETTLED
+        return np.asarray(by_set[rows % self.data_sets])
+
+    def _readings_of(self, rows: Ints) -> list[Array] | None:
+        """The readings of the data sets of some climbs, a sample each; None for the measured ones."""
+        if self.readings is None:
+            return None
+        return [of_sample[..., rows % self.data_sets] for of_sample in self.readings]
+
+
+@dataclass(frozen=True)
+class _Ascent(_Climbs):
+    """What does not change on the way up a ladder.
+
+    Attributes
+    ----------
     column : int
         Of the amplitude.
     neutral, low, high : float
         Where the amplitude changes nothing, and its ends.
-    begin : Start
-        The data sets.
     nothing : (starts n,) array
         The log marginal density without the effect.
     half : (starts n,) array
         Ratio of an amplitude to where the stretch of its rung ends.
     """
 
-    target: LogPosterior
     column: int
     neutral: float
     low: float
     high: float
-    begin: Start
     nothing: Array
     half: Array
 
@@ -208,11 +274,6 @@ class _Ascent:
         columns = moving_columns(self.target.problem)
         return [i for i in columns if i != self.column and names[i].split("[")[0] not in but_for]
 
-    def best_start(self, values: Array) -> Array:
-        """(n,) the largest value of each data set."""
-        by_start = values.reshape(-1, self.begin.data_sets)
-        return np.asarray(by_start.max(axis=0))
-
     def is_beyond(self, amplitudes: Array) -> bool:
         """Whether all amplitudes have reached their ends."""
         within = np.clip(self.neutral + amplitudes, self.low, self.high)
@@ -220,8 +281,6 @@ class _Ascent:
 
     def look(self, z: Array, amplitude: Array, alive: Bools, free: list[int], steps: int) -> _Places:
         """The best places at one step of the path: the other parameters follow while the amplitude is held.
-
-        A data set goes on for as long as it gains something from any of its starts.
 
         Parameters
         ----------
@@ -243,46 +302,17 @@ class _Ascent:
         at, first, last = self._stretch(amplitude)
         z = z.copy()
         z[:, self.column] = (self.neutral + at) / self._scale
-        best = _Places.unseen(z, at)
+
+        def look(y: Array, rows: Ints) -> _Look:
+            x = self.tangent(y, rows, [*free, self.column])
+            signature = x.parameters[..., -1] / self._scale
+            here = weigh(without_last(x), signature, first[rows], last[rows], self.degrees)
+            log_bayes = _finite(here.height + x.prior - self.nothing[rows])
+            return _Look(x, here, _Places(y, log_bayes, at[rows] + here.move, here.norm))
+
         starts = len(z) // len(alive)
         rows = np.flatnonzero(np.tile(alive, starts))
-        for step in range(steps + 1):
-            both = self._tangent(z[rows], rows, free)
-            signature = both.parameters[..., -1] / self._scale
-            here = weigh(without_last(both), signature, first[rows], last[rows], self.begin.degrees)
-            log_bayes = self._log_bayes(here, both, rows)
-            hope = np.minimum(log_bayes - best.log_bayes[rows], here.promise)
-            moved = at[rows] + here.move
-            better = best.improve(rows, _Places(z[rows], log_bayes, moved, here.norm))
-            # A step that led down, where the wire went slack say, is the last one.
-            go = np.flatnonzero(better & self._is_hopeful(rows, hope))
-            if step == steps or not len(go):
-                break
-            rows = rows[go]
-            readings = self._seen(rows)
-            z[rows] = stepped(self.target, z[rows], readings, both.of(go), here.of(go), free, self.begin.degrees)
-        return best
-
-    def _tangent(self, z: Array, rows: Ints, free: list[int]) -> Tangent:
-        """Of some climbs at their places, by the parameters that follow and the amplitude, which comes last."""
-        with np.errstate(all="ignore"):
-            return tangent(self.target, z, self._seen(rows), [*free, self.column])
-
-    def _log_bayes(self, here: Weighed, x: Tangent, rows: Ints) -> Array:
-        """Log Bayes factors of the effect at some climbs' places, finite everywhere."""
-        value = here.height + x.prior - self.nothing[rows]
-        return np.nan_to_num(value, nan=_NEVER, neginf=_NEVER)
-
-    def _is_hopeful(self, rows: Ints, hope: Array) -> Bools:
-        """Whether the data sets of some climbs may gain something, by what each climb hopes for."""
-        every = np.full(len(self.nothing), -np.inf)
-        every[rows] = hope
-        by_set = self.best_start(every) >= _SETTLED
-        return np.asarray(by_set[rows % len(by_set)])
-
-    def _seen(self, rows: Ints) -> list[Array] | None:
-        """The readings of the data sets of some climbs."""
-        return _of_rows(self.begin.readings, rows % self.begin.data_sets)
+        return self.follow(look, _Places.unseen(z, at), rows, free, steps)
 
     @property
     def _scale(self) -> float:
@@ -314,11 +344,13 @@ def _begin(block: LaplaceFit, ladder: AmplitudePath, begin: Start) -> tuple[_Asc
     low, high = main.prior.support()
     ascent = _Ascent(
         target,
+        begin.readings,
+        begin.data_sets,
+        begin.degrees,
         column,
         main.neutral,
         float(low),
         float(high),
-        begin,
         nothing=np.tile(nothing, len(ladder.probes)),
         half=np.sqrt(apart.repeat(begin.data_sets)),
     )

@@ -40,21 +40,26 @@ def stepped(
     degrees : int
         Readings less parameters.
     """
-    many = len(_LENGTHS)
     trial = _along(here.step, z, columns)
-    flat = trial[1:].reshape(-1, z.shape[1])
-    tiled = None
-    if readings is not None:
-        tiled = [np.tile(of_sample, (1, 1, many)) for of_sample in readings]
-    moved, prior = residuals(target, flat, tiled)
-    residual = np.concatenate([x.residual[None], moved.reshape(many, len(z), -1)])
-    priors = np.concatenate([x.prior[None], prior.reshape(many, -1)])
+    residual, prior = _tried(target, trial[1:], readings)
+    residual = np.concatenate([x.residual[None], residual])
+    prior = np.concatenate([x.prior[None], prior])
     square = _squares(x, here.ratio, residual)
     with np.errstate(invalid="ignore"):
-        value = priors - 0.5 * degrees * np.log(np.maximum(square, x.least))
+        value = prior - 0.5 * degrees * np.log(np.maximum(square, x.least))
     best = np.argmax(or_impossible(value), axis=0)
     rows = np.arange(len(z))
     return np.asarray(trial[best, rows])
+
+
+def _tried(target: LogPosterior, places: Array, readings: Sequence[Array] | None) -> tuple[Array, Array]:
+    """(k, n, N) residuals and (k, n) log prior densities at k places (k, n, d) of each data set."""
+    k, n, d = places.shape
+    tiled = None
+    if readings is not None:
+        tiled = [np.tile(of_sample, (1, 1, k)) for of_sample in readings]
+    residual, prior = residuals(target, places.reshape(-1, d), tiled)
+    return residual.reshape(k, n, -1), prior.reshape(k, n)
 
 
 def _along(step: Array, z: Array, columns: list[int]) -> Array:

@@ -4,6 +4,8 @@ The parameters may bend to absorb most of two effects where they cannot absorb w
 there; a setting error takes the place of a slip only until the elastic curve has its form.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from wirebayes.discovery.noise_integral import Expansion, Projected, has_tangent, project, with_each_signature
@@ -109,19 +111,33 @@ def _leading(single: Array, groups: list[Ints]) -> Ints:
 
 def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
     """(n, k, j, m) of the sum of squares by some signatures with each one; -inf where an amplitude has no meaning."""
-    along = found.along[:, :, None, :]
-    square = found.square[:, :, None, :]
-    along_first = np.take_along_axis(found.along, first[:, None], axis=2)[..., None]
-    square_first = np.take_along_axis(found.square, first[:, None], axis=2)[..., None]
+    each = _Signatures(found.along[:, :, None, :], found.square[:, :, None, :])
+    along_first = np.take_along_axis(found.along, first[:, None], axis=2)
+    square_first = np.take_along_axis(found.square, first[:, None], axis=2)
+    leading = _Signatures(along_first[..., None], square_first[..., None])
     cross = found.form.of(first).products(found.form, found.shrink)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        determinant = square_first * square - cross**2
-        a_first = (square * along_first - cross * along) / determinant
-        a = (square_first * along - cross * along_first) / determinant
-        explained = a_first * along_first + a * along
-        are_two = determinant > LEAST_LEFT * square_first * square
+        of_leading = leading.beside(each, cross)
+        of_each = each.beside(leading, cross)
+        explained = of_leading * leading.along + of_each * each.along
+        are_two = leading.determinant(each, cross) > LEAST_LEFT * leading.square * each.square
     either_sign = ~x.one_sided
-    allowed_first = (a_first >= 0.0) | either_sign[first][:, None, :, None]
-    allowed = (a >= 0.0) | either_sign
-    possible = are_two & np.isfinite(explained) & allowed_first & allowed
+    leading_allowed = (of_leading >= 0.0) | either_sign[first][:, None, :, None]
+    each_allowed = (of_each >= 0.0) | either_sign
+    possible = are_two & np.isfinite(explained) & leading_allowed & each_allowed
     return np.where(possible, explained, -np.inf)
+
+
+class _Signatures(NamedTuple):
+    """What the readings have along signatures, and the squares of these; arrays that broadcast with one another's."""
+
+    along: Array
+    square: Array
+
+    def determinant(self, other: "_Signatures", cross: Array) -> Array:
+        """Of the products of pairs, `cross` those of one with the other."""
+        return np.asarray(self.square * other.square - cross**2)
+
+    def beside(self, other: "_Signatures", cross: Array) -> Array:
+        """Best amplitudes with the others at their best."""
+        return np.asarray((other.square * self.along - cross * other.along) / self.determinant(other, cross))

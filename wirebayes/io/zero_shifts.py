@@ -76,22 +76,24 @@ def zero_shift(readings: CheckedTest) -> str:
 
 def _moves(readings: CheckedTest, way: float) -> _Moves:
     """The moves of one way; a move after a reversal shows friction, and one of a slack wire nothing."""
-    each, setting = readings.each, readings.setting
-    first = np.array([row[0] for row in each])
-    last = np.array([row[-1] for row in each])
-    # where there is a single reading, that one
-    second = np.array([row[:2][-1] for row in each])
-    last_but_one = np.array([row[-2:][0] for row in each])
-    moved = np.diff(setting)
+    moved = np.diff(readings.setting)
+    middle = readings.setting[:-1] + 0.5 * moved
+    before, after = _about_moves(readings, 0)
     used = _of_one_way(readings, moved, way)
     if readings.protocol.control == "displacement":
-        weakest = np.minimum(first[1:], last[:-1])
-        used &= weakest > slack_below(readings)
+        used &= np.minimum(after, before) > slack_below(readings)
+    added = after - before
+    inner_before, inner_after = _about_moves(readings, 1)
+    inner = inner_after - inner_before
     at = np.flatnonzero(used)
-    added = first[1:] - last[:-1]
-    inner = second[1:] - last_but_one[:-1]
-    middle = setting[:-1] + 0.5 * moved
     return _Moves(at + 1, added[at], inner[at], moved[at], middle[at])
+
+
+def _about_moves(readings: CheckedTest, between: int) -> tuple[Floats, Floats]:
+    """Readings before and after every move, so many others between; where a hold has fewer, its farthest."""
+    before = np.array([row[-1 - between :][0] for row in readings.each[:-1]])
+    after = np.array([row[: 1 + between][-1] for row in readings.each[1:]])
+    return before, after
 
 
 def _of_one_way(readings: CheckedTest, moved: Floats, way: float) -> Bools:

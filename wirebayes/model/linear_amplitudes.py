@@ -82,6 +82,12 @@ class MarginalisedProblem(Problem):
 
     def drawn(self, theta: Array, rng: Generator) -> tuple[Array, Array]:
         """(n, k) amplitudes given the other parameters, and (n,) the log density of being drawn."""
+        parts = [self._drawn(theta[i : i + _ROWS], rng) for i in range(0, len(theta), _ROWS)]
+        amplitudes, log_density = zip(*parts, strict=True)
+        return np.concatenate(amplitudes), np.concatenate(log_density)
+
+    def _drawn(self, theta: Array, rng: Generator) -> tuple[Array, Array]:
+        """The same of a few."""
         seen = self._seen(self._lines(theta, None))
         normal = rng.normal(size=seen.along.shape)
         amplitudes = seen.amplitudes(seen.along + normal) * self.sd
@@ -226,16 +232,15 @@ def completed(problem: Problem, theta: Array, rng: Generator) -> tuple[Problem, 
     """
     if not isinstance(problem, MarginalisedProblem):
         return problem, theta, np.zeros(len(theta))
-    parts = [problem.drawn(theta[i : i + _ROWS], rng) for i in range(0, len(theta), _ROWS)]
-    amplitudes, log_density = map(np.concatenate, zip(*parts, strict=True))
+    whole = problem.whole
+    amplitudes, log_density = problem.drawn(theta, rng)
     known = np.hstack([theta, amplitudes])
     values = dict(zip((*problem.names, *problem.columns), known.T, strict=True))
-    for name, distribution in problem.whole.prior.distributions.items():
+    for name, distribution in whole.prior.distributions.items():
         if name not in values:
             values[name] = distribution.rvs(len(theta), random_state=rng)
             log_density = log_density + distribution.logpdf(values[name])
-    every = np.column_stack([values[name] for name in problem.whole.names])
-    return problem.whole, every, log_density
+    return whole, np.column_stack([values[name] for name in whole.names]), log_density
 
 
 def _shapes(problem: Problem, i: int, columns: list[str]) -> Array:

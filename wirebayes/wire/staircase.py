@@ -6,7 +6,7 @@ what numpy is fast at.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +49,14 @@ class Linearised:
     carry_by_setting: Array
     carry_by_creep: Array
     creep: Array
+
+
+class Sloped(NamedTuple):
+    """Values of a hold, and their derivatives by its own setting error and by the creep carried into it."""
+
+    value: Array
+    by_setting: Array
+    by_creep: Array
 
 
 def simulate(protocol: Protocol, theta: Theta, model: Model = PLAIN, setting_error: Array | None = None) -> Array:
@@ -133,9 +141,9 @@ def _by_closed_form(protocol: Protocol, theta: Theta, model: Model) -> Linearise
     walk = Walk(protocol, theta, model)
     out = _nothing(protocol, np.shape(theta["k1"])[0])
     for j, setting in enumerate(protocol.setting):
-        here = walk.closed_form(j, walk.base + setting, out.creep[j])
-        out.reading[j], out.by_setting[j], out.by_creep[j] = here[:3]
-        out.creep[j + 1], out.carry_by_setting[j], out.carry_by_creep[j] = here[3:]
+        reading, carried = walk.closed_form(j, walk.base + setting, out.creep[j])
+        out.reading[j], out.by_setting[j], out.by_creep[j] = reading
+        out.creep[j + 1], out.carry_by_setting[j], out.carry_by_creep[j] = carried
     return out
 
 
@@ -151,13 +159,18 @@ def _by_complex_steps(protocol: Protocol, theta: Theta, model: Model) -> Lineari
     for j, setting in enumerate(protocol.setting):
         creep = np.tile(out.creep[j], 2) + creep_step
         reading, carried, beside = walk.hold(j, setting + setting_step, creep, beside)
-        out.reading[j] = reading[:, n:].real
-        out.by_setting[j], out.by_creep[j] = np.hsplit(reading.imag / _STEP, 2)
-        out.creep[j + 1] = carried[n:].real
-        out.carry_by_setting[j], out.carry_by_creep[j] = np.split(carried.imag / _STEP, 2)
+        out.reading[j], out.by_setting[j], out.by_creep[j] = _parted(reading)
+        out.creep[j + 1], out.carry_by_setting[j], out.carry_by_creep[j] = _parted(carried)
         walk.past = [(start_s, goal.real, k2.real) for start_s, goal, k2 in walk.past]
         beside = {key: value.real for key, value in beside.items()}
     return out
+
+
+def _parted(both: Array) -> Sloped:
+    """Values (..., n) of both complex steps (..., 2 n), and what the steps make of them."""
+    _, value = np.split(both.real, 2, axis=-1)
+    by_setting, by_creep = np.split(both.imag / _STEP, 2, axis=-1)
+    return Sloped(value, by_setting, by_creep)
 
 
 def streamed(protocol: Protocol, theta: Theta, model: Model = PLAIN) -> "Linearised | Staircases":
@@ -307,12 +320,13 @@ class Walk:
         self.past = []
         uncrept = np.zeros(len(setting))
         if not self.model.effects and self.protocol.control == "displacement":
-            reading, slope, *_ = self.closed_form(j, self.base + setting, uncrept, rows)
-            return reading, slope
-        moved = self.hold(j, setting + 1j * _STEP, uncrept, {})[0][rows]
+            reading, _ = self.closed_form(j, self.base + setting, uncrept, rows)
+            return reading.value, reading.by_setting
+        readings, _, _ = self.hold(j, setting + 1j * _STEP, uncrept, {})
+        moved = readings[rows]
         return moved.real, moved.imag / _STEP
 
-    def closed_form(self, j: int, stretched: Array, creep: Array, rows: slice = slice(None)) -> tuple[Array, ...]:
+    def closed_form(self, j: int, stretched: Array, creep: Array, rows: slice = slice(None)) -> tuple[Sloped, Sloped]:
         """A hold without effects, eqs (4)-(6) differentiated by hand.
 
         Parameters
@@ -328,26 +342,38 @@ class Walk:
 
         Returns
         -------
-        tension, by_setting, by_creep : (r, n) arrays
-            Readings, N, and their derivatives by the setting error and by the carried creep, N/mm.
-        carried, carry_by_setting, carry_by_creep : (n,) arrays
-            Creep carried out, mm, and its derivatives by the same two.
+        readings : Sloped of (r, n) arrays
+            N, and N/mm.
+        carried : Sloped of (n,) arrays
+            Creep carried out, mm.
         """
         zero = self.protocol.length_mm + creep
-        amount, amount_by_setting, amount_by_creep = self._amount(stretched, zero, creep)
-        every = self.fraction[self.where[j]]
-        fraction = every[rows]
-        tension, by_stretched, by_zero = self._tension(stretched, zero + amount * fraction)
-        stiff = np.where(tension > 0, self.k1, 0.0)
-        by_setting = stiff * (by_stretched + by_zero * (amount_by_setting * fraction))
-        by_creep = stiff * (by_zero * (1.0 + amount_by_creep * fraction))
-        end = every[self.protocol.end[j]]
-        carried = creep + amount * end
-        carry_by_creep = 1.0 + amount_by_creep * end
-        return np.maximum(tension, 0.0), by_setting, by_creep, carried, amount_by_setting * end, carry_by_creep
+        amount = self._amount(stretched, zero, creep)
+        fraction = self.fraction[self.where[j]]
+        end = fraction[self.protocol.end[j]]
+        carried = Sloped(creep + amount.value * end, amount.by_setting * end, 1.0 + amount.by_creep * end)
+        return self._read(stretched, zero, amount, fraction[rows]), carried
 
-    def _amount(self, stretched: Array, zero: Array, creep: Array) -> tuple[Array, Array, Array]:
-        """Creep still to come in a hold, mm, and its derivatives by setting error and by carried creep; all (n,).
+    def _read(self, stretched: Array, zero: Array, amount: Sloped, fraction: Array) -> Sloped:
+        """Readings (r, n) of a hold, N.
+
+        Parameters
+        ----------
+        stretched, zero : (n,) arrays
+            Stretched length, and zero-tension length when it begins, mm.
+        amount : Sloped of (n,) arrays
+            Creep still to come in the hold, mm.
+        fraction : (r, n) array
+            How much of it has come at each reading.
+        """
+        tension, by_stretched, by_zero = self._tension(stretched, zero + amount.value * fraction)
+        stiff = np.where(tension > 0, self.k1, 0.0)
+        by_setting = stiff * (by_stretched + by_zero * (amount.by_setting * fraction))
+        by_creep = stiff * (by_zero * (1.0 + amount.by_creep * fraction))
+        return Sloped(np.maximum(tension, 0.0), by_setting, by_creep)
+
+    def _amount(self, stretched: Array, zero: Array, creep: Array) -> Sloped:
+        """Creep still to come in a hold, mm; all (n,).
 
         Parameters
         ----------
@@ -356,7 +382,7 @@ class Walk:
         """
         first, by_stretched, by_zero = self._tension(stretched, zero)
         target, slope = self._target(first)
-        return target - self.kept * creep, slope * by_stretched, slope * by_zero - self.kept
+        return Sloped(target - self.kept * creep, slope * by_stretched, slope * by_zero - self.kept)
 
     def _target(self, tension: Array) -> tuple[Array, Array]:
         """Final creep (n,) at a tension, mm, and its derivative by the strain; zero when slack."""

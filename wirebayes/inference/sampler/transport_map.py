@@ -99,12 +99,8 @@ class Straight:
         v = np.zeros_like(left)
         held = np.zeros_like(left)
         for j in range(len(v)):
-            before = v[:j]
-            mean = self._mean(j, before, held[:j])
-            constant, slopes = self.log_scale[j, 0], self.log_scale[j, 1 : j + 1]
-            log_scale = constant + slopes @ before
-            log_scale = np.clip(log_scale, self.least[j], self.most[j])
-            v[j] = mean + left[j] * np.exp(log_scale)
+            mean = self._mean(j, v[:j], held[:j])
+            v[j] = mean + left[j] * np.exp(self._log_scale(j, v[:j]))
             held[j] = np.clip(v[j], self.low[j], self.high[j])
         x = np.empty(v.T.shape)
         x[:, self.order] = v.T * self.scale + self.centre
@@ -116,6 +112,11 @@ class Straight:
         bend = self.quadratic[j, :j, :j] @ inside
         mean += (bend * (before - 0.5 * inside)).sum(axis=0)
         return np.asarray(mean)
+
+    def _log_scale(self, j: int, before: Array) -> Array:
+        """(n,) of coordinate j by those before it (j, n)."""
+        log_scale = self.log_scale[j, 0] + self.log_scale[j, 1 : j + 1] @ before
+        return np.clip(log_scale, self.least[j], self.most[j])
 
 
 def fit_map(points: WeightedPoints, order: Ints) -> Straight:
@@ -172,10 +173,9 @@ def _coefficients(found: Sequence["_Straightened"]) -> dict[str, Array]:
         mean = of.of_mean
         constant[j] = mean[0]
         linear[j, :j] = mean[1 : j + 1]
-        products = mean[j + 1 :]
-        curvature = quadratic[j]
-        np.add.at(curvature, (of.one, of.other), products)
-        np.add.at(curvature, (of.other, of.one), products)
+        one, other = of.pairs
+        np.add.at(quadratic[j], (one, other), mean[j + 1 :])
+        np.add.at(quadratic[j], (other, one), mean[j + 1 :])
         log_scale[j, : j + 1] = of.of_scale
     return {"constant": constant, "linear": linear, "quadratic": quadratic, "log_scale": log_scale}
 
@@ -186,7 +186,7 @@ class _Straightened:
 
     Attributes
     ----------
-    one, other : (k,) arrays of int
+    pairs : (2, k) array of int
         The coordinates whose products the mean has, after a constant and the coordinates themselves.
     of_mean : (1 + j + k,) array
     of_scale : (1 + j,) array
@@ -194,8 +194,7 @@ class _Straightened:
         Log scales, and deviations from the mean in units of the scale.
     """
 
-    one: Ints
-    other: Ints
+    pairs: Ints
     of_mean: Array
     of_scale: Array
     spread: Array
@@ -207,36 +206,43 @@ def _straighten(v: Array, j: int, weight: Array, clear: float, every: bool) -> _
     y = v[:, j]
     lines = np.column_stack([np.ones(len(v)), v[:, :j]])
     many = v.shape[1] > FEW
-    one, other = np.triu_indices(j if every or many else 0)
+    pairs = np.array(np.triu_indices(j if every or many else 0))
+    products = v[:, pairs[0]] * v[:, pairs[1]]
     if many and not every:
-        one, other = _seen_at_once(v, lines, one, other, y, weight, clear)
-    products = v[:, one] * v[:, other]
+        clearest = _seen_at_once(products, lines, y, weight, clear)
+        pairs = pairs[:, clearest]
+        products = products[:, clearest]
     terms = np.column_stack([lines, products])
     of_mean, of_scale, t = _regress(terms, lines, y, weight)
     # Far out a bend that is only noise throws everything aside: none without evidence.
     kept = np.abs(t[j + 1 :]) > clear
     if not kept.all():
-        one = one[kept]
-        other = other[kept]
-        terms = terms[:, np.append(np.ones(j + 1, bool), kept)]
+        pairs = pairs[:, kept]
+        terms = np.column_stack([lines, products[:, kept]])
         of_mean, of_scale, _ = _regress(terms, lines, y, weight, of_scale)
     spread = lines @ of_scale
     off_mean = y - terms @ of_mean
-    left = off_mean * np.exp(-spread)
-    return _Straightened(one, other, of_mean, of_scale, spread, left)
+    return _Straightened(pairs, of_mean, of_scale, spread, left=off_mean * np.exp(-spread))
 
 
-def _seen_at_once(
-    v: Array, lines: Array, one: Ints, other: Ints, y: Array, weight: Array, clear: float
-) -> tuple[Ints, Ints]:
-    """The pairs whose product, alone, clearly explains what straight lines leave of y; the clearest few.
+def _seen_at_once(products: Array, lines: Array, y: Array, weight: Array, clear: float) -> Ints:
+    """The products that, alone, clearly explain what straight lines leave of y; the clearest few.
 
     In many dimensions there are too many pairs to fit all together.
+
+    Parameters
+    ----------
+    products : (n, k) array
+        Of pairs of coordinates.
+    lines : (n, 1 + j) array
+        A constant, and the coordinates before y.
+    y, weight : (n,) arrays
+    clear : float
+        The t value from which on something is clear.
     """
-    if not len(one):
-        return one, other
+    if not products.shape[1]:
+        return np.arange(0)
     root = np.sqrt(weight)[:, None]
-    products = v[:, one] * v[:, other]
     both = root * np.column_stack([products, y])
     basis = np.linalg.qr(root * lines)[0]
     left = both - basis @ (basis.T @ both)
@@ -248,7 +254,7 @@ def _seen_at_once(
     clearest = np.argsort(-t, kind="stable")[:MOST_PAIRS]
     best = clearest[t[clearest] > clear]
     best.sort()
-    return one[best], other[best]
+    return best
 
 
 def _normal(x: Array, shape: Array) -> tuple[Array, Array]:

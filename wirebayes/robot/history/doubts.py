@@ -3,7 +3,7 @@
 import numpy as np
 
 from wirebayes.json_files.pose_history import PoseHistoryJson
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Floats, Ints
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.history.corrections import Target
 from wirebayes.robot.history.estimate import Estimate
@@ -73,19 +73,27 @@ def history_warnings(
     content : dict
         Of ``pose.json``, with ``clock`` and ``drift``.
     """
-    out = [
+    position = found.plain.position_m[0]
+    tension = found.plain.tension_N[0]
+    longest_s = _longest_hold(history.times_s, found.track.hold)
+    lengths = inverse.lengths(robot, joint_m)[0]
+    return [
         *_lost(history.times_s, found.track),
         *_contradicted(history, found, line.count),
         *_unsure_clock(history, content),
+        *_dynamics(history.times_s, position),
+        *draws.wire_warnings(robot, line, found.track.tension_N, longest_s, lengths),
+        *plausible.robot_notices(robot),
+        *plausible.strain_notices(robot, line, tension[-1]),
+        *sag.sag_warnings_of_poses(robot, position, found.plain.rotation[0], tension),
     ]
-    out += _dynamics(history.times_s, found.plain.position_m[0])
-    holds = np.concatenate([[0], np.flatnonzero(np.diff(found.track.hold)) + 1, [len(history.times_s) - 1]])
-    longest = float(np.diff(history.times_s[holds]).max())
-    lengths = inverse.lengths(robot, joint_m)[0]
-    out += draws.wire_warnings(robot, line, found.track.tension_N, longest, lengths)
-    plain = found.plain
-    out += plausible.robot_notices(robot) + plausible.strain_notices(robot, line, plain.tension_N[0, -1])
-    return out + sag.sag_warnings_of_poses(robot, plain.position_m[0], plain.rotation[0], plain.tension_N[0])
+
+
+def _longest_hold(times_s: Floats, hold: Ints) -> float:
+    """How long the longest hold took, s, by the number of the hold at each time."""
+    begun = np.flatnonzero(np.diff(hold)) + 1
+    ends = [0, *begun, len(times_s) - 1]
+    return float(np.diff(times_s[ends]).max())
 
 
 def _lost(times_s: Floats, track: Track) -> list[Notice]:
