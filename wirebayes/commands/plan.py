@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,7 +13,7 @@ from wirebayes._version import __version__
 from wirebayes.commands.options import above_zero, check_seed, model_spec, path_of
 from wirebayes.commands.plan_content import PlanRequest, plan_content, protocol_content
 from wirebayes.commands.predict import find_posterior
-from wirebayes.commands.wires import RobotLike, content_hash, hash_of, robot_of
+from wirebayes.commands.wires import RobotLike, hash_of, identity_of, robot_of
 from wirebayes.discovery.next_measurement import other_measurements
 from wirebayes.effects import catalogue, source_of
 from wirebayes.errors import InputError
@@ -36,7 +36,6 @@ from wirebayes.planning.widths import at_centre, expected_widths, middle_tension
 from wirebayes.processes.workers import computing
 from wirebayes.progress import Progress, silent
 from wirebayes.results import read_back
-from wirebayes.robot.mechanics.description import Robot
 from wirebayes.simulation.synthetic import Bench
 from wirebayes.strict.files import PathLike
 from wirebayes.views.plan import Plan
@@ -191,9 +190,7 @@ def _judged(request: PlanRequest, kinds: Kinds, spec: ModelSpec, seed: int, repo
 
 def _identity(robot: RobotLike | None) -> str | None:
     """What decides a robot's part in the results: a hash of its content."""
-    if robot is None:
-        return None
-    return hash_of(asdict(robot)) if isinstance(robot, Robot) else content_hash(Path(robot))
+    return None if robot is None else identity_of(robot)
 
 
 def _request(

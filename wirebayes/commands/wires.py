@@ -376,13 +376,18 @@ def configuration(
     return {
         "command": command,
         "version": __version__,
-        "robot": hash_of(asdict(robot)) if isinstance(robot, Robot) else content_hash(Path(robot)),
+        "robot": identity_of(robot),
         "wires": posterior if isinstance(posterior, str) else content_hash(posterior),
         "own_effects": source_of(own_effects),
         "draws": draws,
         "seed": seed,
         "options": dict(options),
     }
+
+
+def identity_of(robot: RobotLike) -> str:
+    """The hash of what describes a robot, or of its file."""
+    return hash_of(asdict(robot)) if isinstance(robot, Robot) else content_hash(Path(robot))
 
 
 def content_hash(path: Path) -> str:

@@ -162,7 +162,7 @@ class _Places:
 
 @dataclass(frozen=True)
 class _Look:
-    """What is seen from some climbs: the tangents at their places, what its weights say, and what the places are worth."""
+    """What is seen from some climbs: tangents at their places, what the weights of these say, and the places' worth."""
 
     tangent: Tangent
     weighed: Weighed

@@ -160,8 +160,7 @@ def _twice_as_long(sample: Sample) -> Sample:
     settings = stretch * p.setting[p.recorded]
     protocol = _holds(settings, _longest_series(p), 2.0 * p.length_mm, p.control)
     unread = np.zeros((*protocol.time_s.shape, 1))
-    preloaded = sample.model.length_ref_mm or p.length_mm
-    model = replace(sample.model, length_ref_mm=preloaded)
+    model = replace(sample.model, length_ref_mm=sample.length_ref_mm)
     return replace(sample, protocol=protocol, readings=unread, model=model)
 
 

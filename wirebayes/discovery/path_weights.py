@@ -1,6 +1,6 @@
 """The density at one place of a path, the noise integrated out, and the step that leads on from there."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from wirebayes.discovery.noise_integral import ABSORBED, RATIOS
 from wirebayes.discovery.tangent import Tangent, damp
 from wirebayes.numeric.linear_algebra import cholesky, solve
 from wirebayes.numeric.log_sum import or_impossible
+from wirebayes.numeric.rows import joined_rows, rows_of
 from wirebayes.numeric.typing import Array, Bools
 
 _JUMP = 1e8  # standard deviations a unit of any parameter: no tangent where the readings jump
@@ -35,7 +36,7 @@ class Weighed:
 
     def of(self, rows: Array) -> "Weighed":
         """That of some places."""
-        return Weighed(*(getattr(self, f.name)[rows] for f in fields(self)))
+        return rows_of(self, rows)
 
 
 def weigh(
@@ -65,7 +66,7 @@ def weigh(
     for first in range(0, n, _PIECE):
         rows = np.arange(first, min(first + _PIECE, n))
         parts.append(_weigh_few(x.of(rows), signature[rows], near[rows], far[rows], degrees))
-    return Weighed(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Weighed)))
+    return joined_rows(parts)
 
 
 @dataclass(frozen=True)

@@ -146,18 +146,30 @@ def _collapsed(log_s: Floats, information: list[_Information], prior: _Moments) 
     precision = np.tile(before, (n, 1, 1))
     vector = np.tile(before @ mean, (n, 1))
     log_likelihood = np.zeros(n)
-    for own, own_vector in information:
-        both = own + inverse
-        within = np.linalg.inv(both)
-        precision += inverse - inverse @ within @ inverse
-        vector += np.einsum("nij,njk,k->ni", inverse, within, own_vector)
-        square = np.einsum("i,nij,j->n", own_vector, within, own_vector)
-        log_likelihood += 0.5 * square - 0.5 * _log_determinant(both)
+    for of_specimen in information:
+        own_precision, own_vector, own_log_likelihood = _without_specimen(of_specimen, inverse)
+        precision += own_precision
+        vector += own_vector
+        log_likelihood += own_log_likelihood
         log_likelihood -= log_s.sum(1)
     centre = np.linalg.solve(precision, vector[..., None])[..., 0]
     explained = (vector * centre).sum(1)
     log_likelihood += 0.5 * explained - 0.5 * _log_determinant(precision)
     return log_likelihood, precision, vector
+
+
+def _without_specimen(of_specimen: _Information, inverse: Floats) -> tuple[Floats, Floats, Floats]:
+    """What a specimen adds to precision, vector and log likelihood of the line's mean, itself integrated out.
+
+    `inverse` ``(n, p, p)`` is the precision of a specimen about the line.
+    """
+    own, vector = of_specimen
+    both = own + inverse
+    within = np.linalg.inv(both)
+    square = np.einsum("i,nij,j->n", vector, within, vector)
+    log_likelihood = 0.5 * square - 0.5 * _log_determinant(both)
+    along = np.einsum("nij,njk,k->ni", inverse, within, vector)
+    return inverse - inverse @ within @ inverse, along, log_likelihood
 
 
 def _log_determinant(matrices: Floats) -> Floats:

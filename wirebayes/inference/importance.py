@@ -28,7 +28,7 @@ from wirebayes.inference.sampler.proposal import Proposal
 from wirebayes.inference.sampler.settings import EXPLORING_SHARES, ROUGH_SHARES
 from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.resampling import truncated_rows
-from wirebayes.numeric.spread_rows import spread_rows
+from wirebayes.numeric.spread_rows import spread_in_widths
 from wirebayes.numeric.typing import Array, Bools, Function, Ints
 
 
@@ -205,9 +205,7 @@ def from_draws(
     rng : numpy Generator
     """
     height = densities(draws)
-    width = draws.std(axis=0)
-    scaled = draws / np.where(width > 0, width, 1.0)
-    spread = spread_rows(scaled, _STARTS, rng)
+    spread = spread_in_widths(draws, _STARTS, rng)
     highest = np.argmax(height, axis=0)
     begin = draws[np.append(highest, spread)]
     of_highest = np.arange(height.shape[1])

@@ -10,7 +10,7 @@ from wirebayes.inference.climb import climb, curved
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.optimum import REACH, Optimum, distinct, together
 from wirebayes.numeric.resampling import next_power, systematic_rows
-from wirebayes.numeric.spread_rows import spread_rows
+from wirebayes.numeric.spread_rows import spread_in_widths
 from wirebayes.numeric.typing import Array, Function, Ints
 
 _ANNEALED = 400  # prior draws
@@ -144,9 +144,7 @@ def search(target: LogPosterior, rng: Generator, *, extra: Array | None = None) 
 
 def _landmarks(passed: Array, height: Array, rng: Generator) -> Array:
     """Of the places (n, d) that the annealing passed the highest one, and some far from one another."""
-    width = passed.std(axis=0)
-    scaled = passed / np.where(width > 0, width, 1.0)
-    apart = spread_rows(scaled, _FIRST, rng)
+    apart = spread_in_widths(passed, _FIRST, rng)
     highest = int(np.argmax(height))
     return np.asarray(passed[[highest, *apart]])
 

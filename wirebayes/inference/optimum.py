@@ -1,12 +1,12 @@
 """Maxima of densities with the normal approximation there, and which of them are one mode."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from wirebayes.numeric.rows import rows_of
+from wirebayes.numeric.rows import joined_rows, rows_of
 from wirebayes.numeric.typing import Array, Bools, Ints
 
 LEAST_CURVATURE = 0.3  # a standard deviation of 1.8; the widest prior, k1's, has 1.5 in its logarithm
@@ -125,7 +125,7 @@ def distinct(found: Sequence[Optimum]) -> Optimum:
 
 def together(found: Sequence[Optimum]) -> Optimum:
     """The rows of several, one after the other."""
-    return Optimum(*(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(Optimum)))
+    return joined_rows(found)
 
 
 def _apart(z: Array, modes: Array, curvature: Array) -> Array:

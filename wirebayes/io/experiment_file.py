@@ -98,10 +98,22 @@ def read_experiments(path: str | Path) -> list[Experiment]:
     experiments: list[Experiment] = []
     for keys in tables:
         experiment = _read_one(keys, shared, lines)
-        if any(experiment.name == other.name for other in experiments):
-            raise keys.complain("name", shown(experiment.name) + " a second time", "a name used once in the file")
+        refuse_second(keys, experiment.name, [other.name for other in experiments])
         experiments.append(experiment)
     return experiments
+
+
+def refuse_second(keys: Keys, name: str, others: Sequence[str]) -> None:
+    """Refuse a name that another table of the file has."""
+    if name in others:
+        raise keys.complain("name", shown(name) + " a second time", "a name used once in the file")
+
+
+def length_of(keys: Keys) -> float:
+    """The length of a sample, mm."""
+    largest = LARGEST["displacement_mm"]
+    expected = f"a length above 0 mm, from {SHORTEST:.0e} to {largest:.0e} mm"
+    return keys.number("length_mm", expected, least=SHORTEST, most=largest)
 
 
 def _read_one(keys: Keys, shared: dict[str, dict[str, Any]], shared_lines: dict[str, int]) -> Experiment:
@@ -139,9 +151,7 @@ def experiment_of(keys: Keys, readings: Callable[[], CsvTable]) -> Experiment:
         or any(c in "/\\" or not c.isprintable() for c in material)
     ):
         raise keys.complain("material", shown(material), expected)
-    largest = LARGEST["displacement_mm"]
-    expected = f"a length above 0 mm, from {SHORTEST:.0e} to {largest:.0e} mm"
-    length = keys.number("length_mm", expected, least=SHORTEST, most=largest)
+    length = length_of(keys)
     control = control_of(keys)
     resolution = _resolution(keys, control)
     priors = keys.priors()

@@ -11,7 +11,7 @@ import numpy as np
 from wirebayes.errors import InputError, shown
 from wirebayes.io import mistaken_table
 from wirebayes.io.experiment import ENOUGH, LEAST_READINGS
-from wirebayes.io.experiment_file import SHORTEST, control_of
+from wirebayes.io.experiment_file import control_of, length_of, refuse_second
 from wirebayes.io.readings import READ, STRETCH
 from wirebayes.strict.files import read_text
 from wirebayes.strict.hint import hint
@@ -124,8 +124,7 @@ def read_plan(path: Path, effects: Sequence[str] = ()) -> PlanFile:
     tests: list[PlannedTest] = []
     for index, keys in enumerate(top.tables(KIND)):
         test = _planned(keys, index)
-        if any(test.name == other.name for other in tests):
-            raise keys.complain("name", shown(test.name) + " a second time", "a name used once in the file")
+        refuse_second(keys, test.name, [other.name for other in tests])
         tests.append(test)
     guess = _guess(top)
     posterior = _path(top, "posterior", "the folder of a fit")
@@ -159,9 +158,7 @@ def _planned(keys: Keys, index: int) -> PlannedTest:
     of_settings, step, of_resolution = _SET[control]
     keys.only((*_KEYS, of_settings, step, of_resolution))
     name = keys.string("name", "a name", f"protocol-{index + 1}")
-    longest = LARGEST["displacement_mm"]
-    expected = f"a length above 0 mm, from {SHORTEST:.0e} to {longest:.0e} mm"
-    length = keys.number("length_mm", expected, least=SHORTEST, most=longest)
+    length = length_of(keys)
     resolution = 0.01
     if of_resolution in keys.table:
         expected = f"a step of 0 {READ_UNIT[control]} or more"

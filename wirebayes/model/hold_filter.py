@@ -198,9 +198,9 @@ def filter_holds(line: Linearised, measured: Measured) -> Iterator[tuple[Array, 
     noise = measured.noise
     mean = np.zeros(line.reading.shape[2])
     var = mean
-    for j, has_readings in enumerate(measured.mask.any(axis=1)):
+    for j, taken in enumerate(measured.mask):
         read = None
-        if has_readings:
+        if taken.any():
             known_noise = noise.where_read(measured.first(j))
             read = filter_hold(line, j, measured, mean, var, known_noise)
             mean = read.mean

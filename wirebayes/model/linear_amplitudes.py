@@ -13,6 +13,7 @@ import numpy as np
 from numpy.random import Generator
 
 from wirebayes.model import likelihoods
+from wirebayes.model.hold_filter import Measured
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
 from wirebayes.numeric import linear_algebra
@@ -114,7 +115,7 @@ class MarginalisedProblem(Problem):
         return _Seen.of(total, square, precision, pull)
 
 
-_Line = tuple[Linearised, likelihoods.Measured]
+_Line = tuple[Linearised, Measured]
 
 
 @dataclass(frozen=True)

@@ -95,6 +95,11 @@ class Prior:
         drawn = [d.rvs(size=n, random_state=rng) for d in self.distributions.values()]
         return self._from_known(np.column_stack(drawn))
 
+    def named_draws(self, n: int, rng: np.random.Generator) -> dict[str, Array]:
+        """(n,) draws of every parameter, fixed ones included."""
+        drawn = dict(zip(self.names, self.rvs(n, rng).T, strict=True))
+        return drawn | {name: np.full(n, value) for name, value in self.fixed.items()}
+
     def ppf(self, cube: Array) -> Array:
         """(n, d) parameters of points ``(n, d)`` in the unit cube."""
         known = [d.ppf(cube[:, i]) for i, d in enumerate(self.distributions.values())]

@@ -13,6 +13,7 @@ import numpy as np
 
 from wirebayes.model import likelihoods, single_holds
 from wirebayes.model.column_units import sample_in, unit_of_column, units_ratio
+from wirebayes.model.hold_filter import Measured
 from wirebayes.model.prior import PowerScaled, Prior
 from wirebayes.model.sample import LENGTH_EXPONENT, Likelihood, Sample, at_length
 from wirebayes.model.scales import NATURAL, Scales, Units
@@ -72,6 +73,10 @@ class Problem:
         column = self.column(name, sample)
         return self.names.index(column) if column in self.names else float(self.prior.fixed[column])
 
+    def length_exponent(self, sample: Sample) -> int | float:
+        """The place of the exponent by which B grows with the length; 0.0 for a sample of the length that B is of."""
+        return 0.0 if sample.length_ratio == 1.0 else self.place(LENGTH_EXPONENT, sample)
+
     def parameters(self, theta: Array, sample: Sample) -> dict[str, Array]:
         """The parameters of one sample, each (n,), from an (n, d) array of all columns."""
         columns, n = np.ascontiguousarray(theta.T), len(theta)
@@ -80,7 +85,7 @@ class Problem:
             return columns[place] if isinstance(place, int) else np.full(n, place)
 
         out = {name: find(place) for name, place in self._places(sample).items()}
-        ratio = sample.protocol.length_mm / (sample.model.length_ref_mm or sample.protocol.length_mm)
+        ratio = sample.length_ratio
         if ratio == 1.0:
             return out
         return at_length(out, sample.model.effects, ratio, find(self.place(LENGTH_EXPONENT, sample)))
@@ -253,9 +258,7 @@ class Problem:
                 out[name] = PowerScaled(exponent, log_base)
         return out
 
-    def linearised(
-        self, theta: Array, sample: Sample, readings: Array | None = None
-    ) -> tuple[Linearised, likelihoods.Measured]:
+    def linearised(self, theta: Array, sample: Sample, readings: Array | None = None) -> tuple[Linearised, Measured]:
         """A sample's staircase, and its readings or those that stand in for them.
 
         Parameters

@@ -60,6 +60,15 @@ class Sample:
         return Measured(taken, self.protocol.mask, self.variance(own), own["setting_sd"])
 
     @property
+    def length_ref_mm(self) -> float:
+        """The length that the material's parameters refer to, mm."""
+        return self.model.length_ref_mm or self.protocol.length_mm
+
+    @property
+    def length_ratio(self) -> float:
+        return self.protocol.length_mm / self.length_ref_mm
+
+    @property
     def typical_hold_s(self) -> float:
         """Median duration of the recorded holds (a second where all readings are at time zero)."""
         return float(np.median(self.protocol.duration_s[self.protocol.recorded])) or 1.0

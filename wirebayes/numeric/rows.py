@@ -1,5 +1,6 @@
 """Rows of arrays, picked."""
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -29,6 +30,12 @@ def chosen_rows(first: Bools, one: Array, other: Array | float) -> Array:
 def rows_of(record: Record, rows: Any) -> Record:
     """A dataclass of arrays ``(n, ...)`` with some rows of each, by number or mask."""
     return replace(record, **{f.name: getattr(record, f.name)[rows] for f in fields(record)})
+
+
+def joined_rows(records: Sequence[Record]) -> Record:
+    """Dataclasses of arrays ``(n, ...)`` one after the other."""
+    first = records[0]
+    return replace(first, **{f.name: np.concatenate([getattr(r, f.name) for r in records]) for f in fields(first)})
 
 
 def last_axis_of(record: Record, columns: Any) -> Record:

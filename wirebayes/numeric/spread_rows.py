@@ -28,3 +28,9 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator, weight: Array | None
         chosen.append(int(rng.choice(len(x), p=share * nearest / (share @ nearest))))
         nearest = np.minimum(nearest, ((x - x[chosen[-1]]) ** 2).sum(axis=1))
     return chosen
+
+
+def spread_in_widths(x: Array, k: int, rng: np.random.Generator) -> list[int]:
+    """Rows far from one another, each column (n,) of x counted in its standard deviation."""
+    width = x.std(axis=0)
+    return spread_rows(x / np.where(width > 0, width, 1.0), k, rng)

@@ -9,6 +9,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model.single_holds import hold_courses
 from wirebayes.numeric.means import root_mean_square
 from wirebayes.numeric.typing import Array, Ints
+from wirebayes.paper.least_squares import at
 from wirebayes.prediction.predictive import PredictionRequest, draw_predictive
 from wirebayes.results.read_back import Stored
 from wirebayes.wire.model import Model
@@ -120,8 +121,7 @@ def published_course(published: dict[str, float], experiment: Experiment, time_s
         N.
     """
     protocol, first = _last_alone(experiment, time_s)
-    theta = {name: np.array([value]) for name, value in published.items()}
-    course = hold_courses(protocol, theta, Model(), first[:, None])[0]
+    course = hold_courses(protocol, at(published), Model(), first[:, None])[0]
     assert course is not None
     tension: Array = course[0][:, 0]
     return tension

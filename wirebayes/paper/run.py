@@ -228,10 +228,7 @@ def _draw(
 def _prior_draws(experiment: Experiment, likelihood: Likelihood, seed: int) -> dict[str, Array]:
     prior = build([experiment], (), ModelSpec(likelihood=likelihood)).prior
     rng = np.random.default_rng(seed_of(seed, "prior", experiment.name, likelihood))
-    draws = dict(zip(prior.names, prior.rvs(_PRIOR_DRAWS, rng).T, strict=True))
-    for name, value in prior.fixed.items():
-        draws[name] = np.full(_PRIOR_DRAWS, value)
-    return draws
+    return prior.named_draws(_PRIOR_DRAWS, rng)
 
 
 def _measured_row(e: Experiment) -> Row:

@@ -12,6 +12,7 @@ import numpy as np
 from wirebayes.json_files.summary import CREEP_TIMES_S
 from wirebayes.model.sample import MATERIAL
 from wirebayes.numeric.typing import Array
+from wirebayes.paper.least_squares import at
 from wirebayes.results.contraction import MOST, contraction, interval
 from wirebayes.results.parameters import unit_of
 from wirebayes.wire.fresh import FreshSample
@@ -111,7 +112,7 @@ def creep_rows(
         One a time, with the median and the ends of the 90 % interval.
     """
     times = np.array(list(CREEP_TIMES_S.values()))
-    table = {name: np.array([value]) for name, value in published.items()}
+    table = at(published)
     ours = FreshSample(draws, Model(), length_mm).creep_mm(tension_N, times)
     (theirs,) = FreshSample(table, Model(), length_mm).creep_mm(tension_N, times).T
     out = []

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.random import Generator
 
 from wirebayes.inference.laplace_fit import fitted
@@ -80,9 +79,7 @@ def from_tables(
     length_mm = tests[0].length_mm
     scales = planned_scales(tests, _middle(stated.get("k1", TYPICAL_K1_N)))
     prior = default_prior(length_mm, scales, stated, tests[0].control)
-    values = dict(zip(prior.names, prior.rvs(n, rng).T, strict=True))
-    for name, value in prior.fixed.items():
-        values[name] = np.full(n, value)
+    values = prior.named_draws(n, rng)
     draws = {name: values[name] for name in (*MATERIAL, *SAMPLE)}
     given = ", ".join(tables) if tables else "nothing"
     return GuessedWire(draws, length_mm, f"the plan's guess ({given} given, the rest as wide as the model's prior)")

@@ -253,9 +253,7 @@ def _weighted(target: LogPosterior, z: Array, covariance: Array, y: Array, rng: 
     for count in _DRAWS:
         wide = _WIDER**2 * covariance
         points, weight = _round(target, density, centre, wide, count, rng)
-        centre = np.einsum("mk,mkd->md", weight, points)
-        away = points - centre[:, None]
-        spread = np.einsum("mk,mki,mkj->mij", weight, away, away)
+        centre, spread = _moments(points, weight)
         covariance = spread + _LEAST * covariance
     flat = points.reshape(-1, z.shape[1])
     with np.errstate(over="ignore"):
@@ -264,6 +262,13 @@ def _weighted(target: LogPosterior, z: Array, covariance: Array, y: Array, rng: 
     modes = np.repeat(to_natural(z), _DRAWS[-1], axis=0)
     counts = weight.reshape(-1, 1) > 0
     return np.where(counts, theta, modes), weight
+
+
+def _moments(points: Array, weight: Array) -> tuple[Array, Array]:
+    """(m, d) means and (m, d, d) covariances of points (m, k, d) by their weights (m, k)."""
+    mean = np.einsum("mk,mkd->md", weight, points)
+    away = points - mean[:, None]
+    return mean, np.einsum("mk,mki,mkj->mij", weight, away, away)
 
 
 def _round(
@@ -337,17 +342,12 @@ def _row_widths(values: Array, weight: Array) -> Array:
 
 def _log_volume(part: _Posteriors, problem: Problem) -> Array:
     """(m,) half the log determinant of the covariance of the material's parameters, positive ones as logarithms."""
-    names, logarithmic = problem.names, problem.prior.logarithmic
-    columns = [i for i, name in enumerate(names) if name in MATERIAL]
-    positive = [names[i] in logarithmic for i in columns]
-    weight = part.weight
-    theta = part.theta.reshape(*weight.shape, -1)
+    columns = [i for i, name in enumerate(problem.names) if name in MATERIAL]
+    positive = [problem.names[i] in problem.prior.logarithmic for i in columns]
+    theta = part.theta.reshape(*part.weight.shape, -1)
     x = theta[..., columns]
     above_zero = np.where(positive, np.maximum(x, 1e-300), 1.0)
-    x = np.where(positive, np.log(above_zero), x)
-    mean = np.einsum("mk,mkd->md", weight, x)
-    away = x - mean[:, None]
-    covariance = np.einsum("mk,mki,mkj->mij", weight, away, away)
+    _, covariance = _moments(np.where(positive, np.log(above_zero), x), part.weight)
     regular = covariance + 1e-24 * np.eye(len(columns))
     _, log_determinant = np.linalg.slogdet(regular)
     return np.asarray(0.5 * log_determinant)

@@ -37,26 +37,30 @@ def groups_of(fit: Fit, sample: Sample | None, provenance: Mapping[str, Any], rn
     rng : numpy Generator
         Draws from the prior and of the predictive distribution.
     """
-    problem, theta = fit.problem, fit.theta
-    chains, draws, d = theta.shape
-    members = list(problem.samples) if sample is None else [sample]
-    kept = min(draws, _PREDICTIVE_DRAWS)
-    few = np.unique(np.linspace(0, draws - 1, kept).astype(int))
-    chosen = theta[:, few].reshape(-1, d)
-    groups = _of_parameters(fit, sample, members, rng)
-    replicated, measured = _replicated_and_measured(problem, chosen, members, rng)
+    members = list(fit.problem.samples) if sample is None else [sample]
     labels = _hold_coordinates(members, apart=sample is not None)
-    steps = _steps(chains, np.arange(draws))
-    predictive = _readings(members, replicated, (chains, len(few)))
-    groups["posterior_predictive"] = Group(predictive, labels | _steps(chains, few))
-    groups["log_likelihood"] = Group(_log_likelihood(fit, members), labels | steps)
-    groups["observed_data"] = Group(_readings(members, measured, ()), labels)
-    constant = Group(_protocols(members), labels)
-    groups["constant_data"] = constant
+    groups = _of_parameters(fit, sample, members, rng) | _of_readings(fit, members, labels, rng)
     _label(groups, members)
-    constant.attributes["reference_C"] = _listed(s.protocol.reference_C for s in members)
+    groups["constant_data"].attributes["reference_C"] = _listed(s.protocol.reference_C for s in members)
     groups["posterior"].attributes.update(_about(fit, members, provenance))
     return groups
+
+
+def _of_readings(fit: Fit, members: Sequence[Sample], labels: dict[str, Variable], rng: Generator) -> dict[str, Group]:
+    """Predicted and measured readings, how likely they are at every draw, and what was set."""
+    chains, draws, d = fit.theta.shape
+    kept = min(draws, _PREDICTIVE_DRAWS)
+    few = np.unique(np.linspace(0, draws - 1, kept).astype(int))
+    chosen = fit.theta[:, few].reshape(-1, d)
+    replicated, measured = _replicated_and_measured(fit.problem, chosen, members, rng)
+    predictive = _readings(members, replicated, (chains, len(few)))
+    every_step = _steps(chains, np.arange(draws))
+    return {
+        "posterior_predictive": Group(predictive, labels | _steps(chains, few)),
+        "log_likelihood": Group(_log_likelihood(fit, members), labels | every_step),
+        "observed_data": Group(_readings(members, measured, ()), labels),
+        "constant_data": Group(_protocols(members), labels),
+    }
 
 
 def _replicated_and_measured(

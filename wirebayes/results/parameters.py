@@ -45,8 +45,8 @@ def length_of_creep_amount(problem: Problem, sample: Sample | None) -> float:
 
 def _own(problem: Problem, theta: Array, sample: Sample) -> dict[str, Array]:
     """A sample's parameters as they are at its own length, with which it can stand alone."""
-    reference = sample.model.length_ref_mm or sample.protocol.length_mm
-    return by_length(problem.parameters(theta, sample), sample.model.effects, sample.protocol.length_mm, reference)
+    own = problem.parameters(theta, sample)
+    return by_length(own, sample.model.effects, sample.protocol.length_mm, sample.length_ref_mm)
 
 
 def by_length(

@@ -15,7 +15,7 @@ import numpy as np
 from wirebayes.inference.coordinates.one_setting import is_one_setting
 from wirebayes.inference.coordinates.ridge import Ridge, for_sample
 from wirebayes.model.problem import Problem
-from wirebayes.model.sample import LENGTH_EXPONENT, Sample
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 
 
@@ -167,10 +167,6 @@ def _level(problem: Problem, ridge: Ridge, sample: Sample) -> DisplacementLevel 
     k1, preload = (problem.column(name, sample) for name in ("k1", "preload"))
     if preload not in names:
         return None
-    ratio = protocol.length_mm / (sample.model.length_ref_mm or protocol.length_mm)
-    length_exponent: int | float = 0.0
-    if ratio != 1.0:
-        length_exponent = problem.place(LENGTH_EXPONENT, sample)
     readings = sample.readings[..., 0][protocol.mask]
     last_recorded = int(np.flatnonzero(protocol.recorded)[-1])
     return DisplacementLevel(
@@ -182,8 +178,8 @@ def _level(problem: Problem, ridge: Ridge, sample: Sample) -> DisplacementLevel 
         holds=1 + last_recorded,
         modified=sample.model.law == "modified",
         ridge=for_sample(ridge, problem, sample),
-        log_ratio=float(np.log(ratio)),
-        length_exponent=length_exponent,
+        log_ratio=float(np.log(sample.length_ratio)),
+        length_exponent=problem.length_exponent(sample),
     )
 
 

@@ -17,7 +17,7 @@ from wirebayes.inference.coordinates.one_setting import is_one_displacement
 from wirebayes.inference.coordinates.ridge import Ridge
 from wirebayes.inference.coordinates.slack_edge import SlackEdge
 from wirebayes.model.problem import Problem
-from wirebayes.model.sample import LENGTH_EXPONENT, Sample
+from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array
 
 
@@ -221,10 +221,6 @@ def _first_stretch(problem: Problem, ridge: Ridge, sample: Sample, preload: int)
     """
     protocol = sample.protocol
     known = problem.prior.distributions[problem.names[preload]]
-    ratio = protocol.length_mm / (sample.model.length_ref_mm or protocol.length_mm)
-    length_exponent: int | float = 0.0
-    if ratio != 1.0:
-        length_exponent = problem.place(LENGTH_EXPONENT, sample)
     first = protocol.mask[0]
     return FirstStretch(
         preload=preload,
@@ -239,8 +235,8 @@ def _first_stretch(problem: Problem, ridge: Ridge, sample: Sample, preload: int)
         rounding=float(sample.resolution / np.sqrt(12.0)),
         modified=sample.model.law == "modified",
         ridge=ridge,
-        log_ratio=float(np.log(ratio)),
-        length_exponent=length_exponent,
+        log_ratio=float(np.log(sample.length_ratio)),
+        length_exponent=problem.length_exponent(sample),
     )
 
 

@@ -299,7 +299,7 @@ def _ridge(
         which_pair=which_pair.reshape(-1),
         kept=1.0 if sample.model.history == "saturating" and problem.likelihood == "chain" else 0.0,
         hold_s=hold_s,
-        log_length=float(np.log(_length_mm(sample))),
+        log_length=float(np.log(sample.length_ref_mm)),
         effects=effects,
         holds=_holds(sample, tension),
         powers=powers,
@@ -307,13 +307,9 @@ def _ridge(
     )
 
 
-def _length_mm(sample: Sample) -> float:
-    return sample.model.length_ref_mm or sample.protocol.length_mm
-
-
 def _holds(sample: Sample, tension: Array) -> tuple[HoldContext, ...]:
     """What effects see of the holds, which begin at these tensions (H,)."""
-    length, reference = _length_mm(sample), sample.model.tension_ref_N
+    length, reference = sample.length_ref_mm, sample.model.tension_ref_N
     return tuple(
         HoldContext(
             **hold, length_ref_mm=length, tension_ref_N=reference, theta={}, initial_tension=np.full((1, 1), first)

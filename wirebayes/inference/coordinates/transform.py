@@ -141,10 +141,8 @@ class Transformation:
         self.steps = [*_steps(ridges, lasts, levels, means, edges), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
-        preloads = set(of_levels)
-        preloads.update(step.preload for step in means)
-        preloads.update(step.preload for step in toes)
-        preloads.update(step.edge.preload for step in edges)
+        preloads = of_levels | {step.preload for step in means} | {step.preload for step in toes}
+        preloads |= {step.edge.preload for step in edges}
         self._own_scale = [*self.shares, *sorted(preloads)]
 
     @property

@@ -39,8 +39,9 @@ def specimens_of_materials(rows: list[Row], far: list[OutlierRow]) -> Figure:
     axes = figure.subplots(2, 3).ravel()
     axes[-1].set_axis_off()
     for axis, (name, label) in zip(axes, _SHOWN.items(), strict=False):
+        fitted = [row for row in rows if name in row["parameters"]]
         for place, material in enumerate(materials):
-            members = [row for row in rows if row["material"] == material and name in row["parameters"]]
+            members = [row for row in fitted if row["material"] == material]
             _column(axis, place, name, members, marked)
         axis.set_title(label, fontsize=9, loc="left")
         _name_materials(axis, materials, rotation)
@@ -77,15 +78,13 @@ def _interval(row: Row, name: str) -> list[float]:
 
 def _column(axis: Axes, place: int, name: str, members: list[Row], marked: set[tuple[str, str]]) -> None:
     """The specimens of one material."""
-    count = len(members)
-    shifts = np.linspace(-0.35, 0.35, count + 2)[1:-1]
+    shifts = np.linspace(-0.35, 0.35, len(members) + 2)[1:-1]
     for x, row in zip(place + shifts, members, strict=True):
-        specimen = row["name"]
+        apart = (row["name"], name) in marked
         low, middle, high = _interval(row, name)
-        apart = (specimen, name) in marked
         colour, size = (HOLD, 5) if apart else (CHAIN, 3)
-        if count <= _MOST_BARS or apart:
+        if apart or len(members) <= _MOST_BARS:
             axis.plot([x, x], [low, high], "-", color=colour, lw=0.8, alpha=0.6)
         axis.plot([x], [middle], "o", color=colour, ms=size)
         if apart:
-            axis.annotate(specimen, (x, middle), (4, 4), textcoords="offset points", fontsize=7, color=colour)
+            axis.annotate(row["name"], (x, middle), (4, 4), textcoords="offset points", fontsize=7, color=colour)

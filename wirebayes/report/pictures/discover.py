@@ -19,6 +19,7 @@ from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readin
 from wirebayes.results.read_back import Stored
 from wirebayes.sentences import spoken
 from wirebayes.wire.control import READ_UNIT
+from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import Linearised, linearise
 
 _MEASURED, _BAND, _HELD, _WORSE = "#1b1b1b", "#4c78a8", "#f2e6d0", "#c44e52"
@@ -254,22 +255,31 @@ def _residuals(axis: Axes, stored: Stored, held: list[int]) -> None:
     protocol = stored.sample.protocol
     bands = _left_with_band(stored)
     shown = np.flatnonzero(protocol.recorded)
-    numbers = [int(number) for number in protocol.number[shown]]
+    numbers = protocol.number[shown].tolist()
     labels = {"held": "kept out to test it", "band": "90 % band", "left": "measured"}  # each once in the legend
-    for place, (hold, number) in enumerate(zip(shown, numbers, strict=True)):
+    for place, hold in enumerate(shown.tolist()):
         keep = protocol.mask[hold]
-        left, low, high = (values[hold][keep] for values in bands)
-        time = protocol.time_s[hold][keep]
-        duration = max(float(protocol.duration_s[hold]), 1e-9)
-        x = place + 0.1 + 0.8 * time / duration
-        if number in held:
+        of_hold = [values[hold][keep] for values in bands]
+        if numbers[place] in held:
             axis.axvspan(place, place + 1, color=_HELD, zorder=0, label=labels.pop("held", None))
-        axis.fill_between(x, low, high, color=_BAND, alpha=0.3, lw=0, label=labels.pop("band", None))
-        axis.plot(x, left, "o-", color=_MEASURED, ms=3, lw=0.8, label=labels.pop("left", None))
+        _draw_hold(axis, place + 0.1 + _scaled_time(protocol, hold, 0.8), of_hold, labels)
     axis.axhline(0.0, color="0.5", lw=0.6)
     middles = np.arange(len(shown)) + 0.5
     axis.set_xticks(middles, list(map(str, numbers)))
     axis.set_xlim(0, len(shown))
+
+
+def _scaled_time(protocol: Protocol, hold: int, length: float) -> Floats:
+    """Times of a hold's readings, the hold as long as this."""
+    time = protocol.time_s[hold][protocol.mask[hold]]
+    return length * time / max(float(protocol.duration_s[hold]), 1e-9)
+
+
+def _draw_hold(axis: Axes, x: Floats, of_hold: list[Floats], labels: dict[str, str]) -> None:
+    """What is left of the readings of a hold in their band; labels are used up."""
+    left, low, high = of_hold
+    axis.fill_between(x, low, high, color=_BAND, alpha=0.3, lw=0, label=labels.pop("band", None))
+    axis.plot(x, left, "o-", color=_MEASURED, ms=3, lw=0.8, label=labels.pop("left", None))
 
 
 def _left_with_band(stored: Stored) -> tuple[Floats, Floats, Floats]:

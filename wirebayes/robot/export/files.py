@@ -9,6 +9,7 @@ drives several lines it knows the middle.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,25 +48,39 @@ def _anchors(robot: Robot) -> Floats:
     return mean_of_each_winch(robot, apart.T).T
 
 
+class _Winches(NamedTuple):
+    """What firmware is told of each winch ``(j,)``: parts of line, wire beyond its anchor, planned forces."""
+
+    parts: Floats
+    beyond_mm: Floats
+    lowest_N: Floats
+    highest_N: Floats
+
+    @classmethod
+    def of(cls, robot: Robot) -> "_Winches":
+        parts = mean_of_each_winch(robot, robot.lines)
+        beyond_mm = 1e3 * mean_of_each_winch(robot, robot.beyond_m)
+        lowest = np.full(robot.joints, robot.rule.lowest_N)
+        highest = np.full(robot.joints, robot.rule.highest_N)
+        return cls(parts, beyond_mm, lowest, highest)
+
+
 def reprapfirmware(robot: Robot, line: WireDraws) -> str:
     """Lines for ``config.g`` of RepRapFirmware (M669 and M666), each value with its 90 % interval in a comment."""
     count = "" if robot.joints == ANCHORS_UNLESS_SAID else f"N{robot.joints} "
     anchors = ""
     for letter, anchor in zip(ANCHORS, _anchors(robot), strict=False):
         anchors += f" {letter}{_joined(1e3 * anchor, '.2f')}"
-    parts = mean_of_each_winch(robot, robot.lines)
-    beyond = mean_of_each_winch(robot, robot.beyond_m)
-    lowest = np.full(robot.joints, robot.rule.lowest_N)
-    highest = np.full(robot.joints, robot.rule.highest_N)
+    winches = _Winches.of(robot)
     spring = working_spring(robot, line)
     rows = [
         (f"M669 K6 {count}{anchors.lstrip()}", "anchors, mm"),
-        (f"M666 U{_joined(parts, '.0f')}", "mechanical advantages"),
+        (f"M666 U{_joined(winches.parts, '.0f')}", "mechanical advantages"),
         (f"M666 W{robot.mass_kg:g}", "mover, kg"),
         (f"M666 S{spring.mean_N:.0f}", f"spring constant per unit length, N: {spring.described}"),
-        (f"M666 Y{_joined(1e3 * beyond, '.0f')}", "wire beyond each anchor, mm"),
-        (f"M666 I{_joined(lowest, 'g')}", "smallest planned force, N"),
-        (f"M666 X{_joined(highest, 'g')}", "largest planned force, N"),
+        (f"M666 Y{_joined(winches.beyond_mm, '.0f')}", "wire beyond each anchor, mm"),
+        (f"M666 I{_joined(winches.lowest_N, 'g')}", "smallest planned force, N"),
+        (f"M666 X{_joined(winches.highest_N, 'g')}", "largest planned force, N"),
     ]
     on_spool = turned_by(robot).sum(0)
     if robot.winch is not None:
@@ -95,20 +110,17 @@ def _reprapfirmware_spools(robot: Robot, drums: Drums, on_spool: Floats) -> list
 def klipper(robot: Robot, line: WireDraws) -> str:
     """Sections for ``printer.cfg``: anchors for every Klipper, spring settings for the Hangprinter branch."""
     spring = working_spring(robot, line)
-    parts = mean_of_each_winch(robot, robot.lines)
-    beyond = mean_of_each_winch(robot, robot.beyond_m)
-    lowest = np.full(robot.joints, robot.rule.lowest_N)
-    highest = np.full(robot.joints, robot.rule.highest_N)
+    winches = _Winches.of(robot)
     text = _head(robot, line, spring, "#")
     text += (
         "[printer]\nkinematics: winch\n"
         "# The next options are those of the Hangprinter branch of Klipper; upstream does not know them.\n"
         f"winch_mover_weight: {robot.mass_kg:g}  # kg\n"
         f"winch_spring_constant: {spring.mean_N:.0f}  # N per unit strain: {spring.described}\n"
-        f"winch_mechanical_advantage: {_joined(parts, '.0f', ', ')}\n"
-        f"winch_guy_wire_lengths: {_joined(1e3 * beyond, '.0f', ', ')}  # mm\n"
-        f"winch_min_force: {_joined(lowest, 'g', ', ')}  # N\n"
-        f"winch_max_force: {_joined(highest, 'g', ', ')}  # N\n"
+        f"winch_mechanical_advantage: {_joined(winches.parts, '.0f', ', ')}\n"
+        f"winch_guy_wire_lengths: {_joined(winches.beyond_mm, '.0f', ', ')}  # mm\n"
+        f"winch_min_force: {_joined(winches.lowest_N, 'g', ', ')}  # N\n"
+        f"winch_max_force: {_joined(winches.highest_N, 'g', ', ')}  # N\n"
     )
     drums = _measured_drums(robot)
     of_spools = [""] * robot.joints
@@ -116,7 +128,7 @@ def klipper(robot: Robot, line: WireDraws) -> str:
         radius, growth = _spools(robot, drums)
         growth_mm = 1e3 * growth
         text += f"winch_buildup_factor: {growth_mm.mean():.5f}  # mm: {_joined(growth_mm, '.5f', ', ')}\n"
-        of_spools = _klipper_spools(robot, drums, 2 * np.pi * (1e3 * radius) / parts)
+        of_spools = _klipper_spools(robot, drums, 2 * np.pi * (1e3 * radius) / winches.parts)
     anchors_mm = 1e3 * _anchors(robot)
     for letter, anchor, spool in zip(STEPPERS, anchors_mm, of_spools, strict=False):
         x, y, z = anchor

@@ -52,11 +52,18 @@ def balance_at(
     hessian : (6, 6, n) or (3, 3, n) array
         N/m.
     """
-    scale = robot.edge_scale[:, None]
     R = rotation.transpose(1, 2, 0)
     shape = statics.geometry(robot, position_m.T, R)
-    tau, slope = tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)
-    return in_metres(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), scale)
+    tau, slope = _pulls(robot, wires, shape, zero_m, offset_m)
+    return in_metres(*statics.unbalance_and_stiffness(robot, shape, R, tau, slope), robot.edge_scale[:, None])
+
+
+def _pulls(
+    robot: Robot, wires: Wires, shape: statics.Geometry, zero_m: Floats, offset_m: Floats
+) -> tuple[Floats, Floats]:
+    """Tensions, N, and their slopes by the stretched length, N/m; ``(w, n)`` each."""
+    beyond = np.broadcast_to(offset_m, zero_m.shape).T
+    return tension(wires, statics.stretched(robot, shape, beyond), zero_m.T)
 
 
 def tensions_at(
@@ -75,4 +82,5 @@ def tensions_at(
         N.
     """
     shape = statics.geometry(robot, position_m.T, rotation.transpose(1, 2, 0))
-    return tension(wires, statics.stretched(robot, shape, np.broadcast_to(offset_m, zero_m.shape).T), zero_m.T)[0].T
+    pull, _ = _pulls(robot, wires, shape, zero_m, offset_m)
+    return pull.T

@@ -133,13 +133,9 @@ def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, cont
     content["equilibria"] = poses
     proved = proofs.only_equilibrium(robot, wires, x, R)
     courses = _courses(held, rng)
-    band = proofs.enclosed(robot, wires, courses[0.0], x, R)
-    content["certificate"] = {**proved, **band}
-    content["drift"] = []
-    content["stability"] = []
-    for spread, course in courses.items():
-        content["drift"].append({"specimen_spread": spread, **_drift(course, x, R)})
-        content["stability"].append({"specimen_spread": spread, **stability.summary(course)})
+    content["certificate"] = {**proved, **proofs.enclosed(robot, wires, courses[0.0], x, R)}
+    content["drift"] = [{"specimen_spread": spread, **_drift(one, x, R)} for spread, one in courses.items()]
+    content["stability"] = [{"specimen_spread": spread, **stability.summary(one)} for spread, one in courses.items()]
     content["claim"] = _claim(courses, x, R)
     content["pose_error"] = controllers.errors(robot, line, request, rng, other)
     content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)

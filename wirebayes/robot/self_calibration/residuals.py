@@ -4,7 +4,7 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from wirebayes.numeric.means import root_mean_square
-from wirebayes.numeric.typing import Floats
+from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.self_calibration.equations import EXACT, FRICTIONLESS, Holds
 from wirebayes.robot.self_calibration.posterior import Whole
@@ -33,8 +33,7 @@ def trust(found: Whole) -> float:
     each other.
     """
     p = _joint_probability(found)
-    rows = found.equations.rows["tension"]
-    unread = ~found.equations.known[:, rows]
+    unread = _unread(found)
     if not unread.any():
         return p
     free = unread.sum() - _taken_up(found)
@@ -57,17 +56,21 @@ def _joint_probability(found: Whole) -> float:
 
 def _taken_up(found: Whole) -> float:
     """Degrees of freedom that the unknowns take up of the tensions that nobody read."""
-    rows = found.equations.rows["tension"]
-    unread = ~found.equations.known[:, rows]
-    return float(leverage(found, rows)[unread].sum())
+    of_tensions = leverage(found, found.equations.rows["tension"])
+    return float(of_tensions[_unread(found)].sum())
 
 
 def _beyond_usual(found: Whole) -> float:
     """Squared residuals, summed, of tensions that nobody read about what is usual."""
-    e = found.equations
-    rows = e.rows["tension"]
-    usual = e.residual[:, rows][~e.known[:, rows]]
+    of_tensions = found.equations.residual[:, found.equations.rows["tension"]]
+    usual = of_tensions[_unread(found)]
     return float((usual**2).sum())
+
+
+def _unread(found: Whole) -> Bools:
+    """(p, w) Which tensions nobody read."""
+    rows = found.equations.rows["tension"]
+    return ~found.equations.known[:, rows]
 
 
 def misfit(found: Whole) -> float:
