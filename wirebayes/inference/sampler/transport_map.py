@@ -218,7 +218,7 @@ def _straighten(v: Array, j: int, weight: Array, clear: float, every: bool) -> _
     kept = np.abs(t[j + 1 :]) > clear
     if not kept.all():
         pairs = pairs[:, kept]
-        terms = np.column_stack([lines, products[:, kept]])
+        terms = terms[:, np.append(np.ones(j + 1, bool), kept)]
         of_mean, of_scale, _ = _regress(terms, lines, y, weight, of_scale)
     spread = lines @ of_scale
     off_mean = y - terms @ of_mean
