@@ -345,11 +345,7 @@ def _warnings(rows: Sequence[Row]) -> list[NoticeJson]:
 
 def _line(row: Row, far: Sequence[OutlierRow], names: Sequence[str]) -> list[Any]:
     """The cells of an experiment."""
-    outliers_in = [outlier["parameter"] for outlier in far if outlier["experiment"] == row["name"]]
-    warned = [notice["text"] for notice in row["warnings"]]
-    cells: dict[str, Any] = dict(row)
-    for key, items in (("effects", row["effects"]), ("outlier", outliers_in), ("warnings", warned)):
-        cells[key] = "; ".join(items) or None
+    cells = _cells(row, far)
     parameters: dict[str, Any] = dict(row["parameters"])
     line = [cells[key] for key in _FIRST]
     for name in names:
@@ -357,3 +353,11 @@ def _line(row: Row, far: Sequence[OutlierRow], names: Sequence[str]) -> list[Any
         line += [of_parameter.get(quantile) for quantile in QUANTITIES]
     line += [cells[key] for key in _LAST]
     return line
+
+
+def _cells(row: Row, far: Sequence[OutlierRow]) -> dict[str, Any]:
+    """What an experiment's row says, lists as texts."""
+    outliers_in = [outlier["parameter"] for outlier in far if outlier["experiment"] == row["name"]]
+    warned = [notice["text"] for notice in row["warnings"]]
+    texts = {"effects": row["effects"], "outlier": outliers_in, "warnings": warned}
+    return {**row, **{key: "; ".join(items) or None for key, items in texts.items()}}

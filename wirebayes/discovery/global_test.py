@@ -268,10 +268,15 @@ def _strike_gross_errors(
         if found is None:
             break
         name, hold, reading, value = found
-        members = [gross_errors.without(e, hold, reading) if e.name == name else e for e in block.experiments]
-        block = fitted(members, block.effects, block.spec, rng, scales=block.scales)
+        block = _refitted_without(block, name, hold, reading, rng)
         struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
     return block, struck
+
+
+def _refitted_without(block: LaplaceFit, name: str, hold: int, reading: int, rng: Generator) -> LaplaceFit:
+    """The block without one reading of an experiment."""
+    members = [gross_errors.without(e, hold, reading) if e.name == name else e for e in block.experiments]
+    return fitted(members, block.effects, block.spec, rng, scales=block.scales)
 
 
 def _best_rival(block: LaplaceFit, trials: list[Probe], own: Sequence[int]) -> float:

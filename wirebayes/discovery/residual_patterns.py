@@ -171,13 +171,11 @@ def _covariates(problem: Problem) -> list[tuple[str, list[Array], int]]:
     out: list[tuple[str, list[Array], int]] = []
     for name, degrees in _HIGHEST_POWER.items():
         values = [_values(name, sample) for sample in samples]
-        read = [v[s.protocol.mask] for v, s in zip(values, samples, strict=True)]
-        every = np.concatenate(read)
-        middle = every.mean()
-        spread = every.std()
+        read = np.concatenate([v[s.protocol.mask] for v, s in zip(values, samples, strict=True)])
+        middle = read.mean()
+        spread = read.std()
         if spread > 1e-9 * (1.0 + abs(middle)):
-            scaled = [(v - middle) / spread for v in values]
-            out.append((name, scaled, degrees))
+            out.append((name, [(v - middle) / spread for v in values], degrees))
     return out
 
 

@@ -33,11 +33,15 @@ def over_subsets(values: Array) -> tuple[float, Array, list[int]]:
     if np.isfinite(total):
         beside = np.logaddexp.reduce(weights + without, axis=1)
         each = np.exp(values + beside - total)
-    each = np.minimum(each, 1.0)
+    return total, np.minimum(each, 1.0), _most_probable(values, weights)
+
+
+def _most_probable(values: Array, weights: Array) -> list[int]:
+    """The most probable subset, by the log prior (b,) of one of each size."""
     order = np.argsort(-values, kind="stable")
     highest = weights + np.cumsum(values[order])
     size = int(np.argmax(highest)) + 1
-    return total, each, sorted(int(i) for i in order[:size])
+    return sorted(order[:size].tolist())
 
 
 def _log_weights(b: int) -> Array:

@@ -68,8 +68,7 @@ def build(
         distributions |= _sample_priors(experiment, effects, mark, spec, scales)
     every = _in_natural_units(distributions, effects, samples, scales)
     stated = _apply_tables(every, experiments)
-    fixed = {name: float(d) for name, d in every.items() if isinstance(d, int | float)}
-    free = {name: d for name, d in every.items() if name not in fixed}
+    fixed, free = _fixed_and_free(every)
     logarithmic = _positive(free, effects)
     powers = _default_powers([name for name in free if name not in stated], fixed, scales.units)
     return Problem(
@@ -102,10 +101,15 @@ def default_prior(
         "setting_sd": SET_UNIT[control],
     }
     every = {name: scaled(d, units.of(own[name])) for name, d in defaults.items()} | dict(instead)
-    fixed = {name: d for name, d in every.items() if isinstance(d, float)}
-    free = {name: d for name, d in every.items() if name not in fixed}
+    fixed, free = _fixed_and_free(every)
     powers = _default_powers([name for name in free if name not in instead], fixed, units)
     return Prior(free, fixed, frozenset(_POSITIVE & free.keys()), powers)
+
+
+def _fixed_and_free(every: Mapping[str, Any]) -> tuple[dict[str, float], dict[str, Any]]:
+    """Values of fixed parameters, and the distributions of the others."""
+    fixed = {name: float(d) for name, d in every.items() if isinstance(d, int | float)}
+    return fixed, {name: d for name, d in every.items() if name not in fixed}
 
 
 def _default_powers(names: Sequence[str], fixed: Mapping[str, float], units: Units) -> dict[str, PowerScaled]:

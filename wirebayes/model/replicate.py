@@ -6,7 +6,8 @@ from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
 from wirebayes.model.single_holds import hold_courses
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.staircase import Theta, simulate
+from wirebayes.wire.staircase import simulate
+from wirebayes.wire.walk import Theta
 
 
 def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Generator) -> Array:

@@ -6,11 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from wirebayes.model.hold_filter import LOG_2PI
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 from wirebayes.wire import compiled
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Theta, Walk, simulate_alone
+from wirebayes.wire.staircase import simulate_alone
+from wirebayes.wire.walk import Theta, Walk
 
 
 def hold_by_hold(protocol: Protocol, theta: Theta, model: Model, readings: Array, variance: Array) -> Array:
@@ -57,16 +58,12 @@ def standardised_hold_by_hold(
     -------
     (n,) and (m, n) arrays
     """
-    sd = np.sqrt(variance)
     total = np.zeros(len(variance))
     residuals = [np.zeros((0, len(variance)))]
     for hold in _single_holds(protocol, theta, model, readings):
-        every = np.vstack([hold.left, hold.first[None]]) / sd
-        square = (every**2).sum(axis=0)
-        total = total + hold.log_density(square, variance)
-        log_sd = 0.5 * np.sqrt(len(hold.left)) * np.log(variance)
-        of_hold = np.vstack([every, log_sd[None]])
-        residuals.append(np.where(hold.valid, of_hold, 0.0))
+        log_density, of_hold = hold.standardised(variance)
+        total = total + log_density
+        residuals.append(of_hold)
     return total, np.concatenate(residuals)
 
 
@@ -82,6 +79,33 @@ class _SingleHold(NamedTuple):
     first: Array
     ratio_square: Array
 
+    @classmethod
+    def of(cls, j: int, course: tuple[Array, Array, Array], readings: Array, later: Ints) -> "_SingleHold":
+        """The same by a hold's course (see `hold_courses`), its readings, and which of them are later ones.
+
+        Parameters
+        ----------
+        j : int
+            Position of the hold.
+        course : tuple of arrays
+        readings : (R, n) or (R, 1) array
+        later : (r,) array of int
+        """
+        tension, slope, valid = course
+        ratio = slope[later] / np.where(valid, slope[0], 1.0)
+        residual = readings[later] - tension[later]
+        ratio_square = np.einsum("rn,rn->n", ratio, ratio)
+        first = np.einsum("rn,rn->n", ratio, residual) / (1.0 + ratio_square)
+        return cls(j, valid, residual - ratio * first, first, ratio_square)
+
+    def standardised(self, variance: Array) -> tuple[Array, Array]:
+        """(n,) log density, and the hold's part (r, n) of the residuals of `standardised_hold_by_hold`."""
+        every = np.vstack([self.left, self.first[None]]) / np.sqrt(variance)
+        square = (every**2).sum(axis=0)
+        log_sd = 0.5 * np.sqrt(len(self.left)) * np.log(variance)
+        residuals = np.vstack([every, log_sd[None]])
+        return self.log_density(square, variance), np.where(self.valid, residuals, 0.0)
+
     def log_density(self, square: Array, variance: Array) -> Array:
         """(n,) by the sum of squared residuals in variances; zero where the length is not known."""
         log_noise = len(self.left) * (np.log(variance) + LOG_2PI)
@@ -94,15 +118,9 @@ def _single_holds(protocol: Protocol, theta: Theta, model: Model, readings: Arra
     for j, fitted in enumerate(hold_courses(protocol, theta, model, readings[:, 0])):
         if fitted is None:
             continue
-        tension, slope, valid = fitted
         later = np.flatnonzero(protocol.mask[j])[1:]
-        if not len(later):
-            continue
-        ratio = slope[later] / np.where(valid, slope[0], 1.0)
-        residual = readings[j][later] - tension[later]
-        ratio_square = np.einsum("rn,rn->n", ratio, ratio)
-        first = np.einsum("rn,rn->n", ratio, residual) / (1.0 + ratio_square)
-        yield _SingleHold(j, valid, residual - ratio * first, first, ratio_square)
+        if len(later):
+            yield _SingleHold.of(j, fitted, readings[j], later)
 
 
 def hold_courses(

@@ -20,7 +20,8 @@ from wirebayes.numeric.linear_algebra import eigh, solve
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.wire.model import Model
 from wirebayes.wire.protocol import Protocol
-from wirebayes.wire.staircase import Theta, Walk, linearise
+from wirebayes.wire.staircase import linearise
+from wirebayes.wire.walk import Theta, Walk
 
 _CHUNK = 500  # draws at a time: bounds the memory of the normal equations
 

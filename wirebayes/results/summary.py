@@ -116,10 +116,9 @@ def _parameters(fit: Fit, sample: Sample | None) -> dict[str, Parameter]:
     parameters: dict[str, Parameter] = {}
     for name, values in variables(fit.problem, fit.theta, sample).items():
         if values.ndim == 2:
-            unit = unit_of(name, effects, controls)
-            parameters[name] = {"unit": unit, **statistics(values)}
+            parameters[name] = {"unit": unit_of(name, effects, controls), **statistics(values)}
             continue
-        for i, one in enumerate(samples):
-            unit = unit_of(name, effects, [one.protocol.control])
+        for i, (one, control) in enumerate(zip(samples, controls, strict=True)):
+            unit = unit_of(name, effects, [control])
             parameters[f"{name}[{one.name}]"] = {"unit": unit, **statistics(values[..., i])}
     return parameters

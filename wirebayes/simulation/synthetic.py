@@ -32,7 +32,8 @@ from wirebayes.wire.effect import Effect, Kinds
 from wirebayes.wire.laws import ElasticLaw, History
 from wirebayes.wire.model import tension_reference
 from wirebayes.wire.protocol import Control
-from wirebayes.wire.staircase import Theta, simulate
+from wirebayes.wire.staircase import simulate
+from wirebayes.wire.walk import Theta
 
 FILE, TRUTH = "experiments.toml", "truth.json"
 PAPER_TIMES_S = (0.0, 30.0, 60.0, 90.0, 120.0)  # when the paper read its holds

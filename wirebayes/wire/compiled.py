@@ -5,7 +5,7 @@ everything where no C compiler was at hand. Both agree to rounding. Which of the
 on the installation, never on the work, so the same seed gives the same bytes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -48,12 +48,17 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
     rows = [theta[name] for name in (*_PLAIN, *columns)]
     if any(row.dtype.kind == "c" for row in rows):
         return None
+    remembers = any(name == "superposition" for name, _, _ in formulas)
+    test = protocol.flat_with_ages if remembers else protocol.flat
+    return Call(kernel.Test(**test), _law_of(model, protocol.length_mm, formulas), _packed(rows))
+
+
+def _packed(rows: Sequence[Array]) -> Array:
+    """Parameters (n,) in one array."""
     packed = np.empty((len(rows), len(rows[0])))
     for i, row in enumerate(rows):
         packed[i] = row
-    remembers = any(name == "superposition" for name, _, _ in formulas)
-    test = protocol.flat_with_ages if remembers else protocol.flat
-    return Call(kernel.Test(**test), _law_of(model, protocol.length_mm, formulas), packed)
+    return packed
 
 
 def _law_of(model: "Model", length_mm: float, formulas: tuple[tuple[str, int, float], ...]) -> Any:

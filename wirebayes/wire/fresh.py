@@ -20,7 +20,7 @@ from wirebayes.wire.bent_strain import bent, strain_of
 from wirebayes.wire.creep import Creep
 from wirebayes.wire.effect import HoldContext, Placed, steady_hold
 from wirebayes.wire.model import Model
-from wirebayes.wire.staircase import Theta
+from wirebayes.wire.walk import Theta
 
 _LOG_TIMES = -50.0, 700.0  # logarithms of the times between which the median creep time is looked for
 _HALVINGS = 60  # 750 over two to the 60th is less than rounding

@@ -355,13 +355,7 @@ def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -
 
 def _beyond(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
     """In which ways a use leaves what was tested."""
-    out = []
-    loads = tension_N[np.isfinite(tension_N) & (tension_N > 0)]
-    if line.tension_range_N is not None and loads.size:
-        low, high = line.tension_range_N
-        if loads.min() < low or loads.max() > high:
-            span = _span(loads, partial(short, digits=3))
-            out.append(f"tensions {span} N leave the tested range {short(low, 3)} to {short(high, 3)} N")
+    out = _other_tensions(line, tension_N[np.isfinite(tension_N) & (tension_N > 0)])
     if line.time_range_s is not None and time_s > line.time_range_s[1]:
         out.append(f"{short(time_s, 4)} s is longer than the longest tested hold, {short(line.time_range_s[1], 4)} s")
     lengths = 1e3 * zero_m[np.isfinite(zero_m)]
@@ -376,3 +370,14 @@ def _other_lengths(line: WireDraws, length_mm: Floats) -> list[str]:
     if LENGTH_EXPONENT in line.parameters:
         rule = "grows with length by the exponent fitted to the tested lengths"
     return [f"wires of {_span(length_mm, '{:.0f}'.format)} mm, tested at {line.length_mm:.0f} mm: creep {rule}"]
+
+
+def _other_tensions(line: WireDraws, loads: Floats) -> list[str]:
+    """That tensions leave the tested range."""
+    if line.tension_range_N is None or not loads.size:
+        return []
+    low, high = line.tension_range_N
+    if loads.min() >= low and loads.max() <= high:
+        return []
+    span = _span(loads, partial(short, digits=3))
+    return [f"tensions {span} N leave the tested range {short(low, 3)} to {short(high, 3)} N"]

@@ -138,19 +138,21 @@ def _least_of(both: Floats, one_way: Floats) -> Floats:
     one_way : (d, m) array
         Of the numbers.
     """
-    d = len(both)
-    size = np.abs(both).max() + (one_way**2).sum()
-    noise = np.random.default_rng(0).standard_normal((d, d))
-    symmetric = noise + noise.T
-    apart = both + _APART * size * symmetric
-    _, vectors = np.linalg.eigh(apart + _of_every_set(one_way))
-    both_ways = np.concatenate([vectors, -vectors], axis=-1)
-    tried = both_ways.mT.reshape(-1, d)
+    tried = _directions(both, one_way)
     stretch = np.maximum(tried @ one_way, 0.0)
     squares = (stretch**2).sum(axis=1)
     form = np.einsum("vi,ij,vj->v", tried, both, tried)
-    least = (form + squares).min()
-    return np.asarray(least)
+    return np.asarray((form + squares).min())
+
+
+def _directions(both: Floats, one_way: Floats) -> Floats:
+    """(v, d) either way along the axes of the form with every set of the squares, moved apart where they are alike."""
+    d = len(both)
+    size = np.abs(both).max() + (one_way**2).sum()
+    noise = np.random.default_rng(0).standard_normal((d, d))
+    apart = both + _APART * size * (noise + noise.T)
+    _, vectors = np.linalg.eigh(apart + _of_every_set(one_way))
+    return np.concatenate([vectors, -vectors], axis=-1).mT.reshape(-1, d)
 
 
 def _of_every_set(one_way: Floats) -> Floats:

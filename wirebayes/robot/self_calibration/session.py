@@ -141,15 +141,13 @@ class LengthPrior:
         values = self.fitted
         own = len(self.own) * legs
         biased = legs if self.bias_sd_N > 0 else 0
-        expected = values.mean(1)
-        mean = np.concatenate([np.zeros(legs), expected, np.zeros(own + biased)])
+        mean = np.concatenate([np.zeros(legs), values.mean(1), np.zeros(own + biased)])
         # A parameter that is given exactly still gets a relative uncertainty, far below anything that matters.
         fitted = 1e-12 * np.eye(len(values))
         if self.line.count > 1:
             fitted = fitted + np.cov(values)
-        references = self.reference_sd_m**2 * np.eye(legs)
-        specimens = self.own_sd**2 * np.eye(own)
-        sensors = self.bias_sd_N**2 * np.eye(biased)
+        sds = ((self.reference_sd_m, legs), (self.own_sd, own), (self.bias_sd_N, biased))
+        references, specimens, sensors = (sd**2 * np.eye(count) for sd, count in sds)
         return mean, block_diag(references, fitted, specimens, sensors)
 
     def wires(self, robot: Robot, unknowns: Floats) -> tuple[Wires, Floats]:
