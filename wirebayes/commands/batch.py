@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from wirebayes._version import __version__
-from wirebayes.commands.one_experiment import QUANTITIES, BatchTask, Done, do, first_columns, packed
+from wirebayes.commands.one_experiment import QUANTITIES, BatchTask, Done, do, empty_row, first_columns, packed
 from wirebayes.commands.options import (
     check_seed,
     check_train_holds,
@@ -303,23 +303,7 @@ def _store(done: Done, folder: Path) -> None:
 
 def _empty(file: str, error: str) -> Row:
     """The row of a file that could not be read."""
-    return {
-        "name": Path(file).stem,
-        "material": None,
-        "file": file,
-        "length_mm": None,
-        "holds": None,
-        "readings": None,
-        "converged": None,
-        "parameters": {},
-        "verdict": None,
-        "effects": [],
-        "best_effect": None,
-        "p_global": None,
-        "check": None,
-        "warnings": [],
-        "error": error,
-    }
+    return {**empty_row(Path(file).stem, file), "error": error}
 
 
 def _tabulate(rows: Sequence[Row], far: Sequence[OutlierRow], folder: Path) -> None:

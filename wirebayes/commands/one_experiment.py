@@ -118,12 +118,23 @@ def first_columns(experiment: Experiment, file: str) -> Row:
     recorded = experiment.recorded_holds
     readings = sum(hold.time_s.size for hold in recorded)
     return {
-        "name": experiment.name,
+        **empty_row(experiment.name, file),
         "material": experiment.material,
-        "file": file,
         "length_mm": experiment.length_mm,
         "holds": len(recorded),
         "readings": readings,
+    }
+
+
+def empty_row(name: str, file: str) -> Row:
+    """The row of an experiment of which nothing is known yet."""
+    return {
+        "name": name,
+        "material": None,
+        "file": file,
+        "length_mm": None,
+        "holds": None,
+        "readings": None,
         "converged": None,
         "parameters": {},
         "verdict": None,

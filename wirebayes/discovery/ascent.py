@@ -1,7 +1,7 @@
 """The way up one path: at every rung the parameters follow, and the evidence of the effect is evaluated."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from wirebayes.discovery.tangent_step import stepped
 from wirebayes.inference.laplace_fit import LaplaceFit, column_of
 from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.numeric.distributions import Normal
+from wirebayes.numeric.rows import put_rows, rows_of
 from wirebayes.numeric.typing import Array, Bools, Ints
 
 _STEPS, _FEW = 4, 2  # of the parameters at a rung, and at the low ones
@@ -155,8 +156,7 @@ class _Places:
     def improve(self, rows: Array, other: "_Places") -> Bools:
         """Take over, in place, the others' places where they are better than these in some rows, and say where."""
         better = other.log_bayes > self.log_bayes[rows]
-        for f in fields(self):
-            getattr(self, f.name)[rows[better]] = getattr(other, f.name)[better]
+        put_rows(self, rows[better], rows_of(other, better))
         return np.asarray(better)
 
 

@@ -32,10 +32,39 @@ def rows_of(record: Record, rows: Any) -> Record:
     return replace(record, **{f.name: getattr(record, f.name)[rows] for f in fields(record)})
 
 
-def joined_rows(records: Sequence[Record]) -> Record:
-    """Dataclasses of arrays ``(n, ...)`` one after the other."""
+def chosen_records(first: Bools, one: Record, other: Record) -> Record:
+    """Of two dataclasses of arrays ``(n, ...)`` the rows of one or of the other.
+
+    Parameters
+    ----------
+    first : (n,) bool array
+        True where the row is of `one`.
+    one, other : dataclasses of one kind
+    """
+    chosen = {f.name: chosen_rows(first, getattr(one, f.name), getattr(other, f.name)) for f in fields(one)}
+    return replace(one, **chosen)
+
+
+def put_rows(out: Record, rows: Any, found: Record) -> None:
+    """Put the rows of a dataclass of arrays ``(k, ...)`` in place of others, by number or mask.
+
+    Parameters
+    ----------
+    out : dataclass of arrays
+        Changed in place.
+    rows : (k,) int array, or mask
+        Where they are put.
+    found : dataclass of the same kind
+    """
+    for f in fields(out):
+        getattr(out, f.name)[rows] = getattr(found, f.name)
+
+
+def joined_rows(records: Sequence[Record], axis: int = 0) -> Record:
+    """Dataclasses of arrays ``(n, ...)`` one after the other, or along another axis."""
     first = records[0]
-    return replace(first, **{f.name: np.concatenate([getattr(r, f.name) for r in records]) for f in fields(first)})
+    joined = {f.name: np.concatenate([getattr(r, f.name) for r in records], axis) for f in fields(first)}
+    return replace(first, **joined)
 
 
 def last_axis_of(record: Record, columns: Any) -> Record:

@@ -6,7 +6,7 @@ import numpy as np
 
 from wirebayes.numeric import cholesky
 from wirebayes.numeric.batches import batch_first
-from wirebayes.numeric.rows import last_axis_of
+from wirebayes.numeric.rows import joined_rows, last_axis_of
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
 from wirebayes.robot.mechanics import statics
@@ -118,11 +118,7 @@ def _in_chunks(
         cut = slice(first, first + _CHUNK)
         part = wires.part(cut), zero[:, cut], offset[:, cut], x[:, cut], R[..., cut]
         parts.append(_in_one_chunk(robot, *part, max_iterations))
-    joined = {}
-    for field in fields(Solved):
-        arrays = [getattr(part, field.name) for part in parts]
-        joined[field.name] = np.concatenate(arrays, -1)
-    return Solved(**joined)
+    return joined_rows(parts, axis=-1)
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,12 @@ An equilibrium is a minimum of the potential energy of weight and wires, slack w
 that energy, damped where the Hessian is not positive definite or the energy would rise, finds it from any start.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wirebayes.numeric.batches import batch_first, batch_last
+from wirebayes.numeric.rows import put_rows
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
@@ -143,6 +144,5 @@ def put_back(found: Equilibria | None, rows: Indices, n: int, legs: int = 0) -> 
         np.full(n, np.inf),
     )
     if found is not None:
-        for field in fields(Equilibria):
-            getattr(whole, field.name)[rows] = getattr(found, field.name)
+        put_rows(whole, rows, found)
     return whole

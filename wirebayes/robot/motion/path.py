@@ -5,13 +5,13 @@ accepted when it ends where the stiffness at its start predicts; otherwise it is
 jump is left that no division removes: there the platform falls.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from wirebayes.numeric import cholesky
 from wirebayes.numeric.batches import batch_first
-from wirebayes.numeric.rows import chosen_rows, rows_of
+from wirebayes.numeric.rows import chosen_rows, put_rows, rows_of
 from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
@@ -210,7 +210,7 @@ def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, lengths: Leng
     softest = _softest(robot, part, balance, own)
     aside = mixed.after_step(robot, balance, _ASIDE * robot.size_m * softest)
     found = forward.solve_equilibrium(robot, part, *own, *aside)
-    _put_in(there, loose[found.found], rows_of(found, found.found))
+    put_rows(there, loose[found.found], rows_of(found, found.found))
 
 
 def _softest(robot: Robot, wires: Wires, balance: Poses, lengths: Lengths) -> Floats:
@@ -218,12 +218,6 @@ def _softest(robot: Robot, wires: Wires, balance: Poses, lengths: Lengths) -> Fl
     _, hessian = balance_at(robot, wires, *balance, *lengths)
     _, directions = np.linalg.eigh(batch_first(hessian))
     return np.asarray(directions[..., 0])
-
-
-def _put_in(out: forward.Equilibria, rows: Indices, found: forward.Equilibria) -> None:
-    """Put equilibria in place of others, in these rows."""
-    for field in fields(forward.Equilibria):
-        getattr(out, field.name)[rows] = getattr(found, field.name)
 
 
 def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: float = _SMALL) -> forward.Equilibria:
@@ -255,7 +249,7 @@ def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: flo
         zero, offset = lengths
         position, turn = near
         rest = forward.solve_equilibrium(robot, wires.part(far), zero[far], offset[far], position[far], turn[far])
-        _put_in(out, far, rest)
+        put_rows(out, far, rest)
     return out
 
 

@@ -4,13 +4,13 @@ The posterior is Gaussian about its mode, found by Gauss-Newton over the whole l
 creep model makes readings at different times speak of the same unknowns.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtri
 
 from wirebayes.numeric.linear_algebra import inv, solve
-from wirebayes.numeric.rows import chosen_rows, rows_of
+from wirebayes.numeric.rows import chosen_records, chosen_rows, rows_of
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.progress import ShareDone
 from wirebayes.robot.mechanics import rotation
@@ -214,7 +214,7 @@ def _mode(target: _Target, white: Floats, patience: int) -> _Mode:
         moved = _better(new, cost)
         white = chosen_rows(moved, tried, white)
         damping = np.where(moved, damping / 10, damping * 10)
-        here = _pick(moved, there, here)
+        here = chosen_records(moved, there, here)
         cost = np.where(moved, new, cost)
     return _Mode(white, here, cost, converged)
 
@@ -321,10 +321,3 @@ def _small_motions(moved: PredictedSession, at: PredictedSession) -> Floats:
     held = np.isfinite(change).all((-1, -2), keepdims=True)
     turned = rotation.vector(np.where(held, change, np.eye(3))).reshape(moved.ended_m.shape)
     return np.concatenate([moved.ended_m, turned], -1).reshape(len(turned), -1)
-
-
-def _pick(first: Bools, a: PredictedSession, b: PredictedSession) -> PredictedSession:
-    chosen = {}
-    for field in fields(PredictedSession):
-        chosen[field.name] = chosen_rows(first, getattr(a, field.name), getattr(b, field.name))
-    return PredictedSession(**chosen)
