@@ -67,20 +67,9 @@ def expand(
     points = list(points_of(target, around, readings))
     reference = reference or plain_reference(problem)
     shapes = shapes or forms(target, z[:1], trials)
-    added: list[Array] = []
-    functions: list[list[Array]] = []
-    for at, (sample, point) in enumerate(zip(problem.samples, points, strict=True)):
-        mask = sample.protocol.mask
-        sd = point.sd[:, None, None]
-        each = [shapes[at][mask][None] / sd]
-        if columns is not None:
-            more = columns(at, point.tension, point.slopes)
-            each.append(_rows(point, more, mask))
-        added.append(np.concatenate(each, axis=-1))
-        functions.append([f[mask][None] / sd for f in reference[at]])
-    signatures = np.concatenate(added, axis=1)
+    signatures = _signatures(problem, points, shapes, columns)
     one_sided, kinds = _described(trials, signatures.shape[-1])
-    processes = [block_diagonal(each) for each in zip(*functions, strict=True)]
+    processes = _processes(problem, points, reference)
     return Expansion(
         **vars(tangent_of(target, around, points)),
         signatures=signatures,
@@ -89,6 +78,29 @@ def expand(
         flexible=np.concatenate(processes, axis=2),
         processes=tuple(f.shape[2] for f in processes),
     )
+
+
+def _signatures(
+    problem: Problem, points: Sequence[Point], shapes: Sequence[Array], columns: AddedColumns | None
+) -> Array:
+    """(n, N, m) those of the probes, an array (H, R, m) a sample, and those added behind them."""
+    out = []
+    for at, (sample, point) in enumerate(zip(problem.samples, points, strict=True)):
+        mask = sample.protocol.mask
+        own = point.in_errors(shapes[at][mask])
+        if columns is not None:
+            more = columns(at, point.tension, point.slopes)
+            own = np.concatenate([own, _rows(point, more, mask)], axis=-1)
+        out.append(own)
+    return np.concatenate(out, axis=1)
+
+
+def _processes(problem: Problem, points: Sequence[Point], reference: Sequence[Sequence[Array]]) -> list[Array]:
+    """(n, N, q) functions of each process of the flexible reference, those of every sample by themselves."""
+    each_sample = []
+    for sample, point, functions in zip(problem.samples, points, reference, strict=True):
+        each_sample.append([point.in_errors(f[sample.protocol.mask]) for f in functions])
+    return [block_diagonal(of_samples) for of_samples in zip(*each_sample, strict=True)]
 
 
 def _rows(point: Point, values: Array, mask: Array) -> Array:

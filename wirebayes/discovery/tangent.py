@@ -157,6 +157,10 @@ class Point:
     by_setting: Array
     floor: Array
 
+    def in_errors(self, values: Array) -> Array:
+        """(n, N, m) values (N, m) in units of the reading error."""
+        return values[None] / self.sd[:, None, None]
+
     def rows(self, values: Array, mask: Array) -> Array:
         """(H, R, n) to (n, N) in units of the reading error."""
         return np.asarray((values[mask] / self.sd).T)

@@ -237,8 +237,7 @@ def pit_band(draws: Array, observed: Array, probability: float = 0.95) -> tuple[
     """
     rows, n = draws.shape
     levels = np.linspace(0.0, 1.0, 101)
-    order = np.argsort(draws, axis=1)
-    ranks = np.argsort(order, axis=1)
+    ranks = np.argsort(np.argsort(draws, axis=1), axis=1)
     pit = (ranks + 0.5) / n
     below = draws < observed[:, None]
     observed_pit = below.mean(axis=1)

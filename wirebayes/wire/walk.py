@@ -1,6 +1,7 @@
 """A walk along the holds of a test, each computed from what the holds before it have left."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,15 @@ from wirebayes.wire.protocol import Protocol
 Theta = Mapping[str, Array]
 _NONE: Array = np.zeros((1, 1))  # stands in for what the hold has not computed yet
 _STEP = 1e-30  # a complex step has no truncation error, so it may be this small
+
+
+@contextmanager
+def _at(hold: HoldContext, time_s: Array) -> Iterator[None]:
+    """Effects see a single time of the hold, at its first temperature."""
+    every_time, warming = hold.time_s, hold.warming_K
+    hold.time_s, hold.warming_K = time_s, warming[:1]
+    yield
+    hold.time_s, hold.warming_K = every_time, warming
 
 
 class Sloped(NamedTuple):
@@ -123,17 +133,12 @@ class Walk:
         """Let time pass before a hold begins, as in a hold that nobody reads; what is then beside the creep."""
         if not np.any(wait_s):
             return beside
-        times = hold.time_s
-        warming = hold.warming_K
-        hold.time_s = wait_s
-        hold.warming_K = warming[:1]
-        amount = self.creep.amount(hold.initial_tension, hold)
-        hold.grown = hold.carried + amount * laws.creep_fraction(wait_s, self.k2, self.N)
-        self.past.append((hold.start_s, hold.carried + amount, self.k2))
-        beside = self.creep.beside(beside, hold)
+        with _at(hold, wait_s):
+            amount = self.creep.amount(hold.initial_tension, hold)
+            hold.grown = hold.carried + amount * laws.creep_fraction(wait_s, self.k2, self.N)
+            self.past.append((hold.start_s, hold.carried + amount, self.k2))
+            beside = self.creep.beside(beside, hold)
         self.past[:] = [(start_s - wait_s, goal, k2) for start_s, goal, k2 in self.past]
-        hold.time_s = times
-        hold.warming_K = warming
         hold.carried = hold.grown
         hold.initial_tension = self._first(held, sum(beside.values(), hold.carried), hold)
         return beside
@@ -236,11 +241,8 @@ class Walk:
 
     def _first(self, held: Array, elongation: Array, hold: HoldContext) -> Array:
         """Tension (1, n) when the hold begins: effects see its first time only."""
-        times, warming = hold.time_s, hold.warming_K
-        hold.time_s, hold.warming_K = times[:1], warming[:1]
-        first = self.bench.tension(held, elongation, hold)
-        hold.time_s, hold.warming_K = times, warming
-        return first
+        with _at(hold, hold.time_s[:1]):
+            return self.bench.tension(held, elongation, hold)
 
     def _context(self, j: int) -> HoldContext:
         length_ref_mm = self.model.length_ref_mm or self.protocol.length_mm

@@ -6,7 +6,7 @@ from typing import Literal
 
 from wirebayes.answers.headline import plan_in_a_sentence
 from wirebayes.io.run_folder import read_json
-from wirebayes.json_files.plan import JudgedProtocol, PlanJson
+from wirebayes.json_files.plan import ExpectedWidth, JudgedProtocol, PlanJson
 from wirebayes.report.blocks import (
     Block,
     Columns,
@@ -156,18 +156,18 @@ def _widths(row: JudgedProtocol) -> Table:
     """How well parameters and creep would be known."""
     creep = row["creep"]
     quantities = row["parameters"] | {name: creep[name] for name in _CREEP}
-    lines = []
-    for name, width in quantities.items():
-        what = with_unit(_words(name), width["unit"])
-        sd = number(width["sd"], 2)
-        middle = number(width["width_90"], 2)
-        most_tests = span(width["width_90_low"], width["width_90_high"], 2)
-        guess = "given" if is_given(width) else number(width["guess_sd"], 2)
-        lines.append([what, sd, middle, most_tests, guess])
+    lines = [[with_unit(_words(name), width["unit"]), *_width(width)] for name, width in quantities.items()]
     header = ["quantity", "sd", "90 % width", "in 90 % of tests", "sd of the guess"]
     wire = f"Creep of {number(creep['length_mm'])} mm at {number(creep['tension_N'])} N"
     longest = number(creep["longest_hold_s"])
     return Table(header, lines, f"{wire}; the longest hold lasts {longest} s.")
+
+
+def _width(width: ExpectedWidth) -> list[str]:
+    """Standard deviation, width, in most tests, and what was known before."""
+    most_tests = span(width["width_90_low"], width["width_90_high"], 2)
+    guess = "given" if is_given(width) else number(width["guess_sd"], 2)
+    return [number(width["sd"], 2), number(width["width_90"], 2), most_tests, guess]
 
 
 def _effects(row: JudgedProtocol) -> Table:

@@ -104,23 +104,14 @@ class Balance:
 
         `known`: tension and its slope, where they are known.
         """
-        from flint import arb_mat
-
         m = self.arb(float(self.robot.lines[i]))
-        u, bends = span.direction, span.curvature
-        stretched = m * span.length + self.offset[i]
         if known is None:
+            stretched = m * span.length + self.offset[i]
             strain = self.strain(i, stretched)
             known = self.pull(i, strain, stretched)
-        tau, stiff = known
-        by_place = arb_mat(3, 3)
-        for j in range(3):
-            for k in range(3):
-                stretching = stiff * m * u[j] * u[k]
-                turning = tau * bends[j][k]
-                by_place[j, k] = -m * (stretching + turning)
-        force = [-m * tau * a for a in u]
-        return force, by_place
+        tau, _ = known
+        force = [-m * tau * a for a in span.direction]
+        return force, _by_place(m, *known, span)
 
     def at_centre(self) -> tuple[Any, list[tuple[Any, Any]]]:
         """Balance at the centre in parts: the weight's, and each wire's wrench of 1 N with its tension."""
@@ -283,6 +274,20 @@ def _bends(normal: list[Any], straight: Any, across: list[Any], sine: Any, away:
         in_plane = [normal[j] * normal[k] / straight for k in range(3)]
         swivelling = [across[j] * across[k] * sine / away for k in range(3)]
         out.append(_sum(in_plane, swivelling))
+    return out
+
+
+def _by_place(m: Any, tau: Any, stiff: Any, span: Span) -> Any:
+    """Slope (3, 3) of a wire's force by its platform point, of so many lines."""
+    from flint import arb_mat
+
+    u, bends = span.direction, span.curvature
+    out = arb_mat(3, 3)
+    for j in range(3):
+        for k in range(3):
+            stretching = stiff * m * u[j] * u[k]
+            turning = tau * bends[j][k]
+            out[j, k] = -m * (stretching + turning)
     return out
 
 
