@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -256,10 +256,10 @@ def draw(e: Effect, rig: Rig, rng: np.random.Generator) -> Candidate:
     return Candidate(e.name, int(rng.choice(e.signs)), tuple(shapes.items()), benches)
 
 
-def library(rig: Rig, names: Iterable[str] = tuple(EFFECTS), values: int = 3) -> list[Candidate]:
-    """Every candidate of the named effects on a rig: both signs, some values of each shape constant, all holds."""
+def library(rig: Rig, values: int = 3) -> list[Candidate]:
+    """Every candidate on a rig: both signs, some values of each shape constant, all holds."""
     found = []
-    for e in (effect(name) for name in names):
+    for e in EFFECTS.values():
         if not fits(e, rig):
             continue
         middles = (np.arange(values) + 0.5) / values

@@ -108,7 +108,11 @@ def delta_curves(geo: Geometry, candidates: list[Candidate], grid: Array = COARS
     return sizes, z.reshape(len(candidates), len(grid), -1)
 
 
-def solve_amplitude(geo: Geometry, candidate: Candidate, delta: float, tolerance: float = 2e-3) -> float:
+_AGREES = 2e-3  # relative error of a delta that is reached
+_AGREE_TOGETHER, _ROUNDS = 0.1, 6  # of several effects: error of each, attempts
+
+
+def solve_amplitude(geo: Geometry, candidate: Candidate, delta: float) -> float:
     """Smallest amplitude (its size) whose signature has the given delta; nan when no sensible one has.
 
     A grid, then finer grids inside the bracket with the log-log interpolated point among them, until one point agrees
@@ -125,7 +129,7 @@ def solve_amplitude(geo: Geometry, candidate: Candidate, delta: float, tolerance
         grid = np.sort(np.append(np.geomspace(grid[near][0], grid[near][1], 5), guess))
         height = np.linalg.norm(signature(geo, [[(candidate, float(a))] for a in grid]), axis=1)
         error = np.abs(height / delta - 1)
-        if error.min() < tolerance:
+        if error.min() < _AGREES:
             return float(grid[np.argmin(error)])
     return float("nan")  # delta jumps over the value asked for
 
@@ -143,17 +147,15 @@ def conditional(geo: Geometry, hidden: list[tuple[Candidate, float]]) -> Array:
     return np.array(found)
 
 
-def solve_together(
-    geo: Geometry, candidates: list[Candidate], delta: float, tolerance: float = 0.1, rounds: int = 6
-) -> list[float]:
+def solve_together(geo: Geometry, candidates: list[Candidate], delta: float) -> list[float]:
     """Amplitudes of several effects with the same conditional delta each; nan when no sensible ones have it."""
     wanted = np.full(len(candidates), delta)
-    for _ in range(rounds):
+    for _ in range(_ROUNDS):
         sizes = [solve_amplitude(geo, c, float(w)) for c, w in zip(candidates, wanted, strict=True)]
         if np.any(np.isnan(sizes)):
             break
         found = conditional(geo, list(zip(candidates, sizes, strict=True)))
-        if np.all(np.abs(found / delta - 1.0) < tolerance):
+        if np.all(np.abs(found / delta - 1.0) < _AGREE_TOGETHER):
             return sizes
         wanted = wanted * np.clip(delta / np.maximum(found, 1e-9), 0.3, 3.0)
     return [float("nan")] * len(candidates)

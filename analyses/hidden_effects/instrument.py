@@ -7,14 +7,15 @@ import numpy as np
 from .rig import Array, Bench
 from .state import Effects
 
+_SETTLE_S = 2.0  # between the move and the first node, spent at the first tension
 
-def lagging(tension: Array, grid_s: Array, shown: Array, lag_s: Array, settle_s: float = 2.0) -> Array:
+
+def lagging(tension: Array, grid_s: Array, shown: Array, lag_s: Array) -> Array:
     """First-order sensor: r' = (tension - r) / lag, exact for tension linear between nodes.
 
     Parameters
     ----------
     tension : shape (n, G); grid_s : (G,); shown : what the sensor showed before the hold, (n,); lag_s : (n,).
-    settle_s : time between the move and the first node, spent at the first tension.
 
     Returns
     -------
@@ -22,7 +23,7 @@ def lagging(tension: Array, grid_s: Array, shown: Array, lag_s: Array, settle_s:
     """
     lag = np.maximum(lag_s, 1e-3)
     out = np.empty_like(tension)
-    out[:, 0] = tension[:, 0] + (shown - tension[:, 0]) * np.exp(-settle_s / lag)
+    out[:, 0] = tension[:, 0] + (shown - tension[:, 0]) * np.exp(-_SETTLE_S / lag)
     for i, step in enumerate(np.diff(grid_s)):
         slope = (tension[:, i + 1] - tension[:, i]) / step
         trail = (out[:, i] - tension[:, i] + lag * slope) * np.exp(-step / lag)

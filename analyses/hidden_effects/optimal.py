@@ -43,8 +43,11 @@ def cosines(z: Array, candidates: list[Candidate], curves: Array) -> dict[str, f
     return found
 
 
+_POINTS = 24  # finite sizes of each effect
+
+
 def hypotheses(
-    geo: Geometry, candidates: list[Candidate], sizes: Array, curves: Array, points: int = 24
+    geo: Geometry, candidates: list[Candidate], sizes: Array, curves: Array
 ) -> tuple[Array, Array, list[str], Index]:
     """Points of the ideal judge's prior: finite effects whose delta is log-uniform, up to what the effect can reach.
 
@@ -63,14 +66,14 @@ def hypotheses(
         top = min(DELTA_RANGE[1], float(height[rising - 1]))
         if top > DELTA_RANGE[0]:
             climb = np.maximum.accumulate(np.log(np.maximum(height[:rising], 1e-9)))
-            wanted = np.linspace(np.log(DELTA_RANGE[0]), np.log(top), points)
+            wanted = np.linspace(np.log(DELTA_RANGE[0]), np.log(top), _POINTS)
             rows += [[(candidate, float(a))] for a in np.exp(np.interp(wanted, climb, np.log(grid[:rising])))]
-    exact = signature(geo, rows).reshape(-1, points, curves.shape[2])
+    exact = signature(geo, rows).reshape(-1, _POINTS, curves.shape[2])
     between = 0.5 * (exact[:, 1:] + exact[:, :-1])  # closer together than the noise
     z = np.concatenate([exact, between], axis=1).reshape(-1, curves.shape[2])
-    owners = [row[0][0].name for row in rows[::points]]
+    owners = [row[0][0].name for row in rows[::_POINTS]]
     names = list(dict.fromkeys(owners))
-    owner = np.repeat([names.index(name) for name in owners], 2 * points - 1)
+    owner = np.repeat([names.index(name) for name in owners], 2 * _POINTS - 1)
     weight = -np.log(np.bincount(owner)[owner])
     return z, weight, names, owner
 

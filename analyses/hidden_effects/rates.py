@@ -43,7 +43,10 @@ def weighted_rate(hits: Iterable[bool], weights: Iterable[float], level: float =
     return {"value": value, "n": round(n, 1), "low": lower_bound(k, n, side), "high": upper_bound(k, n, side)}
 
 
-def pooled(rows: list[Row], statistic: Callable[[Any, int], float], draws: int = 400) -> dict[str, Any] | None:
+_DRAWS = 400  # of a bootstrap
+
+
+def pooled(rows: list[Row], statistic: Callable[[Any, int], float]) -> dict[str, Any] | None:
     """A statistic of held-out sums over cases with a 90 % bootstrap interval over cases."""
     table = np.array(
         [[r["held_out"][k] for k in ("plain", "final", "judge_plain", "oracle")] for r in rows if comparable(r)]
@@ -51,7 +54,9 @@ def pooled(rows: list[Row], statistic: Callable[[Any, int], float], draws: int =
     if len(table) < 3:
         return None
     rng = np.random.default_rng(0)
-    spread = [statistic(table[rng.integers(len(table), size=len(table))].sum(axis=0), len(table)) for _ in range(draws)]
+    spread = [
+        statistic(table[rng.integers(len(table), size=len(table))].sum(axis=0), len(table)) for _ in range(_DRAWS)
+    ]
     low, high = np.nanquantile(spread, [0.05, 0.95])
     value = statistic(table.sum(axis=0), len(table))
     return {"value": float(value), "n": len(table), "low": float(low), "high": float(high)}
@@ -84,7 +89,7 @@ def against_optimal(rows: list[Row]) -> dict[str, Any] | None:
     return share_of([r["right"] for r in seen], [r["optimal"]["top1"] for r in seen])
 
 
-def share_of(hits: Sequence[bool], possible: Sequence[float], draws: int = 400) -> dict[str, Any] | None:
+def share_of(hits: Sequence[bool], possible: Sequence[float]) -> dict[str, Any] | None:
     """How often something is right over how often it could be, with a 90 % bootstrap interval over the cases.
 
     Parameters
@@ -96,7 +101,7 @@ def share_of(hits: Sequence[bool], possible: Sequence[float], draws: int = 400) 
         return None
     rng = np.random.default_rng(0)
     ratios = []
-    for _ in range(draws):
+    for _ in range(_DRAWS):
         right, could_be = pairs[rng.integers(len(pairs), size=len(pairs))].sum(axis=0)
         ratios.append(right / max(could_be, 1e-9))
     low, high = np.quantile(ratios, [0.05, 0.95])
