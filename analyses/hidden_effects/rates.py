@@ -54,12 +54,11 @@ def pooled(rows: list[Row], statistic: Callable[[Any, int], float]) -> dict[str,
     if len(table) < 3:
         return None
     rng = np.random.default_rng(0)
-    spread = [
-        statistic(table[rng.integers(len(table), size=len(table))].sum(axis=0), len(table)) for _ in range(_DRAWS)
-    ]
+    n = len(table)
+    spread = [statistic(table[rng.integers(n, size=n)].sum(axis=0), n) for _ in range(_DRAWS)]
     low, high = np.nanquantile(spread, [0.05, 0.95])
-    value = statistic(table.sum(axis=0), len(table))
-    return {"value": float(value), "n": len(table), "low": float(low), "high": float(high)}
+    value = statistic(table.sum(axis=0), n)
+    return {"value": float(value), "n": n, "low": float(low), "high": float(high)}
 
 
 def comparable(row: Row) -> bool:
