@@ -1,13 +1,12 @@
 """Effects on the creep within and between holds."""
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from wirebayes.numeric.distributions import HalfNormal, LogNormal, Normal, Uniform
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own, Place
+from wirebayes.wire.effect import Amplitude, Effect, HoldContext, Own
 from wirebayes.wire.laws import creep_fraction
 from wirebayes.wire.protocol import Protocol
 
@@ -90,7 +89,7 @@ class SteadyCreep(Effect):
 
     name = "steady_creep"
     pattern = "course of a hold"
-    place: ClassVar[Place] = "elongation"
+    place = "elongation"
     formula = "flow"
     scope = "material"
     # at the typical tension up to half a step a hold: more would be the larger part of the creep
@@ -106,17 +105,24 @@ class SteadyCreep(Effect):
         return [SteadyCreep(), SteadyCreepCarried()]
 
 
-class SteadyCreepCarried(SteadyCreep):
+class SteadyCreepCarried(Effect):
     """The same flow as a part of the carried creep: what has flowed counts towards the next hold's total."""
 
+    name = "steady_creep"
+    pattern = "course of a hold"
     place = "creep"
     formula = "flow_carried"
+    scope = "material"
+    amplitudes = SteadyCreep.amplitudes
     sentence = "The wire also flows steadily under tension; on unloading it recovers that flow."
     shows = "tail of the hold; recovered on unloading"
 
     @property
     def key(self) -> str:
         return f"{self.name}@carried"
+
+    def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
+        return value + own["a"] * hold.initial_tension * hold.time_s
 
 
 class TensionDependentRate(Effect):
