@@ -165,7 +165,7 @@ def _distances_mm(parameters: dict[str, Any], length_mm: float, machine: Robot, 
     rotation = matrix(machine.home_rotation_rad)
     course = drift.from_command(machine, wires, machine.home_m, rotation, np.array([0.0, HOUR_S]))
     away_m = course.position_m[:, -1] - machine.home_m
-    return np.asarray(1e3 * np.linalg.norm(away_m, axis=1)[course.found])
+    return 1e3 * np.linalg.norm(away_m, axis=1)[course.found]
 
 
 def _statistics(values: Any) -> Statistics:

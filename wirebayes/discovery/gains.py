@@ -94,7 +94,7 @@ def mixed(log_weight: Array, elpd: Array) -> Array:
     elpd : (m, H) array
         Log density of each left-out hold by each model.
     """
-    return np.asarray(logsumexp(log_weight) - logsumexp(log_weight[:, None] - elpd, axis=0))
+    return logsumexp(log_weight) - logsumexp(log_weight[:, None] - elpd, axis=0)
 
 
 def _acting(candidate: FittedSet, names: Sequence[str]) -> list[int]:

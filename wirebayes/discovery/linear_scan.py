@@ -167,7 +167,7 @@ def _most_probable(effects: Array, found: Projected, left: Array, degrees: int) 
     best = np.argmax(effects, axis=1)[:, None]
 
     def at_best(values: Array) -> Array:
-        return np.asarray(np.take_along_axis(values, best, axis=1)[:, 0])
+        return np.take_along_axis(values, best, axis=1)[:, 0]
 
     square = at_best(found.square)
     # there may be fewer readings than parameters, of which nothing is known

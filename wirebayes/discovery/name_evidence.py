@@ -230,7 +230,7 @@ def _squared_lengths(block: LaplaceFit, trials: Sequence[Probe]) -> Array:
     """(m,) of the probes' signatures, free of what the parameters absorb, in the noise of the fit."""
     x = expand(block.target, block.z, trials)
     signatures = projected(x, float(x.ratio[0]))
-    return np.asarray((signatures**2).sum(axis=0))
+    return (signatures**2).sum(axis=0)
 
 
 @dataclass(frozen=True)

@@ -145,7 +145,7 @@ def _with_parameters(x: Expansion, columns: Array, levels: Array, shrink: Array)
     gram = plain[:, None] - shrunk @ levels[:, None]
     gram[..., :p] += x.prior_precision[:, None]
     gram[..., p] += x.prior_gradient[:, None]
-    return np.asarray(gram)
+    return gram
 
 
 def with_each_signature(x: Expansion, found: Projected) -> tuple[Array, Array]:
@@ -180,19 +180,19 @@ class Functions(NamedTuple):
     def squares(self, shrink: Array) -> Array:
         """(n, k, q) inner product of each with itself."""
         plain = np.einsum("nif,nif->nf", self.plain, self.plain)[:, None]
-        return np.asarray(plain - shrink @ self.levels**2 - np.einsum("nkpf,nkpf->nkf", self.taken, self.taken))
+        return plain - shrink @ self.levels**2 - np.einsum("nkpf,nkpf->nkf", self.taken, self.taken)
 
     def along(self, one: "Functions", shrink: Array) -> Array:
         """(n, k, q) inner product of each with a single other function."""
         plain = np.swapaxes(one.plain, 1, 2) @ self.plain
         taken = (np.swapaxes(one.taken, 2, 3) @ self.taken)[:, :, 0]
-        return np.asarray(plain - shrink @ (self.levels * one.levels) - taken)
+        return plain - shrink @ (self.levels * one.levels) - taken
 
     def products(self, other: "Functions", shrink: Array) -> Array:
         """(n, k, q, m) inner products with other functions, as `project` has them."""
         plain = (np.swapaxes(self.plain, 1, 2) @ other.plain)[:, None]
         whole_holds = (np.swapaxes(self.levels, 1, 2)[:, None] * shrink[:, :, None]) @ other.levels[:, None]
-        return np.asarray(plain - np.swapaxes(self.taken, 2, 3) @ other.taken - whole_holds)
+        return plain - np.swapaxes(self.taken, 2, 3) @ other.taken - whole_holds
 
 
 def evidences(x: Expansion) -> tuple[Array, Array]:
@@ -273,7 +273,7 @@ def projected(x: Expansion, ratio: float) -> Array:
     """(N, m) signatures of the first row, whitened at a noise ratio, free of what the parameters absorb."""
     basis, _ = np.linalg.qr(whitened(x, x.parameters[0], ratio))
     signatures = whitened(x, x.signatures[0], ratio)
-    return np.asarray(signatures - basis @ (basis.T @ signatures))
+    return signatures - basis @ (basis.T @ signatures)
 
 
 ABSORBED = 1e-6  # squared share of a signature below which the parameters take all of it

@@ -227,4 +227,4 @@ def _noise(square: float, x: Expansion) -> float:
 def _taken(functions: Array, columns: Array, precision: Array) -> Array:
     """(N, c) the part of columns that functions (N, q) take whose coefficients have a prior's precision (q, q)."""
     inner = functions.T @ functions + precision
-    return np.asarray(functions @ solve(inner[None], (functions.T @ columns)[None])[0])
+    return functions @ solve(inner[None], (functions.T @ columns)[None])[0]

@@ -185,7 +185,7 @@ def _values(name: str, sample: Sample) -> Array:
     if name != "time in hold":
         return values
     scale = max(0.1 * sample.typical_hold_s, 1e-9)
-    return np.asarray(np.log1p(values / scale))
+    return np.log1p(values / scale)
 
 
 def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names: str) -> list[Disagreement]:

@@ -77,7 +77,7 @@ class Pieces:
         half = -0.5 * self.degrees
         with_it = self.shared + half * np.log(np.maximum(left, self.least))
         without = self.shared + half * np.log(np.maximum(rss, self.least))
-        return np.asarray(log_sum(with_it, axis=0) - log_sum(without, axis=0))
+        return log_sum(with_it, axis=0) - log_sum(without, axis=0)
 
 
 def joined(scans: Sequence[Scan]) -> Scan:

@@ -179,7 +179,7 @@ def best_probes(candidate: Candidate, scans: Sequence[Scan]) -> list[Ints]:
 
 def _each(values: Array, columns: Ints) -> Array:
     """(n,) of every row the value in its own column."""
-    return np.asarray(values[np.arange(len(columns)), columns])
+    return values[np.arange(len(columns)), columns]
 
 
 def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
@@ -207,7 +207,7 @@ def shared_amplitude(lr: Array, a: Array, norm: Array) -> tuple[Array, Array]:
 def _alone_and_together(log_bayes: Sequence[Array]) -> Array:
     """(n,) the largest log Bayes factor of what each block has for itself (n,): of a block alone, or of all."""
     each = np.array(log_bayes)
-    return np.asarray(np.maximum(each.max(axis=0), each.sum(axis=0)))
+    return np.maximum(each.max(axis=0), each.sum(axis=0))
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def beside_smooth(x: Expansion) -> Array:
     beside = shared[..., None] - half * np.log(left_beside)
     by_signature = beside.reshape(-1, signatures)
     log_ratio = log_sum(by_signature) - log_sum(without.ravel())
-    return np.asarray(log_ratio)
+    return log_ratio
 
 
 class _Products(NamedTuple):

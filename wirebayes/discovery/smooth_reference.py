@@ -56,7 +56,7 @@ def basis(protocol: Protocol) -> Array:
         orders = one.hold / holds, other.hold / holds
         over_hold = 0.5 * _smooth(*orders, 0.3) + 0.5 * np.minimum.outer(*orders)
         over_hold += 0.5 * _smooth(one.place / reach, other.place / reach, 0.3)
-        return np.asarray(over_hold * (0.5 + 0.5 * _smooth(one.time, other.time, 0.7)))
+        return over_hold * (0.5 + 0.5 * _smooth(one.time, other.time, 0.7))
 
     return _functions(protocol, covariance, FUNCTIONS)
 
@@ -98,4 +98,4 @@ def _functions(protocol: Protocol, covariance: _Covariance, most: int) -> Array:
 
 
 def _smooth(one: Array | Ints, other: Array | Ints, length: float) -> Array:
-    return np.asarray(np.exp(-0.5 * (np.subtract.outer(one, other) / length) ** 2))
+    return np.exp(-0.5 * (np.subtract.outer(one, other) / length) ** 2)

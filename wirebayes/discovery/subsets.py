@@ -47,7 +47,7 @@ def _most_probable(values: Array, weights: Array) -> list[int]:
 def _log_weights(b: int) -> Array:
     """(b,) log prior probability of one subset of each size from 1 to b."""
     n = np.arange(1, b + 1)
-    return np.asarray(-np.log(b) - (gammaln(b + 1) - gammaln(n + 1) - gammaln(b - n + 1)))
+    return -np.log(b) - (gammaln(b + 1) - gammaln(n + 1) - gammaln(b - n + 1))
 
 
 def _symmetric(values: Array) -> Array:

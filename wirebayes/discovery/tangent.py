@@ -76,13 +76,13 @@ class Tangent:
     def least(self) -> Array:
         """(n,) below which a sum of squares counts as rounding error."""
         most_free = max(self.degrees, 1)  # also where there are no more readings than parameters
-        return np.asarray(most_free * np.maximum(self.floor, _LEAST_NOISE))
+        return most_free * np.maximum(self.floor, _LEAST_NOISE)
 
     @property
     def prior_square(self) -> Array:
         """(n,) squared distance of the point from the prior's own best, as a parabola sees it."""
         along = np.linalg.solve(self.prior_precision, self.prior_gradient[..., None])[..., 0]
-        return np.asarray((self.prior_gradient * along).sum(axis=1))
+        return (self.prior_gradient * along).sum(axis=1)
 
 
 def moving_columns(problem: Problem) -> list[int]:
@@ -163,7 +163,7 @@ class Point:
 
     def rows(self, values: Array, mask: Array) -> Array:
         """(H, R, n) to (n, N) in units of the reading error."""
-        return np.asarray((values[mask] / self.sd).T)
+        return (values[mask] / self.sd).T
 
 
 def points_of(target: LogPosterior, around: Around, readings: Sequence[Array] | None) -> Iterator[Point]:
@@ -285,7 +285,7 @@ def residuals(target: LogPosterior, z: Array, readings: Sequence[Array] | None =
 def _prior_density(target: LogPosterior, theta: Array, z: Array) -> Array:
     """(n,) log density of the prior in the sampled coordinates, at points whose natural parameters are known."""
     with np.errstate(all="ignore"):  # a parameter that underflows to zero has no density
-        return np.asarray(target.sampled_prior(theta, z))
+        return target.sampled_prior(theta, z)
 
 
 def _prior(target: LogPosterior, around: Around) -> tuple[Array, Array, Array]:
@@ -321,7 +321,7 @@ def _parabola(centre: Array, plus: Array, minus: Array) -> tuple[Array, Array]:
 def damp(singular: Array, ratio: Array | float) -> Array:
     """How much of what moves whole holds the noise takes, at a ratio ρ, along each singular vector of K."""
     with np.errstate(over="ignore"):
-        return np.asarray(ratio * singular**2 / (1.0 + ratio * singular**2))
+        return ratio * singular**2 / (1.0 + ratio * singular**2)
 
 
 def whitened(x: Tangent, columns: Array, ratio: float) -> Array:
@@ -335,7 +335,7 @@ def whitened(x: Tangent, columns: Array, ratio: float) -> Array:
         Size of the setting errors against the sensor's, ρ.
     """
     shrink = 1.0 - 1.0 / np.sqrt(1.0 + ratio * x.singular[0] ** 2)
-    return np.asarray(columns - x.left[0] @ (shrink[:, None] * (x.left[0].T @ columns)))
+    return columns - x.left[0] @ (shrink[:, None] * (x.left[0].T @ columns))
 
 
 def block_diagonal(blocks: Sequence[Array]) -> Array:

@@ -38,7 +38,7 @@ def log_bayes_of_two(x: Expansion, found: Projected, single: Array, plain: Array
     if len(groups) < 2:
         return np.full(len(single), -np.inf)
     value = _log_evidence(x, found, _leading(single, groups), groups)
-    return np.asarray(log_sum(value.reshape(len(value), -1), axis=1) - plain)
+    return log_sum(value.reshape(len(value), -1), axis=1) - plain
 
 
 def log_bayes_of_each_pair(x: Expansion) -> Array:
@@ -136,8 +136,8 @@ class _Signatures(NamedTuple):
 
     def determinant(self, other: "_Signatures", cross: Array) -> Array:
         """Of the products of pairs, `cross` those of one with the other."""
-        return np.asarray(self.square * other.square - cross**2)
+        return self.square * other.square - cross**2
 
     def beside(self, other: "_Signatures", cross: Array) -> Array:
         """Best amplitudes with the others at their best."""
-        return np.asarray((other.square * self.along - cross * other.along) / self.determinant(other, cross))
+        return (other.square * self.along - cross * other.along) / self.determinant(other, cross)

@@ -61,7 +61,7 @@ class Superposition(Effect):
             reached = creep_fraction(hold.start_s - start_s + hold.time_s, k2, exponent)
             superposed = superposed + (goal - before) * reached
             before = goal
-        return np.asarray(own["omega"] * (superposed - hold.grown))
+        return own["omega"] * (superposed - hold.grown)
 
 
 class SecondRelaxation(Effect):

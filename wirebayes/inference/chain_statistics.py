@@ -174,7 +174,7 @@ def _autocorrelation(chains: Array) -> Array:
     within = covariance[0] * n / (n - 1.0)
     correlation = 1.0 - (within - covariance) / (covariance[0] + between)
     correlation[0] = 1.0
-    return np.asarray(correlation)
+    return correlation
 
 
 def _autocovariance(chains: Array) -> Array:
@@ -219,7 +219,7 @@ def _pareto_quantiles(shape: float, size: int) -> Array:
     hazard = -np.log1p(-level)
     if shape == 0.0:
         return np.asarray(hazard)
-    return np.asarray(np.expm1(shape * hazard) / shape)
+    return np.expm1(shape * hazard) / shape
 
 
 def pareto_fit(excess: Array) -> tuple[float, float]:

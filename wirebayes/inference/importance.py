@@ -257,7 +257,7 @@ def effective(log_weight: Array) -> Array:
     """(m,) effective numbers of draws, (sum w)² / sum w², of weights (n, m); 0 where none has any weight."""
     top = log_weight.max(axis=0)
     weight = np.exp(log_weight - np.where(np.isfinite(top), top, 0.0))
-    return np.asarray(weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), 1e-300))
+    return weight.sum(axis=0) ** 2 / np.maximum((weight**2).sum(axis=0), 1e-300)
 
 
 def expected(fresh: Weighted, witness: Array, height: Array) -> float:

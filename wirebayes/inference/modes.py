@@ -146,7 +146,7 @@ def _landmarks(passed: Array, height: Array, rng: Generator) -> Array:
     """Of the places (n, d) that the annealing passed the highest one, and some far from one another."""
     apart = spread_in_widths(passed, _FIRST, rng)
     highest = int(np.argmax(height))
-    return np.asarray(passed[[highest, *apart]])
+    return passed[[highest, *apart]]
 
 
 class _SideBySide:
@@ -275,7 +275,7 @@ def _prior(target: LogPosterior, n: int, rng: Generator) -> Array:
 
 def _some(z: Array, n: int, rng: Generator) -> Array:
     """(n, d) of the places (m, d), none twice where there are enough."""
-    return np.asarray(z[rng.choice(len(z), n, replace=n > len(z))])
+    return z[rng.choice(len(z), n, replace=n > len(z))]
 
 
 def _possible(z: Array, value: Array) -> Array:
@@ -291,7 +291,7 @@ def _spread(target: LogPosterior, z: Array, n: int, rng: Generator) -> Array:
         return _some(z, n, rng)
     found = np.stack([np.argsort(np.argsort(z[:, columns].mean(axis=1))) / len(z) for columns in kinds], axis=1)
     wanted = np.resize(_RANKS, (n, 2))[:, : len(kinds)] + _WITHIN * rng.uniform(-1.0, 1.0, (n, len(kinds)))
-    return np.asarray(z[((found - wanted[:, None]) ** 2).sum(axis=2).argmin(axis=1)])
+    return z[((found - wanted[:, None]) ** 2).sum(axis=2).argmin(axis=1)]
 
 
 def _cooled(density: Function, z: Array, value: Array, rng: Generator) -> tuple[Array, Array]:
@@ -328,4 +328,4 @@ def _evolved(z: Array, rng: Generator) -> Array:
     one, other = rng.integers(n, size=(2, n))
     stretch = 2.38 / np.sqrt(2.0 * d)
     jitter = 1e-3 * rng.normal(size=z.shape)
-    return np.asarray(z + stretch * (z[one] - z[other]) + jitter)
+    return z + stretch * (z[one] - z[other]) + jitter

@@ -54,7 +54,7 @@ class Optimum:
         """
         d = self.z.shape[1]
         eigen = np.maximum(np.linalg.eigvalsh(self.curvature), LEAST_CURVATURE)
-        return np.asarray(self.log_density + 0.5 * d * np.log(2.0 * np.pi) - 0.5 * np.log(eigen).sum(axis=1))
+        return self.log_density + 0.5 * d * np.log(2.0 * np.pi) - 0.5 * np.log(eigen).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Ends:
         """
         near = _apart(z, self.places.z, self.places.curvature) <= _ONE_MODE
         lower = value[:, None] <= self.places.log_density
-        return np.asarray((near & lower & (self.which == which[:, None])).any(axis=1))
+        return (near & lower & (self.which == which[:, None])).any(axis=1)
 
 
 def nowhere(d: int) -> Optimum:
@@ -131,4 +131,4 @@ def together(found: Sequence[Optimum]) -> Optimum:
 def _apart(z: Array, modes: Array, curvature: Array) -> Array:
     """(n, k) squared distances of places (n, d) from modes (k, d), in standard deviations."""
     apart = z[:, None] - modes
-    return np.asarray(np.einsum("nki,kij,nkj->nk", apart, curvature, apart))
+    return np.einsum("nki,kij,nkj->nk", apart, curvature, apart)

@@ -52,7 +52,7 @@ class _Moves:
         apart = self.middle[second] != self.middle[first]
         slopes = (each[second] - each[first])[apart] / (self.middle[second] - self.middle[first])[apart]
         slope = float(np.median(slopes)) if slopes.size else 0.0
-        return np.asarray(added - self.moved * (slope * self.middle + np.median(each - slope * self.middle)))
+        return added - self.moved * (slope * self.middle + np.median(each - slope * self.middle))
 
 
 def zero_shift(readings: CheckedTest) -> str:
@@ -103,7 +103,7 @@ def _of_one_way(readings: CheckedTest, moved: Floats, way: float) -> Bools:
     numbers = np.flatnonzero(readings.protocol.recorded)
     adjoining = np.diff(numbers) == 1
     late = _late(readings)[1:]
-    return np.asarray(this_way & after_such & adjoining & ~late)
+    return this_way & after_such & adjoining & ~late
 
 
 def slack_below(readings: CheckedTest) -> float:
@@ -116,7 +116,7 @@ def _late(readings: CheckedTest) -> Bools:
     """Recorded holds that are first read later than usual."""
     first_s = np.array([times[0] for times in readings.times_s])
     until_second_s = np.median([times[1] - times[0] for times in readings.times_s if len(times) > 1] or [0.0])
-    return np.asarray(first_s - np.median(first_s) > LATE * until_second_s)
+    return first_s - np.median(first_s) > LATE * until_second_s
 
 
 def _shift(moves: _Moves, noise: float) -> tuple[float, int, float, float] | None:

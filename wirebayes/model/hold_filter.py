@@ -63,7 +63,7 @@ class Measured:
 
     def first(self, j: int) -> Array:
         """(n,) or (1,) the first reading of a hold."""
-        return np.asarray(self.readings[j][int(np.argmax(self.mask[j]))])
+        return self.readings[j][int(np.argmax(self.mask[j]))]
 
 
 def carried_unread(line: Linearised, j: int, m: Array, p: Array, noise: ReadingNoise) -> tuple[Array, Array]:
@@ -212,7 +212,7 @@ def filter_holds(line: Linearised, measured: Measured) -> Iterator[tuple[Array, 
 
 def summed(one: Array, other: Array) -> Array:
     """(n,) sums of products (R, n) over the readings."""
-    return np.asarray(np.einsum("rn,rn->n", one, other))
+    return np.einsum("rn,rn->n", one, other)
 
 
 class HoldInformation(NamedTuple):
@@ -291,7 +291,7 @@ class Later:
         """Of those readings, the carried creep being normal with this mean and variance."""
         wider = 1.0 + self.precision * var
         square = self.precision * mean**2 - 2.0 * self.pull * mean - self.pull**2 * var
-        return np.asarray(self.constant - 0.5 * (square / wider + np.log(wider)))
+        return self.constant - 0.5 * (square / wider + np.log(wider))
 
     def with_hold(self, line: Linearised, j: int, measured: Measured, noise: ReadingNoise) -> "Later":
         """The same with the readings of hold j, the one before them, by the creep carried into that hold.

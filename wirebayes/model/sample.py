@@ -78,7 +78,7 @@ class Sample:
         """Tensions that were read, or set while something was read."""
         if self.protocol.control == "force":
             return self.protocol.setting[self.protocol.recorded]
-        return np.asarray(self.readings[..., 0][self.protocol.mask])
+        return self.readings[..., 0][self.protocol.mask]
 
     @property
     def tested_tension_N(self) -> float:

@@ -20,7 +20,7 @@ def geometric_mean(values: Iterable[float]) -> float:
 def mean_of_finite(values: Floats) -> Floats:
     """Mean over the first axis of the values that are finite; NaN where none is."""
     good = np.isfinite(values)
-    return np.asarray(np.where(good, values, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan))
+    return np.where(good, values, 0.0).sum(0) / np.where(good.any(0), good.sum(0), np.nan)
 
 
 def root_mean_square(values: Array) -> float:

@@ -61,7 +61,7 @@ def truncated(log_weight: Array) -> Array:
     times the root of all rows.
     """
     weight = np.exp(log_weight - log_weight.max())
-    return np.asarray(np.minimum(weight, np.sqrt(len(weight)) * weight.mean()))
+    return np.minimum(weight, np.sqrt(len(weight)) * weight.mean())
 
 
 def effective_number(weight: Array) -> float:

@@ -350,7 +350,7 @@ def _log_volume(part: _Posteriors, problem: Problem) -> Array:
     _, covariance = _moments(np.where(positive, np.log(above_zero), x), part.weight)
     regular = covariance + 1e-24 * np.eye(len(columns))
     _, log_determinant = np.linalg.slogdet(regular)
-    return np.asarray(0.5 * log_determinant)
+    return 0.5 * log_determinant
 
 
 def _unit(name: str, test: Experiment) -> str:

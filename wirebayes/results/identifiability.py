@@ -75,7 +75,7 @@ def _prior_ends(prior: Prior, name: str, drawn: Array) -> Array:
     """Ends of the prior's 90 % interval of a parameter."""
     if name in prior.powers:
         return np.quantile(drawn, _ENDS)
-    return np.asarray(prior.distributions[name].ppf(_ENDS))
+    return prior.distributions[name].ppf(_ENDS)
 
 
 def _range(ends: Array, is_factor: bool) -> float:
@@ -95,7 +95,7 @@ def _ridges(names: Sequence[str], correlation: Array, i: int) -> dict[str, float
 
 def _thinned(flat: Array) -> Array:
     """At most `_DRAWS` rows, evenly spread."""
-    return np.asarray(flat[evenly(len(flat), _DRAWS)])
+    return flat[evenly(len(flat), _DRAWS)]
 
 
 def parameter_in_words(name: str, figures: IdentifiabilityFigures) -> str:
@@ -180,10 +180,10 @@ class Extrapolation:
 
         def width(band: Array) -> Array:
             with np.errstate(divide="ignore", invalid="ignore"):  # draws without creep have no logarithm
-                return np.asarray(np.log(band[2] / band[0]))
+                return np.log(band[2] / band[0])
 
         with np.errstate(invalid="ignore"):
-            return np.asarray(width(self.weaker_prior_mm) / width(self.posterior_mm) - 1.0)
+            return width(self.weaker_prior_mm) / width(self.posterior_mm) - 1.0
 
     def to_dict(self) -> ExtrapolatedCreep:
         """The same as plain values, for JSON, with a sentence for the longest time."""

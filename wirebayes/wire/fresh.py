@@ -75,7 +75,7 @@ class FreshSample:
             strain = strain_of(effects, np.asarray(tension_N / theta["k1"])[None], hold)
             slope = bent(effects, strain, hold)[1]
             shrunk = 1.0 if self.model.law == "hooke" else np.square(1.0 - strain)
-            return np.asarray((theta["k1"] * slope * shrunk)[0])
+            return (theta["k1"] * slope * shrunk)[0]
 
     @cached_property
     def _wire(self) -> tuple[Placed, Theta]:

@@ -71,7 +71,7 @@ class Protocol:
     def _longer(self) -> Bools:
         """(H,) True where a hold went on after its last reading."""
         last_s = np.max(self.time_s * self.mask, axis=1, initial=0.0)
-        return np.asarray(self.recorded & (self.duration_s > last_s))
+        return self.recorded & (self.duration_s > last_s)
 
     @property
     def recorded(self) -> Bools:
@@ -98,7 +98,7 @@ class Protocol:
     @cached_property
     def last_reading(self) -> Ints:
         """(H,) column of each hold's last reading."""
-        return np.asarray(np.maximum(self.mask.sum(axis=1) - 1, 0))
+        return np.maximum(self.mask.sum(axis=1) - 1, 0)
 
     @cached_property
     def end(self) -> Ints:

@@ -95,7 +95,7 @@ class ColumnMap:
         for i, at in self.edges.items():
             if i not in replaced:
                 total = total + at.log_slope(theta[:, i])
-        return np.asarray(total)
+        return total
 
 
 def columns_of(problem: Problem) -> ColumnMap:

@@ -31,7 +31,7 @@ class Edge:
 
     def log_slope(self, value: Array) -> Array:
         """(n,) log |d value / d score|."""
-        return np.asarray(_log_normal(self.score(value)) - self.log_prior(value))
+        return _log_normal(self.score(value)) - self.log_prior(value)
 
 
 def edge(distribution: Any) -> Edge | None:
@@ -62,7 +62,7 @@ def _half_normal(sd: float, log_prior: Function) -> Edge:
         below = ndtr(np.minimum(score, 0.0))
         above = ndtr(-np.maximum(score, 0.0))
         u = np.where(score < 0.0, erfinv(below), erfcinv(above))
-        return np.asarray(unit * u)
+        return unit * u
 
     return Edge(score, value, log_prior, False)
 

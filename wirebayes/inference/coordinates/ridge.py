@@ -70,7 +70,7 @@ class Ridge:
 
     def log_hazard(self, theta: Array) -> Array:
         """(n,) log hazard at half a typical hold, less log k2, at natural parameters (n, d)."""
-        return np.asarray(self.get(theta, "N") * self.log_half_hold)
+        return self.get(theta, "N") * self.log_half_hold
 
     def log_power(self, z: Array) -> Array:
         """(n,) log U that suits the measured losses best at the hazards of sampled coordinates (n, d)."""
@@ -82,12 +82,12 @@ class Ridge:
             return np.zeros(len(theta))
         stiffness = np.log(self.get(theta, "k1")) - self.log_length
         if self.fixture is None:
-            return np.asarray(stiffness)
+            return stiffness
         return np.asarray(stiffness - np.logaddexp(0.0, np.log(theta[:, self.fixture]) + stiffness))
 
     def reached(self, theta: Array, time_s: Array | float) -> Array:
         """The share of its creep that a hold has reached after a time, (n,) or (T, n) for times (T, 1)."""
-        return np.asarray(-np.expm1(-self.get(theta, "k2") * time_s ** self.get(theta, "N")))
+        return -np.expm1(-self.get(theta, "k2") * time_s ** self.get(theta, "N"))
 
     @property
     def end_s(self) -> Array:
@@ -103,7 +103,7 @@ class Ridge:
             Natural parameters, of which k1 and B are not looked at, and sampled coordinates.
         """
         log_gained = z[:, self.where["B"]] + self.log_unseen(theta)
-        return np.asarray(np.logaddexp(0.0, log_gained - self.log_step))
+        return np.logaddexp(0.0, log_gained - self.log_step)
 
     def log_amount(self, theta: Array, z: Array) -> Array:
         """(n,) log B as sampled, times what is read per elongation; with all that creeps beside the creep.
@@ -119,7 +119,7 @@ class Ridge:
         """(n,) log G: root mean square of the elongation that a hold shows, for B = 1, at natural parameters (n, d)."""
         _, shown = self._squares(theta)
         # the floor keeps the logarithm finite
-        return np.asarray(self.get(theta, "U") * self._tensions[0] + 0.5 * np.log(np.maximum(shown, _NOTHING)))
+        return self.get(theta, "U") * self._tensions[0] + 0.5 * np.log(np.maximum(shown, _NOTHING))
 
     def log_unseen(self, theta: Array) -> Array | float:
         """(n,) log of the elongation gained in a hold over what it shows, both root mean squares."""

@@ -48,9 +48,7 @@ class SlackEdge:
     def value(self, score: Array, theta: Array) -> Array:
         """(n,) preloads, mm, of scores beside the other natural parameters (n, d)."""
         u = (score - self.at) / self.width + DECADES
-        return np.asarray(
-            self._edge(theta) + self.width * (np.logaddexp(0.0, u - DECADES) - np.logaddexp(0.0, -u - DECADES))
-        )
+        return self._edge(theta) + self.width * (np.logaddexp(0.0, u - DECADES) - np.logaddexp(0.0, -u - DECADES))
 
     def score(self, theta: Array) -> Array:
         """(n,) scores of natural parameters (n, d)."""
@@ -59,7 +57,7 @@ class SlackEdge:
     def log_slope(self, theta: Array) -> Array:
         """(n,) log of the derivative of the preload by its score."""
         u = self._bent(theta)
-        return np.asarray(np.logaddexp(-np.logaddexp(0.0, DECADES - u), -np.logaddexp(0.0, DECADES + u)))
+        return np.logaddexp(-np.logaddexp(0.0, DECADES - u), -np.logaddexp(0.0, DECADES + u))
 
     def _edge(self, theta: Array) -> Array | float:
         if self.threshold == 0.0:
@@ -74,7 +72,7 @@ class SlackEdge:
         distance = theta[:, self.preload] - self._edge(theta)
         far = np.abs(distance) / self.width
         root = np.sqrt(np.expm1(-far) ** 2 + 4.0 * np.exp(-far - 2.0 * DECADES))
-        return np.asarray(np.sign(distance) * (far + np.log(0.5 * (root - np.expm1(-far))) + DECADES))
+        return np.sign(distance) * (far + np.log(0.5 * (root - np.expm1(-far))) + DECADES)
 
 
 def slack_edge(problem: Problem, sample: Sample) -> SlackEdge | None:

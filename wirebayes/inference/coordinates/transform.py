@@ -202,7 +202,7 @@ class Transformation:
             out[:, i] += log_factor / spread[i]
         for i in self._own_scale:
             out[:, i] = columns.coordinate(theta, i)
-        return np.asarray(out.T)
+        return out.T
 
 
 def _steps(

@@ -59,7 +59,7 @@ class Components:
         bent = which < self.straightened
         if self.straight is not None:
             x[bent] = self.straight.inverse(x[bent])
-        return np.asarray(x)
+        return x
 
     def to_cube(self, x: Array, random: Any) -> Array:
         """Points of the cube to which draws belong: one for each, by chance from all that could have led to it.

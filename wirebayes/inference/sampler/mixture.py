@@ -73,7 +73,7 @@ class Mixture:
         y = product.astype(x.dtype) @ x.T  # points last: sums over coordinates are several times as fast
         y -= middle.astype(x.dtype)
         y *= y
-        return np.asarray(y.reshape(k, d, len(x)).sum(axis=1))
+        return y.reshape(k, d, len(x)).sum(axis=1)
 
     def log_parts(self, distances: Array) -> Array:
         """(k, n) log of weight times density of each component."""
@@ -82,7 +82,7 @@ class Mixture:
         own = np.log(self.weights) - np.log(np.einsum("kii->ki", self.factors)).sum(axis=1)
         kind = distances.dtype
         heavy, nu = (-0.5 * (nu + d)).astype(kind), nu.astype(kind)
-        return np.asarray((constant + own[:, None]).astype(kind) + heavy * np.log1p(distances / nu))
+        return (constant + own[:, None]).astype(kind) + heavy * np.log1p(distances / nu)
 
 
 def from_modes(centres: Array, covariances: Array, log_weights: Array) -> Mixture:

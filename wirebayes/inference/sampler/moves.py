@@ -151,7 +151,7 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
         first = np.repeat(np.arange(self.ensembles) * each, n // self.ensembles)
         one = random.randint(each, size=n)
         other = (one + random.randint(1, each, size=n)) % each
-        return np.asarray(pool[first + one] - pool[first + other])
+        return pool[first + one] - pool[first + other]
 
     def _lengths(self, d: int) -> tuple[float, ...]:
         """Equally likely lengths of a step in so many dimensions, in those of a difference."""

@@ -77,4 +77,4 @@ def _matters(z: Array, value: Array, middle: float) -> Bools:
     middle : float
         The usual log of posterior over proposal.
     """
-    return np.asarray(value + z.shape[1] * WIDEST > middle + NEXT_TO_NOTHING)
+    return value + z.shape[1] * WIDEST > middle + NEXT_TO_NOTHING

@@ -45,7 +45,7 @@ class WeightedPoints:
     def spread(self) -> Array:
         """(d,) standard deviations."""
         share = self.weight / self.weight.sum()
-        return np.asarray(np.sqrt(share @ (self.z - share @ self.z) ** 2))
+        return np.sqrt(share @ (self.z - share @ self.z) ** 2)
 
     @property
     def distinct(self) -> float:

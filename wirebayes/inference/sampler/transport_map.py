@@ -111,7 +111,7 @@ class Straight:
         mean = self.constant[j] + self.linear[j, :j] @ before
         bend = self.quadratic[j, :j, :j] @ inside
         mean += (bend * (before - 0.5 * inside)).sum(axis=0)
-        return np.asarray(mean)
+        return mean
 
     def _log_scale(self, j: int, before: Array) -> Array:
         """(n,) of coordinate j by those before it (j, n)."""
@@ -350,9 +350,9 @@ def _regress(
 def _precision(lines: Array, of_scale: Array) -> Array:
     """(n,) 1 / variance of y by the coefficients of its log scale, within limits."""
     log_scale = np.clip(lines @ of_scale, -6.0, 3.0)
-    return np.asarray(np.exp(-2.0 * log_scale))
+    return np.exp(-2.0 * log_scale)
 
 
 def _of_worth(weight: Array, worth: Any) -> Array:
     """Weights that sum to so much."""
-    return np.asarray(weight * (worth / weight.sum()))
+    return weight * (worth / weight.sum())

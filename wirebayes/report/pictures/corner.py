@@ -222,7 +222,7 @@ def _density(x: Ints, y: Ints) -> Array:
     cells = _BINS + 1
     counts = np.bincount(x * cells + y, minlength=cells**2)
     inside = counts.reshape(cells, cells)[:-1, :-1]
-    return np.asarray(_SMOOTHING @ inside @ _SMOOTHING.T)
+    return _SMOOTHING @ inside @ _SMOOTHING.T
 
 
 def _outlines(contours: Any, low: float, high: float) -> list[Path]:

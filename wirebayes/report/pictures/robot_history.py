@@ -159,7 +159,7 @@ def _mean_pose(track: Track, rows: Indices) -> tuple[Floats, Floats]:
 
 def _platform_points(robot: Robot, position_m: Floats, rotation: Floats) -> Floats:
     """Where the wires meet the platform, ``(r, w, 3)``."""
-    return np.asarray(position_m[:, None] + robot.platform_m @ np.swapaxes(rotation, 1, 2))
+    return position_m[:, None] + robot.platform_m @ np.swapaxes(rotation, 1, 2)
 
 
 def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
@@ -276,7 +276,7 @@ class _Canvas:
     def at(self, points: Floats) -> Floats:
         """Points (..., 2) on the picture, whose second axis points down."""
         flat = (points - self.low) * self.scale + 20
-        return np.asarray(np.stack([flat[..., 0], self.height - flat[..., 1]], -1))
+        return np.stack([flat[..., 0], self.height - flat[..., 1]], -1)
 
     def head(self, title: str) -> list[str]:
         """What the picture begins with."""

@@ -175,4 +175,4 @@ def _accelerations(times_s: Floats, position_m: Floats) -> Floats:
     step = np.diff(times_s)
     speed = np.diff(position_m, axis=0) / step[:, None]
     change = np.linalg.norm(np.diff(speed, axis=0), axis=1)
-    return np.asarray(change / (0.5 * (step[1:] + step[:-1])))
+    return change / (0.5 * (step[1:] + step[:-1]))

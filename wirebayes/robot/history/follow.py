@@ -247,7 +247,7 @@ def _schedule(times_s: Floats, joint_m: Floats) -> Callable[[float], Floats]:
     def joint(time_s: float) -> Floats:
         k = int(np.clip(np.searchsorted(times_s, time_s, "right") - 1, 0, len(times_s) - 2))
         share = min(max((time_s - times_s[k]) / (times_s[k + 1] - times_s[k]), 0.0), 1.0)
-        return np.asarray(joint_m[k] + share * (joint_m[k + 1] - joint_m[k]))
+        return joint_m[k] + share * (joint_m[k + 1] - joint_m[k])
 
     return joint
 

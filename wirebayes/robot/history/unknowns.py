@@ -157,7 +157,7 @@ def even_normals(n: int, m: int, rng: Generator) -> Floats:
     below = ndtri(drawn / n)
     middle = ndtri((half + rng.uniform(size=(n % 2, m))) / n)
     in_order = np.concatenate([below, middle, -below])
-    return np.asarray(rng.permuted(in_order, axis=0))
+    return rng.permuted(in_order, axis=0)
 
 
 def _root(covariance: Floats) -> Floats:

@@ -23,4 +23,4 @@ def wire_of(robot: Robot, straight_m: ArrayLike) -> Floats:
     """
     lines = mean_of_each_winch(robot, robot.lines)
     beyond = mean_of_each_winch(robot, robot.beyond_m - robot.beyond_joint_m)
-    return np.asarray(lines * np.asarray(straight_m, float) + beyond)
+    return lines * np.asarray(straight_m, float) + beyond

@@ -12,7 +12,7 @@ def matrix(rotation_vector_rad: Floats) -> Floats:
     a = np.sinc(angle / np.pi)
     b = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
     k = cross_matrix(v)
-    return np.asarray(np.eye(3) + a * k + b * (k @ k))
+    return np.eye(3) + a * k + b * (k @ k)
 
 
 def vector(rotation: Floats) -> Floats:

@@ -52,7 +52,7 @@ class Geometry:
 def turned(points_m: Floats, rotation: Floats) -> Floats:
     """Platform points ``(w, 3)`` in the world's axes, ``(3, w, n)``."""
     x, y, z = points_m.T[:, :, None]
-    return np.asarray(rotation[:, 0, None] * x + rotation[:, 1, None] * y + rotation[:, 2, None] * z)
+    return rotation[:, 0, None] * x + rotation[:, 1, None] * y + rotation[:, 2, None] * z
 
 
 def geometry(robot: Robot, position_m: Floats, rotation: Floats) -> Geometry:
@@ -138,7 +138,7 @@ def stretched(robot: Robot, shape: Geometry, offset_m: Floats) -> Floats:
     (w, n) array
         m.
     """
-    return np.asarray(robot.lines[:, None] * shape.distance_m + offset_m)
+    return robot.lines[:, None] * shape.distance_m + offset_m
 
 
 def unbalance_and_stiffness(
@@ -293,4 +293,4 @@ def potential(
     height = position_m[2]
     if robot.degrees == 6:
         height = height + np.einsum("jn,j->n", rotation[2], robot.centre_of_mass_m)
-    return np.asarray(elastic + robot.mass_kg * GRAVITY * height)
+    return elastic + robot.mass_kg * GRAVITY * height

@@ -171,7 +171,7 @@ def energy(wires: Wires, stretched_m: Floats, zero_m: Floats) -> Floats:
         for node, weight in zip(*_GAUSS, strict=True):
             total += 0.5 * weight * tension(wires, zero_m + stretch * (0.5 * (node + 1.0)), zero_m)[0]
         return total * stretch
-    return np.asarray(wires.theta["k1"] * wires.elastic.energy(longer, zero_m))
+    return wires.theta["k1"] * wires.elastic.energy(longer, zero_m)
 
 
 def zero_tension_length(wires: Wires, stretched_m: Floats, tension_N: Floats) -> Floats:

@@ -58,7 +58,7 @@ class WorkspaceDrift:
 
     def holds(self, distance_m: float = DISTANCE_M, tilt_rad: float = TILT_RAD) -> Floats:
         """(p,) probability, at every point, that both limits are kept."""
-        return np.asarray(((self.distance_m < distance_m) & (self.tilt_rad < tilt_rad)).mean(1))
+        return ((self.distance_m < distance_m) & (self.tilt_rad < tilt_rad)).mean(1)
 
     def part(self, rows: Bools, feasible: float) -> "WorkspaceDrift":
         """Some of the positions ``(p,)``, and the share of the requested ones that tensions hold."""

@@ -91,7 +91,7 @@ class PoseError:
     def probability(self, tolerance_m: float, tolerance_rad: float = np.inf) -> Floats:
         """(t,) share of draws within both tolerances; a draw without equilibrium is never within."""
         inside = (self.distance_m < tolerance_m) & (self.angle_rad < tolerance_rad) & self.found[:, None]
-        return np.asarray(inside.mean(0))
+        return inside.mean(0)
 
 
 def error(

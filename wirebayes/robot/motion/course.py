@@ -37,7 +37,7 @@ class Course:
     @property
     def found(self) -> Bools:
         """(n,) True where every time has a stable equilibrium."""
-        return np.asarray((self.status == outcome.FOUND).all(1))
+        return (self.status == outcome.FOUND).all(1)
 
 
 @dataclass(frozen=True)

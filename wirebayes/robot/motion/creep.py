@@ -47,7 +47,7 @@ class CreepState:
 
     def strain(self, wires: Wires) -> Floats:
         """Creep as a strain of the whole wire, (w, n)."""
-        return np.asarray((self.elongation_mm + np.zeros_like(self.creep_mm)) / wires.length_mm)
+        return (self.elongation_mm + np.zeros_like(self.creep_mm)) / wires.length_mm
 
 
 def fresh(legs: int, draws: int) -> CreepState:
@@ -128,7 +128,7 @@ class HoldCreep:
     def _passed(self, clock: Floats) -> Floats:
         """By what ``k2 t^N`` has grown since the last step."""
         N = self.law.N
-        return np.asarray(self.k2 * (np.power(clock, N) - np.power(self.counted, N)))
+        return self.k2 * (np.power(clock, N) - np.power(self.counted, N))
 
     def amount_at(self, tension_N: Floats) -> Floats:
         """Creep that the hold still has to come, if the tension stayed, (w, n) mm of the tested length."""

@@ -220,7 +220,7 @@ class CreepingHold:
 
     def _of_worst_wire(self, values: Floats) -> Floats:
         """(n,) the largest of (w, n) values, or of what spreads to these."""
-        return np.asarray(np.broadcast_to(values, (self.robot.legs, self.n)).max(0))
+        return np.broadcast_to(values, (self.robot.legs, self.n)).max(0)
 
     def _follow(self, creep: HoldCreep, time_s: float, smallest: float) -> path.Followed:
         rows = np.flatnonzero(self.live)

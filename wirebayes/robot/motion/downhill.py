@@ -166,7 +166,7 @@ class _Cases:
 
     def newton(self, step: "_Step") -> Bools:
         """(n,) Which steps are Newton's own."""
-        return np.asarray(step.positive & (self.damping == 0))
+        return step.positive & (self.damping == 0)
 
 
 def _in_one_chunk(
@@ -205,7 +205,7 @@ def _floor(robot: Robot, k1: Floats) -> Floats:
     if robot.degrees == 6:
         arm = max(1.0, np.abs(robot.platform_m).max() / robot.size_m)
     forces = np.max(k1, axis=0) * robot.lines.max() + robot.mass_kg * GRAVITY
-    return np.asarray(32 * np.finfo(float).eps * arm * forces)
+    return 32 * np.finfo(float).eps * arm * forces
 
 
 def _iterate(robot: Robot, cases: _Cases) -> tuple[_Cases, Ints]:
@@ -242,7 +242,7 @@ def _leads_down(robot: Robot, cases: _Cases, step: "_Step", new: "_Point", noise
     lower = new.energy <= before.energy + 1e-4 * step.downhill + noise
     short = step.length < 1e-3 * robot.size_m
     nearer = (new.size < 0.5 * before.size) & short
-    return np.asarray(lower | (cases.newton(step) & nearer))
+    return lower | (cases.newton(step) & nearer)
 
 
 def _ended(cases: _Cases, moved: _Cases, step: "_Step", hardly_moves: Bools) -> Ints:

@@ -45,7 +45,7 @@ class Equilibria:
     @property
     def found(self) -> Bools:
         """(n,) True where a stable equilibrium was found."""
-        return np.asarray(self.status == outcome.FOUND)
+        return self.status == outcome.FOUND
 
 
 def solve_equilibrium(

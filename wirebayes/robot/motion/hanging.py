@@ -235,7 +235,7 @@ def _is_stable(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Fl
 def _basis(rows: Floats) -> Floats:
     """Orthonormal rows that span what rows of size one or less span."""
     _, sizes, right = np.linalg.svd(rows)
-    return np.asarray(right[: int((sizes > _ALIKE).sum())])
+    return right[: int((sizes > _ALIKE).sum())]
 
 
 def _distinct(rotation: Floats, rows: Indices) -> Indices:

@@ -80,7 +80,7 @@ def null_space(matrix: Floats) -> Floats:
         return np.asarray(right.T)
     least = DEPENDENT * max(float(sizes[0]), 1e-300)
     rank = int((sizes > least).sum())
-    return np.asarray(right[rank:].T)
+    return right[rank:].T
 
 
 def vector_by_turn(vector: Floats) -> Floats:
@@ -91,4 +91,4 @@ def vector_by_turn(vector: Floats) -> Floats:
     half = 0.5 * safe
     share = np.where(turned, (1.0 - half / np.tan(half)) / safe**2, 1.0 / 12.0)
     k = turning.cross_matrix(vector)
-    return np.asarray(np.eye(3) - 0.5 * k + share * (k @ k))
+    return np.eye(3) - 0.5 * k + share * (k @ k)

@@ -107,12 +107,12 @@ class _Quadratic:
 
     def tensions(self, move: Floats) -> Floats:
         """(w, n) below zero where a wire is slack."""
-        return np.asarray(self.pull + self.slope * (self.J * move[:, None]).sum(0))
+        return self.pull + self.slope * (self.J * move[:, None]).sum(0)
 
     def unbalance(self, move: Floats) -> Floats:
         """(d, n) the energy's slope."""
         pulled = (self.J * np.maximum(self.tensions(move), 0.0)).sum(1)
-        return np.asarray(self.load + (self.K * move).sum(1) + pulled)
+        return self.load + (self.K * move).sum(1) + pulled
 
     def least_with(self, taut: Bools) -> tuple[Floats, Bools]:
         """Where the energy would be least if just these wires were taut, and whether it would."""
@@ -173,7 +173,7 @@ def _share(energy: _Quadratic, here: Floats, way: Floats) -> Floats:
 
 def _falls(energy: _Quadratic, there: Floats, way: Floats) -> Bools:
     """(n,) Whether the energy still falls along a way, at displacements on it."""
-    return np.asarray((energy.unbalance(there) * way).sum(0) <= 0)
+    return (energy.unbalance(there) * way).sum(0) <= 0
 
 
 def approach(robot: Robot, wires: Wires, pose: Poses, tension_N: Floats, lengths: Lengths) -> tuple[Poses, Floats]:
@@ -216,7 +216,7 @@ def _rows_of(lengths: Lengths, rows: Indices) -> Lengths:
 def _goes_on(robot: Robot, step: Floats) -> Bools:
     """(n,) After which steps another one is worth its while."""
     length = np.linalg.norm(step, axis=1)
-    return np.asarray((length > _NEAR * robot.size_m) & (length < robot.span_m))
+    return (length > _NEAR * robot.size_m) & (length < robot.span_m)
 
 
 def after_step(robot: Robot, pose: Poses, step: Floats) -> Poses:

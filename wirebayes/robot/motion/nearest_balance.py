@@ -184,7 +184,7 @@ class _Search:
         wrongly = rest & ~self.freed[there] & hinders
         self.bound[there] = np.where(wrongly, 0, self.bound[there])
         self.freed[there] |= wrongly
-        return np.asarray(wrongly)
+        return wrongly
 
     def let_go_oldest(self, rows: Indices) -> None:
         """Let go, in searches that no step brings to a balance, the wire that is held longest."""
@@ -210,7 +210,7 @@ class _Search:
         rule = self.aim.robot.rule
         slack = 1e-9 * np.maximum(np.abs(self.tau).max(1), self.aim.unit)
         lowest, highest = self.tau.min(1), self.tau.max(1)
-        return np.asarray((lowest >= rule.lowest_N - slack) & (highest <= rule.highest_N + slack))
+        return (lowest >= rule.lowest_N - slack) & (highest <= rule.highest_N + slack)
 
 
 @dataclass(frozen=True)
@@ -344,7 +344,7 @@ def _first_tensions(robot: Robot, x: Floats, R: Floats) -> Floats:
     load = statics.weight(robot, turn).T[:, :3]
     tau = (np.linalg.pinv(J, rcond=1e-3) @ load[..., None])[..., 0]
     lowest = max(robot.rule.lowest_N, 1e-3 * robot.mass_kg * GRAVITY)
-    return np.asarray(np.clip(tau, lowest, robot.rule.highest_N))
+    return np.clip(tau, lowest, robot.rule.highest_N)
 
 
 def _reference(robot: Robot) -> float:

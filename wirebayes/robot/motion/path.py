@@ -184,7 +184,7 @@ def _believed(robot: Robot, ahead: Floats) -> Bools:
     displaced = np.linalg.norm(ahead[:, :3], axis=1)
     turned = np.linalg.norm(ahead[:, 3:], axis=1)
     short = displaced <= _FARTHEST * robot.span_m
-    return np.asarray(short & (turned <= _FARTHEST_RAD * robot.size_m))
+    return short & (turned <= _FARTHEST_RAD * robot.size_m)
 
 
 def _apart_m(robot: Robot, there: forward.Equilibria, predicted: Poses) -> Floats:

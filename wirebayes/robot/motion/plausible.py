@@ -236,7 +236,7 @@ def _longer(key: str, length_m: Floats, most_m: float, said: str) -> list[str]:
 def _straight_at_home(robot: Robot) -> Floats:
     """(w,) distances of the platform points from their exit points at the home pose, m."""
     points = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
-    return np.asarray(np.linalg.norm(robot.exit_m - points, axis=1))
+    return np.linalg.norm(robot.exit_m - points, axis=1)
 
 
 def _beyond(size_m: float, times: float) -> str:
@@ -331,7 +331,7 @@ def _stretch_at(robot: Robot, joint_m: Floats, position_m: Floats, rotation: Flo
     """Stretched by zero-tension length ``(t, w)`` at one pose."""
     zero, offset = inverse.lengths(robot, joint_m)
     shape = statics.geometry_at(robot, position_m, rotation)
-    return np.asarray(statics.stretched(robot, shape, offset.T).T / zero)
+    return statics.stretched(robot, shape, offset.T).T / zero
 
 
 def _stretch(robot: Robot, joint_m: Floats, start_m: Floats) -> Floats:

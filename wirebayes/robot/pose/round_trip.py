@@ -92,7 +92,7 @@ def _is_at(robot: Robot, found: forward.Equilibria, x: Floats, R: Floats) -> Boo
     """(n,) Which equilibria are at a pose, rotations being compared at the platform's edge."""
     moved = np.abs(found.position_m - x).max(1)
     turned = robot.size_m * np.abs(found.rotation - R).max((1, 2))
-    return np.asarray(np.maximum(moved, turned) < _SAME * robot.span_m)
+    return np.maximum(moved, turned) < _SAME * robot.span_m
 
 
 def _equilibrium(x: Floats, R: Floats, tension_N: Floats, commanded: bool, *, stable: bool) -> EquilibriumPose:

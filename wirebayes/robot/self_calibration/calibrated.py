@@ -40,7 +40,7 @@ class Calibrated:
     @property
     def reference_sd_m(self) -> Floats:
         """(w,) what is still not known of the reference lengths."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)[: self.robot.legs]))
+        return np.sqrt(np.diag(self.covariance)[: self.robot.legs])
 
     def carried(self, unknowns: Floats) -> CreepState:
         """Creep that wires of unknowns ``(n, d)`` carry out of the session; it depends on them as the readings do."""

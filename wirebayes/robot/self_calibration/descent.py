@@ -63,7 +63,7 @@ def _normal(by_hold: Floats, damping: float) -> Floats:
     """Normal matrices of the holds' own unknowns, their diagonals larger by a share."""
     normal = by_hold.mT @ by_hold
     diagonal = np.einsum("pii->pi", normal)
-    return np.asarray(normal + damping * diagonal[:, None] * np.eye(normal.shape[1]))
+    return normal + damping * diagonal[:, None] * np.eye(normal.shape[1])
 
 
 @dataclass(frozen=True)

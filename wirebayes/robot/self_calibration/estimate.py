@@ -171,7 +171,7 @@ class _Target:
 
     def contradicted(self, foreseen: Floats) -> Bools:
         """(m,) Whether the readings contradict a robot grossly where slopes foresee no lower cost."""
-        return np.asarray(foreseen > GROSS * self.readings.shape[1])
+        return foreseen > GROSS * self.readings.shape[1]
 
 
 @dataclass(frozen=True)
@@ -222,13 +222,13 @@ def _mode(target: _Target, white: Floats, patience: int) -> _Mode:
 def _decrement(normal: Floats, slope: Floats) -> Floats:
     """(m,) What a whole step could still gain in twice the log posterior: below a thousandth, the mode is reached."""
     step = solve(normal, slope[..., None])[..., 0]
-    return np.asarray(np.einsum("md,md->m", slope, step))
+    return np.einsum("md,md->m", slope, step)
 
 
 def _better(new: Floats, cost: Floats) -> Bools:
     """(m,) Which costs are lower than before, by more than rounding."""
     finite = np.where(np.isfinite(cost), cost, 0.0)
-    return np.asarray(new < cost - 1e-9 * finite)
+    return new < cost - 1e-9 * finite
 
 
 def _damped_step(normal: Floats, slope: Floats, damping: Floats) -> Floats:
@@ -310,7 +310,7 @@ def _difference(values: Floats, m: int) -> Floats:
     both = values.reshape(m, 2, -1, *values.shape[1:])
     up, down = both[:, 0], both[:, 1]
     slope = (up - down) / (2 * _DIFFERENCE)
-    return np.asarray(slope.mT)
+    return slope.mT
 
 
 def _small_motions(moved: PredictedSession, at: PredictedSession) -> Floats:

@@ -164,7 +164,7 @@ class _Walk:
         pace.first = float(np.clip(pace.first * longer, _EARLIEST, _FIRST))
 
     def _zero(self, state: CreepState) -> Floats:
-        return np.asarray(self.bare * (1 + state.strain(self.wires).T))
+        return self.bare * (1 + state.strain(self.wires).T)
 
     def _look(self, here: forward.Equilibria, zero: Floats) -> None:
         """How poses and tensions answer to strains of the wires; not at all where nothing holds the platform."""
@@ -224,7 +224,7 @@ class _Walk:
         """
         if self.slope is None:
             return np.full(1, 1 / 3)
-        return np.asarray(1.0 / (3.0 * (1.0 + self.before / done)))
+        return 1.0 / (3.0 * (1.0 + self.before / done))
 
     def _worst(self, here: forward.Equilibria, off_mm: Floats) -> float:
         """The largest error of a tension, over what is resolved, of creep that is off."""
@@ -239,7 +239,7 @@ class _Walk:
     def _by_growth(self, slope: Floats, grown_mm: Floats) -> Floats:
         """What slopes ``(n, ., w)`` make of creep ``(w, n)`` of the tested length."""
         strain = np.broadcast_to(grown_mm / self.wires.length_mm, self.bare.T.shape)
-        return np.asarray(np.einsum("nij,jn->ni", slope, strain))
+        return np.einsum("nij,jn->ni", slope, strain)
 
 
 def _factor(error: float, order: int) -> float:

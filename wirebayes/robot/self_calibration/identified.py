@@ -150,4 +150,4 @@ def _flat(robot: Robot) -> Bools:
     """(3,) axes along which neither exit points nor platform have any extent."""
     platform = robot.home_m + robot.platform_m @ matrix(robot.home_rotation_rad).T
     extent = np.ptp(np.vstack([robot.exit_m, platform]), axis=0)
-    return np.asarray(extent < _FLAT * robot.span_m)
+    return extent < _FLAT * robot.span_m

@@ -120,25 +120,25 @@ class _Lengths:
     @property
     def longer(self) -> Floats:
         """(p, w) how often as long as before creep and stretch."""
-        return np.asarray((1 + self.strain) * self.elastic.ratio)
+        return (1 + self.strain) * self.elastic.ratio
 
     def by_pull(self, creep: Grown) -> Floats:
         """(p, w) slopes of `longer` by the tensions."""
         elastic = self.elastic
-        return np.asarray(creep.by_pull * elastic.ratio + (1 + self.strain) * elastic.by_pull)
+        return creep.by_pull * elastic.ratio + (1 + self.strain) * elastic.by_pull
 
     def by_wires(self, creep: Grown) -> Floats:
         """(p, w, d) slopes of `longer` by the wires' unknowns."""
         elastic = self.elastic
         crept = creep.by_wires * elastic.ratio[..., None]
-        return np.asarray(crept + (1 + self.strain)[..., None] * elastic.by_wires)
+        return crept + (1 + self.strain)[..., None] * elastic.by_wires
 
 
 def _more_creep(about: _About, creep: Grown, since: State) -> Floats:
     """(p, w) creep strain, to first order, that a state has beyond the one since which creep was not simulated."""
     state, wires = about.state, about.unknowns.slices["wires"]
     change = state.white[wires] - since.white[wires]
-    return np.asarray(creep.by_wires @ change + creep.by_pull * (state.pull_N - since.pull_N))
+    return creep.by_wires @ change + creep.by_pull * (state.pull_N - since.pull_N)
 
 
 def _loops(out: Equations, about: _About, creep: Grown, since: State) -> None:
@@ -292,12 +292,12 @@ def _tensions(out: Equations, about: _About) -> None:
 def _off_reading(about: _About, pull: Floats) -> Floats:
     """(p, w) N beyond what was read, with the sensors' biases."""
     bias = about.holds.session.signs * about.parts.bias_N
-    return np.asarray(pull + bias - about.holds.tension_N)
+    return pull + bias - about.holds.tension_N
 
 
 def _off_usual(about: _About) -> Floats:
     """(p, w) N beyond what is usual."""
-    return np.asarray(about.state.pull_N - about.parts.level_N - about.noise.usual_N)
+    return about.state.pull_N - about.parts.level_N - about.noise.usual_N
 
 
 def _tensions_by_robot(out: Equations, about: _About, read: Bools) -> None:

@@ -99,7 +99,7 @@ def _apart(robot: Robot, session: Session, rows: Bools, order: Sequence[int]) ->
     shape = statics.geometry(robot, session.position_m[rows].T, turn)
     bare, offset = lengths(robot, session.joint_m[rows][:, order])
     way = statics.stretched(robot, shape, offset.T).T
-    return np.asarray((way - bare).std(0))  # references may err
+    return (way - bare).std(0)  # references may err
 
 
 def _refuse_tensions(robot: Robot, session: Session, tension_N: Floats, rows: Bools, table: CsvTable) -> None:
@@ -190,7 +190,7 @@ class _Balance:
 
     def pull(self, order: Sequence[int]) -> Floats:
         """What wires pull whose tensions stand in this order."""
-        return np.asarray(self.scale * (self.structure * self.tension_N[:, order].T).sum(1))
+        return self.scale * (self.structure * self.tension_N[:, order].T).sum(1)
 
     def left(self, pull: Floats) -> float:
         """What is left unbalanced, of the load."""

@@ -145,7 +145,7 @@ def _observed(information: Floats, prior_sd_m: float) -> Observability:
 def _largest_positive(direction: Floats) -> Floats:
     """The direction or its opposite, whose largest component is positive."""
     largest = direction[np.argmax(np.abs(direction))]
-    return np.asarray(direction * np.sign(largest))
+    return direction * np.sign(largest)
 
 
 def _information(change_N: Floats, tension_sd_N: float, bias_sd_N: float, sign: Floats) -> Floats:
@@ -155,7 +155,7 @@ def _information(change_N: Floats, tension_sd_N: float, bias_sd_N: float, sign: 
         mixed = (sign[:, :, None] * change_N).sum(0) / tension_sd_N**2
         own = (sign**2).sum(0) / tension_sd_N**2 + 1.0 / bias_sd_N**2
         information = information - mixed.T @ (mixed / own[:, None])
-    return np.asarray(information)
+    return information
 
 
 def _sentence(rank: int, weakest: Floats, known_m: float) -> str:

@@ -100,4 +100,4 @@ def _shares(found: Whole) -> Floats:
     """(p, w) of the sum of squares of all loops, a line each."""
     e = found.equations
     squares = (e.residual[:, e.rows["loop"]] / found.unknowns.robot.lines) ** 2
-    return np.asarray(squares / squares.sum())
+    return squares / squares.sum()

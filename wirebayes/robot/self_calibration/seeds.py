@@ -60,7 +60,7 @@ def seed(unknowns: Unknowns, holds: Holds, white: Floats, rng: Generator) -> Sta
 def _lost(unknowns: Unknowns, holds: Holds) -> Bools:
     """(p,) Whether a part of the hold's pose is not stated."""
     turns_freely = unknowns.robot.degrees == 6
-    return np.asarray(~holds.placed | (~holds.oriented & turns_freely))
+    return ~holds.placed | (~holds.oriented & turns_freely)
 
 
 def _fill_unread(robot: Robot, pull: Floats, unread: Bools, poses: Poses) -> None:
@@ -129,7 +129,7 @@ class _PoseSearch:
 
     def drawn(self, count: int, rng: Generator) -> Floats:
         """(count, 3) places in the workspace, and a little outside."""
-        return np.asarray(self.middle + 1.2 * self.half * rng.uniform(-1, 1, (count, 3)))
+        return self.middle + 1.2 * self.half * rng.uniform(-1, 1, (count, 3))
 
     def descended(self, position: Floats, turn: Floats, stated: Bools, rng: Generator) -> tuple[Floats, Floats]:
         """Poses ``(3, n)``, ``(3, 3, n)`` after all steps from drawn places; positions that are `stated` stay.

@@ -82,7 +82,7 @@ class Session:
     @property
     def bias_sign(self) -> Floats:
         """(q, w) How the bias enters the tensions that were read."""
-        return np.asarray(self.signs[self.read])
+        return self.signs[self.read]
 
 
 @dataclass(frozen=True)

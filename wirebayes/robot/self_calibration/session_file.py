@@ -138,7 +138,7 @@ def _some(table: CsvTable, cells: Floats, names: tuple[str, ...]) -> Floats:
     """(p, n) cells of some columns, NaN where the table leaves them out."""
     if not set(names) <= set(table.header):
         return np.full((len(cells), len(names)), np.nan)
-    return np.asarray(cells[:, [table.header.index(name) for name in names]])
+    return cells[:, [table.header.index(name) for name in names]]
 
 
 def _rotations(robot: Robot, position: Floats, turn: Floats) -> Floats:
@@ -146,7 +146,7 @@ def _rotations(robot: Robot, position: Floats, turn: Floats) -> Floats:
     if robot.degrees != 6:
         turn = np.tile(robot.home_rotation_rad, (len(position), 1))
     known = np.asarray(np.isfinite(position).all(1))
-    return np.asarray(np.where(known[:, None, None], matrix(turn), np.nan))
+    return np.where(known[:, None, None], matrix(turn), np.nan)
 
 
 def _motions_without_bias(table: CsvTable) -> InputError:

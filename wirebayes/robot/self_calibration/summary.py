@@ -121,7 +121,7 @@ def _standard_deviations(found: Whole) -> dict[str, Floats]:
         own = sd[unknowns.slices[name]]
         if not len(own):
             return np.zeros(shape)
-        return np.asarray(error * own.reshape(shape))
+        return error * own.reshape(shape)
 
     slope = _slope_of_lengths(found)
     length = np.sqrt(np.einsum("wi,ij,wj->w", slope, found.covariance, slope))

@@ -41,7 +41,7 @@ def joint_test(cost: Floats, count: float, white: Floats, spread: Floats, count_
     learnt = (1.0 + _UNLEARNT) * np.eye(count_alone) - spread[:, :count_alone, :count_alone]
     moved = (reference * solve(learnt, reference)).sum((1, 2))
     least = np.minimum(chdtrc(count, np.maximum(cost, 0.0)), chdtrc(count_alone, np.maximum(moved, 0.0)))
-    return np.asarray(np.minimum(1.0, 2.0 * least))
+    return np.minimum(1.0, 2.0 * least)
 
 
 def chance(p: float) -> str:

@@ -156,4 +156,4 @@ class Unknowns:
         own = white[self.slices[name]]
         if not len(own):
             return points_m
-        return np.asarray(points_m + sd_m * own.reshape(-1, 3))
+        return points_m + sd_m * own.reshape(-1, 3)

@@ -229,7 +229,7 @@ def _ahead(rounds: list[tuple[Floats, Floats]]) -> Floats:
     gone = noise - noise_before
     slope = np.divide(shown - shown_before, gone, out=np.zeros_like(gone), where=np.abs(gone) > 1e-9)
     closing = 1.0 - np.clip(slope, -1.0, _CREEPING)
-    return np.asarray(noise + (shown - noise) / closing)
+    return noise + (shown - noise) / closing
 
 
 def _from_rough(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> State:

@@ -207,7 +207,7 @@ def _held(wires: Wires, carried: CreepState, loaded: Loaded, course: TensionCour
 
 def _ahead(strains: Floats) -> Floats:
     """Strains beyond those at a hold's end, of the lengths there."""
-    return np.asarray((strains - strains[-1]) / (1.0 + strains[-1]))
+    return (strains - strains[-1]) / (1.0 + strains[-1])
 
 
 def _tensions(loaded: Loaded, course: TensionCourse, hold: int, strains: Floats) -> Floats:
@@ -241,4 +241,4 @@ def _times(wires: Wires, duration_s: float, count: int) -> Floats:
     power = float(np.clip(np.median(wires.theta["N"]), *_POWERS))
     clock = float(np.median(wires.theta["k2"])) * duration_s**power
     share = np.expm1(np.log1p(clock) * np.arange(count + 1) / count) / clock
-    return np.asarray(duration_s * share ** (1 / power))
+    return duration_s * share ** (1 / power)
