@@ -104,7 +104,16 @@ def read_experiments(path: str | Path) -> list[Experiment]:
 
 
 def refuse_second(keys: Keys, name: str, others: Sequence[str]) -> None:
-    """Refuse a name that another table of the file has."""
+    """Refuse a name that another table of the file has.
+
+    Parameters
+    ----------
+    keys : Keys
+        Of the table.
+    name : str
+    others : sequence of str
+        Names of the tables before it.
+    """
     if name in others:
         raise keys.complain("name", shown(name) + " a second time", "a name used once in the file")
 

@@ -31,6 +31,19 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator, weight: Array | None
 
 
 def spread_in_widths(x: Array, k: int, rng: np.random.Generator) -> list[int]:
-    """Rows far from one another, each column (n,) of x counted in its standard deviation."""
+    """Rows far from one another, each column counted in its standard deviation.
+
+    Parameters
+    ----------
+    x : (n, d) array
+    k : int
+        How many rows.
+    rng : numpy Generator
+
+    Returns
+    -------
+    list of int
+        As of `spread_rows`.
+    """
     width = x.std(axis=0)
     return spread_rows(x / np.where(width > 0, width, 1.0), k, rng)
