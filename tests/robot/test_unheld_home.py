@@ -257,8 +257,11 @@ def test_a_folder_of_results_with_one_posterior_or_one_final_one_is_that_one(tmp
     posterior("found", "line", "plain")
     final = posterior("found", "line", "final")
     assert folder_of(tmp_path / "found") == final
-    posterior("fit", "other")
+    other = posterior("fit", "other")
     assert folder_of(tmp_path / "fit") == tmp_path / "fit"
+    assert [folder_of(tmp_path / "fit", name) for name in ("line", "other")] == [one, other]
+    posterior("found", "other", "final")
+    assert folder_of(tmp_path / "found", "line") == final
 
 
 @pytest.mark.parametrize(

@@ -103,14 +103,15 @@ def folder_of(wires: Wires, experiment: str | None = None) -> Path:
         return wires.folder
     if not isinstance(wires, str | os.PathLike):
         raise InputError(f"wires: found {type(wires).__name__}, expected a Posterior or a folder with a posterior.nc")
-    return _only_one_in(Path(wires))
+    return _only_one_in(Path(wires), experiment)
 
 
-def _only_one_in(folder: Path) -> Path:
-    """The folder of the one posterior in a folder of results, or of the final one; the folder itself otherwise."""
+def _only_one_in(folder: Path, experiment: str | None) -> Path:
+    """The folder of the one posterior, or of the final one, of results or of one experiment; else the folder itself."""
     if (folder / POSTERIOR).is_file():
         return folder
     below = [path.parent for path in folder.glob(f"*/**/{POSTERIOR}")]
+    below = [place for place in below if experiment in place.relative_to(folder).parts] or below
     last = below if len(below) == 1 else [place for place in below if place.name == "final"]
     return last[0] if len(last) == 1 else folder
 
@@ -146,7 +147,7 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
     if isinstance(wires, Posterior):
         stored = wires.stored(experiment)
         return _usable(stored, wires.name, count)
-    folder = folder_of(wires)
+    folder = folder_of(wires, experiment)
     return read_wires(folder, count, experiment, own_effects)
 
 
