@@ -152,8 +152,7 @@ def test_the_paper_s_figures_hold_in_the_draws_that_keep_both() -> None:
     d, t = DISTANCE_M, TILT_RAD
     alike = at(d * np.array([0.9, 0.5, 0.9, 1.1, NAN]), t * np.array([0.9, 0.5, 1.1, 0.5, NAN]))
     other = at(np.array([0.1 * d] * 4), np.zeros(4), (0.0, 30.0))
-    request: Any = None
-    found = answer._claim({0.0: alike, 0.05: other}, HERE, TURNED, request)
+    found = answer._claim({0.0: alike, 0.05: other}, HERE, TURNED)
     assert found["holds"] == [
         {"specimen_spread": 0.0, "probability": 0.4},
         {"specimen_spread": 0.05, "probability": None},
