@@ -14,7 +14,7 @@ D = 8
 class Analytic:
     """What the sampler asks of a target, for a density written down."""
 
-    def __init__(self, log_density, mean, second, spread=6.0, hills=1):
+    def __init__(self, log_density, mean, second, spread=6.0, hills=1, scores=()):
         self.hills = hills
         self.log_density, self.mean, self.second = log_density, mean, second
         self.evaluations = 0
@@ -29,6 +29,7 @@ class Analytic:
             to_natural=same,
             log_columns=np.zeros(d, bool),
             order=np.arange(d),
+            scores=np.array(scores, np.int64),
         )
         start = lambda n, rng: rng.normal(0.0, spread, (n, d))  # noqa: E731
         self.problem = SimpleNamespace(prior=SimpleNamespace(rvs=start), names=tuple(f"x{i}" for i in range(d)))
@@ -110,6 +111,21 @@ def funnel(neck=0):
     second = np.full(d, np.exp(4.5))
     second[neck] = 9.0
     return Analytic(density, np.zeros(d), second)
+
+
+SHARE = stats.truncnorm(-11.0 / 6.0, np.inf, 0.11, 0.06)  # an amount that may be nothing
+
+
+def share():
+    """The score of such an amount, and three narrow coordinates that follow it."""
+    slopes, width = np.array([1.5, -0.7, 0.4]), 3e-3
+
+    def density(z):
+        amount = stats.norm.cdf(z[:, 0])
+        left = (z[:, 1:] - amount[:, None] * slopes) / width
+        return SHARE.logpdf(amount) + stats.norm.logpdf(z[:, 0]) - 0.5 * (left**2).sum(axis=1)
+
+    return Analytic(density, np.zeros(4), np.ones(4), spread=1.0, scores=[0])
 
 
 def sixteen_modes(centres):

@@ -5,9 +5,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from tests.simulated import simulated_tests
-from tests.statistical.targets import TARGETS, Analytic, corners, funnel, gaussian, grid, sixteen_modes
+from tests.statistical.targets import SHARE, TARGETS, Analytic, corners, funnel, gaussian, grid, share, sixteen_modes
 from wirebayes.effects import catalogue, effect_named
 from wirebayes.inference import convergence
 from wirebayes.inference.fit import fit_problem
@@ -360,3 +361,17 @@ def test_a_killed_run_goes_on_to_the_same_bytes(policy, blow, tmp_path, monkeypa
     assert (resumed.evaluations, resumed.why) == (whole.evaluations, whole.why)
     finished = sample_posterior(gaussian(), 11, policy, checkpoint=path)
     assert finished.z.tobytes() == whole.z.tobytes()
+
+
+def test_where_an_amount_is_next_to_nothing_there_are_as_many_draws_as_there_should_be():
+    """The score of the amount has a long tail there, and what follows the amount no longer changes."""
+    level, runs = 0.005, 8
+    expected = SHARE.cdf(level)
+    found = []
+    for seed in range(runs):
+        chains = sample_posterior(share(), seed, Policy(ess=2000.0))
+        assert chains.converged
+        found.append((stats.norm.cdf(chains.z[..., 0]) < level).mean())
+    error = np.sqrt(expected * (1.0 - expected) / 2000.0)
+    assert abs(np.mean(found) - expected) < 4.0 * error / np.sqrt(runs)
+    assert np.std(found, ddof=1) < 2.0 * error

@@ -46,6 +46,42 @@ def test_the_map_has_an_inverse_and_the_jacobian_it_says(points, order):
     assert np.linalg.slogdet(np.moveaxis(moved, 0, 2))[1] == pytest.approx(jacobian, abs=1e-4)
 
 
+def of_a_share(n, rng):
+    """The score of a share that may be nothing, and two that follow the share, one narrow."""
+    share = stats.truncnorm(-0.11 / 0.06, np.inf, 0.11, 0.06).rvs(n, random_state=rng)
+    wide = rng.normal(size=n)
+    narrow = 1.5 * share + 0.2 * wide * share + 0.003 * rng.normal(size=n)
+    return np.column_stack([stats.norm.ppf(share), wide, narrow])
+
+
+@pytest.fixture(scope="module")
+def share_points():
+    return of_a_share(6000, np.random.default_rng(4))
+
+
+def test_what_follows_a_share_is_straight_where_the_share_is_next_to_nothing(share_points):
+    known = WeightedPoints.equal(share_points)
+    straight = transport_map.fit_map(known, np.arange(3), np.array([0]))
+    score = np.array([-3.0, -4.0, -6.0])
+    share = stats.norm.cdf(score)
+    at = np.column_stack([score, np.zeros(3), 1.5 * share])
+    u, _ = straight.forward(at)
+    assert np.abs(u[:, 2]).max() < 0.5
+    without, _ = transport_map.fit_map(known, np.arange(3)).forward(at)
+    assert abs(without[-1, 2]) > 5.0  # by the score the mean goes on where nothing changes any more
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [1, 0, 2], [1, 2, 0]])
+def test_a_map_by_shares_has_an_inverse_and_the_jacobian_it_says(share_points, order):
+    straight = transport_map.fit_map(WeightedPoints.equal(share_points), np.array(order), np.array([0]))
+    x = np.vstack([share_points[:20], 2.0 * share_points[:20]])
+    u, jacobian = straight.forward(x)
+    assert straight.inverse(u) == pytest.approx(x, rel=1e-9, abs=1e-9)
+    h = 1e-6
+    moved = [(straight.forward(x + h * e)[0] - straight.forward(x - h * e)[0]) / (2 * h) for e in np.eye(3)]
+    assert np.linalg.slogdet(np.moveaxis(moved, 0, 2))[1] == pytest.approx(jacobian, abs=1e-4)
+
+
 def test_a_cloud_without_bends_gets_none():
     straight = transport_map.fit_map(
         WeightedPoints.equal(np.random.default_rng(3).normal(size=(4000, 6))), np.arange(6)

@@ -133,6 +133,7 @@ def fit_proposal(
     points: int = POINTS,
     before: Proposal | None = None,
     along_tails: bool = True,
+    scores: Ints = transport_map.NO_SCORES,
 ) -> Proposal:
     """The proposal learned from the burn-in.
 
@@ -160,6 +161,8 @@ def fit_proposal(
         Of nearly these points: where the mixtures are sought from.
     along_tails : bool
         Whether the map may be fitted to the hot points.
+    scores : (s,) array of int
+        Coordinates that are scores of shares (see `wirebayes.inference.sampler.transport_map`).
 
     Raises
     ------
@@ -168,7 +171,7 @@ def fit_proposal(
     """
     hot, cold = hot.thinned(points, rng), cold.thinned(points, rng)
     elsewhere = before is None or (hot.spread > ELSEWHERE * cold.spread).any()
-    straight = transport_map.fit_map(hot if along_tails and not elsewhere else cold, order)
+    straight = transport_map.fit_map(hot if along_tails and not elsewhere else cold, order, scores)
     near, far = (replace(each, z=straight.forward(each.z)[0]) for each in (cold, hot))
     far, plain = far.thinned(points // 2, rng), hot.thinned(points // 2, rng)
     old_close, old_wide, old_plain = (before.close, before.wide, before.plain) if before else (None, None, None)

@@ -1,11 +1,13 @@
 """A triangular map that straightens points: each coordinate minus its mean, over its scale, given those before it.
 
 The mean is a quadratic and the logarithm of the scale a linear function of the preceding coordinates: a curved ridge
-and a funnel (a setting error that widens everything it allows) become nearly round. The residual of each coordinate is
-made symmetric by a sinh-arcsinh transformation, for skewed marginals such as that of an exponent U whose lower end the
-data hardly bound. Heavy tails are left to the mixtures: they seldom belong to one coordinate alone. The map is
-triangular, so its Jacobian is the product of the slopes, and it has an inverse for any coefficients. Outside the range
-of the points to which it was fitted, quadratics continue as straight lines and scales keep their value at the border.
+and a funnel (a setting error that widens everything it allows) become nearly round. What follows an amount that is
+sampled by a score (`wirebayes.inference.coordinates.edges`) follows the amount, not the score, which goes on where the
+amount is next to nothing: in means and scales its share stands for it. The residual of each coordinate is made
+symmetric by a sinh-arcsinh transformation, for skewed marginals such as that of an exponent U whose lower end the data
+hardly bound. Heavy tails are left to the mixtures: they seldom belong to one coordinate alone. The map is triangular,
+so its Jacobian is the product of the slopes, and it has an inverse for any coefficients. Outside the range of the
+points to which it was fitted, quadratics continue as straight lines and scales keep their value at the border.
 
 References
 ----------
@@ -34,6 +36,8 @@ from wirebayes.inference.sampler.settings import (
 )
 from wirebayes.numeric.typing import Array, Ints
 
+NO_SCORES = np.zeros(0, np.int64)  # of coordinates none of which is one
+
 
 @dataclass(frozen=True)
 class Straight:
@@ -44,8 +48,12 @@ class Straight:
     order : (d,) array of int
     centre, scale : (d,) arrays
         Of the points fitted, in the map's own order.
+    scores : (s,) array of int
+        Which coordinates are scores.
+    share_centre, share_scale : (s,) arrays
+        Of their shares.
     low, high : (d,) arrays
-        The range of the standardised points.
+        The range of the standardised points, of scores that of the shares.
     constant : (d,) array
     linear : (d, d) array, strictly lower triangular
     quadratic : (d, d, d) array
@@ -61,6 +69,9 @@ class Straight:
     order: Ints
     centre: Array
     scale: Array
+    scores: Ints
+    share_centre: Array
+    share_scale: Array
     low: Array
     high: Array
     constant: Array
@@ -84,11 +95,16 @@ class Straight:
         """(n, d) straightened points and the (n,) logarithm of the map's Jacobian, of points (n, d)."""
         # points last: sums over coordinates are several times as fast
         v = np.ascontiguousarray(((x[:, self.order] - self.centre) / self.scale).T)
-        held = np.clip(v, self.low[:, None], self.high[:, None])
-        mean, bend = self.linear @ v + self.constant[:, None], v - 0.5 * held
+        before = v
+        if len(self.scores):
+            before = v.copy()
+            share = ndtr(x[:, self.order[self.scores]])
+            before[self.scores] = ((share - self.share_centre) / self.share_scale).T
+        held = np.clip(before, self.low[:, None], self.high[:, None])
+        mean, bend = self.linear @ before + self.constant[:, None], before - 0.5 * held
         for j in range(1, len(v)):
             mean[j] += ((self.quadratic[j, :j, :j] @ held[:j]) * bend[:j]).sum(axis=0)
-        log_scale = self.log_scale[:, 1:] @ v + self.log_scale[:, :1]
+        log_scale = self.log_scale[:, 1:] @ before + self.log_scale[:, :1]
         log_scale = np.clip(log_scale, self.least[:, None], self.most[:, None])
         u, slopes = _normal((v - mean) * np.exp(-log_scale), self.shape[:, :, None])
         return u.T, np.log(slopes.prod(axis=0)) - log_scale.sum(axis=0) - np.log(self.scale).sum()
@@ -97,11 +113,17 @@ class Straight:
         """(n, d) points of straightened ones."""
         left = _skewed(np.ascontiguousarray(u.T), self.shape[:, :, None])
         v = np.zeros_like(left)
+        regressors = np.zeros_like(left)
         held = np.zeros_like(left)
         for j in range(len(v)):
-            mean = self._mean(j, v[:j], held[:j])
-            v[j] = mean + left[j] * np.exp(self._log_scale(j, v[:j]))
-            held[j] = np.clip(v[j], self.low[j], self.high[j])
+            before = regressors[:j]
+            mean = self._mean(j, before, held[:j])
+            v[j] = mean + left[j] * np.exp(self._log_scale(j, before))
+            regressors[j] = v[j]
+            for k in np.flatnonzero(self.scores == j):
+                share = ndtr(v[j] * self.scale[j] + self.centre[j])
+                regressors[j] = (share - self.share_centre[k]) / self.share_scale[k]
+            held[j] = np.clip(regressors[j], self.low[j], self.high[j])
         x = np.empty(v.T.shape)
         x[:, self.order] = v.T * self.scale + self.centre
         return x
@@ -119,13 +141,17 @@ class Straight:
         return np.clip(log_scale, self.least[j], self.most[j])
 
 
-def fit_map(points: WeightedPoints, order: Ints) -> Straight:
+def fit_map(points: WeightedPoints, order: Ints, scores: Ints = NO_SCORES) -> Straight:
     """The map that straightens points: weighted regressions, coordinate by coordinate.
 
     Parameters
     ----------
+    points : WeightedPoints
+        Of n places (n, d).
     order : (d,) array of int
         In which coordinates are straightened.
+    scores : (s,) array of int
+        Coordinates that are scores of shares.
 
     Raises
     ------
@@ -135,31 +161,42 @@ def fit_map(points: WeightedPoints, order: Ints) -> Straight:
     x, weight = points.z[:, order], points.weight
     d = x.shape[1]
     worth = weight.sum()
-    centre = weight @ x / worth
-    scale = np.sqrt(weight @ (x - centre) ** 2 / worth)
-    if not (scale > 0).all():
+    v, centre, scale = _standardised(x, weight)
+    scored = np.flatnonzero(np.isin(order, scores))
+    shares, share_centre, share_scale = _standardised(ndtr(x[:, scored]), weight)
+    if not ((scale > 0).all() and (share_scale > 0).all()):
         raise np.linalg.LinAlgError("the points do not span their space")
-    v = (x - centre) / scale
+    before = v.copy()
+    before[:, scored] = shares
     clear = CLEAR * np.sqrt(worth / points.distinct)  # draws that repeat know no more
     every = d**3 / 6.0 < worth / POINTS_A_TERM
-    found = [_straighten(v, j, weight, clear, every) for j in range(d)]
-    spreads = [one.spread for one in found]
-    spread = np.column_stack(spreads)
-    lefts = [one.left for one in found]
-    left = np.column_stack(lefts)
+    found = [_straighten(v[:, j], before[:, :j], d, weight, clear, every) for j in range(d)]
+    spread = np.column_stack([one.spread for one in found])
+    left = np.column_stack([one.left for one in found])
     if not np.isfinite(left).all():
         raise np.linalg.LinAlgError("the points do not settle the scales")
     return Straight(
         order=order,
         centre=centre,
         scale=scale,
-        low=v.min(axis=0),
-        high=v.max(axis=0),
+        scores=scored,
+        share_centre=share_centre,
+        share_scale=share_scale,
+        low=before.min(axis=0),
+        high=before.max(axis=0),
         least=spread.min(axis=0),
         most=spread.max(axis=0),
         shape=_shapes(left, weight),
         **_coefficients(found),
     )
+
+
+def _standardised(x: Array, weight: Array) -> tuple[Array, Array, Array]:
+    """Weighted points (n, k) in standard deviations from their mean, and mean and standard deviations (k,)."""
+    worth = weight.sum()
+    centre = weight @ x / worth
+    scale = np.sqrt(weight @ (x - centre) ** 2 / worth)
+    return (x - centre) / np.maximum(scale, 1e-300), centre, scale
 
 
 def _coefficients(found: Sequence["_Straightened"]) -> dict[str, Array]:
@@ -201,13 +238,13 @@ class _Straightened:
     left: Array
 
 
-def _straighten(v: Array, j: int, weight: Array, clear: float, every: bool) -> _Straightened:
-    """Regress standardised coordinate j on those before it and on products of two: all, or in many dimensions a few."""
-    y = v[:, j]
-    lines = np.column_stack([np.ones(len(v)), v[:, :j]])
-    many = v.shape[1] > FEW
+def _straighten(y: Array, before: Array, d: int, weight: Array, clear: float, every: bool) -> _Straightened:
+    """Regress one of d coordinates on those before it and on products of two: all, or in many dimensions a few."""
+    j = before.shape[1]
+    lines = np.column_stack([np.ones(len(y)), before])
+    many = d > FEW
     pairs = np.array(np.triu_indices(j if every or many else 0))
-    products = v[:, pairs[0]] * v[:, pairs[1]]
+    products = before[:, pairs[0]] * before[:, pairs[1]]
     if many and not every:
         clearest = _seen_at_once(products, lines, y, weight, clear)
         pairs = pairs[:, clearest]
