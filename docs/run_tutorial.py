@@ -20,7 +20,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from wirebayes.answers.lines import in_columns
-from wirebayes.report.blocks import save_figure
+from wirebayes.report.drawn import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET
 from wirebayes.report.pictures.corner import corner
 from wirebayes.report.pictures.curve import READ, curve, draw_curve, draw_readings, name_holds

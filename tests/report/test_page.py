@@ -24,12 +24,11 @@ from wirebayes.report.blocks import (
     Text,
     View,
     as_sentence,
-    drawn,
     number,
     span,
-    svg,
     unit_text,
 )
+from wirebayes.report.drawn import drawn, svg
 from wirebayes.report.page import render, write_page
 from wirebayes.results.jobs import Job, run
 from wirebayes.sentences import quantity

@@ -2,7 +2,7 @@ import re
 
 import numpy as np
 
-from wirebayes.report.blocks import svg
+from wirebayes.report.drawn import svg
 from wirebayes.report.pictures.robot import platform_edges
 from wirebayes.report.pictures.robot_space import workspace_maps
 from wirebayes.robot.motion.claim import WorkspaceDrift

@@ -344,7 +344,7 @@ def _warnings(found: Investigation, output: Path) -> None:
 
 def _pictures(found: Investigation, output: Path, own_effects: Path | None) -> None:
     """Before and after, hold by hold, and one of each finding."""
-    from wirebayes.report.blocks import save_together  # matplotlib only where it is needed
+    from wirebayes.report.drawn import save_together  # matplotlib only where it is needed
     from wirebayes.report.pictures.discover import pictures
 
     for experiment in _experiments(found):

@@ -8,7 +8,8 @@ from wirebayes.io.run_folder import read_json
 from wirebayes.paper import page_tables as paper_tables
 from wirebayes.paper.page_summary import creep_of_each_wire, in_a_minute, of_table_4, unbroken
 from wirebayes.paper.page_tables import LEAST_COVERAGE, Rows, column_values
-from wirebayes.report.blocks import Block, Page, Picture, Pictures, Section, Text, embedded, files_beside
+from wirebayes.report.blocks import Block, Page, Picture, Pictures, Section, Text, files_beside
+from wirebayes.report.drawn import embedded
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.sentences import listed

@@ -20,7 +20,8 @@ from wirebayes.paper import figures as paper_figures
 from wirebayes.paper.held_out import Forecast, last_hold_course, published_course, some
 from wirebayes.paper.least_squares import at, tension_residuals
 from wirebayes.report import figures
-from wirebayes.report.blocks import number, svg
+from wirebayes.report.blocks import number
+from wirebayes.report.drawn import svg
 from wirebayes.results.read_back import Stored
 from wirebayes.wire.laws import creep_fraction
 

@@ -20,12 +20,12 @@ from wirebayes.report.blocks import (
     Text,
     before_the_answer,
     beside_the_answer,
-    drawn,
     files_beside,
     number,
     seed_of_page,
 )
 from wirebayes.report.cells import NONE, with_unit
+from wirebayes.report.drawn import drawn
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.batch import specimens_of_materials
 from wirebayes.results.outliers import FALSE_ALARMS, LEAST_SPECIMENS

@@ -21,12 +21,12 @@ from wirebayes.report.blocks import (
     Text,
     before_the_answer,
     beside_the_answer,
-    drawn,
     files_beside,
     number,
     seed_of_page,
 )
 from wirebayes.report.cells import NONE
+from wirebayes.report.drawn import drawn
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.robot_view import robot_view
 from wirebayes.report.pictures.calibrate import reference_errors

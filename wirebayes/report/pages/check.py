@@ -21,7 +21,6 @@ from wirebayes.report.blocks import (
     as_sentence,
     before_the_answer,
     beside_the_answer,
-    embedded,
     files_beside,
     number,
     picture_file,
@@ -29,6 +28,7 @@ from wirebayes.report.blocks import (
     span,
 )
 from wirebayes.report.cells import NONE, unit_or_dash
+from wirebayes.report.drawn import embedded
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.result_warnings import warns_of
 from wirebayes.sentences import counted, spoken

@@ -23,8 +23,6 @@ from wirebayes.report.blocks import (
     Text,
     before_the_answer,
     beside_the_answer,
-    drawn,
-    embedded,
     files_beside,
     number,
     picture_file,
@@ -32,6 +30,7 @@ from wirebayes.report.blocks import (
     seed_of_page,
 )
 from wirebayes.report.cells import NONE, median_and_interval, percent, unit_or_dash
+from wirebayes.report.drawn import drawn, embedded
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.discover import waterfall
 from wirebayes.sentences import listed, p_in_words, quantity, said_beside, spoken

@@ -15,12 +15,12 @@ from wirebayes.report.blocks import (
     Text,
     before_the_answer,
     beside_the_answer,
-    drawn,
     files_beside,
     number,
     seed_of_page,
     span,
 )
+from wirebayes.report.drawn import drawn
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.creep_table import growth
 from wirebayes.sentences import lasting

@@ -27,12 +27,12 @@ from wirebayes.report.blocks import (
     as_sentence,
     before_the_answer,
     beside_the_answer,
-    drawn_together,
     files_beside,
     number,
     seed_of_page,
 )
 from wirebayes.report.cells import NONE, median_and_interval, percent, unit_or_dash
+from wirebayes.report.drawn import drawn_together
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.report.pictures.corner import corner
 from wirebayes.report.pictures.curve import through_the_readings

@@ -20,7 +20,6 @@ from wirebayes.report.blocks import (
     Text,
     before_the_answer,
     beside_the_answer,
-    embedded,
     files_beside,
     number,
     picture_file,
@@ -28,6 +27,7 @@ from wirebayes.report.blocks import (
     span,
 )
 from wirebayes.report.cells import NONE, unit_or_dash, with_unit
+from wirebayes.report.drawn import embedded
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pictures.plan import is_given
 from wirebayes.sentences import counted, short, spoken

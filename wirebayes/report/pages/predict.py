@@ -19,10 +19,10 @@ from wirebayes.report.blocks import (
     as_sentence,
     before_the_answer,
     beside_the_answer,
-    drawn,
     files_beside,
     span,
 )
+from wirebayes.report.drawn import drawn
 from wirebayes.result_warnings import NoticeJson, Warned
 from wirebayes.sentences import counted, number_within, quantity, short
 from wirebayes.wire.control import READ_UNIT, SET_UNIT

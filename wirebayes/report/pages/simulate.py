@@ -17,12 +17,12 @@ from wirebayes.report.blocks import (
     Section,
     Table,
     Text,
-    drawn,
     files_beside,
     number,
     seed_of_page,
 )
 from wirebayes.report.cells import unit_or_dash
+from wirebayes.report.drawn import drawn
 from wirebayes.report.glossary import SYMBOLS, meaning
 from wirebayes.results.parameters import unit_of
 from wirebayes.sentences import counted, listed, spoken

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from wirebayes.io.bench.convert import Recording
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.readings import Hold
-from wirebayes.report.blocks import save_figure
+from wirebayes.report.drawn import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, verbatim, without_frame
 from wirebayes.wire.protocol import Control
 

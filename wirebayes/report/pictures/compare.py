@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from wirebayes.json_files.comparison import ComparedModel, ComparedModels, ModelJson, PredictionScores
 from wirebayes.json_files.read_units import read_value, unit_read
 from wirebayes.numeric.typing import Floats
-from wirebayes.report.blocks import save_figure
+from wirebayes.report.drawn import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, logarithmic, panel, places_in_holds
 from wirebayes.sentences import spoken
 

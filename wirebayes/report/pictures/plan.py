@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wirebayes.json_files.plan import ExpectedWidth, JudgedProtocol, PlanJson
-from wirebayes.report.blocks import save_figure
+from wirebayes.report.drawn import save_figure
 from wirebayes.report.figures import logarithmic, verbatim
 from wirebayes.sentences import spoken
 

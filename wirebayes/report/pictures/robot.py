@@ -15,7 +15,7 @@ from wirebayes.json_files.scene import SceneJson
 from wirebayes.json_files.values import Band, Numbers
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
-from wirebayes.report.blocks import save_figure
+from wirebayes.report.drawn import save_figure
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel, verbatim
 from wirebayes.report.pictures.robot_space import orientation, workspace_maps
 from wirebayes.robot.mechanics.description import Robot

@@ -14,7 +14,7 @@ from wirebayes.json_files.pose_history import Corrections, DriftOverTime
 from wirebayes.json_files.values import INTERVAL, Band, Numbers
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats, Indices
-from wirebayes.report.blocks import svg
+from wirebayes.report.drawn import svg
 from wirebayes.report.figures import CHAIN, HOLD, INK, QUIET, legend_below, panel
 from wirebayes.report.pictures.robot import Distance, platform_edges, round_factor
 from wirebayes.robot.history.answer import HistoryAnswer
