@@ -9,6 +9,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from wirebayes.inference.differences import gradient_and_hessian, steps_apart
 from wirebayes.inference.log_posterior import Density, Residuals
 from wirebayes.inference.optimum import Ends, Optimum, nowhere
 from wirebayes.numeric.typing import Array, Bools, Ints
@@ -20,7 +21,6 @@ _NEAR = 1e-6  # step of a derivative: far above rounding, far below any standard
 # nats by which differences may make a normal approximation's volume smaller than the expected information does: of
 # 6,217 places of simulated tests it was 3 at most, but for eleven beside a jump, where it was 4 to 27
 _MOST_CURVED = 3.5
-_NO_DENSITY = 1e3  # how far below its neighbour the log density counts where there is none: downhill, whatever the step
 # added to the curvature (of order one under the prior alone), tried in one batch where a step gains too little
 _DAMPINGS = np.array([1.0, 10.0, 100.0, 1e3, 1e4, 1e6])
 _PATIENCE = 10.0  # times the promised gain of a step: along a bent ridge there are many such steps
@@ -253,7 +253,7 @@ def curved(density: Density, found: Optimum, which: Ints | None = None) -> Optim
     z, value, curvature = found.z[rows], found.log_density[rows], found.curvature.copy()
     before = curvature[rows]
     bend = np.einsum("nii->ni", before)
-    _, hessian = _derivatives(density, z, which[rows], value, _steps(bend), sides=2)
+    _, hessian = gradient_and_hessian(density, z, which[rows], value, steps_apart(bend), sides=2)
     exact = _composed(*_positive(-hessian))
     is_smooth = _log_volume(before) - _log_volume(exact) < _MOST_CURVED
     curvature[rows[is_smooth]] = exact[is_smooth]
@@ -345,60 +345,8 @@ def _by_differences(density: Density, z: Array, rows: Ints, eigen: Array, vector
     inside = np.isfinite(value)
     if inside.any():
         bend = np.einsum("nij,nj->ni", vectors**2, eigen)
-        steps = _steps(bend[inside])
-        slope, bends = _derivatives(density, z[inside], rows[inside], value[inside], steps, sides=1)
+        steps = steps_apart(bend[inside])
+        slope, bends = gradient_and_hessian(density, z[inside], rows[inside], value[inside], steps, sides=1)
         gradient[inside] = slope
         hessian[inside] = bends
     return _Local(value, gradient, -hessian)
-
-
-def _steps(bend: Array) -> Array:
-    """(n, d) steps of differences: a tenth of a standard deviation, as the diagonals (n, d) of curvatures say."""
-    return np.clip(0.1 / np.sqrt(np.maximum(bend, 1.0)), 1e-6, 0.05)
-
-
-def _derivatives(density: Density, z: Array, rows: Array, value: Array, h: Array, sides: int) -> tuple[Array, Array]:
-    """Gradient and Hessian by central differences, all points of all rows in one batch.
-
-    Mixed derivatives take most of the points: with one side only, half as many, they give the
-    direction well enough.
-    """
-    n, d = z.shape
-    i, j = np.triu_indices(d, 1)
-    found = _beside(density, z, rows, value, _differences(d, sides) * h[:, None])
-    centre = value[:, None]
-    plus = found[:, :d]
-    minus = found[:, d : 2 * d]
-    both_plus, both_minus = np.split(found[:, 2 * d :], [len(i)], axis=1)
-    mixed = both_plus - plus[:, i] - plus[:, j] + centre
-    if sides == 2:
-        mixed = 0.5 * (mixed + both_minus - minus[:, i] - minus[:, j] + centre)
-    mixed = mixed / (h[:, i] * h[:, j])
-    diagonal = np.arange(d)
-    hessian = np.zeros((n, d, d))
-    hessian[:, i, j] = mixed
-    hessian[:, j, i] = mixed
-    hessian[:, diagonal, diagonal] = (plus + minus - 2.0 * centre) / h**2
-    gradient = (plus - minus) / (2.0 * h)
-    return gradient, hessian
-
-
-def _beside(density: Density, z: Array, rows: Array, value: Array, moves: Array) -> Array:
-    """(n, m) densities at moves (n, m, d) from places (n, d); far below the place's own (n,) where there is none."""
-    n, m, d = moves.shape
-    points = z[:, None] + moves
-    found = density(points.reshape(-1, d), np.repeat(rows, m))
-    found = found.reshape(n, m)
-    return np.where(np.isfinite(found), found, value[:, None] - _NO_DENSITY)
-
-
-@cache
-def _differences(d: int, sides: int) -> Array:
-    """(m, d) along each coordinate and back, along each pair of them, and where there are two sides, back."""
-    i, j = np.triu_indices(d, 1)
-    unit = np.eye(d)
-    both = unit[i] + unit[j]
-    moves = [unit, -unit, both]
-    if sides == 2:
-        moves.append(-both)
-    return np.concatenate(moves)
