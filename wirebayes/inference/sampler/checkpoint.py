@@ -18,7 +18,7 @@ from wirebayes.errors import InputError
 from wirebayes.io.run_folder import differences, stored_results, write_bytes
 from wirebayes.json_files.plain import plain
 
-FORMAT = 5  # raise it whenever what is stored changes its meaning
+FORMAT = 6  # raise it whenever what is stored changes its meaning
 _VALUES = "state.json"
 INSTEAD = "remove this file to restart the fit"
 
