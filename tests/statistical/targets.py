@@ -14,7 +14,7 @@ D = 8
 class Analytic:
     """What the sampler asks of a target, for a density written down."""
 
-    def __init__(self, log_density, mean, second, spread=6.0, hills=1, scores=()):
+    def __init__(self, log_density, mean, second, spread=6.0, hills=1, shares=()):
         self.hills = hills
         self.log_density, self.mean, self.second = log_density, mean, second
         self.evaluations = 0
@@ -29,7 +29,7 @@ class Analytic:
             to_natural=same,
             log_columns=np.zeros(d, bool),
             order=np.arange(d),
-            scores=np.array(scores, np.int64),
+            shares=shares,
         )
         start = lambda n, rng: rng.normal(0.0, spread, (n, d))  # noqa: E731
         self.problem = SimpleNamespace(prior=SimpleNamespace(rvs=start), names=tuple(f"x{i}" for i in range(d)))
@@ -125,7 +125,7 @@ def share():
         left = (z[:, 1:] - amount[:, None] * slopes) / width
         return SHARE.logpdf(amount) + stats.norm.logpdf(z[:, 0]) - 0.5 * (left**2).sum(axis=1)
 
-    return Analytic(density, np.zeros(4), np.ones(4), spread=1.0, scores=[0])
+    return Analytic(density, np.zeros(4), np.ones(4), spread=1.0, shares=[0])
 
 
 def sixteen_modes(centres):

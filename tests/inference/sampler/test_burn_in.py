@@ -16,7 +16,6 @@ from wirebayes.inference.sampler.overlooked import left_by_search, overlooked_na
 from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.settings import EXPLORING_SHARES, OUTWEIGHS, ROUGH_SHARES, SHARES
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers
-from wirebayes.inference.sampler.transport_map import NO_SCORES
 from wirebayes.numeric.resampling import effective_number
 
 D = 3
@@ -306,7 +305,7 @@ def with_a_far_hill(count: int, steps: int = 32) -> tuple[Sampling, SimpleNamesp
     left[:count] = centre + 2.0 * left[:count]
     learned = Learned(NORMAL, NORMAL, 1, (left, density(left)))
     walkers = Walkers(z[-1], density(z[-1]), np.random.RandomState(0).get_state())
-    coordinates = SimpleNamespace(order=np.arange(D), scores=NO_SCORES)
+    coordinates = SimpleNamespace(order=np.arange(D), shares=[])
     return Sampling(walkers, learned, rng, 0, kept), SimpleNamespace(coordinates=coordinates)
 
 

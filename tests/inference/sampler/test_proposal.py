@@ -61,7 +61,7 @@ def share_points():
 
 def test_what_follows_a_share_is_straight_where_the_share_is_next_to_nothing(share_points):
     known = WeightedPoints.equal(share_points)
-    straight = transport_map.fit_map(known, np.arange(3), np.array([0]))
+    straight = transport_map.fit_map(known, np.arange(3), [0])
     score = np.array([-3.0, -4.0, -6.0])
     share = stats.norm.cdf(score)
     at = np.column_stack([score, np.zeros(3), 1.5 * share])
@@ -73,7 +73,7 @@ def test_what_follows_a_share_is_straight_where_the_share_is_next_to_nothing(sha
 
 @pytest.mark.parametrize("order", [[0, 1, 2], [1, 0, 2], [1, 2, 0]])
 def test_a_map_by_shares_has_an_inverse_and_the_jacobian_it_says(share_points, order):
-    straight = transport_map.fit_map(WeightedPoints.equal(share_points), np.array(order), np.array([0]))
+    straight = transport_map.fit_map(WeightedPoints.equal(share_points), np.array(order), [0])
     x = np.vstack([share_points[:20], 2.0 * share_points[:20]])
     u, jacobian = straight.forward(x)
     assert straight.inverse(u) == pytest.approx(x, rel=1e-9, abs=1e-9)

@@ -112,8 +112,6 @@ class Transformation:
         Columns of amounts that are sampled by their shares in a sum.
     noises : tuple of Noises
         Of every sample of which neither noise is fixed.
-    scores : (s,) array of int
-        Columns that are scores: standard normal for a share that is uniform between nothing and all.
     sensor_columns, setting_columns : lists of int
         Of the standard deviations that are not fixed.
     """
@@ -143,7 +141,6 @@ class Transformation:
         self.steps = [*_steps(ridges, lasts, levels, means, edges), *toes]
         self.ridges = ridges
         self.shares = [column for ridge in ridges for column in ridge.shares]
-        self.scores = np.array(sorted(self.columns.edges), np.int64)
         preloads = of_levels | {step.preload for step in means} | {step.preload for step in toes}
         preloads |= {step.edge.preload for step in edges}
         self._own_scale = [*self.shares, *sorted(preloads)]

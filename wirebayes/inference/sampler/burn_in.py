@@ -340,7 +340,7 @@ def _fitted(
             most=max(components, min(learned.modes, MOST_COMPONENTS)),
             points=points,
             before=learned.proposal if isinstance(learned.proposal, Proposal) else None,
-            scores=target.coordinates.scores,
+            scores=target.coordinates.shares,
         )
     except np.linalg.LinAlgError:
         return state  # too few distinct points yet: keep the proposal that made them

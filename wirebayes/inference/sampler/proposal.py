@@ -7,7 +7,7 @@ these are fitted to most of the mass. What little lies where they make too littl
 its own, fitted to the excess of the posterior over the others.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -133,7 +133,7 @@ def fit_proposal(
     points: int = POINTS,
     before: Proposal | None = None,
     along_tails: bool = True,
-    scores: Ints = transport_map.NO_SCORES,
+    scores: Sequence[int] = (),
 ) -> Proposal:
     """The proposal learned from the burn-in.
 
@@ -161,7 +161,7 @@ def fit_proposal(
         Of nearly these points: where the mixtures are sought from.
     along_tails : bool
         Whether the map may be fitted to the hot points.
-    scores : (s,) array of int
+    scores : sequence of int
         Coordinates that are scores of shares (see `wirebayes.inference.sampler.transport_map`).
 
     Raises

@@ -2,7 +2,7 @@
 
 The mean is a quadratic and the logarithm of the scale a linear function of the preceding coordinates: a curved ridge
 and a funnel (a setting error that widens everything it allows) become nearly round. What follows an amount that is
-sampled by a score (`wirebayes.inference.coordinates.edges`) follows the amount, not the score, which goes on where the
+sampled by a score (`wirebayes.inference.coordinates.shares`) follows the amount, not the score, which goes on where the
 amount is next to nothing: in means and scales its share stands for it. The residual of each coordinate is made
 symmetric by a sinh-arcsinh transformation, for skewed marginals such as that of an exponent U whose lower end the data
 hardly bound. Heavy tails are left to the mixtures: they seldom belong to one coordinate alone. The map is triangular,
@@ -35,8 +35,6 @@ from wirebayes.inference.sampler.settings import (
     SKEWNESSES,
 )
 from wirebayes.numeric.typing import Array, Ints
-
-NO_SCORES = np.zeros(0, np.int64)  # of coordinates none of which is one
 
 
 @dataclass(frozen=True)
@@ -141,7 +139,7 @@ class Straight:
         return np.clip(log_scale, self.least[j], self.most[j])
 
 
-def fit_map(points: WeightedPoints, order: Ints, scores: Ints = NO_SCORES) -> Straight:
+def fit_map(points: WeightedPoints, order: Ints, scores: Sequence[int] = ()) -> Straight:
     """The map that straightens points: weighted regressions, coordinate by coordinate.
 
     Parameters
@@ -150,7 +148,7 @@ def fit_map(points: WeightedPoints, order: Ints, scores: Ints = NO_SCORES) -> St
         Of n places (n, d).
     order : (d,) array of int
         In which coordinates are straightened.
-    scores : (s,) array of int
+    scores : sequence of int
         Coordinates that are scores of shares.
 
     Raises
