@@ -38,23 +38,6 @@ def _session(seed, sd=0.02):
     return robot, LengthPrior(one.line, 1e-3 * robot.span_m, SPREAD), session, rng
 
 
-@pytest.mark.parametrize(("highest", "named"), [(2.9, "wire 2"), (3.1, "")])
-def test_lengths_of_a_wire_that_was_never_surely_taut_are_not_usable(highest, named, monkeypatch):
-    robot, prior, session, _ = _session(0)
-    tension = np.full((len(session.read), robot.legs), 50.0)  # in standard errors
-    tension[:, 1] = np.linspace(-1.0, highest, len(tension))
-    known = length_posterior(robot, prior, session, tension.reshape(1, -1), iterations=1)
-    assert bool(answer._never_taut(robot, prior, session, tension.ravel())) == bool(named)
-    assert not answer._never_taut(robot, replace(prior, bias_sd_N=0.1), session, tension.ravel())
-    monkeypatch.setattr(answer, "length_posterior", lambda *given, **named: known)
-    monkeypatch.setattr(answer, "_contradicted", lambda *given: [])
-    monkeypatch.setattr(answer, "usable", lambda known: True)
-    found, _ = answer.lengths_report(robot, prior, session, tension.ravel(), visits=0)
-    slack = [one["text"] for one in found["warnings"] if one["kind"] == "slack"]
-    assert found["usable"] == (not named) and len(slack) == bool(named)
-    assert all(f"tells {named} from slack" in text for text in slack)
-
-
 def _read(robot, prior, session, rng):
     mean, cov = prior.moments(robot.legs)
     real = predict_session(robot, prior, session, rng.multivariate_normal(mean, cov, 1))

@@ -31,13 +31,12 @@ from wirebayes.robot.self_calibration.session import LengthPrior, Session
 from wirebayes.robot.self_calibration.summary import Moment
 from wirebayes.robot.self_calibration.trust import SIGNIFICANT, chance, interval_about
 from wirebayes.robot.self_calibration.whole import progress_of
-from wirebayes.sentences import listed, number, short
+from wirebayes.sentences import number, short
 
 CANDIDATES = 200  # in the workspace: the best of them come within a few percent of the best there are
 # Times the error of a reference length and the creep of the wire that crept most, by which a pose may be off. In
 # simulated sessions of every shipped robot it was off by at most 2.7 times their sum.
 _FAR = 10.0
-_SURELY = 3.0  # standard errors of a tension above zero, from which on a wire is surely taut
 _HALF = np.asarray(ndtri(0.95))  # standard deviations from the middle to the end of a 90 % interval
 
 
@@ -75,7 +74,7 @@ def lengths_report(
     hooke = replace(prior, creeps=False)
     plain = length_posterior(robot, hooke, session, readings[None], progress=progress_of(progress, "without creep"))
     given: CalibrationPrior = {"reference_sd_mm": 1e3 * prior.reference_sd_m, "specimen_spread": prior.spread}
-    contradicted = [*_contradicted(robot, prior, session, known), *_never_taut(robot, prior, session, readings)]
+    contradicted = _contradicted(robot, prior, session, known)
     at_fault = None if usable(known) else _at_fault(robot, prior, session, readings, known)
     content: CalibrateJson = {
         "version": 2,
@@ -108,26 +107,6 @@ def lengths_report(
         ),
     }
     return content, calibrated(robot, prior, session, known)
-
-
-def _never_taut(robot: Robot, prior: LengthPrior, session: Session, readings: Floats) -> list[Notice]:
-    """A warning where a wire was read in no hold as more than slack: it is long enough, and nothing says how long.
-
-    The interval that slopes at the mode give such a wire, and those whose tensions it would change, is no interval.
-    """
-    count = int(session.read.sum()) * robot.legs
-    if prior.bias_sd_N > 0 or count == 0:
-        return []
-    highest = readings[:count].reshape(-1, robot.legs).max(0)
-    slack = np.flatnonzero(highest < _SURELY)
-    if not slack.size:
-        return []
-    wires = listed([f"wire {i + 1}" for i in slack])
-    text = (
-        f"no reading tells {wires} from slack (all below {_SURELY:g} times --tension-sd): a slack wire is long enough, "
-        "and nothing says how long; do not use these lengths; read poses at which every wire is taut"
-    )
-    return [Notice("slack", text)]
 
 
 def _sag(robot: Robot, session: Session, readings: Floats) -> list[Notice]:
