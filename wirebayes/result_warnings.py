@@ -57,7 +57,11 @@ KINDS = {
         "be another by more than its standard deviation.",
         False,
     ),
-    "extrapolation": Kind("The answer goes beyond the tensions, times or lengths that were tested.", False),
+    "extrapolation": Kind(
+        "The answer goes beyond the tensions, times or lengths that were tested, or farther than the stiffness at a "
+        "pose foresees.",
+        False,
+    ),
     "left-out": Kind("Something that is known of wire or robot has no place in the answer.", False),
     "geometry": Kind(
         "What is asked does not fit the robot, as more wire than a drum holds, or its file does not fit itself.", False

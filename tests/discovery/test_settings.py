@@ -13,11 +13,12 @@ PAGE = Path(__file__).parents[2] / "docs" / "thresholds.rst"
 
 
 def documented() -> dict[str, float | tuple[float, ...]]:
-    """Names and values of the table."""
+    """Names and values of the list."""
     found: dict[str, float | tuple[float, ...]] = {}
-    for names, text in re.findall(r"^   \* - (``.+``)\n     - (.+)$", PAGE.read_text(encoding="utf-8"), re.M):
-        keys, values = re.findall(r"``(\w+)``", names), tuple(map(float, text.split(", ")))
-        found |= {keys[0]: values} if len(keys) == 1 < len(values) else dict(zip(keys, values, strict=True))
+    for line in re.findall(r"^``\w+`` = .+$", PAGE.read_text(encoding="utf-8"), re.M):
+        for name, text in re.findall(r"``(\w+)`` = (\d[\d., ]*)", line):
+            values = tuple(map(float, text.strip(", ").split(", ")))
+            found[name] = values if len(values) > 1 else values[0]
     return found
 
 
