@@ -14,9 +14,9 @@ measured in standard deviations of their prior. Then, one after the other (`wire
 - ``SoftenedStiffness``: log k1 becomes the log stiffness of the wire after its creep: ``log k1 - log(1 + k1 a / L0)``,
   with a slope a of the elongation by creep over the tensions that holds were last read at
   (`wirebayes.inference.coordinates.last_readings`); where these are all alike, of the tension lost in a hold over the
-  root mean square of the steps between first readings. Where all creep is over before
-  it is read, the readings see this stiffness alone; where there is little, it is k1. Where a fixture's compliance is
-  sampled, k1 is in all this the stiffness of the wire with its fixture, and the compliance becomes its share;
+  root mean square of the steps between first readings. Where all creep is over before it is read, the readings see this
+  stiffness alone; where there is little, it is k1. Where a fixture's compliance is sampled, k1 is in all this the
+  stiffness of the wire with its fixture, and the compliance becomes its share;
 - ``AddedCompliance``: the same under weights, where elongations are sampled and compliances add up;
 - ``MeanElongation``: the preload becomes what the mean elongation at last readings leaves of it, which asks for k1 and
   comes first;

@@ -34,7 +34,7 @@ from wirebayes.inference.sampler.settings import (
     SETTLED,
     SKEWNESSES,
 )
-from wirebayes.numeric.typing import Array, Ints
+from wirebayes.numeric.typing import Array, Bools, Ints
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Straight:
     centre, scale : (d,) arrays
         Of the points fitted, in the map's own order.
     scores : (s,) array of int
-        Which coordinates are scores.
+        Which coordinates are scores of shares.
     share_centre, share_scale : (s,) arrays
         Of their shares.
     low, high : (d,) arrays
@@ -96,8 +96,8 @@ class Straight:
         before = v
         if len(self.scores):
             before = v.copy()
-            share = ndtr(x[:, self.order[self.scores]])
-            before[self.scores] = ((share - self.share_centre) / self.share_scale).T
+            share = ndtr(x[:, self.order[self.scores]]).T
+            before[self.scores] = self._standardised_share(share, slice(None))
         held = np.clip(before, self.low[:, None], self.high[:, None])
         mean, bend = self.linear @ before + self.constant[:, None], before - 0.5 * held
         for j in range(1, len(v)):
@@ -118,13 +118,18 @@ class Straight:
             mean = self._mean(j, before, held[:j])
             v[j] = mean + left[j] * np.exp(self._log_scale(j, before))
             regressors[j] = v[j]
-            for k in np.flatnonzero(self.scores == j):
+            is_score = self.scores == j
+            if is_score.any():
                 share = ndtr(v[j] * self.scale[j] + self.centre[j])
-                regressors[j] = (share - self.share_centre[k]) / self.share_scale[k]
+                regressors[j] = self._standardised_share(share, is_score)
             held[j] = np.clip(regressors[j], self.low[j], self.high[j])
         x = np.empty(v.T.shape)
         x[:, self.order] = v.T * self.scale + self.centre
         return x
+
+    def _standardised_share(self, share: Array, which: slice | Bools) -> Array:
+        """(k, n) what stands for k of the scores in means and scales, by their shares (k, n)."""
+        return (share - self.share_centre[which, None]) / self.share_scale[which, None]
 
     def _mean(self, j: int, before: Array, inside: Array) -> Array:
         """(n,) of coordinate j by those before it (j, n), and by these kept in the range of the points fitted."""
