@@ -255,3 +255,51 @@ def test_durations_may_have_days(cells, tmp_path):
 
 def test_hours_after_days_count_to_23():
     assert spelt_s("1 d 23 h") == 169200.0 and spelt_s("1 d 24 h") is None and spelt_s("1 day, 1:60:00") is None
+
+
+def on_the_wall(folder, moments):
+    rows = [f"{moment},{1 + i // 5},{2 + i // 5 - i / 100}" for i, moment in enumerate(moments)]
+    path = folder / "raw.csv"
+    path.write_text("Time,Displacement (mm),Force (N)\n" + "\n".join(rows) + "\n")
+    return convert(path, ABOUT, Choices())
+
+
+MINUTES_APART = ["{}:56:00", "{}:56:30", "{}:57:00", "{}:57:30", "{}:58:00", "{}:59:00", "{}:59:30"]
+MINUTES_AFTER = ["{}:00:00", "{}:00:30", "{}:01:00"]
+
+
+@pytest.mark.parametrize("date", ["", "2024-10-27 "])
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("01", "03", "put forward by an hour at line 9"),
+        ("02", "02", "put back by an hour at line 9"),
+        ("01", "02", None),
+        ("09", "11", None),  # an hour's rest of the day
+    ],
+)
+def test_a_clock_that_is_put_forward_or_back_counts_on(tmp_path, date, before, after, said):
+    moments = [date + m.format(before) for m in MINUTES_APART] + [date + m.format(after) for m in MINUTES_AFTER]
+    found = on_the_wall(tmp_path, moments)
+    assert any(said in note for note in found.notes) if said else not any("by an hour" in n for n in found.notes)
+    first, second = found.experiment.holds
+    assert (first.duration_s, second.duration_s) == (180.0, 3720.0 if before == "09" else 120.0)
+
+
+@pytest.mark.parametrize(
+    "moments",
+    [
+        ("00:10:00", "00:40:00", "01:40:00", "03:20:00", "05:00:00"),  # an hour just passes
+        ("01:58:00", "01:59:00", "03:20:00", "03:21:00", "03:22:00"),  # more than an hour, by a rest
+        ("01:57:00", "01:59:00", "02:59:30", "03:00:00", "03:00:30"),  # not the hour that clocks leave out
+    ],
+)
+def test_an_hour_of_the_night_in_which_nothing_was_read_is_left_as_it_is(tmp_path, moments):
+    found = on_the_wall(tmp_path, moments)
+    assert not any("by an hour" in note for note in found.notes)
+
+
+def test_an_offset_from_utc_leaves_no_doubt_of_an_hour(tmp_path):
+    moments = [f"2024-03-31T{clock}+01:00" for clock in ("01:58:00", "01:58:30", "01:59:30", "03:00:00", "03:00:30")]
+    (hold,) = on_the_wall(tmp_path, moments).experiment.holds
+    assert hold.duration_s == 3750.0

@@ -81,9 +81,18 @@ def test_thousands_that_grow_from_what_was_less_are_thousands(tmp_path):
     assert readings(read(tmp_path, [*lines, "320.0;5.00;1,215"]))[-1] == (5.0, 1215.0)
 
 
-def test_rows_of_a_hold_that_stand_elsewhere_start_no_clock_again(tmp_path):
-    lines = LINES[:8] + LINES[12:16] + LINES[8:12] + LINES[16:]
-    with pytest.raises(wb.InputError, match=r"line 14, column 1 .*: found 140 s after 250 s, which is between two hol"):
+@pytest.mark.parametrize(
+    ("holds", "said"),
+    [((0, 1, 3, 2, 4), "a time amid those above"), ((0, 3, 1, 2, 4), "which is between two holds above")],
+)
+def test_rows_of_a_hold_that_stand_elsewhere_start_no_clock_again(tmp_path, holds, said):
+    """In the second file the settings would rise in the order of the rows: it is the order of time that goes astray."""
+    settings = holds if said == "which is between two holds above" else range(5)
+    placed = [
+        (70.0 * hold + t, settings.index(hold) + 1.0, 5.0 + hold - t / 100) for hold in holds for t in (0, 10, 40)
+    ]
+    lines = [f"{t:.1f};{x:.2f};{force:.3f}" for t, x, force in placed]
+    with pytest.raises(wb.InputError, match=rf"line \d+, column 1 .*: found \d+ s after \d+ s, {said}"):
         read(tmp_path, lines)
 
 

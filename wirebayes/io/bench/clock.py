@@ -10,6 +10,7 @@ from wirebayes.errors import shown
 from wirebayes.io.bench.compound_times import is_spelt, spelt_s
 from wirebayes.io.bench.quantities import Unit
 from wirebayes.io.bench.sheet import MONTHS, is_moment, is_number, is_value, moment
+from wirebayes.io.bench.summer_time import without_summer_time
 from wirebayes.io.bench.table import RawTable
 from wirebayes.io.bench.undecided import Undecided
 from wirebayes.numeric.typing import Array, Bools, Floats
@@ -78,7 +79,8 @@ def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool 
     of_day : bool
         Whether they are moments of a calendar or a clock on the wall, so that nothing restarts.
     passed : list of str
-        That a clock without dates has passed midnight, or one of minutes and seconds the hour, and how often.
+        That a clock without dates has passed midnight, or one of minutes and seconds the hour, and how often; that
+        one on the wall was put forward or back.
 
     Raises
     ------
@@ -95,9 +97,14 @@ def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool 
     if short is not None:
         leading = _leading(table, column, unit, moments, short)
     values = _values(moments, of_clock, leading)
+    lines = [row.line for row in table.rows]
     if moments[0]["date"] is not None:
         days = _days(table, column, moments)
-        return (days - days[0]) + values, True, []
+        time_s = (days - days[0]) + values
+        if moments[0]["zone"] is not None:
+            return time_s, True, []
+        time_s, changed = without_summer_time(time_s, lines)
+        return time_s, True, changed
     if durations and all(of_clock):
         return values, False, []
     if leading == _MINUTE and _minutes_go_round(values):
@@ -108,7 +115,11 @@ def seconds(table: RawTable, column: int, unit: Unit | None, *, durations: bool 
         _check_hours_go_beyond_twelve(table, column, values)
     of_day = short is None and (not of_clock[0] or values[0] >= _HOUR)
     midnights = np.cumsum(_days_begin(values, of_day))
-    return values + _DAY * midnights, of_day, _passed("midnight", midnights)
+    time_s, passed = values + _DAY * midnights, _passed("midnight", midnights)
+    if of_day:
+        time_s, changed = without_summer_time(time_s, lines)
+        passed += changed
+    return time_s, of_day, passed
 
 
 def _values(moments: _Moments, of_clock: Sequence[bool], leading: float) -> Floats:

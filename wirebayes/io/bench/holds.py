@@ -31,6 +31,7 @@ from wirebayes.io.bench.recorded import (
     wanders,
 )
 from wirebayes.io.bench.resets import joined_at_resets
+from wirebayes.io.bench.row_order import check_row_order
 from wirebayes.io.bench.undecided import TimeSince, Undecided
 from wirebayes.io.readings import times_run_on
 from wirebayes.io.unread_ends import unread_s
@@ -44,7 +45,6 @@ ENDS_UNKNOWN = (
     "when a hold ended is not known: if the wire rested between its last reading and the next move, add a row without "
     "a reading at the moment of that move"
 )
-BACKWARDS = 0.5  # of the steps in time: holds of two readings or more whose times start again fall at fewer
 
 
 def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
@@ -53,10 +53,10 @@ def cut(readings: Readings, time_since: TimeSince | None) -> Cut:
     Raises
     ------
     InputError
-        The setting never stays, times fall within a hold, or the newest reading stands first; `Undecided` where
-        times may count from the beginning of each hold or of the test.
+        The setting never stays, times fall within a hold, or rows stand in another order than that of time;
+        `Undecided` where times may count from the beginning of each hold or of the test.
     """
-    _check_order(readings)
+    check_row_order(readings)
     if readings.of_day and time_since == "hold":
         raise InputError(f"--time-since hold: found moments of a day in {readings.time_name}, which restart nowhere")
     readings, resets = joined_at_resets(readings)
@@ -132,19 +132,6 @@ def _are_holds(groups: Sequence[Rows]) -> bool:
     usual = usual_size(groups)
     no_moves = sizes.min() > MOVE_SHARE * usual
     return bool(2 * len(groups) <= sizes.sum() and (usual < CONTINUOUS or no_moves))
-
-
-def _check_order(readings: Readings) -> None:
-    """Refuse rows whose newest reading stands first: each would become a hold of its own."""
-    time = readings.time_s
-    steps = np.arange(1, len(time))
-    if readings.hold is not None:  # holds of one reading each may last ever shorter
-        steps = steps[np.diff(readings.hold) == 0]
-    falling = steps[time[steps] < time[steps - 1]]
-    if len(falling) > BACKWARDS * len(steps):
-        row = int(falling[0])
-        found = f"{time[row]:g} s after {time[row - 1]:g} s, and times that fall in {len(falling)} of {len(steps)} rows"
-        raise readings.complain(row, "time", found, "rows in the order of time, the oldest first; turn them round")
 
 
 def _wandering(readings: Readings, groups: Sequence[Rows]) -> InputError:
