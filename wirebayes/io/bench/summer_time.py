@@ -7,7 +7,7 @@ import numpy as np
 from wirebayes.numeric.typing import Floats
 
 _HOUR = 3600.0
-_DAY_HOURS = 24
+_DAY_HOURS = 24  # of a clock that goes round once a day
 _LAST_HOUR = 3  # of the night: no country leaves out a later one
 _OFTEN = 0.1 * _HOUR  # between readings around the change: where they are farther apart an hour may just have passed
 _PASSED = 4.0  # times the longest step beside it: a move to the next hold takes longer than one between readings
