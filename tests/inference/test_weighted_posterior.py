@@ -170,12 +170,13 @@ def test_draws_are_of_the_whole_problem_and_follow_the_weights(monkeypatch: pyte
 
     monkeypatch.setattr(module, "integrated", lambda problem: problem)
     monkeypatch.setattr(module, "LogPosterior", lambda problem: Density(problem=problem, coordinates=identity))
-    problem = SimpleNamespace(names=names, own_units=None, units=None, samples=(), theta_in=lambda units, theta: theta)
+    problem = SimpleNamespace(names=names, own_units=None, units=None, theta_in=lambda units, theta: theta)
+    problem.log_units = lambda other: [np.array([2.0, 1.0])]  # densities are larger by so much in its own units
     problem.in_units = lambda units: problem
     one = weighted_posterior(problem, 1, 1000.0)  # type: ignore[arg-type]
     assert one.problem is problem and one.flat.shape == (4000, D) and one.converged
     near = one.flat[one.flat[:, 1] < 105.0][:, 1]
     assert len(near) == pytest.approx(3600, abs=120) and stats.kstest(near[:400] - 100.0, "norm").pvalue > 1e-3
-    assert one.log_evidence == pytest.approx(0.0, abs=0.1)
+    assert one.log_evidence == pytest.approx(-3.0, abs=0.1)
     assert one.why.startswith("importance sampling: ") and " effective draws of " in one.why
     assert np.array_equal(weighted_posterior(problem, 1, 1000.0).flat, one.flat)  # type: ignore[arg-type]

@@ -16,8 +16,10 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.model import single_holds
 from wirebayes.model.build import build
 from wirebayes.model.prior import Prior
-from wirebayes.model.problem import with_protocols, with_readings
+from wirebayes.model.problem import Problem, with_protocols, with_readings
+from wirebayes.model.replicate import readings as replicate
 from wirebayes.model.sample import Likelihood
+from wirebayes.model.scales import Units
 from wirebayes.model.spec import ModelSpec
 from wirebayes.simulation.synthetic import Bench, Truth
 from wirebayes.wire.model import Model
@@ -252,6 +254,39 @@ def test_every_hold_s_part_and_all_readings_but_its_own(likelihood: Likelihood) 
             assert without[s][j] == pytest.approx(blind.log_likelihood(theta), rel=1e-9)
             assert left[s][j] == pytest.approx(whole - without[s][j], abs=1e-9)
         assert left[s].shape == (3, 2) and (left[s][1] == 0.0).all()  # it was not recorded
+
+
+def slackening(likelihood: Likelihood) -> Problem:
+    """A test of two recorded holds of which the last begins slack."""
+    experiment = short()
+    last = experiment.holds[-1]
+    slack = replace(last, readings=np.array([0.0, 0.02, 0.01]))
+    return build([replace(experiment, holds=(*experiment.holds[:-1], slack))], spec=ModelSpec(likelihood=likelihood))
+
+
+@pytest.mark.parametrize("likelihood", ["chain", "hold"])
+def test_densities_in_other_units_differ_by_the_readings_that_they_are_of(likelihood: Likelihood) -> None:
+    """Hold by hold the first reading of a hold is given, and all of one that begins slack."""
+    problem = slackening(likelihood)
+    other = problem.in_units(Units(1.0, 5.0, 1.0))
+    theta = at(problem, WIRE)
+    one, two = (
+        p.hold_log_likelihood(t)[0] for p, t in ((problem, theta), (other, problem.theta_in(other.units, theta)))
+    )
+    (found,) = other.log_units(problem)
+    assert found == pytest.approx((two - one)[:, 0], abs=1e-9)
+    assert found[0] == pytest.approx({"chain": 3.0, "hold": 2.0}[likelihood] * np.log(5.0))
+
+
+def test_hold_by_hold_a_replicate_of_a_slack_hold_is_slack() -> None:
+    """Whatever its sensor's error was, the first reading stays, and no tension comes of none."""
+    problem = slackening("hold")
+    sample = problem.samples[0]
+    sd = 0.02
+    theta = np.repeat(at(problem, WIRE | {"sensor_sd": sd}), 400, axis=0)
+    found = replicate(problem, theta, sample, np.random.default_rng(0))
+    assert found[:, 0] == pytest.approx(np.repeat(sample.readings[:, 0], 400, axis=1), abs=sample.resolution)
+    assert np.abs(found[2, 1:]).max() < 6.0 * sd
 
 
 def test_replicates_take_the_place_of_the_readings_row_by_row() -> None:

@@ -206,6 +206,15 @@ def test_under_weights_the_range_reaches_from_the_wire_without_tension():
     assert single.range_mm == pytest.approx(1.0) == single.step_mm
 
 
+def test_under_weights_holds_that_begin_alike_have_no_step_of_their_own():
+    """A coarse gauge: where it stands is not how far it moves."""
+    times, x = [0.0, 1.0, 2.0] * 2, [12.0, 12.0, 12.5, 12.0, 12.5, 12.5]
+    made = from_arrays(
+        [1] * 3 + [2] * 3, x, times, [4.0] * 3 + [4.1] * 3, length_mm=1e3, name="w", material="m", control="force"
+    )
+    assert scales_of([made]).step_mm == scales_of([made]).range_mm == scales_of([shifted(made, 300.0)]).step_mm
+
+
 @pytest.mark.parametrize("factor", [2.0**-30, 2.0**7])
 def test_a_geometric_mean_is_multiplied_to_the_last_bit(factor):
     values = [0.3, 7.0, 11.3]

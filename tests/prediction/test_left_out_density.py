@@ -73,8 +73,8 @@ class Normals:
     def theta_in(self, units: Units, theta: np.ndarray) -> np.ndarray:
         return theta
 
-    def read_unit(self, sample: object) -> float:
-        return 1.0
+    def log_units(self, other: "Normals") -> list[np.ndarray]:
+        return [np.zeros(3)]
 
     def without_each_hold(self, theta: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         away = (theta[:, None, :] - self.moved[:, None]) / self.widened[:, None]

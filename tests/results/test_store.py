@@ -1,11 +1,13 @@
 """A joint fit of two lengths, stored and read back at each sample's own length."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import xarray
 
+from wirebayes.effects import effect_named
 from wirebayes.effects.creep import SecondRelaxation, SteadyCreep
 from wirebayes.effects.elastic import LengthDependence
 from wirebayes.inference.fit import fit_problem
@@ -104,6 +106,38 @@ def test_samples_fitted_at_once_are_stored_apart_and_again_where_one_is_missing(
     (tmp_path / "long/final/summary.json").unlink()
     jobs.run([job], tmp_path, 0, policy=HASTY)
     assert [(tmp_path / folder / "summary.json").read_text() for folder in job.folders] == texts
+
+
+@pytest.mark.parametrize("stated", [{"N": 1.0}, {"creep_length_exponent": 0.0}, {"N": 0.9, "preload": 0.3}])
+def test_what_is_fixed_is_read_back_as_it_was_fitted(stated, tmp_path):
+    """Of each of two lengths: what no draw says of a parameter, or of how creep grows with the length."""
+    write_tests(tmp_path, BENCHES, Truth(), 3)
+    priors = {name: {"fixed": value} for name, value in stated.items()}
+    experiments = [replace(e.train(4), priors=priors) for e in read_experiments(tmp_path / "experiments.toml")]
+    fit = fit_problem(build(experiments), 1, policy=HASTY)
+    summary = store.save_posterior(fit, tmp_path, {})
+    assert ("N" in summary["parameters"]) and "creep_length_exponent" not in summary["parameters"]
+    for sample in fit.problem.samples:
+        own = fit.problem.parameters(np.concatenate(list(fit.theta)), sample)
+        stored = read_back.load_posterior(tmp_path, sample.name)
+        for name, values in own.items():
+            assert stored.draws[name] == pytest.approx(values, rel=1e-12)
+        exponent = stored.length_exponent
+        assert exponent is None if "N" in stated else exponent.tolist() == [0.0] * len(own["B"])
+
+
+def test_an_event_is_read_back_in_its_own_test_alone(tmp_path):
+    """The second of two, behind effects that both have."""
+    write_tests(tmp_path, BENCHES, Truth(), 3)
+    experiments = [e.train(4) for e in read_experiments(tmp_path / "experiments.toml")]
+    effects = [effect_named("grip_slip@long:2"), SteadyCreep(), effect_named("unrecorded_hold@short:3")]
+    fit = fit_problem(build(experiments, effects), 1, policy=HASTY)
+    summary = store.save_posterior(fit, tmp_path, {})
+    assert summary["effects"] == ["grip_slip@long:2", "steady_creep", "unrecorded_hold@short:3"]
+    assert [summary["parameters"][name]["unit"] for name in ("grip_slip.w", "unrecorded_hold.T")] == ["mm", "s"]
+    for sample in fit.problem.samples:
+        stored = read_back.load_posterior(tmp_path, sample.name)
+        assert [e.key for e in stored.sample.model.effects] == [e.key for e in sample.model.effects]
 
 
 def test_the_reference_temperature_is_stored_for_each_sample(tmp_path):

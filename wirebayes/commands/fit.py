@@ -227,6 +227,16 @@ def _groups(experiments: Sequence[Experiment], together: str | None, file: Path)
     return {members[0].material_folder: members}
 
 
+def _check_hold(effect: EventEffect, members: Sequence[Experiment], found: str, where: str) -> None:
+    """An event happens at a recorded hold of an experiment that is fitted."""
+    there = [experiment for experiment in members if effect.acts_on(experiment.name, experiment.control)]
+    if not there:
+        raise InputError(f"{found} experiment {effect.test} {where}")
+    possible = type(effect).variants([experiment.protocol() for experiment in there])
+    if all(type(effect)(effect.hold) != variant for variant in possible):
+        raise InputError(f"{found} recorded hold {effect.hold} {where}")
+
+
 def _check_possible(
     effect: Effect, members: Sequence[Experiment], file: Path, known: Mapping[str, type[Effect]], history: History
 ) -> None:
@@ -240,11 +250,12 @@ def _check_possible(
         raise InputError(f"{option}: found {found}, expected {effect.name}: a fit has one amplitude a kind")
     if effect.name not in known:
         return  # the flexible discrepancy shows anywhere
+    names = ", ".join(experiment.name for experiment in members)
+    if isinstance(effect, EventEffect):
+        _check_hold(effect, members, f"{option}: found no", f"in {names} of {file}")
+        return
     protocols = [experiment.protocol() for experiment in members]
     variants = [variant.key for variant in type(effect).variants(protocols)]
     if effect.key in variants:
         return
-    if isinstance(effect, EventEffect):
-        raise InputError(f"{option}: no recorded hold {effect.hold} in experiment {members[0].name} of {file}")
-    names = ", ".join(experiment.name for experiment in members)
     raise InputError(f"{option}: the holds of {names} cannot show it ({effect.shows})")

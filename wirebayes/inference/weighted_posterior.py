@@ -75,18 +75,10 @@ def weighted_posterior(problem: Problem, seed: int, ess: float) -> WeightedPoste
     found = effective(pool.log_weight)[0]
     k = tail(pool.log_weight[:, 0])
     why = f"importance sampling: {found:.0f} effective draws of {size}, Pareto k {k:.2f}"
-    log_evidence = float(pool.log_integral[0] - _log_units(own, problem))
+    log_units = sum(of_holds.sum() for of_holds in own.log_units(problem))
+    log_evidence = float(pool.log_integral[0] - log_units)
     settled = bool(pool.settled[0])
     return WeightedPosterior(problem, theta, log_evidence, settled, why)
-
-
-def _log_units(own: Problem, problem: Problem) -> float:
-    """Log of what a density of readings in one problem's units is in those of the other."""
-    total = 0.0
-    for sample in problem.samples:
-        ratio = own.read_unit(sample) / problem.read_unit(sample)
-        total += sample.protocol.mask.sum() * np.log(ratio)
-    return total
 
 
 def witnessed(target: LogPosterior, rng: Generator, ess: float) -> Weighted:

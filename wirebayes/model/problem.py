@@ -186,6 +186,20 @@ class Problem:
         """How many N, or mm where the tension is set, the readings of a sample count as one."""
         return self.units.of(READ_UNIT[sample.protocol.control])
 
+    def log_units(self, other: "Problem") -> list[Array]:
+        """Per sample (H,) by how much log densities of holds are larger than in the units of the other problem.
+
+        Parameters
+        ----------
+        other : Problem
+            As `in_units` returns it.
+        """
+        out = []
+        for sample in self.samples:
+            ratio = self.read_unit(sample) / other.read_unit(sample)
+            out.append(sample.scored_readings(self.likelihood) * np.log(ratio))
+        return out
+
     @property
     def own_units(self) -> Units:
         """Units made of the test's scales; mm, N and s where it has none.

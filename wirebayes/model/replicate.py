@@ -4,10 +4,9 @@ import numpy as np
 
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
-from wirebayes.model.single_holds import hold_courses
+from wirebayes.model.single_holds import from_first_readings
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.staircase import simulate
-from wirebayes.wire.walk import Theta
 
 
 def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Generator) -> Array:
@@ -35,21 +34,11 @@ def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Gene
     holds, width = protocol.time_s.shape
     noise = rng.normal(size=(holds, width, len(theta))) * own["sensor_sd"]
     if problem.likelihood == "hold":
-        return rounded(_hold_by_hold(own, sample, noise), sample.resolution)
+        first = sample.readings[:, 0, 0]
+        return rounded(from_first_readings(protocol, own, sample.model, first, noise), sample.resolution)
     setting_error = rng.normal(size=(holds, len(theta))) * own["setting_sd"]
     out = simulate(protocol, own, sample.model, setting_error) + noise
     return rounded(out, sample.resolution)
-
-
-def _hold_by_hold(own: Theta, sample: Sample, noise: Array) -> Array:
-    """(H, R, n) readings with noise of holds that begin where the first reading puts them."""
-    # The first reading carries noise, so what it says of the length does too.
-    first = sample.readings[:, 0] - noise[:, 0]
-    out = np.zeros(noise.shape)
-    for j, course in enumerate(hold_courses(sample.protocol, own, sample.model, first)):
-        if course is not None:
-            out[j] = course[0] + noise[j]
-    return out
 
 
 def rounded(readings: Array, resolution: float) -> Array:

@@ -50,6 +50,16 @@ class Sample:
         wire = MATERIAL if self.protocol.control == "displacement" else MATERIAL[1:]
         return (*wire, "sensor_sd")
 
+    def scored_readings(self, likelihood: Likelihood) -> Array:
+        """(H,) of how many readings of each hold the likelihood is a density: hold by hold the first one is given."""
+        taken = self.protocol.mask.sum(axis=1)
+        if likelihood == "chain":
+            return taken
+        given = self.protocol.recorded
+        if self.protocol.control == "displacement":
+            given = given & (self.readings[:, 0, 0] > 0.0)  # a slack one says nothing of the length
+        return np.where(given, taken - 1, 0)
+
     def variance(self, own: Mapping[str, Array]) -> Array:
         """(n,) variance of one reading, N² or mm², by the sample's own parameters."""
         return reading_variance(own["sensor_sd"], self.resolution)

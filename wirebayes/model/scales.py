@@ -147,8 +147,7 @@ def _under_weights(experiment: Experiment) -> Scales:
     weights = np.array([hold.setting for hold in recorded])
     first = np.array([hold.readings[0] for hold in recorded])
     reach = _reach_under_weights(experiment, weights)
-    moved = typical_step(first) if len(first) > 1 else 0.0
-    step = moved or reach
+    step = typical_step(first) if np.ptp(first) > 0.0 else reach
     lightest = int(weights.argmin())
     zero = float(first[lightest] - reach * weights[lightest] / float(weights.max()))
     settings = [hold.setting for hold in experiment.holds]

@@ -152,6 +152,36 @@ def hold_courses(
     return _under_steps(protocol, theta, model, first)
 
 
+def from_first_readings(protocol: Protocol, theta: Theta, model: Model, first: Array, error: Array) -> Array:
+    """Readings of holds that each begin where their first reading puts them, which stays as it is.
+
+    A first reading under steps whose error leaves no tension is that of a slack wire, which stays slack.
+
+    Parameters
+    ----------
+    theta : mapping of name to (n,) array
+        As for `hold_courses`.
+    first : (H,) array
+        N, or mm under weights; NaN of a hold of which nothing is wanted.
+    error : (H, R, n) array
+        Of every reading, the first ones too: what they say of the length is in error as well.
+
+    Returns
+    -------
+    (H, R, n) array
+        Zero for a hold without readings.
+    """
+    without_error = first[:, None] - error[:, 0]
+    out = np.zeros_like(error)
+    for j, course in enumerate(hold_courses(protocol, theta, model, without_error)):
+        if course is None:
+            continue
+        reading, _, valid = course
+        out[j] = np.where(valid, reading, 0.0) + error[j]
+        out[j, 0] = first[j]
+    return out
+
+
 def _under_steps(
     protocol: Protocol, theta: Theta, model: Model, first: Array
 ) -> list[tuple[Array, Array, Array] | None]:

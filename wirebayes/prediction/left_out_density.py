@@ -61,7 +61,8 @@ def log_densities(problem: Problem, holds: Holds, draws: Array, seed: int, doubt
             log_without, converged = _evidence_without(own, holds[m], seed)
             elpd[m] = log_whole - log_without
             settled[m] = known and converged
-    return elpd - _log_units(problem, own, holds), settled
+    larger = own.log_units(problem)
+    return elpd - [larger[sample][row] for sample, row in holds], settled
 
 
 def _evidence_without(problem: Problem, hold: tuple[int, int], seed: int) -> tuple[float, bool]:
@@ -100,17 +101,6 @@ def _bear_witness(
         others = importance.widened(found)
         overlooked = overlooked_share(left, pool, column, log_integral, others, rng)
         settled[m] = abs(overlooked) <= _MISSED
-
-
-def _log_units(asked: Problem, own: Problem, holds: Holds) -> Array:
-    """By how much the log density of each hold's readings differs in own units from that in the units asked for."""
-    out = []
-    for s, j in holds:
-        sample = own.samples[s]
-        readings = sample.protocol.mask[j].sum()
-        ratio = own.read_unit(sample) / asked.read_unit(sample)
-        out.append(readings * np.log(ratio))
-    return np.array(out)
 
 
 def without_hold(problem: Problem, sample: int, hold: int) -> Problem:

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
-from wirebayes.model import single_holds
+from wirebayes.model.hold_filter import LOG_2PI
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
-from wirebayes.numeric.linear_algebra import eigh, solve
-from wirebayes.numeric.typing import Bools, Floats
-from wirebayes.wire.model import Model
+from wirebayes.model.single_holds import from_first_readings
+from wirebayes.numeric.linear_algebra import cholesky, eigh, solve
+from wirebayes.numeric.log_sum import or_impossible
+from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.staircase import linearise
 from wirebayes.wire.walk import Theta, Walk
@@ -68,12 +69,25 @@ def draw_predictive(
     (H, R, n) array
         Zero for holds that were not requested. Rounding is continuous: uniform within half a step.
     """
+    drawn = draw_unconditioned(problem, theta, sample, request, rng)
+    return drawn if problem.likelihood == "hold" else given_first(drawn, request)
+
+
+def draw_unconditioned(
+    problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: Generator
+) -> Floats:
+    """`draw_predictive` before first readings condition it; hold by hold each hold begins with its own all the same.
+
+    Parameters
+    ----------
+    problem, theta, sample, request, rng
+        As for `draw_predictive`.
+    """
     parts = [
         _readings(problem, theta[start : start + _CHUNK], sample, request, rng)
         for start in range(0, len(theta), _CHUNK)
     ]
-    drawn = np.concatenate(parts, axis=-1)
-    return drawn if problem.likelihood == "hold" else given_first(drawn, request)
+    return np.concatenate(parts, axis=-1)
 
 
 def _readings(problem: Problem, theta: Floats, sample: Sample, request: PredictionRequest, rng: Generator) -> Floats:
@@ -83,9 +97,10 @@ def _readings(problem: Problem, theta: Floats, sample: Sample, request: Predicti
     rounding = rng.uniform(-0.5, 0.5, shape) * sample.resolution
     error = noise + rounding
     if problem.likelihood == "hold":
-        return _hold_by_hold(own, sample.model, request, error)
-    course = chain_course(own, sample, request, rng)
-    return np.where(request.requested[:, None, None], course + error, 0.0)
+        drawn = from_first_readings(request.protocol, own, sample.model, request.first, error)
+    else:
+        drawn = chain_course(own, sample, request, rng) + error
+    return np.where(request.requested[:, None, None], drawn, 0.0)
 
 
 def chain_course(own: Theta, sample: Sample, request: PredictionRequest, rng: Generator) -> Floats:
@@ -181,19 +196,6 @@ def _normal_equations(own: Theta, sample: Sample) -> tuple[Floats, Floats]:
     return square, right
 
 
-def _hold_by_hold(own: Theta, model: Model, request: PredictionRequest, error: Floats) -> Floats:
-    """Every hold from its own first reading, which carries the sensor's error too and stays as it was given."""
-    given = request.first[:, None] - error[:, 0]
-    out = np.zeros_like(error)
-    for j, course in enumerate(single_holds.hold_courses(request.protocol, own, model, given)):
-        if course is None or not request.requested[j]:
-            continue
-        reading, _, valid = course
-        out[j] = np.where(valid, reading, 0.0) + error[j]
-        out[j, 0] = request.first[j]
-    return out
-
-
 def given_first(drawn: Floats, request: PredictionRequest) -> Floats:
     """Condition the requested holds on the first readings given up to them; a replicate on its own alone.
 
@@ -207,15 +209,51 @@ def given_first(drawn: Floats, request: PredictionRequest) -> Floats:
     (H, R, n) array
         The same array.
     """
-    given = request.requested & np.isfinite(request.first)
-    for j in np.flatnonzero(request.requested)[::-1]:
-        first = request.trained if j >= request.trained else j
-        known = np.flatnonzero(given[first : j + 1]) + first
+    for j in reversed(np.flatnonzero(request.requested).tolist()):
+        known = _known_at(request, j)
         if len(known):
             drawn[j] = _regressed(drawn[j], drawn[known, 0], request.first[known])
-        if given[j]:
+        if j in known:
             drawn[j, 0] = request.first[j]  # not only to the last digit
     return drawn
+
+
+def log_density_of_given(drawn: Floats, request: PredictionRequest) -> Floats:
+    """How well a model predicts the first readings that condition each hold, by a normal of its draws.
+
+    Parameters
+    ----------
+    drawn : (H, R, n) array
+        As `draw_unconditioned` returned them.
+
+    Returns
+    -------
+    (H,) array
+        Log densities; zero where nothing conditions a hold.
+    """
+    out = np.zeros(len(drawn))
+    for j in np.flatnonzero(request.requested).tolist():
+        known = _known_at(request, j)
+        if len(known):
+            out[j] = _log_normal(drawn[known, 0], request.first[known])
+    return out
+
+
+def _known_at(request: PredictionRequest, j: int) -> Ints:
+    """Holds whose first readings condition hold j: those up to it that follow the training; of a replicate its own."""
+    first = request.trained if j >= request.trained else j
+    given = request.requested & np.isfinite(request.first)
+    return np.flatnonzero(given[first : j + 1]) + first
+
+
+def _log_normal(drawn: Floats, observed: Floats) -> float:
+    """Log density at observed values (m,) of the normal with the moments of draws (m, n); -inf where it has none."""
+    covariance = np.atleast_2d(np.cov(drawn))
+    factor = cholesky(covariance)
+    away = solve(factor, (observed - drawn.mean(axis=1))[:, None])
+    with np.errstate(all="ignore"):
+        log_density = -0.5 * (away**2).sum() - np.log(np.diag(factor)).sum() - 0.5 * len(observed) * LOG_2PI
+    return float(or_impossible(log_density))
 
 
 def _regressed(drawn: Floats, first: Floats, observed: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from wirebayes.io.readings import READ, SET, Hold
 from wirebayes.io.run_folder import read_json, writable, write_csv, write_json
 from wirebayes.json_files.prediction import PredictionJson
 from wirebayes.numeric.evenly import evenly
+from wirebayes.numeric.log_sum import log_sum
 from wirebayes.numeric.typing import Floats
-from wirebayes.prediction.predictive import draw_predictive
+from wirebayes.prediction.predictive import draw_unconditioned, given_first, log_density_of_given
 from wirebayes.prediction.request import ProtocolRequest
 from wirebayes.result_warnings import Notice
 from wirebayes.results.read_back import Stored
@@ -44,17 +46,18 @@ def mixture_table(members: Members, seed: int = 0, draws: int = DRAWS) -> list[l
     Parameters
     ----------
     members : sequence of (probability, ProtocolRequest)
-        One protocol requested of each model, as often among the draws as it is probable; the probabilities sum to one.
+        One protocol requested of each model, as often among a hold's draws as it is probable given the first readings
+        that condition the hold; the probabilities, which are those without them, sum to one.
     draws : int
         In all, evenly spread over the stored ones.
     """
     drawn = _drawn(members, seed, draws)
     _, request = members[0]
     experiment = request.stored.sample.name
-    positions = np.flatnonzero(request.prediction.requested)
+    positions = np.flatnonzero(request.prediction.requested).tolist()
     rows: list[list[Any]] = []
     for hold, position in zip(request.holds, positions, strict=True):
-        here = drawn[position, : len(hold.time_s)]
+        here = drawn[position][: len(hold.time_s)]
         for time, readings, figures in zip(hold.time_s, here, _figures(here), strict=True):
             mean, sd = _moments(readings)
             rows.append([experiment, hold.number, hold.setting, float(time), mean, sd, *figures])
@@ -88,13 +91,13 @@ def unlikely_readings(members: Members, seed: int = 0) -> list[Notice]:
     if request.stored.likelihood == "hold" or not given.any():  # each hold starts from its own reading
         return []
     blind = [(probability, _blind(member)) for probability, member in members]
-    first = _drawn(blind, seed, _FEW)[:, 0]
-    positions = np.flatnonzero(prediction.requested)
+    drawn = _drawn(blind, seed, _FEW)
+    positions = np.flatnonzero(prediction.requested).tolist()
     out = []
     for hold, position in zip(request.holds, positions, strict=True):
         if not given[position]:
             continue
-        doubt = _far_off(hold, prediction.first[position], first[position])
+        doubt = _far_off(hold, prediction.first[position], drawn[position][0])
         if doubt is not None:
             out.append(Notice("data", doubt))
     return out
@@ -158,18 +161,45 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
     return [Notice("extrapolation", text) for text in out]
 
 
-def _drawn(members: Members, seed: int, draws: int) -> Floats:
-    """Readings (H, R, n) of all models, each with as many draws as it is probable."""
+def _drawn(members: Members, seed: int, draws: int) -> dict[int, Floats]:
+    """Of each requested hold the readings (R, n) of all models, each with as many draws as it is probable there."""
     experiment = members[0][1].stored.sample.name
     rng = np.random.default_rng(seed_of(seed, "predict", experiment))
-    parts = []
+    asked = members[0][1].prediction
+    # given readings may make any of them the only one that is left
+    each = draws if np.isfinite(asked.first[asked.requested]).any() else 0
+    readings, log_weights = [], []
     for probability, request in members:
         stored = request.stored
-        theta = stored.theta
-        own_draws = max(round(probability * draws), 2)
-        theta = theta[evenly(len(theta), own_draws)]
-        parts.append(draw_predictive(stored.problem, theta, stored.sample, request.prediction, rng))
-    return np.concatenate(parts, axis=-1)
+        own_draws = max(each, ceil(probability * draws))
+        theta = stored.theta[evenly(len(stored.theta), own_draws)]
+        own = draw_unconditioned(stored.problem, theta, stored.sample, request.prediction, rng)
+        log_weight = np.full(len(own), np.log(probability))
+        if stored.likelihood == "chain":
+            log_weight += log_density_of_given(own, request.prediction)
+            own = given_first(own, request.prediction)
+        readings.append(own)
+        log_weights.append(log_weight)
+    shares = _shares(np.array(log_weights))
+    positions = np.flatnonzero(asked.requested).tolist()
+    return {j: _mixed([own[j] for own in readings], shares[:, j], draws) for j in positions}
+
+
+def _shares(log_weight: Floats) -> Floats:
+    """(m, H) probabilities of m models from log weights (m, H); all alike where no model predicts what was read."""
+    possible = np.where(np.isfinite(log_weight).any(axis=0), log_weight, 0.0)
+    return np.exp(possible - log_sum(possible))
+
+
+def _mixed(readings: Sequence[Floats], share: Floats, draws: int) -> Floats:
+    """Draws (R, n) of several models, each as often as its share says, as many as each of them has enough for."""
+    with np.errstate(divide="ignore"):
+        enough = min(draws, *(own.shape[1] / part for own, part in zip(readings, share, strict=True)))
+    parts = []
+    for own, part in zip(readings, share, strict=True):
+        count = round(part * enough)
+        parts.append(own[:, evenly(own.shape[1], count)])
+    return np.concatenate(parts, axis=1)
 
 
 class Prediction(xr.Dataset):  # type: ignore[no-untyped-call]  # xarray's __init_subclass__

@@ -12,10 +12,16 @@ from wirebayes.inference.fit import Fit
 from wirebayes.io.readings import READ, SET, UNIT
 from wirebayes.model.problem import Problem
 from wirebayes.model.replicate import readings as replicate
-from wirebayes.model.sample import Sample
+from wirebayes.model.sample import LENGTH_EXPONENT, Sample
 from wirebayes.numeric.typing import Array, Ints
 from wirebayes.results.netcdf import Group, Variable
-from wirebayes.results.parameters import length_of_creep_amount, unit_of, variables
+from wirebayes.results.parameters import (
+    all_effects,
+    fixed_length_exponent,
+    length_of_creep_amount,
+    unit_of,
+    variables,
+)
 from wirebayes.wire.protocol import Control, Protocol
 
 _UNIT_IN_NAME = {unit: unit for unit in ("N", "mm", "s", "K")}  # the last part of the name of what was measured
@@ -121,7 +127,7 @@ def _log_likelihood(fit: Fit, members: Sequence[Sample]) -> dict[str, Variable]:
 
 def _label(groups: Mapping[str, Group], members: Sequence[Sample]) -> None:
     """Units of all variables."""
-    effects, controls = members[0].model.effects, _controls(members)
+    effects, controls = all_effects(members), _controls(members)
     for kind, group in groups.items():
         for name in group.variables:
             if kind in ("posterior", "prior"):
@@ -163,7 +169,8 @@ def _about(fit: Fit, members: Sequence[Sample], provenance: Mapping[str, Any]) -
         "elastic_law": model.law,
         "history": model.history,
         "likelihood": fit.problem.likelihood,
-        "effects": _listed(effect.key for effect in model.effects),
+        LENGTH_EXPONENT: fixed_length_exponent(fit.problem, first),
+        "effects": _listed(effect.key for effect in all_effects(members)),
         "tension_ref_N": model.tension_ref_N,
         "tension_range_N": [float(lowest), float(highest)],
         "time_range_s": [0.0, float(longest)],

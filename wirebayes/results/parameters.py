@@ -70,20 +70,49 @@ def by_length(
 
 
 def _together_variables(problem: Problem, theta: Array) -> dict[str, Array]:
-    """Columns under their plain names; those of one sample each, or of one instrument, by sample along a last axis."""
+    """Parameters under their plain names; those of one sample each, or of one instrument, by sample along a last axis.
+
+    An exponent of the length that is fixed is no parameter of a wire: see `fixed_length_exponent`.
+    """
     columns = dict(zip(problem.names, np.moveaxis(theta, -1, 0), strict=True))
     fixed = {name: np.full(theta.shape[:-1], value) for name, value in problem.prior.fixed.items()}
     known = columns | fixed
     out: dict[str, Array] = {}
-    for name in problem.names:
+    for name in known:
         plain = parameter_of(name)
+        if plain in out or (plain == LENGTH_EXPONENT and name in fixed):
+            continue
         if plain == name:
-            out[plain] = columns[name]
-        elif plain not in out:
+            out[plain] = known[name]
+        else:
             of_samples = [problem.column(plain, sample) for sample in problem.samples]
             values = [known[column] for column in of_samples]
             out[plain] = np.stack(values, axis=-1)
     return out
+
+
+def fixed_length_exponent(problem: Problem, sample: Sample) -> float:
+    """The power of the length that creep grows with among samples fitted together, where it is fixed; otherwise 1."""
+    try:
+        column = problem.column(LENGTH_EXPONENT, sample)
+    except KeyError:  # of samples of one length
+        return 1.0
+    return float(problem.prior.fixed.get(column, 1.0))
+
+
+def all_effects(samples: Sequence[Sample]) -> tuple[Effect, ...]:
+    """The effects of any of these samples, in an order that is each sample's own: some act on one of them alone."""
+    every: list[Effect] = []
+    for sample in samples:
+        at = 0
+        for effect in sample.model.effects:
+            keys = [known.key for known in every]
+            if effect.key in keys:
+                at = keys.index(effect.key) + 1
+            else:
+                every.insert(at, effect)
+                at += 1
+    return tuple(every)
 
 
 def unit_of(name: str, effects: tuple[Effect, ...] = (), controls: Sequence[Control] = ("displacement",)) -> str:

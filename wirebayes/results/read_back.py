@@ -166,28 +166,39 @@ def _stored(groups: Mapping[str, Group], path: Path, at: int, own_effects: Path 
     def own(key: str, of: Group = posterior) -> Any:
         return json.loads(of.attributes[key])[at]
 
-    model = _model(about, own_effects, path)
-    draws = _one_of(posterior, at)
-    exponent = draws.pop(LENGTH_EXPONENT, None)
-    lengths = json.loads(about["lengths_mm"])
-    length = lengths[at]
-    if len(lengths) > 1:
-        reference = float(np.exp(np.mean(np.log(lengths))))
-        power = 1.0 if exponent is None else exponent
-        draws = at_length(draws, model.effects, length / reference, power)
-        draws = by_length(draws, model.effects, length, reference)
     test = _Test(
         name=own("experiments"),
-        length_mm=float(length),
+        length_mm=float(own("lengths_mm")),
         reference_C=own("reference_C", constant),
         control=own("controls"),
     )
+    model = _model(about, own_effects, path)
+    model = replace(model, effects=tuple(e for e in model.effects if e.acts_on(test.name, test.control)))
+    draws, exponent = _draws(posterior, at, model)
     protocol, readings = _measured(constant, observed, test)
     resolution = float(own("resolutions"))
     sample = Sample(test.name, about["material"], protocol, readings[..., None], resolution, model)
     likelihood = about["likelihood"]
     check_stored(draws, sample, likelihood)
     return Stored(draws, sample, likelihood, exponent)
+
+
+def _draws(posterior: Group, at: int, model: Model) -> tuple[dict[str, Array], Array | None]:
+    """Draws of the experiment at this place, at its own length, and the exponent of the length, where it is not 1."""
+    about = posterior.attributes
+    draws = _one_of(posterior, at)
+    fixed = float(about.get(LENGTH_EXPONENT, 1.0))
+    exponent = draws.pop(LENGTH_EXPONENT, None)
+    if exponent is None and fixed != 1.0:
+        exponent = np.full(len(draws["B"]), fixed)
+    lengths = json.loads(about["lengths_mm"])
+    if len(lengths) == 1:
+        return draws, exponent
+    length = lengths[at]
+    reference = float(np.exp(np.mean(np.log(lengths))))
+    power = 1.0 if exponent is None else exponent
+    draws = at_length(draws, model.effects, length / reference, power)
+    return by_length(draws, model.effects, length, reference), exponent
 
 
 def _model(about: Mapping[str, Any], own_effects: Path | None, path: Path) -> Model:

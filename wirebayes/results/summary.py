@@ -13,7 +13,7 @@ from wirebayes.result_warnings import Notice, NoticeJson, to_json
 from wirebayes.results import hold_ends, posterior_checks
 from wirebayes.results.contraction import interval
 from wirebayes.results.identifiability import extrapolation, identifiability
-from wirebayes.results.parameters import length_of_creep_amount, unit_of, variables
+from wirebayes.results.parameters import all_effects, length_of_creep_amount, unit_of, variables
 from wirebayes.wire.fresh import FreshSample
 
 
@@ -87,7 +87,7 @@ def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
         "likelihood": problem.likelihood,
         "elastic_law": model.law,
         "history": model.history,
-        "effects": [effect.key for effect in model.effects],
+        "effects": [effect.key for effect in all_effects([sample] if sample else problem.samples)],
         "converged": chains.converged,
         "convergence": chains.why,
         "warnings": _warnings(fit, sample, ends),
@@ -111,7 +111,7 @@ def summary_of(fit: Fit, sample: Sample | None) -> SummaryJson:
 def _parameters(fit: Fit, sample: Sample | None) -> dict[str, Parameter]:
     """Every parameter with its unit; those that each sample has for itself, with the name of the sample."""
     samples = [sample] if sample else list(fit.problem.samples)
-    effects = samples[0].model.effects
+    effects = all_effects(samples)
     controls = [one.protocol.control for one in samples]
     parameters: dict[str, Parameter] = {}
     for name, values in variables(fit.problem, fit.theta, sample).items():

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from wirebayes.answers.robot import of_calibration
 from wirebayes.json_files.calibrate import CalibrateJson
-from wirebayes.views.result import NOTHING, Given, Result, html_table
+from wirebayes.views.result import NOTHING, Given, Result, html_table, typed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,7 +29,7 @@ class Calibration(Result[CalibrateJson]):
             again = "with more poses, or once readings, stated errors and --anchor-sd are checked"
             return f"wirebayes calibrate {given.file} {again}"
         if robot.is_file():
-            settings = f"wirebayes export {robot} --wires {given.wires}  (for controllers and simulators)"
+            settings = f"wirebayes export {typed(robot)} --wires {given.wires}  (for controllers and simulators)"
             return f"{settings}, with the references of {lengths}"
         return f"set the lengths of {lengths} in the controller"
 

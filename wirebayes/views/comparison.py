@@ -1,14 +1,10 @@
 """Models side by side."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from wirebayes.answers import terminal
 from wirebayes.json_files.comparison import ComparisonJson
-
-if TYPE_CHECKING:
-    pass
-
 from wirebayes.views.result import NOTHING, Given, Result, html_table
 
 

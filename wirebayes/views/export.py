@@ -6,7 +6,7 @@ from typing import ClassVar
 from wirebayes.io.run_folder import COMPLETE, CONFIGURATION
 from wirebayes.json_files.export import ExportSummary
 from wirebayes.sentences import counted, listed
-from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
+from wirebayes.views.result import NOTHING, Given, Result, figure, html_table, typed
 
 _FIRMWARE = {"reprapfirmware.g": "config.g", "klipper.cfg": "printer.cfg"}  # and where their lines belong
 _MODEL = "robot.xml"  # MuJoCo's
@@ -39,7 +39,7 @@ class Export(Result[ExportSummary]):
         settings = {name: goal for name, goal in _FIRMWARE.items() if name in there}
         steps = [f"put the lines of {folder / name} into the printer's {goal}" for name, goal in settings.items()]
         if _MODEL in there:
-            steps.append(f"python -m mujoco.viewer --mjcf={folder / _MODEL}")
+            steps.append(f"python -m mujoco.viewer --mjcf={typed(folder / _MODEL)}")
         return "\n".join(steps) or f"read {folder}"
 
     def _short_form(self) -> list[str]:

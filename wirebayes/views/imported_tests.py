@@ -2,17 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from wirebayes.answers import terminal
 from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.json_files.imported import ImportJson
 from wirebayes.sentences import counted
-
-if TYPE_CHECKING:
-    pass
-
 from wirebayes.views.result import NOTHING, Given, Result, html_table, typed
 
 IMPORTED = "import.json"

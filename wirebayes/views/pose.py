@@ -3,18 +3,13 @@
 import csv
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, cast
+from typing import ClassVar, cast
 
 from wirebayes.answers.robot import of_pose
-from wirebayes.json_files.pose import PoseJson
+from wirebayes.json_files.pose import PoseJson, known_at_the_end
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.robot.mechanics.wires_used import specimens_in_words
 from wirebayes.sentences import coordinates
-
-if TYPE_CHECKING:
-    pass
-
-from wirebayes.json_files.pose import known_at_the_end
 from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
 
 

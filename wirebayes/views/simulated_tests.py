@@ -8,7 +8,7 @@ from wirebayes.io.experiment import Experiment
 from wirebayes.io.experiment_file import read_experiments
 from wirebayes.json_files.truth import TruthJson
 from wirebayes.sentences import counted, some_of
-from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
+from wirebayes.views.result import NOTHING, Given, Result, figure, html_table, typed
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,7 +36,7 @@ class SimulatedTests(Result[TruthJson]):
         return [f"Simulated: {some_of(names)} ({what}); the true parameters are in {self._content}"]
 
     def next_step(self, given: Given = NOTHING) -> str:
-        return f"wirebayes fit {self.place.path / 'experiments.toml'}"
+        return f"wirebayes fit {typed(self.place.path / 'experiments.toml')}"
 
     def _short_form(self) -> list[str]:
         return [e.name for e in self.experiments]
