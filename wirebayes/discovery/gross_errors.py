@@ -69,9 +69,7 @@ def without(experiment: Experiment, hold: int, reading: int) -> Experiment:
     holds = []
     for h in experiment.holds:
         if h.number == hold:
-            keep = np.arange(len(h.time_s)) != reading
-            temperature = None if h.temperature_C is None else h.temperature_C[keep]
-            h = replace(h, time_s=h.time_s[keep], readings=h.tension_N[keep], temperature_C=temperature)
+            h = h.of_readings(np.arange(len(h.time_s)) != reading)
         holds.append(h)
     return replace(experiment, holds=tuple(holds))
 
