@@ -85,6 +85,20 @@ def test_a_real_printers_anchors_agree_with_an_independent_least_squares(run):
     assert found["sensors_at_fault"]["bias_N"]["mean"][0] == pytest.approx(16, abs=3)
 
 
+@pytest.mark.slow
+def test_a_file_that_knows_its_anchors_better_than_is_stated_is_told_from_a_search_without_an_end(run):
+    session = FIELD / "lengths-only" / "hp-session-unknown.csv"
+    options = ("--tension-sd", "5", "--reference-sd", "50", "--anchor-sd", "50")
+    _, _, found, _ = _calibrate(run, ANCHORS / "hp4.toml", session, *options)
+    assert found["with_creep_model"]["converged"] and not found["usable"]
+    assert found["sensors_at_fault"]["wires"] == [4]
+    said = " ".join(one["text"] for one in found["warnings"])
+    assert "nearer to the robot's file than their stated errors allow" in said
+    sd = 1e3 * np.array(found["exit_points_m"]["sd"])
+    theirs = [[16.8, -1570.6, -108.6], [1298.2, 1238.1, -161.8], [-1404.1, 738.8, -150.8], [21.3, -0.5, 2354.0]]
+    assert (np.abs(1e3 * np.array(found["exit_points_m"]["mean"]) - theirs) < 5 * sd).all()
+
+
 def test_lengths_alone_are_an_answer_that_says_what_it_does_not_know(run):
     session = FIELD / "lengths-only" / "t1-notension.csv"
     code, _, found, _ = _calibrate(run, ANCHORS / "hp4.toml", session, "--anchor-sd", "2")

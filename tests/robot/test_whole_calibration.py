@@ -1,6 +1,7 @@
 """Calibration of whole robots from the command line: anchors unknown, poses unknown, lengths alone."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +10,10 @@ from scipy.stats import norm, t
 from tests.robot.test_commands import fitted, session_csv  # noqa: F401
 from wirebayes.cli import main
 from wirebayes.io.run_folder import read_json
+from wirebayes.progress import silent
 from wirebayes.robot.mechanics import schema
-from wirebayes.robot.self_calibration import descent, summary, whole
+from wirebayes.robot.self_calibration import descent, search, summary, whole
+from wirebayes.robot.self_calibration.equations import Holds, State
 
 
 def test_rows_without_a_pose_and_unknown_anchors_are_estimated(fitted, session_csv, tmp_path):  # noqa: F811
@@ -97,3 +100,28 @@ def _without_poses(session):
     for cells in lines[1:]:
         cells[1:7] = [""] * 6
     session.write_text("\n".join(",".join(cells) for cells in lines) + "\n")
+
+
+@pytest.mark.parametrize("shown", [6.6, 2.5])
+def test_a_noise_goes_at_most_twice_as_far_as_what_is_shown(shown):
+    before = (np.log([0.3e-3, 1e-5]), np.log([1.0e-3, 1e-5]))
+    last = (np.log([1.0e-3, 1e-5]), np.log([1e-3 * shown, 1e-5]))  # shown grows faster, or nearly as fast, than thought
+    joint, balance = np.exp(whole._ahead([before, last]))
+    assert (1 - 1e-9) * shown <= 1e3 * joint <= 2 * shown * (1 + 1e-9)
+    assert balance == pytest.approx(1e-5)
+
+
+@pytest.mark.parametrize(
+    ("found", "other", "requested"), [(True, False, False), (True, True, True), (False, False, True)]
+)
+def test_an_answer_is_not_given_up_for_a_search_without_one(monkeypatch, found, other, requested):
+    state = State(np.zeros(2), np.zeros((1, 3)), np.eye(3)[None], np.ones((1, 4)))
+    session = SimpleNamespace(position_m=np.zeros((1, 3)), without_poses=lambda: "blind")
+    holds = Holds(session, np.ones((1, 4)))
+    given, blind = (SimpleNamespace(unknowns=None, state=state, converged=one) for one in (found, other))
+    monkeypatch.setattr(search, "estimate", lambda *arguments: blind)
+    for rule in ("_steadier", "_closer"):
+        monkeypatch.setattr(search, rule, lambda *arguments: False)
+    answer = search._rather_requests(given, holds, True, True, silent)
+    assert answer[0] is (blind if requested else given)
+    assert answer[2] is requested

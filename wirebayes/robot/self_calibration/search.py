@@ -38,6 +38,9 @@ class Searched:
         Joint values that were taken as exact are not.
     requested : bool
         Stated poses were taken for requests.
+    too_near : bool
+        Estimates lie nearer to the robot's file than its stated errors allow, and without the stated poses there is
+        no answer.
     """
 
     found: Whole
@@ -46,6 +49,7 @@ class Searched:
     at_fault: Suspects | None
     inexact: bool
     requested: bool
+    too_near: bool = False
 
 
 def searched(
@@ -68,7 +72,8 @@ def searched(
     progress : function of name, done and total
     """
     found = best(unknowns, holds, rng, progress)
-    found, holds, requested = _rather_requests(found, holds, requests, progress)
+    too_good = bool(holds.placed.any()) and _too_good(found)
+    found, holds, requested = _rather_requests(found, holds, too_good, requests, progress)
     p, at_fault = trust(found), None
     if (p < SIGNIFICANT or found.noise.balance > _UNSEEN) and not lost(found):
         at_fault = suspects(found, holds, progress_of(progress, "sensors"))
@@ -76,17 +81,23 @@ def searched(
     if inexact:  # how far from exact the joint values are tells more than that there is no answer
         rough = replace(unknowns, errors=replace(unknowns.errors, joint_m=None))
         found = best(rough, holds, rng, progress, "rough start")
-    return Searched(found, holds, p, at_fault, inexact, requested)
+    return Searched(found, holds, p, at_fault, inexact, requested, too_good and not requested)
 
 
-def _rather_requests(found: Whole, holds: Holds, allowed: bool, progress: Progress) -> tuple[Whole, Holds, bool]:
-    """What is found without the poses, where they are commands or contradict the joint values: they were requests."""
-    too_good = _too_good(found)
+def _rather_requests(
+    found: Whole, holds: Holds, too_good: bool, allowed: bool, progress: Progress
+) -> tuple[Whole, Holds, bool]:
+    """What is found without the poses, where they are commands or contradict the joint values: they were requests.
+
+    An answer is not given up for a search that found none.
+    """
     if not holds.placed.any() or not (too_good or (allowed and found.unknowns.errors.pose_m == 0)):
         return found, holds, False
     blind = replace(holds, session=holds.session.without_poses())
     state = replace(found.state, white=np.zeros_like(found.state.white))
     other = estimate(found.unknowns, blind, state, progress_of(progress, "poses as requests"))
+    if found.converged and not other.converged:
+        return found, holds, False
     better = _steadier(found, other) or _closer(found, other, holds)
     if too_good or (other.converged and better and trust(other) >= SIGNIFICANT):
         return other, blind, True

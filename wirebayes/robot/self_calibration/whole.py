@@ -48,6 +48,9 @@ _LEVEL_FIT = 0.5  # of the sum of squares, from one round to the next: more, and
 _SURE = 8  # rounds from which on noises go ever smaller shares of their way
 _SETTLED = 0.02  # of a noise, relative
 _CREEPING = 0.8  # slope of what is shown over what is thought: a secant of more would leap
+# Logarithm of what a secant may go beyond what is shown: another mode, whose loops are open as far as noise lets them,
+# lies a few times farther, and a search that leaps there stays.
+_LEAP = np.log(2.0)
 _UNEVEN = 0.3  # of the weight: tensions that were read badly, at a rough pose
 _EASINGS = 16  # quarterings that lead from a tenth of the span to a micrometre
 # Of the range that a robot's file allows: tensions that nobody read lie anywhere in it, so this is their standard
@@ -229,7 +232,9 @@ def _ahead(rounds: list[tuple[Floats, Floats]]) -> Floats:
     gone = noise - noise_before
     slope = np.divide(shown - shown_before, gone, out=np.zeros_like(gone), where=np.abs(gone) > 1e-9)
     closing = 1.0 - np.clip(slope, -1.0, _CREEPING)
-    return noise + (shown - noise) / closing
+    step = shown - noise
+    beyond = np.where(slope < 1.0, step / closing - step, 0.0)
+    return shown + np.clip(beyond, -_LEAP, _LEAP)
 
 
 def _from_rough(unknowns: Unknowns, holds: Holds, noise: Noise, state: State, creep: Grown) -> State:

@@ -166,7 +166,7 @@ class _Verdict:
         """Whether the values are known and nothing contradicts them."""
         search = self.search
         biased = search.at_fault is not None and search.at_fault.p_none < SIGNIFICANT
-        explained = search.p >= SIGNIFICANT and not (search.inexact or self.uneven or biased)
+        explained = search.p >= SIGNIFICANT and not (search.inexact or search.too_near or self.uneven or biased)
         return bool(search.found.converged and self.learnt and explained)
 
 
@@ -265,6 +265,13 @@ def _warnings(verdict: _Verdict) -> list[Notice]:
             "taken for requests, and the poses as unknown; give --pose-sd if they were measured"
         )
         out.append(Notice("data", text))
+    if search.too_near:
+        text = (
+            "geometry and references are found nearer to the robot's file than their stated errors allow: the file "
+            "knows them better than --anchor-sd and --reference-sd say, or the joint values were computed for the "
+            "stated poses, without which there is no answer; do not use these values before the errors are stated anew"
+        )
+        out.append(Notice("misfit", text))
     if found.converged and search.inexact:
         text = (
             f"geometry, taken as exact, and joint values agree to {short(1e3 * found.noise.joint_m, 2)} mm only: do "
