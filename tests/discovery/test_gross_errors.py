@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.simulated import simulated_tests
-from wirebayes.discovery.gross_errors import without
+from wirebayes.discovery.gross_errors import place_in_file, without
 from wirebayes.io.experiment import Experiment
 from wirebayes.simulation.synthetic import Bench, Truth
 
@@ -34,3 +34,15 @@ def test_a_hold_whose_only_reading_is_struck_out_was_not_recorded() -> None:
     after = without(before, 2, 0)
     assert [hold.recorded for hold in after.holds] == [True, False, True]
     assert after.protocol().number.tolist() == [1, -1, 3] and np.array_equal(after.protocol().setting, [1.0, 2.0, 3.0])
+
+
+def test_a_further_reading_of_a_hold_is_named_as_the_file_counts_it() -> None:
+    """Whatever was struck out of the hold before, in any order."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        in_file, struck = list(range(8)), []
+        for _ in range(5):
+            left = int(rng.integers(len(in_file)))
+            found = place_in_file(left, struck)
+            assert found == in_file.pop(left)
+            struck.append(found)

@@ -267,8 +267,10 @@ def _strike_gross_errors(
         found = gross_errors.suspect(block, _best_rival(block, trials, own))
         if found is None:
             break
-        name, hold, reading, value = found
-        block = _refitted_without(block, name, hold, reading, rng)
+        name, hold, left, value = found
+        block = _refitted_without(block, name, hold, left, rng)
+        gone = [s["reading"] for s in struck if (s["experiment"], s["hold"]) == (name, hold)]
+        reading = gross_errors.place_in_file(left, gone)
         struck.append({"experiment": name, "hold": hold, "reading": reading, "log_bayes": value})
     return block, struck
 

@@ -74,6 +74,21 @@ def without(experiment: Experiment, hold: int, reading: int) -> Experiment:
     return replace(experiment, holds=tuple(holds))
 
 
+def place_in_file(left: int, struck: Sequence[int]) -> int:
+    """Position of a reading in its hold as the file has it, from its position among those that are left.
+
+    Parameters
+    ----------
+    left : int
+    struck : sequence of int
+        Positions, in the file, of the readings of the hold that were struck out before.
+    """
+    place = left
+    for gone in sorted(struck):
+        place += gone <= place
+    return place
+
+
 def in_words(error: GrossError) -> Notice:
     """The warning of a reading that was struck out.
 
