@@ -213,6 +213,7 @@ def test_command_refuses_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixtu
     for words, message in (
         (["--only", "springy", "--experiment", "kite-1.5m"], "--only springy"),
         (["--train-holds", "40"], "found --train-holds 40"),
+        (["--train-holds", "2"], "found --train-holds 2, expected 3 or more: each of them is left out"),
         (["--experiment", "kite"], "did you mean kite-1.5m"),
     ):
         assert cli.main(["compare", file, "--output", str(tmp_path / "no"), *words]) == 2

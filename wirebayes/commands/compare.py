@@ -37,6 +37,8 @@ from wirebayes.views.result import ResultFolder
 from wirebayes.wire.effect import Kinds
 from wirebayes.wire.laws import ElasticLaw, History
 
+_LEAST_HOLDS = 3  # one is left out, and what creep of an earlier hold carries into a later one shows from two on
+
 
 def compare(
     source: Source,
@@ -64,7 +66,7 @@ def compare(
     experiment : str, optional
         This experiment only.
     train_holds : int, optional
-        Fit the first so many recorded holds only, and predict all after them.
+        Fit the first so many recorded holds only, three or more, and predict all after them.
     elastic_law, history, likelihood
         Of the plain model, as in `fit`.
     only : sequence of str
@@ -86,7 +88,7 @@ def compare(
     Raises
     ------
     InputError
-        Something that was given is wrong, or a test has fewer than three recorded holds.
+        Something that was given is wrong, or fewer than three recorded holds are there or trained on.
 
     Examples
     --------
@@ -202,10 +204,16 @@ def _check_holds(experiment: Experiment, train_holds: int | None) -> None:
     """Refuse a test that has not as many holds as are wanted, or too few to hold some out."""
     recorded = len(experiment.recorded_holds)
     experiment.first(recorded if train_holds is None else train_holds)
-    if recorded < 3:
+    if recorded < _LEAST_HOLDS:
         holds = counted(recorded, "recorded hold")
-        found = f"found {holds}, expected 3 or more: some are held out, and the others tell the models apart"
+        found = (
+            f"found {holds}, expected {_LEAST_HOLDS} or more: some are held out, and the others tell the models apart"
+        )
         raise InputError(f"{experiment.source}, experiment {experiment.name}: {found}")
+    if train_holds is not None and train_holds < _LEAST_HOLDS:
+        found = f"found --train-holds {train_holds}, expected {_LEAST_HOLDS} or more"
+        why = "each of them is left out in turn, and the others tell the models apart"
+        raise InputError(f"{experiment.source}, experiment {experiment.name}: {found}: {why}")
 
 
 def _chosen(experiment: Experiment, base: ModelToCompare, known: Kinds, names: Sequence[str]) -> list[ModelToCompare]:
