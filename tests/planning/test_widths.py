@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.rescaled import rewritten
 from wirebayes.inference.climb import climb
 from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.log_posterior import LogPosterior
@@ -12,6 +13,7 @@ from wirebayes.inference.policy import Policy
 from wirebayes.model.build import build
 from wirebayes.model.problem import with_readings
 from wirebayes.model.replicate import readings
+from wirebayes.model.scales import Units
 from wirebayes.model.spec import PLAIN_SPEC
 from wirebayes.planning import widths
 from wirebayes.planning.widths import at_centre, expected_widths, middle_tension
@@ -72,6 +74,21 @@ def test_without_weights_it_would_not_be(monkeypatch):
     one_round = widths._round
     monkeypatch.setattr(widths, "_round", even)
     assert abs(np.log(planned_over_sampled(RIDGE))).mean() > 0.2  # twice what is allowed
+
+
+@pytest.mark.parametrize("by", [Units(256.0, 1.0, 1.0), Units(1.0, 1024.0, 1.0), Units(3.0, 700.0, 60.0)])
+def test_what_a_test_teaches_does_not_depend_on_units(by):
+    """The same wire and test in other lengths, tensions and times: as many bits, and widths that are as many times."""
+    test, here = at_centre(RIDGE.experiment(), guess(8), PLAIN_SPEC), guess(8)
+    length, tension, time = by.length_mm, by.tension_N, by.time_s
+    units = {"k1": tension, "sensor_sd": tension, "preload": length, "setting_sd": length}
+    units |= {"B": length * tension ** -here["U"], "k2": time ** -here["N"]}
+    there = {name: values * units.get(name, 1.0) for name, values in here.items()}
+    one = expected_widths(test, here, np.random.default_rng(1))
+    other = expected_widths(rewritten(test, by), there, np.random.default_rng(1))
+    assert other.information_bits == pytest.approx(one.information_bits, abs=1e-3)
+    for name, factor in {"k1": tension, "preload": length, "U": 1.0, "creep_longest_hold_mm": length}.items():
+        assert other.widths[name]["sd"] == pytest.approx(one.widths[name]["sd"] * factor, rel=1e-3)
 
 
 def test_more_readings_and_longer_holds_teach_more():

@@ -128,29 +128,29 @@ def expected_widths(
     ValueError
         If no simulated test has a posterior that can be climbed.
     """
-    problem = build([test], (), spec)
-    (sample,) = problem.samples
+    natural = build([test], (), spec)
+    problem = natural.in_units(natural.own_units)  # so that nothing depends on what is called a newton
     creep = _Creep(
         tension_N=middle_tension(test) if tension_N is None else tension_N,
         length_mm=test.length_mm if length_mm is None else length_mm,
-        longest_s=float(sample.protocol.duration_s.max()),
+        longest_s=float(natural.samples[0].protocol.duration_s.max()),
     )
     target = LogPosterior(problem)
-    guessed = np.column_stack([guess[name] for name in problem.names])
-    truth, y = _simulated(problem, guessed, rng)
+    guessed = np.column_stack([guess[name] for name in natural.names])
+    truth, y = _simulated(problem, natural.theta_in(problem.units, guessed), rng)
     found, good = _climbed(target, truth, y)
     widths = list[dict[str, Array]]()
     volumes = list[Array]()
     draws = list[dict[str, Array]]()
     for part in _posteriors(target, found, good, y, rng):
-        values = part.of_tests(_quantities(problem, part.theta, creep))
+        values = part.of_tests(_quantities(natural, problem.theta_in(natural.units, part.theta), creep))
         own = {}
         for name, rows in values.items():
             own[name] = _row_widths(rows, part.weight)
         widths.append(own)
         volumes.append(_log_volume(part, problem))
         draws += _kept(part, values, kept_draws - len(draws), rng)
-    before = _quantities(problem, truth, creep)
+    before = _quantities(natural, problem.theta_in(natural.units, truth), creep)
     return Expected(
         _expected(widths, before, test),
         creep.tension_N,
@@ -183,7 +183,10 @@ def _simulated(problem: Problem, truth: Array, rng: Generator) -> tuple[Array, A
 
 @dataclass(frozen=True)
 class _Posteriors:
-    """Of some simulated tests: draws of all of them after each other (tests * draws, d), and their weights."""
+    """Of some simulated tests: draws of all of them after each other (tests * draws, d), and their weights.
+
+    Parameters are in the problem's units.
+    """
 
     theta: Array
     weight: Array
@@ -242,7 +245,7 @@ def _bits(problem: Problem, log_volumes: Array) -> float:
 
 
 def _weighted(target: LogPosterior, z: Array, covariance: Array, y: Array, rng: Generator) -> tuple[Array, Array]:
-    """(m * k, d) natural draws at m modes, and their (m, k) weights, each row summing to one.
+    """(m * k, d) draws of the parameters at m modes, and their (m, k) weights, each row summing to one.
 
     The first draws are spread as the curvature at the mode says, those of each further round as the weighted draws
     before them lie.
