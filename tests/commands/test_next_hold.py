@@ -2,6 +2,7 @@
 
 import csv
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from wirebayes.io.next_hold import NEXT_HOLD, write_next_hold
 from wirebayes.io.readings import protocol_holds, protocol_table
 
 FEW = wb.Policy(walkers=32, ess=300, rounds=2, round_draws=1024, block=20, most_steps=60, r_hat=1.5)
+JOINT = replace(FEW, most_steps=240)  # several tests together take more steps to agree
 
 
 def one_test(**options: Any) -> wb.Experiment:
@@ -76,11 +78,24 @@ def test_hold_by_hold_the_next_hold_has_its_first_reading_and_runs_too(options, 
 def test_the_command_that_the_next_line_names_runs_as_it_stands(lengths, together, tmp_path, capsys) -> None:
     experiments = wb.simulate_tests(seed=1, displacements=[1, 2, 3], times=[0, 30, 60], lengths=lengths).experiments
     material = experiments[0].material if together else None
-    found = wb.fit(experiments, together=material, policy=FEW, check=False, output=tmp_path / "out")
+    found = wb.fit(experiments, together=material, policy=JOINT, check=False, output=tmp_path / "out")
     command = shlex.split(found.next_step().partition("  (")[0])
     assert command.pop(0) == "wirebayes"
     assert main(command) == 0
     assert f"Hold 4 of {experiments[0].name}, at 4 mm" in capsys.readouterr().out
+
+
+def test_a_fit_of_two_kinds_of_test_has_an_example_of_each(tmp_path, capsys) -> None:
+    hung = replace(one_test(weights=[5.0, 10.0, 20.0]), name="hung")
+    pulled = one_test(displacements=[1, 2, 3])
+    tests = [pulled, replace(pulled, name="again"), hung]
+    found = wb.fit(tests, together=hung.material, policy=JOINT, check=False, output=tmp_path / "out")
+    steps = [shlex.split(step.partition("  (")[0])[1:] for step in found.next_step().splitlines()]
+    predictions = [step for step in steps if step[0] == "predict"]
+    for command, (name, at) in zip(predictions, [(pulled.name, "4 mm"), ("hung", "30 N")], strict=True):
+        assert main(command) == 0
+        assert f"Hold 4 of {name}, at {at}" in capsys.readouterr().out
+    assert not (tmp_path / "out" / hung.material_folder / "next-again.csv").exists()
 
 
 def test_commands_that_follow_are_given_effects_of_the_user_s_own(tmp_path, capsys) -> None:

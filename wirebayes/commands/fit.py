@@ -23,7 +23,7 @@ from wirebayes.effects import catalogue, effect_named, source_of
 from wirebayes.errors import InputError
 from wirebayes.inference.policy import DEFAULT, Policy
 from wirebayes.io.experiment import Experiment
-from wirebayes.io.next_hold import write_next_hold
+from wirebayes.io.next_hold import write_next_holds
 from wirebayes.io.run_folder import open_run
 from wirebayes.model.build import build
 from wirebayes.model.sample import Likelihood
@@ -184,10 +184,9 @@ def _compute(jobs: Sequence[Job], folder: Path, seed: int, check: bool, policy: 
                 if check:
                     write_checks(jobs, folder, seed, report, parallel_map)
     for job in jobs:
-        experiment = job.experiments[0]
         own_folder = folder / job.folder
         hold_by_hold = job.spec.likelihood == "hold"
-        write_next_hold(experiment, own_folder, hold_by_hold=hold_by_hold)
+        write_next_holds(job.experiments, own_folder, hold_by_hold=hold_by_hold)
 
 
 def fits_in(

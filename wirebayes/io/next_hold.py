@@ -1,5 +1,6 @@
 """An example of what `predict` reads, beside a fit: one hold more of the same test, to be edited."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,35 @@ NEXT_HOLD = "next.csv"
 _MOST_READINGS = 5  # of a recording's thousands: enough to see a curve, few enough to edit
 
 
-def write_next_hold(experiment: Experiment, folder: Path, *, hold_by_hold: bool = False) -> None:
+def next_hold_of(name: str) -> str:
+    """The name of an example for a test that is fitted with others of another kind."""
+    return f"next-{name}.csv"
+
+
+def write_next_holds(experiments: Sequence[Experiment], folder: Path, *, hold_by_hold: bool = False) -> None:
+    """Write an example of the first test of a fit, and of the first one of every other kind that it has.
+
+    Tests are of one kind where the same is set and temperatures are known of both or of neither: their examples have
+    the same columns.
+
+    Parameters
+    ----------
+    experiments : sequence of Experiment
+    folder : Path
+    hold_by_hold : bool
+        As for `write_next_hold`.
+    """
+    seen = set()
+    for experiment in experiments:
+        kind = experiment.control, experiment.recorded_holds[-1].temperature_C is not None
+        if kind in seen:
+            continue
+        file = next_hold_of(experiment.name) if seen else NEXT_HOLD
+        write_next_hold(experiment, folder, hold_by_hold=hold_by_hold, file=file)
+        seen.add(kind)
+
+
+def write_next_hold(experiment: Experiment, folder: Path, *, hold_by_hold: bool = False, file: str = NEXT_HOLD) -> None:
     """Write the protocol of one hold more of a test into the folder of its results.
 
     Parameters
@@ -22,6 +51,8 @@ def write_next_hold(experiment: Experiment, folder: Path, *, hold_by_hold: bool 
     hold_by_hold : bool
         Whether it was fitted so: a hold is then predicted from its first reading, and the example is a tested hold
         once more, from where that began.
+    file : str
+        The example's name.
     """
     control = experiment.control
     last = example = experiment.recorded_holds[-1]
@@ -44,7 +75,7 @@ def write_next_hold(experiment: Experiment, folder: Path, *, hold_by_hold: bool 
         first.append(float(example.readings[0]))
         for row in others:
             row.append("")
-    write_csv(folder / NEXT_HOLD, header, rows)
+    write_csv(folder / file, header, rows)
 
 
 def _one_step_further(experiment: Experiment) -> float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from wirebayes.answers import terminal
 from wirebayes.answers.headline import UNUSABLE
 from wirebayes.errors import InputError
-from wirebayes.io.next_hold import NEXT_HOLD
+from wirebayes.io.next_hold import NEXT_HOLD, next_hold_of
 from wirebayes.io.run_folder import CONFIGURATION, stored_results
 from wirebayes.json_files.summary import SummaryJson
 from wirebayes.numeric.typing import Floats
@@ -271,15 +271,27 @@ def _after_fit(posterior: Posterior, kinds: frozenset[str], given: Given) -> str
     """What to do with the posteriors of a command, of which one is given with the kinds of the warnings of all."""
     if "model-check" in kinds:
         return f"wirebayes discover {given.file}  (what is the model missing?)"
-    several = not posterior.alone or len(posterior.experiments) > 1
-    whose = f" --experiment {posterior.experiments[0]}" if several else ""
     if "not-converged" in kinds:
         return UNUSABLE
     own = own_effects_option(posterior.own_effects)
-    prediction = next_prediction(posterior.place.path, posterior.folder, whose + own)
-    if posterior.summary()["likelihood"] == "hold":  # k1 is not determined, which a robot needs
-        return prediction
-    return f"{prediction}\n{next_pose(posterior.folder, own)}"
+    steps = _next_predictions(posterior, own)
+    if posterior.summary()["likelihood"] != "hold":  # else k1 is not determined, which a robot needs
+        steps.append(next_pose(posterior.folder, own))
+    return "\n".join(steps)
+
+
+def _next_predictions(posterior: Posterior, own: str) -> list[str]:
+    """The commands that predict the examples beside a fit: the first test's, and one of every other kind."""
+    first, *others = posterior.experiments
+    several = not posterior.alone or others
+    whose = f" --experiment {first}" if several else ""
+    results, folder = posterior.place.path, posterior.folder
+    commands = [next_prediction(results, folder, whose + own)]
+    for name in others:
+        file = next_hold_of(name)
+        if (folder / file).is_file():
+            commands.append(next_prediction(results, folder, f" --experiment {name}{own}", file))
+    return commands
 
 
 def own_effects_option(file: Path | None) -> str:
@@ -287,7 +299,7 @@ def own_effects_option(file: Path | None) -> str:
     return "" if file is None else f" --own-effects {typed(file)}"
 
 
-def next_prediction(results: Path, around: Path, options: str = "") -> str:
+def next_prediction(results: Path, around: Path, options: str = "", file: str = NEXT_HOLD) -> str:
     """The command that predicts the example of a hold to come.
 
     Parameters
@@ -298,8 +310,10 @@ def next_prediction(results: Path, around: Path, options: str = "") -> str:
         The folder with the example.
     options : str
         Those that name one of several experiments, and the user's own effects.
+    file : str
+        The example's name.
     """
-    command = f"wirebayes predict {typed(results)} {typed(around / NEXT_HOLD)}{options}"
+    command = f"wirebayes predict {typed(results)} {typed(around / file)}{options}"
     return f"{command}  (one hold more: edit the file for others)"
 
 
