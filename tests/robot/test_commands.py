@@ -461,6 +461,16 @@ def test_the_exported_model_settles_at_home_in_mujoco(fitted, tmp_path):
     assert np.abs(data.qacc).max() < 1e-6
 
 
+def test_a_payload_of_the_table_beside_one_of_the_command_is_refused(fitted, tmp_path, capsys):
+    way, out = tmp_path / "way.csv", tmp_path / "out"
+    arguments = ["pose", "linear-7", "--wires", str(fitted), "--trajectory", str(way), "--output", str(out)]
+    way.write_text("time_s,x_m,y_m,z_m,payload_kg\n0,0,0,.6,0\n60,0,0,.6,.2\n")
+    assert main([*arguments, "--payload", "0.1"]) == 2
+    said = capsys.readouterr().err
+    assert "found payload_kg in the table of --trajectory beside --payload 0.1, expected one of them" in said
+    assert not out.exists()
+
+
 def test_the_command_maps_the_requested_slices(fitted, tmp_path):
     import csv
 

@@ -35,6 +35,8 @@ class AskedPose:
         Components of the rotation vector, NaN where balance decides; None where nothing is asked for.
     seed : int
     own_effects : Path or None
+    payload_kg : float
+        What ``--payload`` gave the robot.
     """
 
     robot: Robot
@@ -43,6 +45,7 @@ class AskedPose:
     rotation_rad: Floats | None
     seed: int
     own_effects: Path | None
+    payload_kg: float = 0.0
 
     @property
     def start(self) -> tuple[Floats, Floats]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -174,7 +174,7 @@ def pose(
     allowed = _Allowed(rising_times(times), float(tolerance), float(tolerance_tilt))
     allowed.check()
     specimen_spread = check_spread(specimen_spread, alike=False)
-    asked = given.asked(machine, position, rotation)
+    asked = replace(given.asked(machine, position, rotation), payload_kg=float(payload or 0.0))
     specimen_spread = typical_spread(asked.line, specimen_spread)
     carried = carried_options(payload, payload_at)
     at = spelled({"--position": position, "--rotation": rotation})

@@ -150,6 +150,7 @@ def pose_over_time(asked: AskedPose, option: str, given: Any, errors: Uncertain,
         cells = columns_table(given, Path(name), table.may_be_unread)
         history = table.parse_log(cells, robot, columns)
         read = hash_of({option: [cells.header, *cells.rows]})
+    _refuse_two_payloads(asked, option, history)
     _refuse_off_plane(robot, option, history)
     lasting = {  # in a fixed order, as in `wires.configuration`
         "of": name,
@@ -176,6 +177,13 @@ def pose_over_time(asked: AskedPose, option: str, given: Any, errors: Uncertain,
         pictures.save_history_pictures(folder, robot, history, found)
         opened.finish()
     return Pose(begun.place, asked.own_effects)
+
+
+def _refuse_two_payloads(asked: AskedPose, option: str, history: History) -> None:
+    """Refuse a payload of the table beside one of the command: whether they add up, nobody said."""
+    if asked.payload_kg and history.payload_kg.any():
+        given = f"found {table.PAYLOAD} in the table of {option} beside --payload {asked.payload_kg:g}"
+        raise InputError(f"{given}, expected one of them: write what is carried in all into the table")
 
 
 def _refuse_off_plane(robot: Robot, option: str, history: History) -> None:
