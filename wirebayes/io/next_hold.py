@@ -31,7 +31,7 @@ def write_next_holds(experiments: Sequence[Experiment], folder: Path, *, hold_by
     hold_by_hold : bool
         As for `write_next_hold`.
     """
-    seen = set()
+    seen: set[tuple[str, bool]] = set()
     for experiment in experiments:
         kind = experiment.control, experiment.recorded_holds[-1].temperature_C is not None
         if kind in seen:
