@@ -212,6 +212,16 @@ def test_an_effect_with_a_function_of_its_own_has_lost_its_parent_s_formula():
     assert (softer < stiffer).all()
 
 
+def test_an_effect_may_name_the_formula_of_a_function_that_it_inherits():
+    class Named(StrainStiffening):
+        name, formula = "named", StrainStiffening.formula
+
+    class Inherited(StrainStiffening):
+        name = "inherited"
+
+    assert Named().has_formula and Inherited().has_formula
+
+
 def test_numpy_computes_what_has_no_formula_and_what_is_complex():
     p = protocol(ONE_WAY, [TIMES] * 6)
     theta = {name: np.array([value]) for name, value in PLAIN.items()}

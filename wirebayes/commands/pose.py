@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -174,7 +174,7 @@ def pose(
     allowed = _Allowed(rising_times(times), float(tolerance), float(tolerance_tilt))
     allowed.check()
     specimen_spread = check_spread(specimen_spread, alike=False)
-    asked = replace(given.asked(machine, position, rotation), payload_kg=float(payload or 0.0))
+    asked = given.asked(machine, position, rotation, payload)
     specimen_spread = typical_spread(asked.line, specimen_spread)
     carried = carried_options(payload, payload_at)
     at = spelled({"--position": position, "--rotation": rotation})
@@ -231,11 +231,13 @@ class _Given:
         """Draws of the posterior of some wires, for the robot with its payload."""
         return draws_for(machine, wires, self.draws, self.experiment, self.own_effects)
 
-    def asked(self, machine: Robot, position: Numbers | None, rotation: Numbers | None) -> AskedPose:
+    def asked(
+        self, machine: Robot, position: Numbers | None, rotation: Numbers | None, payload_kg: float | None
+    ) -> AskedPose:
         """The pose of the robot with its payload, and its wires."""
         line = self.draws_of(self.wires, machine)
         place = asked_place(machine, position, rotation)
-        return AskedPose(machine, line, *place, self.seed, self.own_effects)
+        return AskedPose(machine, line, *place, self.seed, self.own_effects, float(payload_kg or 0.0))
 
     def other(self, fit: Wires | None, machine: Robot) -> tuple[WireDraws | None, str | None]:
         """Draws of another fit of the line, and what its content is known by; none where there is none."""

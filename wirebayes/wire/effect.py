@@ -200,9 +200,10 @@ class Effect:
     @property
     def has_formula(self) -> bool:
         """Whether the compiled twin computes it: a subclass with an `apply` of its own has lost that of its parent."""
-        kinds = type(self).__mro__
-        applied = next(kind for kind in kinds if "apply" in vars(kind))
-        return bool(self.formula) and applied is next(kind for kind in kinds if "formula" in vars(kind))
+        kinds = [vars(kind) for kind in type(self).__mro__]
+        applied = next(place for place, own in enumerate(kinds) if "apply" in own)
+        stated = next(place for place, own in enumerate(kinds) if "formula" in own)
+        return bool(self.formula) and stated <= applied
 
     @property
     def formula_constant(self) -> float:
