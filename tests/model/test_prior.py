@@ -44,7 +44,7 @@ def test_draws_quantiles_and_density_belong_to_one_distribution():
 def test_the_stated_ranges_are_the_5_and_95_percent_points():
     stated = {
         "k1": (0.13, 18),
-        "B": (0.0064 * 0.5, 0.88 * 0.5),
+        "B": (0.013, 1.8),
         "U": (0.16, 1.6),
         "k2": (0.059, 8.3),
         "N": (0.31, 1.4),
@@ -53,7 +53,7 @@ def test_the_stated_ranges_are_the_5_and_95_percent_points():
         "setting_sd": (0.004, 0.16),
     }
     length, steps = 1000.0 / SCALES.range_mm, SCALES.range_mm / SCALES.step_mm
-    unit = {"k1": length, "B": 2.0 * steps, "preload": steps}
+    unit = {"k1": length, "B": 0.5 * steps, "preload": steps}
     for name, distribution in wire_defaults(1000.0, SCALES).items():
         found = distribution.ppf([0.05, 0.95]) / unit.get(name, 1.0)
         assert found == pytest.approx(stated[name], rel=0.15), name

@@ -73,7 +73,7 @@ def fit(
     likelihood : {"chain", "hold"}
         Treat the holds as one history, or each hold separately.
     effects : sequence of str
-        Effects to add, by name; ``grip_slip@7`` names its hold. See `list_effects`.
+        Effects to add, by name; ``grip_slip@7`` names its hold, ``grip_slip@TEST:7`` its test too. See `list_effects`.
     own_effects : path, optional
         A Python file with effects of your own.
     together : str, optional

@@ -9,7 +9,7 @@ parameter      range                                       reason
 k1             0.13 to 18 tensions / (range / length)      a test spans tensions of its typical size: k1 times the
                                                            range of strain is 2 typical tensions where it begins at
                                                            none, less where the wire is preloaded or kept slack
-B              0.0064 to 0.88 of half the range            creep at the typical tension as a share of the elastic
+B              0.013 to 1.8 of half the range              creep at the typical tension as a share of the elastic
                                                            stretch there: a per cent on stiff braids, most on kite line
 U              0.16 to 1.6                                 linear viscoelasticity is 1; polymers under small loads lie
                                                            below
