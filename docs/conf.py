@@ -86,8 +86,19 @@ def _pages_of_commands(_app: object) -> None:
         (folder / f"{name}.rst").write_text(page, encoding="utf-8")
 
 
+def _table_of_commands(_app: object) -> None:
+    """What each command does, in the order in which ``wirebayes --help`` lists them."""
+    lines = [".. list-table::", "   :widths: 18 82", ""]
+    for name, command in COMMANDS.items():
+        lines += [f"   * - :doc:`{name} <commands/{name}>`", f"     - {command.summary}"]
+    target = Path(__file__).parent / "generated" / "commands.rst"
+    target.parent.mkdir(exist_ok=True)
+    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def setup(app: object) -> None:
     """Called by Sphinx."""
     app.connect("builder-inited", _table_of_mistakes)  # type: ignore[attr-defined]
     app.connect("builder-inited", _table_of_effects)  # type: ignore[attr-defined]
+    app.connect("builder-inited", _table_of_commands)  # type: ignore[attr-defined]
     app.connect("builder-inited", _pages_of_commands, priority=100)  # type: ignore[attr-defined]
