@@ -140,11 +140,11 @@ def test_what_few_draws_of_great_weight_made_of_a_hill_is_not_overlooked() -> No
 
 
 def test_a_mode_that_half_the_searches_miss_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Five holds of the 1.71 m line have two modes, and the first search is made to miss the one with more mass.
+    """Eight holds of the kite line have two modes, and the first search is made to miss the one with more mass.
 
     Without a witness some machines find it, too: what learned proposals reach depends on the last digits.
     """
-    problem = build([experiments()[1].train(5)])
+    problem = build([experiments()[3].train(8)])
     true, made = module.searches, []
 
     def searches(target: object, rng: np.random.Generator, n: int, starts: int) -> list[Optimum]:

@@ -54,6 +54,7 @@ def test_the_chain_is_the_dense_normal(p, theta, errors, model, resolution, seed
     # a preload on the brink of slackness: the creep's derivative by the tension has no bound there
     assume(theta["preload"] == 0 or abs(theta["preload"]) > 1e-3)
     y = measured(p, theta, model, seed)
+    assume(linearise(p, columns(theta), model).edges is None)
     r, covariance, _ = normal(p, theta, model, y, resolution)
     expected = log_density(r, covariance)
     found = filtered(p, theta, y, model, resolution).log_likelihood.sum()
@@ -150,6 +151,7 @@ def test_leaving_a_hold_out_is_dense_conditioning(p, theta, errors, seed):
     y = measured(p, theta, seed=seed)
     r, covariance, hold = normal(p, theta, Model(), y, 0.01)
     line = linearise(p, columns(theta))
+    assume(line.edges is None)
     variance = likelihoods.reading_variance(np.array([theta["sensor_sd"]]), 0.01)
     seen = Measured(y[..., None], p.mask, variance, np.array([theta["setting_sd"]]))
     filtered = likelihoods.chain(line, seen)

@@ -104,7 +104,7 @@ def test_for_other_factors_the_log_posterior_is_the_same_at_mapped_parameters(in
         target, again = LogPosterior(a), LogPosterior(b)
         value = target(target.coordinates.to_sampled(theta))
         mapped = again(again.coordinates.to_sampled(theta))
-        np.testing.assert_allclose(mapped, value, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(mapped, value, rtol=1e-6, atol=1e-9)  # squares of a million errors are among them
 
 
 @pytest.mark.parametrize("index", [1, 4, *(pytest.param(index, marks=pytest.mark.slow) for index in range(5, NUMBER))])

@@ -35,7 +35,10 @@ def test_the_densities_are_those_of_problems_without_a_hold(likelihood: str) -> 
     prior = target.sampled_prior(theta, target.coordinates.to_sampled(theta))
     found, expected = joined_densities(target, holds)(target.coordinates.to_sampled(theta)), prior + likelihoods
     good = np.isfinite(expected).all(axis=0)
-    assert good.sum() > 100
+    if likelihood == "chain":  # near an edge what comes after a hold is taken on one side, whatever was left out
+        edges = [problem.linearised(theta, sample)[0].edges for sample in problem.samples]
+        good &= ~np.any([e.near.any(axis=0) for e in edges if e is not None], axis=0)
+    assert good.sum() > 80
     np.testing.assert_allclose(found[good], expected.T[good], rtol=1e-7, atol=1e-6)
 
 

@@ -87,12 +87,13 @@ def test_readings_and_derivatives_are_those_of_numpy(p, model, rows, seed):
     theta = drawn(model, rows, seed)
     assert compiled.call(p, theta, model) is not None
     line, expected = linearise(p, theta, model), by_numpy(lambda: linearise(p, theta, model))
-    assume(all(np.isfinite(value).all() for value in vars(expected).values()))
+    fields = {name: value for name, value in vars(expected).items() if name != "edges"}
+    assume(all(np.isfinite(value).all() for value in fields.values()))
     # of a wire that is just slack, or pulls by rounding alone, the derivatives are anything
     stretched = theta["preload"] + p.setting[:, None] - expected.creep[:-1]
     assume((np.abs(stretched) > 1e-3).all())
     assume(not any(((t > 0) & (t < 1e-6 * theta["k1"])).any() for t in (line.reading, expected.reading)))
-    for name, value in vars(expected).items():
+    for name, value in fields.items():
         same(getattr(line, name), value, theta["k1"].max())
     setting = np.random.default_rng(seed).normal(0.0, 0.1, (len(p.setting), len(rows)))
     same(simulate(p, theta, model, setting), by_numpy(lambda: simulate(p, theta, model, setting)), theta["k1"].max())

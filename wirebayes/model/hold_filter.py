@@ -3,14 +3,14 @@
 `line` is what `wirebayes.wire.staircase.linearise` returned; j is the number of a hold in it.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from wirebayes.numeric.typing import Array
-from wirebayes.wire.staircase import Linearised
+from wirebayes.wire.compiled import FirstReadings
+from wirebayes.wire.staircase import Linearised, Side
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 
@@ -65,6 +65,14 @@ class Measured:
         """(n,) or (1,) the first reading of a hold."""
         return self.readings[j][int(np.argmax(self.mask[j]))]
 
+    @property
+    def first_readings(self) -> FirstReadings:
+        """Of every hold, NaN where it has none."""
+        column = np.argmax(self.mask, axis=1)
+        value = np.array([self.first(j) for j in range(len(column))])
+        value[~self.mask.any(axis=1)] = np.nan
+        return FirstReadings(value, column, self.variance)
+
 
 def carried_unread(line: Linearised, j: int, m: Array, p: Array, noise: ReadingNoise) -> tuple[Array, Array]:
     """Mean and variance of the creep that a hold without readings carries on.
@@ -91,12 +99,12 @@ class LinearHold(NamedTuple):
     by_setting: Array
 
     @classmethod
-    def of(cls, line: Linearised, j: int, taken: Array | slice) -> "LinearHold":
+    def of(cls, line: Linearised | Side, j: int, taken: Array | slice) -> "LinearHold":
         """A hold of a staircase.
 
         Parameters
         ----------
-        line : Linearised
+        line : Linearised or Side
         j : int
             Its number.
         taken : (R,) bool array or slice
@@ -153,12 +161,14 @@ class HoldRead(NamedTuple):
         return [in_sensor_errors, creep[None], setting[None], *log_sd]
 
 
-def filter_hold(line: Linearised, j: int, measured: Measured, m: Array, p: Array, noise: ReadingNoise) -> HoldRead:
+def filter_hold(
+    line: Linearised | Side, j: int, measured: Measured, m: Array, p: Array, noise: ReadingNoise
+) -> HoldRead:
     """Filter the readings of one hold.
 
     Parameters
     ----------
-    line : Linearised
+    line : Linearised or Side
     j : int
     measured : Measured
     m, p : (n,) arrays
@@ -185,29 +195,6 @@ def filter_hold(line: Linearised, j: int, measured: Measured, m: Array, p: Array
         known=known,
         noise=noise,
     )
-
-
-def filter_holds(line: Linearised, measured: Measured) -> Iterator[tuple[Array, Array, HoldRead | None]]:
-    """Mean and variance (n,) of the creep that each hold carries on, and what its readings say if it has any.
-
-    Parameters
-    ----------
-    line : Linearised
-    measured : Measured
-    """
-    noise = measured.noise
-    mean = np.zeros(line.reading.shape[2])
-    var = mean
-    for j, taken in enumerate(measured.mask):
-        read = None
-        if taken.any():
-            known_noise = noise.where_read(measured.first(j))
-            read = filter_hold(line, j, measured, mean, var, known_noise)
-            mean = read.mean
-            var = read.var
-        else:
-            mean, var = carried_unread(line, j, mean, var, noise)
-        yield mean, var, read
 
 
 def summed(one: Array, other: Array) -> Array:

@@ -16,10 +16,9 @@ from wirebayes.model.hold_filter import (
     LinearHold,
     Measured,
     carried_unread,
-    filter_hold,
-    filter_holds,
     information_of,
 )
+from wirebayes.model.slack_holds import filter_holds, read_hold, settled
 from wirebayes.numeric.typing import Array
 from wirebayes.wire import compiled
 from wirebayes.wire.staircase import Linearised
@@ -61,7 +60,7 @@ def chain(line: "Linearised | Staircases", measured: Measured) -> Filtered:
         What `wirebayes.wire.staircase.linearise` or `streamed` returned.
     measured : Measured
     """
-    if compiled.kernel is not None:
+    if _is_compiled(line):
         return Filtered(*compiled.kernel.chain(*_compiled(line, measured)))
     assert isinstance(line, Linearised)  # nothing is streamed without the kernel
     holds, _, n = line.reading.shape
@@ -92,7 +91,7 @@ def standardised(line: "Linearised | Staircases", measured: Measured) -> tuple[A
     -------
     (n,) and (m, n) arrays
     """
-    if compiled.kernel is not None:
+    if _is_compiled(line):
         return compiled.kernel.standardised(*_compiled(line, measured))
     assert isinstance(line, Linearised)  # nothing is streamed without the kernel
     log_likelihood = np.zeros(line.reading.shape[2])
@@ -102,6 +101,11 @@ def standardised(line: "Linearised | Staircases", measured: Measured) -> tuple[A
             log_likelihood = log_likelihood + read.log_density
             residuals += read.residuals()
     return log_likelihood, np.concatenate(residuals)
+
+
+def _is_compiled(line: "Linearised | Staircases") -> bool:
+    """Whether compiled filters take a staircase: of those that were stored only what is on one side of every edge."""
+    return compiled.kernel is not None and not (isinstance(line, Linearised) and line.edges is not None)
 
 
 def _compiled(line: "Linearised | Staircases", measured: Measured) -> tuple[Any, ...]:
@@ -146,9 +150,44 @@ def held_out_density(line: Linearised, filtered: Filtered, measured: Measured) -
     noise = measured.noise
     densities = []
     for j in np.flatnonzero(measured.mask.any(axis=1)).tolist():
-        found = filter_hold(line, j, measured, filtered.carried_mean[j], filtered.carried_var[j], noise)
+        found = read_hold(line, j, measured, filtered.carried_mean[j], filtered.carried_var[j], noise)
         densities.append(found.log_density)
     return np.array(densities)
+
+
+@dataclass(frozen=True)
+class OnSides:
+    """A staircase with each hold on the more probable side of its edge, and what the readings say by it.
+
+    Attributes
+    ----------
+    line : Linearised
+        Without edges.
+    filtered : Filtered
+        By this line.
+    beside : (H, n) array
+        Log densities of each hold's readings on either side, less those on this one; zero far from edges.
+    """
+
+    line: Linearised
+    filtered: Filtered
+    beside: Array
+
+
+def on_sides(line: Linearised, measured: Measured) -> OnSides:
+    """What depends on readings through sums of squares alone needs a staircase that is linear in its errors.
+
+    Parameters
+    ----------
+    line, measured
+        As for `chain`.
+    """
+    every = chain(line, measured)
+    if line.edges is None:
+        return OnSides(line, every, np.zeros_like(every.log_likelihood))
+    chosen = settled(line, measured)
+    filtered = chain(chosen, measured)
+    return OnSides(chosen, filtered, every.log_likelihood - filtered.log_likelihood)
 
 
 def seen(line: Linearised, filtered: Filtered, measured: Measured, shapes: Array) -> tuple[Array, Array]:
@@ -157,7 +196,7 @@ def seen(line: Linearised, filtered: Filtered, measured: Measured, shapes: Array
     Parameters
     ----------
     line, measured
-        As for `chain`.
+        As for `chain`; without edges.
     filtered : Filtered
         What it returned for them.
     shapes : (H, R, k) array

@@ -104,11 +104,11 @@ class MarginalisedProblem(Problem):
         precision: Any = np.eye(len(self.sd))
         pull: Any = expected
         for shapes, (line, measured) in zip(self.shapes, lines, strict=True):
-            filtered = likelihoods.chain(line, measured)
-            gram, along = likelihoods.seen(line, filtered, measured, shapes * self.sd)
+            by_side = likelihoods.on_sides(line, measured)
+            gram, along = likelihoods.seen(by_side.line, by_side.filtered, measured, shapes * self.sd)
             precision = precision + gram
             pull = pull + along
-            height = filtered.log_likelihood.sum(axis=0)
+            height = (by_side.filtered.log_likelihood + by_side.beside).sum(axis=0)
             total = total + height
             log_volume = measured.mask.sum() * np.log(2.0 * np.pi * measured.variance)
             square = square - 2.0 * height - log_volume

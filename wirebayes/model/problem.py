@@ -116,8 +116,9 @@ class Problem:
                 variance = sample.variance(own)
                 out.append(single_holds.hold_by_hold(sample.protocol, own, sample.model, y, variance))
             else:
-                line = streamed(sample.protocol, own, sample.model)
-                out.append(likelihoods.chain(line, sample.measured(own, y)).log_likelihood)
+                measured = sample.measured(own, y)
+                line = streamed(sample.protocol, own, sample.model, measured.first_readings)
+                out.append(likelihoods.chain(line, measured).log_likelihood)
         return out
 
     def observed(self, readings: Sequence[Array] | None) -> Iterator[tuple[Sample, Array]]:
@@ -144,8 +145,9 @@ class Problem:
                     variance = sample.variance(own)
                     found = single_holds.standardised_hold_by_hold(sample.protocol, own, sample.model, y, variance)
                 else:
-                    line = streamed(sample.protocol, own, sample.model)
-                    found = likelihoods.standardised(line, sample.measured(own, y))
+                    measured = sample.measured(own, y)
+                    line = streamed(sample.protocol, own, sample.model, measured.first_readings)
+                    found = likelihoods.standardised(line, measured)
                 value, left = found
                 values.append(value)
                 residuals.append(left)
@@ -163,9 +165,11 @@ class Problem:
             without = []
             for sample in self.samples:
                 line, measured = self.linearised(theta, sample)
-                filtered = likelihoods.chain(line, measured)
-                each.append(filtered.log_likelihood.sum(axis=0))
-                without.append(likelihoods.without_each_hold(line, filtered, measured))
+                by_side = likelihoods.on_sides(line, measured)
+                beside = by_side.beside.sum(axis=0)
+                each.append(by_side.filtered.log_likelihood.sum(axis=0) + beside)
+                rest = likelihoods.without_each_hold(by_side.line, by_side.filtered, measured)
+                without.append(rest + (beside - by_side.beside))
             whole = np.sum(each, axis=0)
             return whole, [rest + (whole - own) for rest, own in zip(without, each, strict=True)]
 
@@ -282,7 +286,8 @@ class Problem:
         readings : (H, R, n) array, optional
         """
         own = self.parameters(theta, sample)
-        return linearise(sample.protocol, own, sample.model), sample.measured(own, readings)
+        measured = sample.measured(own, readings)
+        return linearise(sample.protocol, own, sample.model, measured.first_readings), measured
 
 
 def with_readings(problem: Problem, readings: Sequence[Array]) -> Problem:

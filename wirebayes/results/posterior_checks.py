@@ -32,7 +32,7 @@ _FEW = 500  # draws are enough for a share of them
 _TENTH, _NINE_TENTHS = np.log(10.0 / 9.0), np.log(10.0)  # of the creep is reached at this hazard k2 t^N
 _CENTURY_S = 100 * 365.25 * 86400  # beyond it seconds say nothing
 _DECADES_TIMES_N = float(np.log10(_NINE_TENTHS / _TENTH))
-NEAR, OFTEN = 2.0, 0.1  # setting errors from slack, and the share of draws in which a hold begins or ends so near it
+NEAR, OFTEN = 2.0, 0.1  # setting errors from slack, and the share of draws in which a taut hold comes so near it
 LEAST_SHRINKAGE = 0.1  # share by which the widest-moved parameter's interval shrank; below it the prior is returned
 
 
@@ -90,7 +90,7 @@ def of_posterior(own: Mapping[str, Floats], prior: Mapping[str, Floats], sample:
         Draws of its posterior and of its prior.
     """
     found = [
-        ("slack", near_slack(own, sample)),
+        ("slack", slackening(own, sample)),
         ("data", loose_steps(own, sample)),
         ("data", noise(own, sample)),
         ("prior", unlikely_stiffness(own, prior)),
@@ -118,8 +118,8 @@ def loose_steps(own: Mapping[str, Floats], sample: Sample) -> str:
     )
 
 
-def near_slack(own: Mapping[str, Floats], sample: Sample) -> str:
-    """Holds read as taut that an error of their setting may leave slack, of which the likelihood knows nothing."""
+def slackening(own: Mapping[str, Floats], sample: Sample) -> str:
+    """Holds that begin taut and that creep may leave slack: a setting error decides when, which no likelihood knows."""
     protocol = sample.protocol
     if "setting_sd" not in own or protocol.control == "force":
         return ""
@@ -129,8 +129,10 @@ def near_slack(own: Mapping[str, Floats], sample: Sample) -> str:
         taut = line.reading > NEAR * few["setting_sd"] * line.by_setting
     readings, mask = sample.readings[..., 0], protocol.mask
     least = np.where(mask, readings, np.inf).min(axis=1)
+    first = np.argmax(mask, axis=1)
+    begins = taut[np.arange(len(mask)), first]
     stays = (taut | ~mask[..., None]).all(axis=1)
-    share = 1.0 - stays.mean(axis=1)
+    share = (begins & ~stays).mean(axis=1)
     test = CheckedTest(protocol, readings, sample.resolution)
     near = (share > OFTEN) & (least > slack_below(test))
     if not near.any():
@@ -139,9 +141,9 @@ def near_slack(own: Mapping[str, Floats], sample: Sample) -> str:
     plural = "s" if near.sum() > 1 else ""
     percent = 100 * share[near].max()
     return (
-        f"in hold{plural} {holds} the wire is within {NEAR:g} setting errors of being slack "
-        f"({percent:.0f} % of the draws): a slack wire is not linear in such errors, as the likelihood "
-        "is, and intervals may be too narrow; test it where it stays taut"
+        f"in hold{plural} {holds} the wire begins taut and creeps to within {NEAR:g} setting errors of being slack "
+        f"({percent:.0f} % of the draws): when it goes slack depends on that error, as the likelihood does not know, "
+        "and intervals may be too narrow; test it where it stays taut"
     )
 
 

@@ -5,7 +5,7 @@ The twin of `wirebayes.wire.staircase` and of `wirebayes.model.likelihoods`, whi
 the reference, and compute what has no formula here. `wirebayes.wire.compiled` decides who computes.
 """
 
-from libc.math cimport INFINITY, NAN, cos, exp, expm1, fabs, fmax, isinf, isnan, log, log1p, pow, sin, sqrt
+from libc.math cimport INFINITY, NAN, cos, erfc, exp, expm1, fabs, fmax, isinf, isnan, log, log1p, pow, sin, sqrt
 
 import numpy as np
 
@@ -29,10 +29,17 @@ FORMULAS = (
 
 cdef double LEAST_RATE_RATIO = 0.01  # of tension to reference, as in `wirebayes.effects.creep`
 cdef double PI = 3.141592653589793
+cdef double HALF_LOG_2PI = 0.5 * log(2.0 * PI)
 cdef int NEWTON_STEPS = 7  # as in `wirebayes.effects.rivals`
 cdef int MOST_STEPS = 200  # as in `wirebayes.wire.inverse`
 cdef double EXACT = 4.0 * 2.220446049250313e-16
 cdef double MISSED = 1e-9
+cdef double FAR = 8.0  # as in `wirebayes.wire.staircase`
+cdef double LEAST_STRETCH = 0.5  # likewise
+cdef double LEAST_READ = 0.1  # likewise
+cdef double MOST_ERROR = 6.0  # likewise
+cdef double LEAST_VARIANCE = 1e-300  # as in `wirebayes.model.slack_holds`
+cdef double LOWEST = -35.0  # standard deviations: below, the complementary error function is next to nothing
 
 
 cdef struct Dual:
@@ -80,6 +87,21 @@ cdef inline double gone(double x) noexcept nogil:
 cdef inline double log_of_one_and(double x) noexcept nogil:
     # log(1 + x), likewise.
     return log(1.0 + x) if x > 1.0 else log1p(x)
+
+
+cdef inline double log_normal_below(double x) noexcept nogil:
+    # log of the probability of a standard normal number below x; far out by its asymptotic series.
+    cdef double y
+    if x > LOWEST:
+        return log(0.5 * erfc(-x * sqrt(0.5)))
+    y = 1.0 / (x * x)
+    return -0.5 * x * x - log(-x) - HALF_LOG_2PI + log1p(y * (-1.0 + y * (3.0 + y * (-15.0 + 105.0 * y))))
+
+
+cdef inline double log_sum(double x, double y) noexcept nogil:
+    # log(e^x + e^y)
+    cdef double top = fmax(x, y)
+    return top if isinf(top) else top + log1p(exp(-fabs(x - y)))
 
 
 cdef struct Chosen:
@@ -537,19 +559,27 @@ cdef double rested(Wire* wire, Hold* hold, Test test, double[:, ::1] shares, dou
     return hold.carried.v
 
 
+cdef inline double waited(Wire* wire, double order) noexcept nogil:
+    """How long the wire waits before a hold of this order begins, s."""
+    cdef double total = 0.0
+    cdef int e
+    for e in range(wire.effects):
+        if wire.formula[e] == WAIT and order == wire.number[e]:
+            total += wire.own[e][0]
+    return total
+
+
 cdef void begin(
     Wire* wire, Hold* hold, Test test, int j, double setting, double carried, double[:, ::1] shares,
     double[:, ::1] past
 ) noexcept:
     """Hold `j` at its first moment; what is set is a stretched length, or a tension."""
-    cdef int e, i
-    cdef double before = 0.0
+    cdef int i
+    cdef double before
     for i in range(wire.clocks):
         past[i, 3] = past[i, 4] = 0.0
     enter(wire, hold, test, j, setting, 0.0 if wire.weights else test.setting[j], carried)
-    for e in range(wire.effects):
-        if wire.formula[e] == WAIT and hold.order == wire.number[e]:
-            before += wire.own[e][0]
+    before = waited(wire, hold.order)
     if before != 0.0:
         wait(wire, hold, test, j, before, shares, past)
 
@@ -694,16 +724,33 @@ cdef class Staircases:
     cdef Dual* readings  # (holds, width) of the column that was asked for
     cdef Dual* carry  # (holds,): creep carried out of each
     cdef double brought  # creep carried into the first
+    cdef unsigned char[::1] near  # (holds,): whether the setting error decides if the wire is taut
+    cdef Dual* stretch  # (holds,): of the wire when each begins
+    cdef Dual* taut  # as `readings` and `carry`, of a wire that is known to be taut there, and to be slack
+    cdef Dual* taut_carry
+    cdef Dual* slack
+    cdef Dual* slack_carry
     cdef double[:, ::1] memory
 
     cdef void allocate(self, Py_ssize_t n, int holds, int width):
         self.n, self.holds, self.width = n, holds, width
-        self.memory = np.empty((holds * width + holds + 1, 3))
+        self.near = np.zeros(holds, np.uint8)
+        self.memory = np.empty((3 * holds * width + 4 * holds + 1, 3))
         self.readings = <Dual*> &self.memory[0, 0]
-        self.carry = self.readings + holds * width
+        self.taut = self.readings + holds * width
+        self.slack = self.taut + holds * width
+        self.carry = self.slack + holds * width
+        self.taut_carry = self.carry + holds
+        self.slack_carry = self.taut_carry + holds
+        self.stretch = self.slack_carry + holds
 
     cdef void ask(self, Py_ssize_t i) noexcept:
         """Column `i`."""
+
+
+cdef inline Dual stretched_by(Wire* wire, Hold* hold, double warming_K) noexcept nogil:
+    """By how much the wire is longer than without tension when a hold begins, mm."""
+    return minus(hold.position, zero_of(wire, hold, plus(hold.carried, beside_of(wire)), warming_K))
 
 
 cdef class Computed(Staircases):
@@ -712,26 +759,104 @@ cdef class Computed(Staircases):
     cdef Test test
     cdef Law law
     cdef const double[:, ::1] theta
+    cdef const double[::1] spread  # of setting errors, mm, or none
+    cdef const double[:, :] first  # the first reading of each hold, NaN or none where it is not known
+    cdef const Py_ssize_t[::1] column  # and in which column it stands
+    cdef const double[::1] variance  # of a reading
     cdef double[:, ::1] past
     cdef double[:, ::1] shares
 
-    def __init__(self, Test test, Law law, const double[:, ::1] theta):
+    def __init__(self, Test test, Law law, const double[:, ::1] theta, const double[::1] spread,
+                 const double[:, :] first, const Py_ssize_t[::1] column, const double[::1] variance):
+        if spread.shape[0] not in (0, theta.shape[1]):
+            raise ValueError("setting errors and columns are of different sizes")
+        if first.shape[0] and (first.shape[0] != test.holds or column.shape[0] != test.holds
+                               or first.shape[1] not in (1, theta.shape[1]) or variance.shape[0] != theta.shape[1]):
+            raise ValueError("readings and columns are of different sizes")
         self.allocate(theta.shape[1], test.holds, test.width)
-        self.test, self.law, self.theta = test, law, theta
+        self.test, self.law, self.theta, self.spread = test, law, theta, spread
+        self.first, self.column, self.variance = first, column, variance
         self.past, self.shares = np.empty((2 * test.holds + 1, 5)), np.empty((1 + law.effects, test.times.shape[0]))
 
     cdef void ask(self, Py_ssize_t i) noexcept:
-        cdef Wire wire
+        cdef Wire wire, before
         cdef Hold hold
-        cdef double creep = 0.0
+        cdef double creep = 0.0, spread = fabs(self.spread[i]) if self.spread.shape[0] else 0.0, waits
         cdef int j
         take(&wire, self.law, self.test, self.theta, i, self.shares)
         creep = self.brought = rested(&wire, &hold, self.test, self.shares, self.past)
         for j in range(self.holds):
+            waits = waited(&wire, self.test.order[j])
+            if waits != 0.0:
+                before = wire
             begin(&wire, &hold, self.test, j, set_in(&wire, self.test, j), creep, self.shares, self.past)
+            self.near[j] = False
+            if spread > 0.0 and not wire.weights:
+                self.stretch[j] = stretched_by(&wire, &hold, self.test.warming_K[j, 0])
+                self.near[j] = self.stretch[j].v < FAR * spread
+            if self.near[j]:
+                if waits == 0.0:
+                    before = wire
+                self.look_aside(&before, j, i, waits, creep, spread)
+                self.undo_wait(&before, waits)
+                wire = before
+                begin(&wire, &hold, self.test, j, set_in(&wire, self.test, j), creep, self.shares, self.past)
             self.carry[j] = follow(&wire, &hold, self.test, j, self.width, self.shares, self.past,
                                    self.readings + j * self.width)
             creep = self.carry[j].v
+            if self.near[j]:
+                self.taut_carry[j].v -= creep
+                self.slack_carry[j].v -= creep
+
+    cdef void look_aside(
+        self, Wire* before, int j, Py_ssize_t i, double waits, double creep, double spread
+    ) noexcept:
+        """Hold `j` on both sides of its edge: `wirebayes.wire.staircase`."""
+        cdef double ratio = self.stretch[j].v / spread
+        cdef double hazard = exp(-0.5 * ratio * ratio - HALF_LOG_2PI - log_normal_below(ratio))
+        cdef double to_taut = fmax(hazard, LEAST_STRETCH - ratio) * spread
+        cdef double to_slack = -fmax(self.stretch[j].v + spread, 0.0)
+        cdef double closer
+        self.taut_carry[j] = self.aside(before, j, waits, creep, to_taut, self.taut + j * self.width)
+        closer = self.as_read(j, i, to_taut, spread)
+        if closer != to_taut:
+            self.taut_carry[j] = self.aside(before, j, waits, creep, closer, self.taut + j * self.width)
+        self.slack_carry[j] = self.aside(before, j, waits, creep, to_slack, self.slack + j * self.width)
+
+    cdef double as_read(self, int j, Py_ssize_t i, double to_taut, double spread) noexcept:
+        """A setting error nearer to what the first reading says of it: `wirebayes.wire.staircase.nearer_as_read`."""
+        cdef double first, slope, error, ratio = self.stretch[j].v / spread, q = spread * spread
+        cdef Dual line
+        if not self.first.shape[0]:
+            return to_taut
+        first = self.first[j, i if self.first.shape[1] > 1 else 0]
+        if isnan(first):
+            return to_taut
+        line = self.taut[j * self.width + self.column[j]]
+        error = q * line.s / (q * line.s * line.s + self.variance[i]) * (first - line.v)
+        if not error < MOST_ERROR * spread:
+            error = MOST_ERROR * spread
+        error = fmax(error, (LEAST_READ - ratio) * spread)
+        return to_taut + (1.0 if ratio < FAR - 1.0 else FAR - ratio) * (error - to_taut)
+
+    cdef void undo_wait(self, Wire* before, double waits) noexcept:
+        """Set the clocks back to where they stood before the wire waited for a hold to begin."""
+        cdef int i
+        for i in range(before.clocks):
+            self.past[i, 0] += waits
+
+    cdef Dual aside(self, Wire* before, int j, double waits, double creep, double moved, Dual* readings) noexcept:
+        """Readings of hold `j`, and the creep that it carries out, expanded at a setting error."""
+        cdef Wire wire = before[0]
+        cdef Hold hold
+        cdef Dual out
+        cdef int r
+        self.undo_wait(before, waits)
+        begin(&wire, &hold, self.test, j, set_in(&wire, self.test, j) + moved, creep, self.shares, self.past)
+        out = follow(&wire, &hold, self.test, j, self.width, self.shares, self.past, readings)
+        for r in range(self.width):
+            readings[r].v -= readings[r].s * moved
+        return Dual(out.v - out.s * moved, out.s, out.c)
 
 
 cdef class Stored(Staircases):
@@ -757,27 +882,57 @@ cdef class Stored(Staircases):
             self.carry[j] = Dual(0.0, self.carry_by_setting[j, i], self.carry_by_creep[j, i])
 
 
-def linearise(Test test, Law law, const double[:, ::1] theta):
-    """Staircases (see `wirebayes.wire.staircase.Linearised`), a column of `theta` each."""
-    cdef Staircases made = Computed(test, law, theta)
-    cdef int holds = made.holds, width = made.width, j, r
+def linearise(
+    Test test, Law law, const double[:, ::1] theta, const double[::1] spread, const double[:, :] first,
+    const Py_ssize_t[::1] column, const double[::1] variance
+):
+    """Staircases (see `wirebayes.wire.staircase.Linearised`), a column of `theta` each, and their edges.
+
+    These are None, or which holds are near one, the stretch (3, H, n), and of a wire that is taut and of one that is
+    slack readings (3, H, R, n) and what is carried out (3, H, n).
+    """
+    cdef Staircases made = Computed(test, law, theta, spread, first, column, variance)
+    cdef int holds = made.holds, width = made.width, j
     cdef Py_ssize_t i
     each = np.empty((3, holds, width, made.n))
     carry = np.empty((2, holds, made.n))
     creep = np.zeros((holds + 1, made.n))
-    cdef double[:, :, :, ::1] y = each
-    cdef double[:, :, ::1] c = carry
+    edges = None
+    cdef double[:, :, :, ::1] y = each, taut, slack
+    cdef double[:, :, ::1] c = carry, stretch, taut_carry, slack_carry
     cdef double[:, ::1] e = creep
-    cdef Dual read
+    cdef unsigned char[:, ::1] near
     for i in range(made.n):
         made.ask(i)
         e[0, i] = made.brought
         for j in range(holds):
-            for r in range(width):
-                read = made.readings[j * width + r]
-                y[0, j, r, i], y[1, j, r, i], y[2, j, r, i] = read.v, read.s, read.c
+            write(made.readings + j * width, y, j, i, width)
             e[j + 1, i], c[0, j, i], c[1, j, i] = made.carry[j].v, made.carry[j].s, made.carry[j].c
-    return each[0], each[1], each[2], carry[0], carry[1], creep
+            if not made.near[j]:
+                continue
+            if edges is None:
+                edges = (np.zeros((holds, made.n), np.uint8), np.zeros((3, holds, made.n)),
+                         np.zeros_like(each), np.zeros((3, holds, made.n)),
+                         np.zeros_like(each), np.zeros((3, holds, made.n)))
+                near, stretch, taut, taut_carry, slack, slack_carry = edges
+            near[j, i] = True
+            write_one(made.stretch[j], stretch, j, i)
+            write(made.taut + j * width, taut, j, i, width)
+            write_one(made.taut_carry[j], taut_carry, j, i)
+            write(made.slack + j * width, slack, j, i, width)
+            write_one(made.slack_carry[j], slack_carry, j, i)
+    return (each[0], each[1], each[2], carry[0], carry[1], creep), edges
+
+
+cdef inline void write(Dual* readings, double[:, :, :, ::1] to, int j, Py_ssize_t i, int width) noexcept:
+    """The readings of a hold in column `i`."""
+    cdef int r
+    for r in range(width):
+        to[0, j, r, i], to[1, j, r, i], to[2, j, r, i] = readings[r].v, readings[r].s, readings[r].c
+
+
+cdef inline void write_one(Dual value, double[:, :, ::1] to, int j, Py_ssize_t i) noexcept:
+    to[0, j, i], to[1, j, i], to[2, j, i] = value.v, value.s, value.c
 
 
 def simulate(Test test, Law law, const double[:, ::1] theta, const double[:, :] setting_error, bint each_alone=False):
@@ -859,22 +1014,26 @@ cdef void alone(
 
 
 cdef struct Read:
-    # What the readings of one hold say: see `wirebayes.model.likelihoods._Read`.
-    double log_density, mean, var, pull_c, pull_s, cc, ss, post_c, post_s
+    # What the readings of one hold say: see `wirebayes.model.hold_filter.HoldRead`.
+    double log_density, mean, var, pull_c, pull_s, cc, ss, v_cc, v_cs, v_ss
 
 
-cdef inline Read read_hold(
-    Staircases of, const double[:, :, :] readings, const unsigned char[:, ::1] mask, int j, Py_ssize_t i,
-    double m, double p, double weight, double log_variance, double q, double* left
+cdef struct Noise:
+    # Of a reading 1 / variance, and its log normal density's constant; the variance of a setting error.
+    double weight, log_variance, q
+
+
+cdef inline Read read_line(
+    Dual* line, Dual carry, int width, const double[:, :, :] readings, const unsigned char[:, ::1] mask, int j,
+    Py_ssize_t i, double m, double p, Noise noise, double* left
 ) noexcept:
-    """Filter one hold: the creep carried into it has mean m and variance p, its setting error variance q."""
+    """Filter one hold: the creep carried into it has mean m and variance p."""
     cdef double cc = 0.0, cs = 0.0, ss = 0.0, cr = 0.0, sr = 0.0, square = 0.0, residual, det, v_cc, v_cs, v_ss
-    cdef double a = of.carry[j].c, c = of.carry[j].s
+    cdef double post_c, post_s, weight = noise.weight, q = noise.q
     cdef int r, count = 0
     cdef Read out
-    cdef Dual* line = of.readings + j * of.width
     i = i if readings.shape[2] > 1 else 0  # all columns see the same
-    for r in range(of.width):
+    for r in range(width):
         if mask[j, r]:
             residual = readings[j, r, i] - line[r].v - line[r].c * m
             left[count] = residual
@@ -888,22 +1047,68 @@ cdef inline Read read_hold(
     # the difference of two products may come out below zero by rounding
     det = 1.0 + p * cc + q * ss + p * q * fmax(cc * ss - cs * cs, 0.0)
     v_cc, v_cs, v_ss = p * (1.0 + q * ss) / det, -p * q * cs / det, q * (1.0 + p * cc) / det
-    out.post_c, out.post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
+    post_c, post_s = v_cc * cr + v_cs * sr, v_cs * cr + v_ss * sr
     out.pull_c = ((1.0 + q * ss) * cr - q * cs * sr) / det
     out.pull_s = ((1.0 + p * cc) * sr - p * cs * cr) / det
     count = 0
-    for r in range(of.width):
+    for r in range(width):
         if mask[j, r]:
             # a sum of squares: the shorter difference of products can turn negative at absurd parameters
-            residual = left[count] - line[r].c * out.post_c - line[r].s * out.post_s
+            residual = left[count] - line[r].c * post_c - line[r].s * post_s
             left[count] = residual
             square += residual * residual
             count += 1
     square = square * weight + p * out.pull_c * out.pull_c + q * out.pull_s * out.pull_s
-    out.log_density = -0.5 * (square + count * log_variance + log(det))
-    out.mean = a * (m + out.post_c) + c * out.post_s
-    out.var = a * a * v_cc + 2.0 * a * c * v_cs + c * c * v_ss
-    out.cc, out.ss = cc, ss
+    out.log_density = -0.5 * (square + count * noise.log_variance + log(det))
+    out.mean = carry.c * (m + post_c) + carry.s * post_s
+    out.var = carry.c * carry.c * v_cc + 2.0 * carry.c * carry.s * v_cs + carry.s * carry.s * v_ss
+    out.cc, out.ss, out.v_cc, out.v_cs, out.v_ss = cc, ss, v_cc, v_cs, v_ss
+    return out
+
+
+cdef inline Read read_hold(
+    Staircases of, const double[:, :, :] readings, const unsigned char[:, ::1] mask, int j, Py_ssize_t i,
+    double m, double p, Noise noise, double* left, double* other
+) noexcept:
+    """Filter one hold, on both sides of an edge where it is near one: `wirebayes.model.slack_holds`.
+
+    What is left of the readings stands in `left`; `other` is room for as much.
+    """
+    cdef Dual* line = of.readings + j * of.width
+    if not of.near[j]:
+        return read_line(line, of.carry[j], of.width, readings, mask, j, i, m, p, noise, left)
+    return read_sides(of, readings, mask, j, i, m, p, noise, left, other)
+
+
+cdef Read read_sides(
+    Staircases of, const double[:, :, :] readings, const unsigned char[:, ::1] mask, int j, Py_ssize_t i,
+    double m, double p, Noise noise, double* left, double* other
+) noexcept:
+    """Filter one hold on both sides of its edge."""
+    cdef Dual stretch = of.stretch[j]
+    cdef Dual* line = of.taut + j * of.width
+    cdef Read taut = read_line(line, of.taut_carry[j], of.width, readings, mask, j, i, m, p, noise, left), slack, out
+    cdef double before = stretch.v + stretch.c * m, after, var, log_taut, log_slack, density, share
+    cdef int r
+    line = of.slack + j * of.width
+    slack = read_line(line, of.slack_carry[j], of.width, readings, mask, j, i, m, p, noise, other)
+    taut.mean += of.taut_carry[j].v
+    slack.mean += of.slack_carry[j].v
+    after = before + stretch.c * p * taut.pull_c + stretch.s * noise.q * taut.pull_s
+    var = stretch.c * stretch.c * taut.v_cc + 2.0 * stretch.c * stretch.s * taut.v_cs + stretch.s * stretch.s * taut.v_ss
+    log_taut = taut.log_density + log_normal_below(after / sqrt(fmax(var, LEAST_VARIANCE)))
+    var = stretch.c * stretch.c * p + stretch.s * stretch.s * noise.q
+    log_slack = slack.log_density + log_normal_below(-before / sqrt(fmax(var, LEAST_VARIANCE)))
+    density = log_sum(log_taut, log_slack)
+    share = exp(log_taut - density)
+    out = taut
+    if not log_taut > log_slack:
+        out = slack
+        for r in range(of.width):
+            left[r] = other[r]
+    out.log_density = density
+    out.mean = slack.mean + share * (taut.mean - slack.mean)
+    out.var = share * taut.var + (1.0 - share) * slack.var + share * (1.0 - share) * (taut.mean - slack.mean) ** 2
     return out
 
 
@@ -968,15 +1173,19 @@ def chain(
     cdef double[:, ::1] out = density
     cdef double[:, :, ::1] mv = carried
     cdef int[:, ::1] counts = counted(readings, mask, n)
-    cdef double[::1] left = np.empty(max(mask.shape[1], 1))
-    cdef double weight, log_variance, q, a, c
+    cdef double[:, ::1] left = np.empty((2, max(mask.shape[1], 1)))
+    cdef double q, a, c
     cdef Read found
+    cdef Noise noise
     for i in range(n):
         of.ask(i)
-        weight, log_variance, q = 1.0 / variance[i], log(variance[i]) + LOG_2PI, setting_sd[i] * setting_sd[i]
+        q = setting_sd[i] * setting_sd[i]
+        noise = Noise(1.0 / variance[i], log(variance[i]) + LOG_2PI, q)
         for j in range(holds):
             if not is_unseen(readings, counts, j, i):
-                found = read_hold(of, readings, mask, j, i, mv[0, j, i], mv[1, j, i], weight, log_variance, q, &left[0])
+                found = read_hold(
+                    of, readings, mask, j, i, mv[0, j, i], mv[1, j, i], noise, &left[0, 0], &left[1, 0]
+                )
                 out[j, i], mv[0, j + 1, i], mv[1, j + 1, i] = found.log_density, found.mean, found.var
             else:
                 a, c = of.carry[j].c, of.carry[j].s
@@ -996,14 +1205,17 @@ def standardised(
     for j in range(holds):
         row += counts[0, j] + 5 * (counts[0, j] > 0)
     total, residuals = np.zeros(n), np.empty((row, n))
-    cdef double[::1] value = total, left = np.empty(max(mask.shape[1], 1))
-    cdef double[:, ::1] out = residuals
-    cdef double weight, log_variance, q, a, c, m, p, scale, setting_sd_i
+    cdef double[::1] value = total
+    cdef double[:, ::1] out = residuals, left = np.empty((2, max(mask.shape[1], 1)))
+    cdef double q, a, c, m, p, scale, setting_sd_i
     cdef Read found
+    cdef Noise noise
     for i in range(n):
         of.ask(i)
-        weight, log_variance, setting_sd_i = 1.0 / variance[i], log(variance[i]) + LOG_2PI, fabs(setting_sd[i])
-        q, scale, m, p, row = setting_sd_i * setting_sd_i, sqrt(weight), 0.0, 0.0, 0
+        setting_sd_i = fabs(setting_sd[i])
+        q, m, p, row = setting_sd_i * setting_sd_i, 0.0, 0.0, 0
+        noise = Noise(1.0 / variance[i], log(variance[i]) + LOG_2PI, q)
+        scale = sqrt(noise.weight)
         for j in range(holds):
             count = counts[0, j]
             if is_unseen(readings, counts, j, i):
@@ -1013,12 +1225,12 @@ def standardised(
                     out[row : row + count + 5, i] = 0.0
                     row += count + 5
                 continue
-            found = read_hold(of, readings, mask, j, i, m, p, weight, log_variance, q, &left[0])
+            found = read_hold(of, readings, mask, j, i, m, p, noise, &left[0, 0], &left[1, 0])
             for r in range(count):
-                out[row + r, i] = left[r] * scale
+                out[row + r, i] = left[0, r] * scale
             row += count
             out[row, i], out[row + 1, i] = sqrt(p) * found.pull_c, setting_sd_i * found.pull_s
-            out[row + 2, i] = 0.5 * sqrt(<double> count) * log_variance
+            out[row + 2, i] = 0.5 * sqrt(<double> count) * noise.log_variance
             out[row + 3, i], out[row + 4, i] = 0.5 * log_of_one_and(p * found.cc), 0.5 * log_of_one_and(q * found.ss)
             row += 5
             value[i] += found.log_density

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Ints
 from wirebayes.wire.protocol import Protocol
 
 if TYPE_CHECKING:
@@ -25,6 +25,20 @@ except ImportError:
 kernel = _kernel  # None where it was not built
 
 _PLAIN = ("k1", "B", "U", "k2", "N", "preload")
+
+
+_NONE, _NOT_READ, _NO_COLUMN = np.empty(0), np.empty((0, 0)), np.empty(0, np.intp)
+
+
+class FirstReadings(NamedTuple):
+    """The first reading of each hold.
+
+    Values (H, n) or (H, 1), NaN where a hold has none, their columns (H,), and the variance (n,) of a reading.
+    """
+
+    value: Array
+    column: Ints
+    variance: Array
 
 
 class Call(NamedTuple):
@@ -51,6 +65,37 @@ def call(protocol: Protocol, theta: Mapping[str, Array], model: "Model") -> Call
     remembers = any(name == "superposition" for name, _, _ in formulas)
     test = protocol.flat_with_ages if remembers else protocol.flat
     return Call(kernel.Test(**test), _law_of(model, protocol.length_mm, formulas), _packed(rows))
+
+
+class AtSlack(NamedTuple):
+    """What the kernel is told of edges beyond which the wire is slack.
+
+    The standard deviations (n,) of setting errors, mm, and the first reading (H, n) or (H, 1) of each hold, its column
+    (H,), and the variance (n,) of a reading; all empty where they are not known, or where none can leave a wire slack.
+    """
+
+    spread: Array
+    first: Array
+    column: Ints
+    variance: Array
+
+
+def at_slack(protocol: Protocol, theta: Mapping[str, Array], read: "FirstReadings | None") -> AtSlack:
+    """What the kernel is told of edges.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    theta : mapping of name to (n,) array
+    read : FirstReadings, optional
+    """
+    spread = _NONE
+    if protocol.control == "displacement" and "setting_sd" in theta:
+        spread = np.ascontiguousarray(theta["setting_sd"], float)
+    if read is None or not len(spread):
+        return AtSlack(spread, _NOT_READ, _NO_COLUMN, _NONE)
+    variance = np.ascontiguousarray(np.broadcast_to(read.variance, spread.shape), float)
+    return AtSlack(spread, np.asarray(read.value, float), read.column, variance)
 
 
 def _packed(rows: Sequence[Array]) -> Array:

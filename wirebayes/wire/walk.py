@@ -37,6 +37,17 @@ class Sloped(NamedTuple):
     by_creep: Array
 
 
+class LinearHoldWalked(NamedTuple):
+    """A hold with its derivatives: readings (R, n), the creep (n,) that it carries on, and the stretch when it begins.
+
+    The stretch, mm, is that of the wire beyond its zero-tension length, (n,); where the tension is set it is empty.
+    """
+
+    readings: Sloped
+    carried: Sloped
+    stretch: Sloped
+
+
 class Walk:
     """One pass along the holds: what all holds share is computed once here."""
 
@@ -44,6 +55,7 @@ class Walk:
         self.protocol = protocol
         self.model = model
         self.past: list[Clock] = []
+        self.stretch: Array = np.zeros(0)  # mm, (n,), of the wire when the last hold began; negative where it was slack
         self.late: Any = 0.0
         effects = Placed(model.effects, theta)
         self.at = effects.at
@@ -99,6 +111,8 @@ class Walk:
         if "wait" in self.at:
             wait_s = self.change("wait", np.zeros((1, 1)), hold)
             beside = self._wait(held, wait_s, beside, hold)
+        if self.protocol.control == "displacement":
+            self.stretch = (held - hold.zero_mm)[0]
         hold.grown = self._grown(j, hold)
         courses = self.creep.beside(beside, hold)
         total = sum(courses.values(), hold.grown)
@@ -269,8 +283,8 @@ class ByHand(Walk):
         super().__init__(protocol, theta, model)
         self.brought = np.zeros(np.shape(theta["k1"])[0])
 
-    def linearised(self, j: int, setting: Array, creep: Array) -> tuple[Sloped, Sloped]:
-        """Readings (R, n) of a hold and the creep (n,) that it carries on.
+    def linearised(self, j: int, setting: Array, creep: Array) -> LinearHoldWalked:
+        """A hold of the walk; holds are walked in order.
 
         Parameters
         ----------
@@ -281,7 +295,21 @@ class ByHand(Walk):
         creep : (n,) array
             Creep elongation carried in, mm.
         """
-        return self.closed_form(j, self.base + setting, creep)
+        return self.elsewhere(j, setting, creep)
+
+    def elsewhere(self, j: int, setting: Array, creep: Array) -> LinearHoldWalked:
+        """The same of a hold that is at another setting than the walk's, of which the walk takes no notice.
+
+        Parameters
+        ----------
+        j, creep
+            As for `linearised`.
+        setting : float or (n,) array
+        """
+        stretched = self.base + setting
+        readings, carried = self.closed_form(j, stretched, creep)
+        one = np.ones(len(creep))
+        return LinearHoldWalked(readings, carried, Sloped(stretched - (self.protocol.length_mm + creep), one, -one))
 
 
 class BySteps(Walk):
@@ -295,10 +323,11 @@ class BySteps(Walk):
         n = np.shape(theta["k1"])[0]
         self._setting_step, self._creep_step = 1j * np.repeat([[_STEP, 0.0], [0.0, _STEP]], n, axis=1)
         brought, self._beside = self.begin(2 * n)
+        self._before = list(self.past), self._beside
         self.brought = brought[:n]
 
-    def linearised(self, j: int, setting: Array, creep: Array) -> tuple[Sloped, Sloped]:
-        """Readings (R, n) of a hold and the creep (n,) that it carries on; holds are walked in order.
+    def linearised(self, j: int, setting: Array, creep: Array) -> LinearHoldWalked:
+        """A hold of the walk; holds are walked in order.
 
         Parameters
         ----------
@@ -309,11 +338,33 @@ class BySteps(Walk):
         creep : (n,) array
             Creep elongation carried in, mm.
         """
-        carried_in = np.tile(creep, 2) + self._creep_step
-        readings, carried, beside = self.hold(j, setting + self._setting_step, carried_in, self._beside)
+        self._before = list(self.past), self._beside
+        found, beside = self._stepped(j, setting, creep)
         self._beside = {key: value.real for key, value in beside.items()}
         self.past = [(start_s, goal.real, k2.real) for start_s, goal, k2 in self.past]
-        return _parted(readings), _parted(carried)
+        return found
+
+    def elsewhere(self, j: int, setting: Array, creep: Array) -> LinearHoldWalked:
+        """The hold walked last at another setting, of which the walk takes no notice.
+
+        Parameters
+        ----------
+        j, creep
+            As for `linearised`.
+        setting : float or (n,) array
+        """
+        after = self.past, self._beside
+        past, self._beside = self._before
+        self.past = list(past)
+        found, _ = self._stepped(j, np.tile(setting, 2) if np.ndim(setting) else setting, creep)
+        self.past, self._beside = after
+        return found
+
+    def _stepped(self, j: int, setting: Array, creep: Array) -> tuple[LinearHoldWalked, dict[str, Array]]:
+        """A hold, and what it leaves beside the creep, with both steps."""
+        carried_in = np.tile(creep, 2) + self._creep_step
+        readings, carried, beside = self.hold(j, setting + self._setting_step, carried_in, self._beside)
+        return LinearHoldWalked(_parted(readings), _parted(carried), _parted(self.stretch)), beside
 
 
 def _parted(both: Array) -> Sloped:
