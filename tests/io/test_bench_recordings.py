@@ -242,28 +242,62 @@ def test_rows_that_are_written_twice_are_left_out_as_before(tmp_path):
     assert "rows that repeat the row above left out: 48" in made.notes
 
 
+def two_holds(path, counts, move_s, number=True):
+    """Two displacements held for so many readings at 10 Hz, and the move between them, which has no number."""
+    rows = round(10 * move_s)
+    x = [0.5] * counts[0] + list(np.linspace(0.5, 3.0, rows + 2)[1:-1]) + [3.0] * counts[1]
+    of_move = range(counts[0], counts[0] + rows)
+    lines = ["Number,Time (s),Displacement (mm),Force (N)"]
+    for i, level in enumerate(x):
+        if number and i in of_move:
+            continue
+        lines.append(f"{1 + (i >= counts[0])},{i / 10:.1f},{level:.4f},{2.0 * level - 1e-5 * i:.5f}")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
 @pytest.mark.parametrize(
-    ("counts", "line", "passed"),
+    ("counts", "found"),
     [
-        ((100, 3900), 102, "from here on; the 100 readings before"),
-        ((3900, 100), 3902, "up to here; the 100 readings after"),
+        ((100, 3900), "line 1[56][0-9], column 3 .*, from here on; the 1[56][0-9] readings before"),
+        ((3900, 100), "line 39[0-9][0-9], column 3 .*, up to here; the 1[56][0-9] readings after"),
     ],
 )
-def test_a_hold_that_is_short_beside_the_only_other_one_is_refused_where_it_ends(tmp_path, counts, line, passed):
-    path = tmp_path / "raw.csv"
-    x = np.repeat([0.5, 3.0], counts)
-    rows = [
-        f"{j + 1},{i / 10:.1f},{x[i]},{2.0 * x[i] - 1e-5 * i:.5f}\n"
-        for j, n in enumerate(counts)
-        for i in range(j * counts[0], j * counts[0] + n)
-    ]
-    path.write_text("Number,Time (s),Displacement (mm),Force (N)\n" + "".join(rows))
-    with pytest.raises(
-        wb.InputError, match=rf"line {line}, column 3 .*: found one displacement .*, {passed} were taken"
-    ):
-        convert(path, About("wire", "line", 1000.0), Choices())
-    made = convert(path, About("wire", "line", 1000.0), Choices(mapping=("Number=hold",)))  # as the message advises
+def test_a_hold_that_is_hardly_longer_than_the_move_beside_the_only_other_one_is_refused(tmp_path, counts, found):
+    raw = two_holds(tmp_path / "raw.csv", counts, move_s=6.0, number=False)
+    with pytest.raises(wb.InputError, match=rf"{found} were taken"):
+        convert(raw, About("wire", "line", 1000.0), Choices())
+    raw = two_holds(tmp_path / "raw.csv", counts, move_s=6.0)
+    made = convert(raw, About("wire", "line", 1000.0), Choices(mapping=("Number=hold",)))  # as the message advises
     assert [hold.displacement_mm for hold in made.experiment.holds] == [0.5, 3.0]
+
+
+@pytest.mark.parametrize("counts", [(100, 3900), (3900, 100)])
+@pytest.mark.parametrize("move_s", [0.0, 2.0])
+def test_a_hold_that_is_long_beside_its_move_is_one_however_long_the_other_is(tmp_path, counts, move_s):
+    raw = two_holds(tmp_path / "raw.csv", counts, move_s, number=False)
+    made = convert(raw, About("wire", "line", 1000.0), Choices())
+    assert [hold.displacement_mm for hold in made.experiment.holds] == [0.5, 3.0]
+
+
+@pytest.mark.parametrize("noise_mm", [0.0, 0.002])
+@pytest.mark.parametrize("move_s", [0, 3])
+def test_holds_of_seconds_stand_beside_holds_of_hours(tmp_path, noise_mm, move_s):
+    """A recording at 1 Hz; stops of a move that is made bit by bit are none of its holds."""
+    rng = np.random.default_rng(4)
+    x, held = [], [20, 3600, 60, 30, 7200, 120]
+    for level, lasts in enumerate(held, start=1):
+        x += [level - 1.0 + part / (move_s + 1) for part in range(1, move_s + 1)] if x else []
+        x += [float(level)] * lasts
+    for level in (6.3, 6.6, 7.0):  # 4 s at each of two stops
+        x += [*np.linspace(x[-1], level, 5)[1:], *[level] * (4 if level < 7.0 else 600)]
+    measured = np.array(x) + rng.normal(0.0, noise_mm, len(x))
+    rows = [f"{i},{level:.4f},{2.0 * level - 1e-6 * i:.5f}\n" for i, level in enumerate(measured)]
+    raw = tmp_path / "raw.csv"
+    raw.write_text("Time (s),Displacement (mm),Force (N)\n" + "".join(rows))
+    holds = convert(raw, About("wire", "line", 1000.0), Choices()).experiment.holds
+    assert [hold.displacement_mm for hold in holds] == pytest.approx([1, 2, 3, 4, 5, 6, 7], abs=0.002)
+    assert [hold.duration_s for hold in holds[:-2]] == pytest.approx(held[:-1], abs=move_s + 1.0)
 
 
 @pytest.mark.parametrize("count", [1, 2, MOST, MOST + 1, 100, 5000])

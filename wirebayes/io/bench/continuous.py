@@ -21,6 +21,8 @@ LONG = 10  # times as many readings: shorter holds have none to spare
 AFTER_MOVE = 0.1
 SLACK = 0.05  # of what is read in the hold: a rest before it with less says nothing of the wire
 TURN = 0.5  # of the way to a hold: smaller ones are an overshoot or a drive that hunts
+READ_ENOUGH = 10  # readings of a hold that is short beside the others: with fewer it is passed
+OF_MOVES = 3.0  # times the moves beside it: a stop of a move that is made bit by bit is hardly longer than these
 COVERED = 0.5  # of the readings in holds; a recording with less is a pull, not a test of holds
 
 
@@ -69,13 +71,35 @@ def by_plateaus(readings: Readings, resets: Sequence[str]) -> Cut:
 def _found(readings: Readings) -> Sequence[Plateau]:
     """The holds, which have to be most of the recording."""
     _check_rising(readings)
-    found_holds = plateaus(readings.setting, readings.time_s, readings.step)
+    found_holds = _with_short_ones(readings, plateaus(readings.setting, readings.time_s, readings.step))
     kept = sum(p.end - p.begin for p in found_holds)
     if not found_holds or kept < COVERED * len(readings.setting):
         raise _too_few(readings, found_holds, kept)
     if len(found_holds) == 1:
         _check_only_hold(readings, found_holds[0])
     return found_holds
+
+
+def _with_short_ones(readings: Readings, long_ones: Sequence[Plateau]) -> list[Plateau]:
+    """The holds of a recording, and those that are short beside them but long beside the moves to and from them.
+
+    Times of tests may go through decades. What the wire does in a pause at next to no tension says nothing of it.
+    """
+    if not long_ones:
+        return []
+    time, read = readings.time_s, readings.read
+    taut = SLACK * max(abs(float(np.median(read[hold.begin : hold.end]))) for hold in long_ones)
+    rests = plateaus(readings.setting, time, readings.step, shortest=0.0)
+    found = []
+    for i, rest in enumerate(rests):
+        before_s = time[rests[i - 1].end - 1] if i else time[0]
+        after_s = time[rests[i + 1].begin] if i + 1 < len(rests) else time[-1]
+        begin_s, end_s = time[rest.begin], time[rest.end - 1]
+        move_s = max(begin_s - before_s, after_s - end_s)
+        is_long = OF_MOVES * move_s <= end_s - begin_s and rest.end - rest.begin >= READ_ENOUGH
+        if rest in long_ones or (is_long and abs(float(np.median(read[rest.begin : rest.end]))) > taut):
+            found.append(rest)
+    return found
 
 
 def _moves_to(
