@@ -70,7 +70,7 @@ def test_rows_stand_the_other_way_round_where_most_times_fall(falling, refused, 
     """Of twenty steps in time within one hold."""
     times = np.cumsum([0, *([3] * (20 - falling)), *([-1] * falling)])
     rows = [(1, 1.0, t, 5.0) for t in times + 90]
-    expected = "the oldest first" if refused else "times that rise"
+    expected = "turn them round" if refused else "a time amid those above"
     with pytest.raises(InputError, match=expected):
         convert(file_of(tmp_path, "Hold,x [mm],Time [s],Force [N]", rows), ABOUT, Choices())
 

@@ -83,23 +83,38 @@ def _found(readings: Readings) -> Sequence[Plateau]:
 def _with_short_ones(readings: Readings, long_ones: Sequence[Plateau]) -> list[Plateau]:
     """The holds of a recording, and those that are short beside them but long beside the moves to and from them.
 
-    Times of tests may go through decades. What the wire does in a pause at next to no tension says nothing of it.
+    Times of tests may go through decades. A short rest at zero before the test is none of its holds.
     """
-    if not long_ones:
-        return []
-    time, read = readings.time_s, readings.read
-    taut = SLACK * max(abs(float(np.median(read[hold.begin : hold.end]))) for hold in long_ones)
-    rests = plateaus(readings.setting, time, readings.step, shortest=0.0)
+    rests = plateaus(readings.setting, readings.time_s, readings.step, shortest=0.0)
     found = []
     for i, rest in enumerate(rests):
-        before_s = time[rests[i - 1].end - 1] if i else time[0]
-        after_s = time[rests[i + 1].begin] if i + 1 < len(rests) else time[-1]
-        begin_s, end_s = time[rest.begin], time[rest.end - 1]
-        move_s = max(begin_s - before_s, after_s - end_s)
-        is_long = OF_MOVES * move_s <= end_s - begin_s and rest.end - rest.begin >= READ_ENOUGH
-        if rest in long_ones or (is_long and abs(float(np.median(read[rest.begin : rest.end]))) > taut):
+        at_zero = abs(rest.level) <= noise_of(readings.setting, readings.step)
+        before_test = i == 0 and at_zero
+        is_short_hold = not before_test and _pulls(readings, rest, long_ones) and _is_held(readings.time_s, rests, i)
+        if rest in long_ones or is_short_hold:
             found.append(rest)
     return found
+
+
+def _is_held(time: Floats, rests: Sequence[Plateau], i: int) -> bool:
+    """Whether a rest is read often enough, and lasts long beside the moves to and from it."""
+    rest = rests[i]
+    begin_s, end_s = time[rest.begin], time[rest.end - 1]
+    before_s = time[rests[i - 1].end - 1] if i else time[0]
+    after_s = time[rests[i + 1].begin] if i + 1 < len(rests) else time[-1]
+    move_s = max(begin_s - before_s, after_s - end_s)
+    return bool(OF_MOVES * move_s <= end_s - begin_s and rest.end - rest.begin >= READ_ENOUGH)
+
+
+def _pulls(readings: Readings, rest: Plateau, holds: Sequence[Plateau]) -> bool:
+    """Whether more than next to nothing is read in a rest, beside the most that is read in some holds."""
+    most = max((_read_in(readings, hold) for hold in holds), default=np.inf)
+    return _read_in(readings, rest) > SLACK * most
+
+
+def _read_in(readings: Readings, rest: Plateau) -> float:
+    """What is read in a rest, in size."""
+    return abs(float(np.median(readings.read[rest.begin : rest.end])))
 
 
 def _moves_to(
