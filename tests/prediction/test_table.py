@@ -145,6 +145,13 @@ def test_a_first_reading_also_says_which_of_the_undecided_models_is_right(number
             assert (row["mean_N"] - other) / (one - other) == pytest.approx(weight, abs=0.06)
 
 
+def test_a_model_without_probability_has_no_part_in_the_answer() -> None:
+    """Whatever a first reading says."""
+    for first in ([np.nan] * 3, [2.0, np.nan, np.nan]):
+        found, alone = mixed((1.0, 0.0), (900.0, 1200.0), first, 300), mixed((1.0,), (900.0,), first, 300)
+        assert found == alone
+
+
 def test_models_with_few_draws_keep_their_shares() -> None:
     """A model of nine tenths has no more than three hundred draws: the other one does not fill up what is missing."""
     found = mixed((0.9, 0.1), (900.0, 1200.0), [np.nan] * 3, 300)
@@ -154,9 +161,9 @@ def test_models_with_few_draws_keep_their_shares() -> None:
 
 @pytest.mark.parametrize(
     ("shares", "used"),
-    [((1.0,), [4000]), ((0.75, 0.25), [3000, 1000]), ((0.9999, 1e-4), [4000, 1]), ((1.0 - 1e-9, 1e-9), [4000, 1])],
+    [((1.0,), [4000]), ((0.75, 0.25), [3000, 1000]), ((0.9999, 1e-4), [4000, 2]), ((1.0, 0.0), [4000, 2])],
 )
-def test_four_thousand_draws_are_shared_by_probability(
+def test_four_thousand_draws_are_shared_by_probability_and_an_improbable_model_has_two(
     shares: tuple[float, ...], used: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Evenly spread over the stored ones, from the first to the last."""
@@ -180,7 +187,7 @@ def test_four_thousand_draws_are_shared_by_probability(
     mixture_table([(1.0, request)], 0, 70)  # type: ignore[arg-type]
     assert [len(rows) for rows in asked[-2:]] == [4000, 70]
     del asked[-2:]
-    for rows in asked[: 1 + (shares[-1] == 0.25)]:
+    for rows in asked:
         assert (rows[0], rows[-1]) == (0.0, 8999.0) and np.ptp(np.diff(rows)) <= 1.0
 
 

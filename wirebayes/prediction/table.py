@@ -28,6 +28,7 @@ from wirebayes.wire.protocol import Control
 
 FAR_OFF = 5.0  # standard deviations of a first reading: one in a million by chance, a wrong unit is at hundreds
 FAR_UP, FAR_ON = 2.0, 10.0  # times the largest tested tension, and the longest tested hold: nothing there was tested
+_LEAST = 2  # draws of a model that hardly counts: one has no spread
 _FEW = 500  # draws, enough for a standard deviation
 Members = Sequence[tuple[float, ProtocolRequest]]  # of a mixture: probability and request, one or several
 DRAWS = 4000  # a 5 % quantile is then one between 4.3 % and 5.7 %
@@ -171,10 +172,11 @@ def _drawn(members: Members, seed: int, draws: int) -> dict[int, Floats]:
     readings, log_weights = [], []
     for probability, request in members:
         stored = request.stored
-        own_draws = max(each, ceil(probability * draws))
+        own_draws = max(each, ceil(probability * draws), _LEAST)
         theta = stored.theta[evenly(len(stored.theta), own_draws)]
         own = draw_unconditioned(stored.problem, theta, stored.sample, request.prediction, rng)
-        log_weight = np.full(len(own), np.log(probability))
+        with np.errstate(divide="ignore"):
+            log_weight = np.full(len(own), np.log(probability))
         if stored.likelihood == "chain":
             log_weight += log_density_of_given(own, request.prediction)
             own = given_first(own, request.prediction)
