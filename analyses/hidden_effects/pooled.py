@@ -68,7 +68,14 @@ def target_lines(rows: list[Row]) -> tuple[str, list[list[str]]]:
             continue
         again = cell(same) if same["found"] and same["found"]["n"] != row["found"]["n"] else ""
         lines.append([row["target"], row["wanted"], cell(row, row["passed"] is False), again])
-    return "40 14 24 22", lines
+    return _without_empty_column("40 14 24 22", lines)
+
+
+def _without_empty_column(widths: str, lines: list[list[str]]) -> tuple[str, list[list[str]]]:
+    """Widths and cells without the last column, where no row but the header says anything in it."""
+    if any(cells[-1] for cells in lines[1:]):
+        return widths, lines
+    return widths.rpartition(" ")[0], [cells[:-1] for cells in lines]
 
 
 def stated_lines(rows: list[Row]) -> tuple[str, list[list[str]]]:

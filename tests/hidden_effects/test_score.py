@@ -120,6 +120,13 @@ def test_false_alarms_need_numbers_to_pass():
         assert row["passed"] is passed
 
 
+def test_a_column_that_no_row_fills_is_not_printed():
+    lines = [["", "wanted", "found", "again"], ["a", "1", "2", ""]]
+    assert program._without_empty_column("4 3 2 1", lines) == ("4 3 2", [["", "wanted", "found"], ["a", "1", "2"]])
+    seen = [*lines, ["b", "1", "2", "3"]]
+    assert program._without_empty_column("4 3 2 1", seen) == ("4 3 2 1", seen)
+
+
 def test_gap_is_pooled_in_noise_floors():
     sums = [90.0, 40.0, 90.0, 10.0]  # ten cases: plain 9, final 4, judge's plain 9, oracle 1, floor 1
     assert closed(sums, 10) == pytest.approx(50 / 80)
