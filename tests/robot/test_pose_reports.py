@@ -66,7 +66,7 @@ def test_warnings_say_who_falls_when_and_what_catches_it() -> None:
     began, fall, slack = (notice.text for notice in found)
     assert began.startswith("draws cannot begin at the pose, no stable equilibrium is found there: 20 % of them (spec")
     assert "not stable" in stability.stability_warnings({0.0: course(FIVE)}, stable=False)[0].text
-    assert "falls within 60 s: in 50 % of the draws, first after 5 s, in the median after 17.5 s" in fall
+    assert "falls within 1 min: in 50 % of the draws, first after 5 s, in the median after 17.5 s" in fall
     assert fall.endswith("wire 2 giving way, dropping 20 mm (specimens differing by 5 %)")
     assert "wire 1 in 25 % of the draws, first after 20 s, wire 2 in 25 % of the draws, first after 4 s (" in slack
 
@@ -90,9 +90,9 @@ def holding(tension: float, stiffness: float) -> Course:
     [
         (0.21, 0.31, []),
         (0.2, 0.3, []),
-        (0.19, 0.31, ["a wire may keep little of its tension within 60 s: wire 3 19 % (specimens alike)"]),
-        (0.21, 0.29, ["the stiffness against the softest motion may fall within 60 s: to 29 % (specimens alike)"]),
-        (0.21, -0.1, ["the stiffness against the softest motion may fall within 60 s: to 0 % (specimens alike)"]),
+        (0.19, 0.31, ["a wire may keep little of its tension within 1 min: wire 3 19 % (specimens alike)"]),
+        (0.21, 0.29, ["the stiffness against the softest motion may fall within 1 min: to 29 % (specimens alike)"]),
+        (0.21, -0.1, ["the stiffness against the softest motion may fall within 1 min: to 0 % (specimens alike)"]),
     ],
 )
 def test_a_platform_that_holds_is_warned_of_when_it_comes_near_to_a_fall(
@@ -293,12 +293,12 @@ def test_a_robot_that_may_fall_says_who_is_to_blame_in_every_way() -> None:
     assert found["least_tension_wire"] == 3 and found["slack_time_s"] == [None] * 3
     assert found["stiffness_share"]["mean"] == 0.5 and found["least_tension_share"]["mean"] == pytest.approx(0.1)
     falls = (
-        "the platform falls within 60 s: in 75 % of the draws, first after 20 s, in the median after 40 s, "
+        "the platform falls within 1 min: in 75 % of the draws, first after 20 s, in the median after 40 s, "
         "wire 3 giving way, nothing catching it nearby (specimens alike)"
     )
     assert stability.stability_warnings({0.0: course(fallen)}) == [
         Notice("fall", falls),
-        Notice("slack", "a wire may keep little of its tension within 60 s: wire 3 10 % (specimens alike)"),
+        Notice("slack", "a wire may keep little of its tension within 1 min: wire 3 10 % (specimens alike)"),
     ]
 
 
@@ -311,8 +311,8 @@ def test_wires_that_only_slacken_are_named_and_the_nearest_is_not_named_again() 
     )
     who = "(specimens differing by 5 %)"
     assert stability.stability_warnings({0.05: course(loose)}) == [
-        Notice("slack", f"wires go slack within 60 s: wire 2 in 25 % of the draws, first after 7.5 s {who}"),
-        Notice("fall", f"the stiffness against the softest motion may fall within 60 s: to 20 % {who}"),
+        Notice("slack", f"wires go slack within 1 min: wire 2 in 25 % of the draws, first after 7.5 s {who}"),
+        Notice("fall", f"the stiffness against the softest motion may fall within 1 min: to 20 % {who}"),
     ]
 
 
@@ -332,7 +332,7 @@ def test_a_wire_that_goes_slack_among_some_specimens_is_not_near_slack_among_oth
     near = holding(0.1, 0.5)
     slack = course(replace(FIVE, stiffness_share=np.full(5, 0.5), time_s=np.full(5, NEVER)))
     found = stability.stability_warnings({0.0: near, 0.05: slack})
-    assert [one.text.split(":")[0] for one in found] == ["wires go slack within 60 s"]
+    assert [one.text.split(":")[0] for one in found] == ["wires go slack within 1 min"]
     assert "specimens alike" not in found[0].text
 
 

@@ -116,7 +116,7 @@ def test_only_lines_that_legs_hang_on_warn():
     assert draws.wire_warnings(robot, line, tau, 60.0, np.ones((1, 6))) == []
     robot = replace(robot, wire=(THICK, *robot.wire[1:-1], "default"))
     assert draws.wire_warnings(robot, line, tau, 60.0, np.ones((1, 6))) == [
-        Notice("extrapolation", "60 s is longer than the longest tested hold, 30 s")
+        Notice("extrapolation", "1 min is longer than the longest tested hold, 30 s")
     ]
 
 

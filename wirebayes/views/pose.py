@@ -9,7 +9,7 @@ from wirebayes.answers.robot import of_pose
 from wirebayes.json_files.pose import PoseJson, known_at_the_end
 from wirebayes.json_files.pose_history import PoseHistoryJson
 from wirebayes.robot.mechanics.wires_used import specimens_in_words
-from wirebayes.sentences import coordinates
+from wirebayes.sentences import coordinates, lasting
 from wirebayes.views.result import NOTHING, Given, Result, figure, html_table
 
 
@@ -42,7 +42,7 @@ class Pose(Result[PoseJson | PoseHistoryJson]):
             return [found["robot"], found["sentence"]]
         drift = found["drift"][0]
         middle = drift["distance_mm"]["q50"][-1]
-        return [found["robot"], f"drift {figure(middle)} mm after {figure(drift['times_s'][-1])} s"]
+        return [found["robot"], f"drift {figure(middle)} mm after {lasting(drift['times_s'][-1])}"]
 
     def _repr_html_(self) -> str:
         found = self.summary()

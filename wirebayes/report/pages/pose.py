@@ -316,7 +316,7 @@ def _variance_shares(pose: PoseJson) -> list[Block]:
     if not shares:
         return []
     lines = [[name, percent(share)] for name, share in shares.items()]
-    caption = f"Each parameter's share of the variance of the drift after {pose['variance_shares']['time_s']:g} s."
+    caption = f"Each parameter's share of the variance of the drift after {lasting(pose['variance_shares']['time_s'])}."
     return [Table(["parameter", "share"], lines, caption)]
 
 
@@ -342,8 +342,8 @@ def _equilibria(pose: PoseJson) -> list[Block]:
     sure = (
         f"With stiffness and creep of each wire independently anywhere in {part} of their 90 % bands, and the mean "
         f"wire's joint values commanded, the platform is certain to be in this box about the pose after "
-        f"{band['time_s']:g} s: {box}. This is proved for the whole way there, with wires up to a tenth of the creep "
-        "out of step."
+        f"{lasting(band['time_s'])}: {box}. This is proved for the whole way there, with wires up to a tenth of the "
+        "creep out of step."
     )
     return [Text(proved), Text(sure)]
 

@@ -17,7 +17,7 @@ from wirebayes.robot.mechanics.description import GivenWire, Robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.sentences import short
+from wirebayes.sentences import lasting, short
 from wirebayes.wire import laws
 from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed, steady_hold
 
@@ -357,7 +357,7 @@ def _beyond(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -
     """In which ways a use leaves what was tested."""
     out = _other_tensions(line, tension_N[np.isfinite(tension_N) & (tension_N > 0)])
     if line.time_range_s is not None and time_s > line.time_range_s[1]:
-        out.append(f"{short(time_s, 4)} s is longer than the longest tested hold, {short(line.time_range_s[1], 4)} s")
+        out.append(f"{lasting(time_s)} is longer than the longest tested hold, {lasting(line.time_range_s[1])}")
     lengths = 1e3 * zero_m[np.isfinite(zero_m)]
     return out + _other_lengths(line, lengths) if lengths.size else out
 

@@ -9,7 +9,7 @@ from wirebayes.numeric.typing import Bools, Floats, Ints
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.motion.course import Course, Falls
 from wirebayes.robot.pose.request import band_over_draws
-from wirebayes.sentences import short
+from wirebayes.sentences import lasting, short
 
 NEAR_SLACK, NEAR_LOOSE = 0.2, 0.3  # shares of first tension and stiffness: a builder wants to know below these
 
@@ -82,7 +82,7 @@ def stability_warnings(courses: dict[float, Course], stable: bool = True) -> lis
         Whether the commanded pose is a stable equilibrium at all.
     """
     last_s = max(course.times_s[-1] for course in courses.values())
-    within = f"within {last_s:g} s"
+    within = f"within {lasting(last_s)}"
     found, began = {}, {}
     for spread, course in courses.items():
         who = _who(spread)
@@ -135,8 +135,8 @@ def _fallen(found: FallsReport) -> str | None:
     wire = int(np.argmax(found["fall_wires"])) + 1
     end = f"dropping {short(drop['median'], 3)} mm" if drop else "nothing catching it nearby"
     return (
-        f"in {_percent(found['fall_probability'])} of the draws, first after {short(times['first'], 3)} s, in the "
-        f"median after {short(times['median'], 3)} s, wire {wire} giving way, {end}"
+        f"in {_percent(found['fall_probability'])} of the draws, first after {lasting(times['first'])}, in the "
+        f"median after {lasting(times['median'])}, wire {wire} giving way, {end}"
     )
 
 
@@ -144,7 +144,7 @@ def _slack(found: FallsReport) -> str | None:
     each = []
     for i, (share, times) in enumerate(zip(found["slack_probability"], found["slack_time_s"], strict=True)):
         if times is not None:
-            each.append(f"wire {i + 1} in {_percent(share)} of the draws, first after {short(times['first'], 3)} s")
+            each.append(f"wire {i + 1} in {_percent(share)} of the draws, first after {lasting(times['first'])}")
     return ", ".join(each) or None
 
 
