@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 
 from wirebayes.numeric.typing import Array
 
+_Six = tuple[Array, Array, Array, Array, Array, Array]
+
 MOST_EFFECTS: int
 FORMULAS: tuple[str, ...]
 
@@ -42,7 +44,7 @@ class Stored(Staircases):
 
 def linearise(
     test: Test, law: Law, theta: Array, spread: Array, first: Array, column: NDArray[np.intp], variance: Array
-) -> tuple[tuple[Array, ...], tuple[Array, ...] | None]: ...
+) -> tuple[_Six, _Six | None]: ...
 def simulate(test: Test, law: Law, theta: Array, setting_error: Array, each_alone: bool = ...) -> Array: ...
 def courses(test: Test, law: Law, theta: Array, first_N: Array, most_steps: int) -> tuple[Array, Array]: ...
 def chain(
