@@ -3,6 +3,7 @@
     python -m analyses.benchmarks --output out/benchmarks [--minutes 10] [--wires NAME ...] [--likelihoods chain hold]
 
 Every peer gets the same data, prior and likelihood; before anything is timed its model is compared with the package's.
+A wire that a setting error may leave slack is left out of the chain: the peers' likelihood is linear in such errors.
 A peer that did not finish, diverged or has R-hat above 1.01 is printed as not converged and gets no ratio. wirebayes is
 run anew beside each peer, so that a busy machine slows both. Each case has a process of its own: what XLA has compiled
 for one stays in memory until its process ends.
@@ -35,7 +36,9 @@ def main():
     cases = []
     with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as alone:
         for wire, likelihood in product(wires, options.likelihoods):
-            cases.append(alone.submit(beside_each_peer, wire, likelihood, options).result())
+            case = alone.submit(beside_each_peer, wire, likelihood, options).result()
+            if case is not None:
+                cases.append(case)
             write_json(
                 options.output / "samplers.json",
                 {"wanted_ess": measure.WANTED, "minutes": options.minutes, "cases": cases},

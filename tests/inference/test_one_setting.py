@@ -41,4 +41,4 @@ def test_specimens_at_one_displacement_each_are_sampled_in_bounded_time():
     benches = [Bench(name, displacements_mm=(25.0,), times_s=TIMES_S, resolution_N=1e-4) for name in "abc"]
     done = fit_problem(draw(benches, Truth(WIRE | {"sensor_sd": 0.005, "setting_sd": 0.0}), seed=4).problem)
     assert done.converged
-    assert done.chains.evaluations < 80_000  # in the coordinates of several settings 390,000 were not enough
+    assert done.chains.evaluations < 120_000  # in the coordinates of several settings 390,000 were not enough

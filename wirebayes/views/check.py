@@ -18,7 +18,7 @@ class Check(Result[CheckJson]):
     Examples
     --------
     >>> [warning.kind for warning in checked.warnings]
-    ['slack']
+    []
     """
 
     _content: ClassVar[str] = CHECKED
