@@ -10,7 +10,7 @@ from tests.wire.protocols import protocol
 from wirebayes.effects import effect_named
 from wirebayes.model import likelihoods
 from wirebayes.model.hold_filter import Measured
-from wirebayes.wire import compiled, staircase
+from wirebayes.wire import compiled, edges
 from wirebayes.wire.model import Model
 from wirebayes.wire.staircase import linearise, simulate, streamed
 
@@ -98,7 +98,7 @@ def test_leaving_a_hold_out_is_the_ratio_of_two_integrals(preload):
 
 def test_beyond_eight_standard_deviations_there_is_no_edge_and_the_density_goes_on():
     theta = WIRE | {"U": 1.0}
-    least = staircase.FAR * theta["setting_sd"]
+    least = edges.FAR * theta["setting_sd"]
     readings = read(theta | {"preload": least}, 0)
     inside, outside = theta | {"preload": least - 1e-9}, theta | {"preload": least + 1e-9}
     assert linearise(TEST, columns(inside)).edges is not None

@@ -10,7 +10,8 @@ import numpy as np
 
 from wirebayes.numeric.typing import Array
 from wirebayes.wire.compiled import FirstReadings
-from wirebayes.wire.staircase import Linearised, Side
+from wirebayes.wire.edges import Side
+from wirebayes.wire.staircase import Linearised
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 

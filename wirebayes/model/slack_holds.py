@@ -15,7 +15,8 @@ from scipy.special import log_ndtr
 
 from wirebayes.model.hold_filter import HoldRead, Measured, ReadingNoise, carried_unread, filter_hold
 from wirebayes.numeric.typing import Array, Bools
-from wirebayes.wire.staircase import Edges, Linearised, Side
+from wirebayes.wire.edges import Edges, Side
+from wirebayes.wire.staircase import Linearised
 
 _LEAST_VARIANCE = 1e-300  # mm², of a stretch: where none is left, the wire is on the side that its mean says
 

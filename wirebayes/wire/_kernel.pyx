@@ -34,7 +34,7 @@ cdef int NEWTON_STEPS = 7  # as in `wirebayes.effects.rivals`
 cdef int MOST_STEPS = 200  # as in `wirebayes.wire.inverse`
 cdef double EXACT = 4.0 * 2.220446049250313e-16
 cdef double MISSED = 1e-9
-cdef double FAR = 8.0  # as in `wirebayes.wire.staircase`
+cdef double FAR = 8.0  # as in `wirebayes.wire.edges`
 cdef double LEAST_STRETCH = 0.5  # likewise
 cdef double LEAST_READ = 0.1  # likewise
 cdef double MOST_ERROR = 6.0  # likewise
@@ -811,7 +811,7 @@ cdef class Computed(Staircases):
     cdef void look_aside(
         self, Wire* before, int j, Py_ssize_t i, double waits, double creep, double spread
     ) noexcept:
-        """Hold `j` on both sides of its edge: `wirebayes.wire.staircase`."""
+        """Hold `j` on both sides of its edge: `wirebayes.wire.edges`."""
         cdef double ratio = self.stretch[j].v / spread
         cdef double hazard = exp(-0.5 * ratio * ratio - HALF_LOG_2PI - log_normal_below(ratio))
         cdef double to_taut = fmax(hazard, LEAST_STRETCH - ratio) * spread
@@ -824,7 +824,7 @@ cdef class Computed(Staircases):
         self.slack_carry[j] = self.aside(before, j, waits, creep, to_slack, self.slack + j * self.width)
 
     cdef double as_read(self, int j, Py_ssize_t i, double to_taut, double spread) noexcept:
-        """A setting error nearer to what the first reading says of it: `wirebayes.wire.staircase.nearer_as_read`."""
+        """A setting error nearer to what the first reading says of it: `wirebayes.wire.edges.nearer_as_read`."""
         cdef double first, slope, error, ratio = self.stretch[j].v / spread, q = spread * spread
         cdef Dual line
         if not self.first.shape[0]:
