@@ -175,7 +175,7 @@ class OnSides:
 
 
 def on_sides(line: Linearised, measured: Measured) -> OnSides:
-    """What depends on readings through sums of squares alone needs a staircase that is linear in its errors.
+    """Put each hold on the more probable side of its edge, for what needs a staircase that is linear in its errors.
 
     Parameters
     ----------

@@ -87,15 +87,15 @@ def read_hold(
     edges = line.edges
     if edges is None or not edges.near[j].any():
         return as_it_is
-    taut = _on_side(edges.taut, j, measured, m, p, noise)
-    slack = _on_side(edges.slack, j, measured, m, p, noise)
+    taut = _filtered(edges.taut, j, measured, m, p, noise)
+    slack = _filtered(edges.slack, j, measured, m, p, noise)
     before, after = _stretches(edges, j, m, p, noise, taut)
     log_taut = taut.log_density + log_ndtr(after.ratio)
     log_slack = slack.log_density + log_ndtr(-before.ratio)
     return EitherSide(as_it_is, edges.near[j], taut, slack, log_taut, log_slack)
 
 
-def _on_side(side: Side, j: int, measured: Measured, m: Array, p: Array, noise: ReadingNoise) -> HoldRead:
+def _filtered(side: Side, j: int, measured: Measured, m: Array, p: Array, noise: ReadingNoise) -> HoldRead:
     read = filter_hold(side, j, measured, m, p, noise)
     return read._replace(mean=read.mean + side.carry[j])
 
@@ -154,20 +154,20 @@ def settled(line: Linearised, measured: Measured) -> Linearised:
     Parameters
     ----------
     line : Linearised
+        With edges.
     measured : Measured
     """
-    if line.edges is None:
-        return line
+    assert line.edges is not None
     recorded = np.asarray(measured.mask.any(axis=1))
     near = line.edges.near & recorded[:, None]
     is_taut = np.zeros(near.shape, bool)
     for j, (_, _, read) in enumerate(filter_holds(line, measured)):
         if isinstance(read, EitherSide):
             is_taut[j] = read.log_taut > read.log_slack
-    return _on_sides(line, near, is_taut)
+    return _moved_to_sides(line, near, is_taut)
 
 
-def _on_sides(line: Linearised, near: Bools, is_taut: Bools) -> Linearised:
+def _moved_to_sides(line: Linearised, near: Bools, is_taut: Bools) -> Linearised:
     """A staircase whose holds near an edge are on one side of it; what they carry on moves those after them.
 
     Parameters

@@ -15,6 +15,7 @@ from wirebayes.numeric.typing import Array, Ints
 from wirebayes.wire.protocol import Protocol
 
 if TYPE_CHECKING:
+    from wirebayes.wire.edges import FirstReadings
     from wirebayes.wire.model import Model
 
 try:
@@ -28,17 +29,6 @@ _PLAIN = ("k1", "B", "U", "k2", "N", "preload")
 
 
 _NONE, _NOT_READ, _NO_COLUMN = np.empty(0), np.empty((0, 0)), np.empty(0, np.intp)
-
-
-class FirstReadings(NamedTuple):
-    """The first reading of each hold.
-
-    Values (H, n) or (H, 1), NaN where a hold has none, their columns (H,), and the variance (n,) of a reading.
-    """
-
-    value: Array
-    column: Ints
-    variance: Array
 
 
 class Call(NamedTuple):

@@ -7,14 +7,24 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import log_ndtr
 
-from wirebayes.numeric.typing import Array, Bools
-from wirebayes.wire.compiled import FirstReadings
+from wirebayes.numeric.typing import Array, Bools, Ints
 from wirebayes.wire.walk import ByHand, BySteps, LinearHoldWalked, Sloped
 
 FAR = 8.0  # standard deviations of the setting: a wire stretched by more is taut whatever its error, to 1e-15
 LEAST_STRETCH = 0.5  # standard deviations of the setting, of the stretch at which a taut hold is expanded
 LEAST_READ = 0.1  # the same, where the first reading says at which
 MOST_ERROR = 6.0  # standard deviations of the setting, that a first reading may say it is off by
+
+
+class FirstReadings(NamedTuple):
+    """The first reading of each hold.
+
+    Values (H, n) or (H, 1), NaN where a hold has none, their columns (H,), and the variance (n,) of a reading.
+    """
+
+    value: Array
+    column: Ints
+    variance: Array
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ import numpy as np
 
 from wirebayes.numeric.typing import Array
 from wirebayes.wire import compiled
-from wirebayes.wire.compiled import FirstReadings
-from wirebayes.wire.edges import EdgeOfHold, Edges, edge_of_hold, edges_of, joined_edges
+from wirebayes.wire.edges import EdgeOfHold, Edges, FirstReadings, edge_of_hold, edges_of, joined_edges
 from wirebayes.wire.model import PLAIN, Model
 from wirebayes.wire.protocol import Protocol
 from wirebayes.wire.walk import ByHand, BySteps, LinearHoldWalked, Theta, Walk

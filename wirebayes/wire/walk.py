@@ -284,32 +284,23 @@ class ByHand(Walk):
         self.brought = np.zeros(np.shape(theta["k1"])[0])
 
     def linearised(self, j: int, setting: Array, creep: Array) -> LinearHoldWalked:
-        """A hold of the walk; holds are walked in order.
+        """A hold of the walk.
 
         Parameters
         ----------
         j : int
             Position of the hold.
-        setting : float
+        setting : float or (n,) array
             Displacement, mm.
         creep : (n,) array
             Creep elongation carried in, mm.
-        """
-        return self.elsewhere(j, setting, creep)
-
-    def elsewhere(self, j: int, setting: Array, creep: Array) -> LinearHoldWalked:
-        """The same of a hold that is at another setting than the walk's, of which the walk takes no notice.
-
-        Parameters
-        ----------
-        j, creep
-            As for `linearised`.
-        setting : float or (n,) array
         """
         stretched = self.base + setting
         readings, carried = self.closed_form(j, stretched, creep)
         one = np.ones(len(creep))
         return LinearHoldWalked(readings, carried, Sloped(stretched - (self.protocol.length_mm + creep), one, -one))
+
+    elsewhere = linearised  # nothing is kept of a hold, so at another setting it is computed in the same way
 
 
 class BySteps(Walk):
@@ -351,12 +342,12 @@ class BySteps(Walk):
         ----------
         j, creep
             As for `linearised`.
-        setting : float or (n,) array
+        setting : (n,) array
         """
         after = self.past, self._beside
         past, self._beside = self._before
         self.past = list(past)
-        found, _ = self._stepped(j, np.tile(setting, 2) if np.ndim(setting) else setting, creep)
+        found, _ = self._stepped(j, np.tile(setting, 2), creep)
         self.past, self._beside = after
         return found
 
