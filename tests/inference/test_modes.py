@@ -203,8 +203,8 @@ def test_a_search_finds_the_mode_with_most_of_the_mass(data):
     assert there.mean() < 0.8
     before = target.evaluations
     found = [search(target, np.random.default_rng(seed)).modes.log_density[0] for seed in range(5)]
-    # a mode whose setting errors are near half a step, where the prior ends, has a small basin: one search may miss it
-    assert (np.array(found) > ended.log_density.max() - 0.01).sum() >= 4
+    # of five climbs by luck all would end there in one case of six
+    assert (np.array(found) > ended.log_density.max() - 0.01).all()
     assert target.evaluations - before < 5 * 12_000
 
 
