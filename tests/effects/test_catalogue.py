@@ -7,6 +7,7 @@ import pytest
 
 from tests.wire.protocols import PLAIN, columns, protocol
 from wirebayes.effects import CATALOGUE, effect_named
+from wirebayes.effects.rivals import RIVALS
 from wirebayes.errors import InputError
 from wirebayes.wire.effect import Amplitude, Effect
 from wirebayes.wire.model import Model
@@ -228,13 +229,29 @@ def test_second_relaxation_and_steady_creep_run_beside_the_creep():
         assert found[1, 0] == pytest.approx(PLAIN["k1"] * (1003.4 / (1000.0 + left) - 1.0), rel=1e-12)
 
 
-@pytest.mark.parametrize("beside", ["", "superposition", "second_relaxation", "steady_creep"])
+BESIDE_A_WAIT = {
+    "": {}, **{key: strong(key) for key in ("superposition", "second_relaxation", "steady_creep")},
+    "steady_creep@carried": strong("steady_creep"), "tension_dependent_rate": strong("tension_dependent_rate"),
+    "logarithmic": {"logarithmic.t0": 5.0},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("beside", BESIDE_A_WAIT)
 def test_an_unrecorded_hold_is_the_same_as_an_entry_in_the_protocol(beside):
     """T seconds before hold 3 at its displacement, its own clock running."""
     stated = protocol([1.0, 3.0, 5.0, 5.0, 2.0, 4.0], [TIMES, TIMES, [0.0, 200.0], TIMES, TIMES, TIMES], unrecorded={2})
-    keys, own = ((beside,), strong(beside)) if beside else ((), {})
-    expected = readings(own, *keys, p=stated)[[0, 1, 3, 4, 5]]
-    found = readings(own | strong("unrecorded_hold@3"), *keys, "unrecorded_hold@3")
+    effects, own = [RIVALS[beside]() if beside in RIVALS else beside] if beside else [], BESIDE_A_WAIT[beside]
+    expected = readings(own, *effects, p=stated)[[0, 1, 3, 4, 5]]
+    found = readings(own | strong("unrecorded_hold@3"), *effects, "unrecorded_hold@3")
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("beside", BESIDE_A_WAIT)
+def test_creep_before_a_test_is_the_same_as_a_hold_at_displacement_zero(beside):
+    stated = protocol([0.0, *PATH], [[0.0, 500.0], *([TIMES] * 5)], unrecorded={0})
+    effects, own = [RIVALS[beside]() if beside in RIVALS else beside] if beside else [], BESIDE_A_WAIT[beside]
+    expected = readings(own, *effects, p=stated)[1:]
+    found = readings(own | strong("prior_creep"), *effects, "prior_creep")
     assert found == pytest.approx(expected, rel=1e-12)
 
 

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from tests.wire.protocols import PLAIN, parameters, protocol, protocols
 from wirebayes.effects import CATALOGUE
-from wirebayes.effects.creep import SteadyCreepCarried, Superposition
+from wirebayes.effects.creep import SteadyCreepCarried, Superposition, TensionDependentRate
 from wirebayes.effects.elastic import LengthDependence, StrainStiffening, ToeOfStrain
+from wirebayes.effects.event import UnrecordedHold
 from wirebayes.effects.instrument import ReadingDelay
 from wirebayes.effects.rivals import RIVALS
 from wirebayes.inference.log_posterior import LogPosterior
@@ -177,6 +178,21 @@ def test_each_law_of_creep_moves_the_compiled_readings(law, beside):
     found = simulate(p, theta, model)
     assert np.abs(found - simulate(p, theta, Model(effects=beside, tension_ref_N=3.0))).max() > 1e-3
     same(found, by_numpy(lambda: simulate(p, theta, model)), 1.0)
+
+
+@pytest.mark.parametrize("during", [TensionDependentRate(), SteadyCreepCarried(), *LAWS_OF_CREEP], ids=lambda e: e.key)
+def test_a_wait_creeps_in_both_twins_as_a_hold_does(during):
+    p = protocol(ONE_WAY, [TIMES] * 6)
+    model = Model(effects=(during, UnrecordedHold(3)), tension_ref_N=3.0)
+    theta = {name: np.array([value]) for name, value in PLAIN.items()}
+    theta |= {
+        c: np.array([a.prior.ppf(0.8)]) for e in model.effects for c, a in zip(e.columns(), e.amplitudes, strict=True)
+    }
+    line = linearise(p, theta, model)
+    expected = by_numpy(lambda: linearise(p, theta, model))
+    for name, value in vars(expected).items():
+        if isinstance(value, np.ndarray):
+            same(getattr(line, name), value, PLAIN["k1"])
 
 
 def test_two_wires_of_the_same_strain_share_no_elastic_part():

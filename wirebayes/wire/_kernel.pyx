@@ -608,12 +608,15 @@ cdef void wait(
     Wire* wire, Hold* hold, Test test, int j, double time_s, double[:, ::1] shares, double[:, ::1] past
 ) noexcept:
     """Time passes before hold `j` begins, as in a hold that nobody reads."""
-    cdef Dual amount = amount_of(wire, hold), rate = constant(wire.k2)
-    cdef double share = gone(wire.k2 * pow(time_s, wire.N))
+    cdef Dual amount = amount_of(wire, hold), rate = rate_of(wire, hold), fraction
+    cdef double share
     cdef int k, e, i
     if wire.at.beside.n:
-        keep_in_mind(wire, hold, plus(hold.carried, amount), wire.k2, past)
-    hold.carried = plus(hold.carried, times(amount, share))
+        keep_in_mind(wire, hold, plus(hold.carried, amount), rate.v, past)
+    fraction = constant(law_of_time(wire, time_s)) if wire.timed else fraction_of(rate, pow(time_s, wire.N))
+    hold.carried = plus(hold.carried, product(amount, fraction))
+    for k in range(wire.at.creep.n):  # flow that is carried
+        hold.carried = plus(hold.carried, times(hold.tension, wire.own[wire.at.creep.each[k]][0] * time_s))
     for k in range(wire.at.beside.n):
         e = wire.at.beside.each[k]
         share = gone(time_s / wire.own[e][1]) if wire.formula[e] == SECOND_MODE else 0.0

@@ -43,7 +43,20 @@ class Creep:
 
     def fraction(self, k2: Array, hold: HoldContext) -> Array:
         """Share of the amount reached at the times of a hold."""
-        return self.effects.change("fraction", laws.creep_fraction(self.clock(hold), k2, self.N), hold)
+        return self.fraction_after(self.clock(hold), k2, hold)
+
+    def fraction_after(self, clock_s: Array, k2: Array, hold: HoldContext) -> Array:
+        """Share of the amount reached when creep has gone on for so long.
+
+        Parameters
+        ----------
+        clock_s : array
+            As creep counts it: a reading that comes late has no part in it.
+        k2 : array
+            What `rate` returned.
+        hold : HoldContext
+        """
+        return self.effects.change("fraction", laws.creep_fraction(clock_s, k2, self.N), hold)
 
     def creep(self, grown_mm: Array, hold: HoldContext) -> Array:
         """Creep elongation at the times of a hold, mm; `grown_mm` is what was carried in and has grown since."""

@@ -149,8 +149,10 @@ class Walk:
             return beside
         with _at(hold, wait_s):
             amount = self.creep.amount(hold.initial_tension, hold)
-            hold.grown = hold.carried + amount * laws.creep_fraction(wait_s, self.k2, self.N)
-            self.past.append((hold.start_s, hold.carried + amount, self.k2))
+            k2 = self.creep.rate(hold)
+            fraction = self.creep.fraction_after(wait_s, k2, hold)
+            hold.grown = self.creep.creep(hold.carried + amount * fraction, hold)
+            self.past.append((hold.start_s, hold.carried + amount, k2))
             beside = self.creep.beside(beside, hold)
         self.past[:] = [(start_s - wait_s, goal, k2) for start_s, goal, k2 in self.past]
         hold.carried = hold.grown
