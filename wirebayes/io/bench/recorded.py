@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -134,7 +135,9 @@ def changes(values: Array) -> Bools:
 
 def groups_between(border: Bools) -> list[Rows]:
     """The rows between borders; each is the first row of a group."""
-    return np.split(np.arange(len(border)), np.flatnonzero(border))
+    rows = np.arange(len(border))
+    ends = [0, *np.flatnonzero(border).tolist(), len(border)]
+    return [rows[begin:end] for begin, end in pairwise(ends)]
 
 
 def is_continuous(groups: Sequence[Rows]) -> bool:
@@ -160,8 +163,9 @@ def wanders(x: Floats, groups: Sequence[Rows], steady: float = STEADY) -> bool:
     steady : float
         The share of the smallest step by which it may scatter.
     """
-    within = max(float(np.ptp(x[rows])) for rows in groups)
-    steps = np.abs(np.diff([float(np.median(x[rows])) for rows in groups]))
+    within = max((float(np.ptp(x[rows])) for rows in groups if len(rows) > 1), default=0.0)
+    levels = [float(x[rows[0]] if len(rows) == 1 else np.median(x[rows])) for rows in groups]  # a recording has many
+    steps = np.abs(np.diff(levels))
     steps = steps[steps > within]
     return within > 0 and (not len(steps) or within > steady * float(steps.min()))
 

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from wirebayes.errors import InputError
 from wirebayes.io.bench.quantities import ROLES, quantity_unit
@@ -91,7 +92,14 @@ class RawTable:
 
     def column(self, column: int) -> list[str]:
         """The cells of a column."""
-        return [row.cells[column] if column < len(row.cells) else "" for row in self.rows]
+        if column not in self._columns:
+            self._columns[column] = [row.cell(column) for row in self.rows]
+        return self._columns[column]
+
+    @cached_property
+    def _columns(self) -> dict[int, list[str]]:
+        """Those that were asked for: most are, many times, and a recording has 100,000 rows."""
+        return {}
 
     def check_names(self) -> None:
         """Refuse two columns of one name.
