@@ -133,6 +133,16 @@ def test_the_last_step_ends_it_and_names_what_is_missing() -> None:
     assert not looked(z, ess=1e6, most_steps=401)[0].finished
 
 
+def test_only_what_is_missing_is_named() -> None:
+    apart = draws(400)
+    apart[:, :WALKERS] += 1.0
+    assert looked(draws(400), ess=1e6, most_steps=400)[0].why.count("(") == 1
+    assert "R-hat" in looked(apart, r_hat=1.01, most_steps=400)[0].why
+    slow, about = looked(draws(64, 0.97), most_steps=64)
+    assert slow.why.endswith(f"asks for {ENOUGH * about.autocorrelation.max():.0f} steps")
+    assert "ESS" not in slow.why and "R-hat" not in slow.why
+
+
 @pytest.mark.parametrize(
     ("nats", "again", "finished", "converged"),
     [

@@ -64,18 +64,26 @@ def apply(target: LogPosterior, state: Sampling, policy: Policy) -> Sampling:
             )
             return replace(state, finished=True, why=why)
     elif steps >= policy.most_steps:
-        why = f"not converged after {steps} steps: {_lacking(target, found, policy)}"
+        why = f"not converged after {steps} steps: {_lacking(target, found, steps, policy)}"
         return replace(state, finished=True, why=why)
     return state
 
 
-def _lacking(target: LogPosterior, found: Diagnostics, policy: Policy) -> str:
-    worst = target.problem.names[int(np.argmin(found.ess))]
-    least, most = float(found.ess.min()), float(found.r_hat.max())
-    return (
-        f"{worst} has ESS {least:.0f} (wanted {policy.ess:.0f}), "
-        f"largest nested R-hat {most:.4f} (allowed {policy.r_hat})"
-    )
+def _lacking(target: LogPosterior, found: Diagnostics, steps: int, policy: Policy) -> str:
+    """What draws lack that do not converge: effective draws, agreement between ensembles, or steps."""
+    names = target.problem.names
+    fewest = int(np.argmin(found.ess))
+    slowest = int(np.argmax(found.autocorrelation))
+    r_hat = float(found.r_hat.max())
+    wanted_steps = ENOUGH * found.autocorrelation[slowest]
+    lacks = []
+    if found.ess[fewest] < policy.ess:
+        lacks.append(f"{names[fewest]} has ESS {found.ess[fewest]:.0f} (wanted {policy.ess:.0f})")
+    if r_hat > policy.r_hat:
+        lacks.append(f"largest nested R-hat {r_hat:.4f} (allowed {policy.r_hat})")
+    if steps < wanted_steps:
+        lacks.append(f"{names[slowest]} has an autocorrelation time that asks for {wanted_steps:.0f} steps")
+    return ", ".join(lacks)
 
 
 def _judged_by(target: LogPosterior, z: Array) -> Array:
