@@ -27,7 +27,7 @@ from analyses.hidden_effects.truth import draw_wire
 from analyses.options import study_options
 from analyses.resumable import records
 from analyses.robots.bands import at_tension, mean_share
-from wirebayes.commands.wires import wire_draws
+from wirebayes.commands.wire_draws import wire_draws
 from wirebayes.discovery.investigation import final_models
 from wirebayes.discovery.search import investigate
 from wirebayes.discovery.settings import ALPHA, Settings

@@ -25,7 +25,7 @@ from analyses.hidden_effects.truth import draw_rig
 from analyses.options import study_options
 from analyses.resumable import records
 from tests.robot import independent
-from wirebayes.commands.wires import read_wires
+from wirebayes.commands.wire_draws import read_wires
 from wirebayes.inference.fit import seed_of
 from wirebayes.inference.policy import Policy
 from wirebayes.io.experiment_file import read_experiments

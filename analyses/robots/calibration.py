@@ -138,7 +138,7 @@ def main():
     options = parser.parse_args()
     rng = np.random.default_rng(7)
     if options.wires:
-        from wirebayes.commands.wires import read_wires
+        from wirebayes.commands.wire_draws import read_wires
 
         line = read_wires(options.wires, 1000)
     else:

@@ -48,7 +48,7 @@ def shares(poses, rng):
 
 def enclosures(folder):
     """Pose after 60 s for a creep between its 5 % and 95 % quantiles, against the sampled 90 % band."""
-    from wirebayes.commands.wires import read_wires
+    from wirebayes.commands.wire_draws import read_wires
 
     line = read_wires(folder, 1000)
     k1 = float(line.parameters["k1"].mean())

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.commands.wires import read_wires
+from wirebayes.commands.wire_draws import read_wires
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.motion import control, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh

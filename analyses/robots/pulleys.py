@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wirebayes.commands.wires import read_wires
+from wirebayes.commands.wire_draws import read_wires
 from wirebayes.robot.mechanics import draws, rotation, schema, statics
 from wirebayes.robot.mechanics.description import Pulleys
 from wirebayes.robot.motion import claim, forward, inverse

@@ -6,6 +6,7 @@ import pytest
 from tests.wire.protocols import protocol
 from wirebayes.io import data_checks, gross_events
 from wirebayes.io.data_checks import CheckedTest
+from wirebayes.io.isolated_readings import outlier
 
 TIMES = [0.0, 20.0, 40.0, 60.0]
 NOISE = 0.1  # by rounding: readings on straight lines have no other
@@ -91,7 +92,7 @@ def test_strains_of_one_weight_say_nothing_of_units(second, warned):
 def test_a_reading_is_an_outlier_beyond_ten_noise_levels_and_a_fifth_of_the_range(off, rest, warned):
     rows = flat(1.0, *np.linspace(1.0, rest, 8), readings=5)
     rows[3][2] += off
-    assert bool(data_checks.outlier(checked(rows))) == warned
+    assert bool(outlier(checked(rows))) == warned
 
 
 def rising_holds(rises):

@@ -12,7 +12,8 @@ import pytest
 
 import wirebayes as wb
 from wirebayes import cli
-from wirebayes.commands.wires import read_robot, wire_draws
+from wirebayes.commands.wire_draws import wire_draws
+from wirebayes.commands.wires import read_robot
 from wirebayes.inference.fit import fit_problem
 from wirebayes.inference.policy import Policy
 from wirebayes.io.paper import FOLDER, experiments

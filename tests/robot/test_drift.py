@@ -7,7 +7,7 @@ import wirebayes as wb
 from tests.robot import cases
 from tests.robot.lines import CORE, line_about
 from tests.wire.test_fresh import Shrinking, Waking
-from wirebayes.commands.wires import wire_draws
+from wirebayes.commands.wire_draws import wire_draws
 from wirebayes.effects import effect_named
 from wirebayes.effects.rivals import Logarithmic, PowerLaw, TwoModes
 from wirebayes.robot.mechanics import draws, rotation, schema

@@ -1,4 +1,4 @@
-"""Inputs of the robot's commands: a fitted wire, the robot's description, and the configuration of the run."""
+"""Inputs of the robot's commands: fitted wires, the robot's description, and the configuration of the run."""
 
 import json
 import os
@@ -12,17 +12,13 @@ import numpy as np
 
 from wirebayes._version import __version__
 from wirebayes.commands.predict import one_of
+from wirebayes.commands.wire_draws import draws_of_specimens, read_wires, usable_draws
 from wirebayes.effects import source_of
 from wirebayes.errors import InputError
-from wirebayes.inference.between_specimens import between_specimens
 from wirebayes.json_files.plain import plain
-from wirebayes.numeric.evenly import evenly
-from wirebayes.numeric.typing import Floats
-from wirebayes.results import read_back
-from wirebayes.results.read_back import Stored
 from wirebayes.robot.mechanics import schema
 from wirebayes.robot.mechanics.description import Robot
-from wirebayes.robot.mechanics.draws import CORE, LENGTH_EXPONENT, WireDraws, lines_of, material
+from wirebayes.robot.mechanics.draws import WireDraws, lines_of
 from wirebayes.robot.motion.hanging import at_home
 from wirebayes.strict.files import PathLike
 from wirebayes.views.findings import Findings
@@ -139,14 +135,15 @@ def draws_of(wires: Wires, count: int, experiment: str | None = None, own_effect
         lines = {name: draws_of(line, count, experiment, own_effects) for name, line in wires.items()}
         return _together(lines)
     if _is_sample(wires):
-        return _sample(wires, count, experiment, own_effects)
+        folders = [folder_of(line, experiment) for line in wires]
+        return draws_of_specimens(folders, count, experiment, own_effects)
     if isinstance(wires, Findings):
         wires = wires.final
     if isinstance(wires, Posteriors):
         wires = one_of(wires, experiment)
     if isinstance(wires, Posterior):
         stored = wires.stored(experiment)
-        return _usable(stored, wires.name, count)
+        return usable_draws(stored, wires.name, count)
     folder = folder_of(wires, experiment)
     return read_wires(folder, count, experiment, own_effects)
 
@@ -209,62 +206,6 @@ def _check_alike(name: str, first: WireDraws, other: str, line: WireDraws) -> No
             raise InputError(f"--wires: found {found}, expected one for all wires")
 
 
-def _check_plain_and_alike(folders: Sequence[Path], ones: Sequence[WireDraws]) -> None:
-    """Refuse fits that cannot be compared: with effects, or with other laws than the first."""
-    first = ones[0]
-    for folder, one in zip(folders, ones, strict=True):
-        if one.material() or LENGTH_EXPONENT in one.parameters:
-            raise InputError(f"{folder}: found a fit with effects, expected plain fits where specimens are compared")
-        if (one.law, one.history) != (first.law, first.history):
-            raise InputError(
-                f"{folder}: found a fit with {one.law} and {one.history}, expected {first.law} and {first.history} as "
-                f"in {folders[0]}"
-            )
-
-
-def _sample(lines: Sequence[Line], count: int, experiment: str | None, own_effects: Path | None) -> WireDraws:
-    """A line known from several specimens: what they have in common, and how they differ."""
-    folders = [folder_of(line, experiment) for line in lines]
-    if len(folders) < 2:
-        raise InputError(f"--wires: found {len(folders)} specimen, expected two or more")
-    tests = [read_back.load_posterior(folder, experiment, own_effects) for folder in folders]
-    ones = [_usable(stored, str(folder), count) for folder, stored in zip(folders, tests, strict=True)]
-    first = ones[0]
-    _check_plain_and_alike(folders, ones)
-    logarithms = []
-    for stored, one in zip(tests, ones, strict=True):
-        values = _log_core(stored.draws)
-        values[:, CORE.index("B")] += np.log(first.length_mm / one.length_mm)  # creep is a strain
-        logarithms.append(values)
-    prior_draws = read_back.prior_draws(folders[0], experiment)
-    log_prior = _log_core(prior_draws)
-    prior = log_prior.mean(0), np.cov(log_prior.T)
-    rng = np.random.default_rng(0)
-    found = between_specimens(logarithms, prior, count, rng)
-    means = np.exp(found.mean)
-    return replace(
-        first,
-        parameters=dict(zip(CORE, means.T, strict=True)),
-        effects=(),
-        tension_range_N=_widest([one.tension_range_N for one in ones]),
-        time_range_s=_widest([one.time_range_s for one in ones]),
-        spread=dict(zip(CORE, found.spread.T, strict=True)),
-        specimens=len(ones),
-        doubts=tuple(doubt for one in ones for doubt in one.doubts),
-    )
-
-
-def _log_core(draws: Mapping[str, Floats]) -> Floats:
-    """Logarithms (n, p) of the material's parameters."""
-    return np.log(np.column_stack([draws[name] for name in CORE]))
-
-
-def _widest(ranges: Sequence[tuple[float, float] | None]) -> tuple[float, float]:
-    """The range that covers all; of one that is not known, zero."""
-    ends = np.array([known or (0.0, 0.0) for known in ranges])
-    return float(ends.min()), float(ends.max())
-
-
 def named_lines(texts: Sequence[str]) -> Wires:
     """What ``--wires`` was given: a line, or several times ``NAME=LINE``; a line is a folder, or some with commas."""
     pairs = [text.partition("=") for text in texts]
@@ -284,67 +225,6 @@ def _folders(text: str) -> Path | list[Path]:
     if "," not in text or Path(text).exists():
         return Path(text)
     return [Path(part) for part in text.split(",") if part]
-
-
-def read_wires(folder: Path, count: int, experiment: str | None = None, own_effects: Path | None = None) -> WireDraws:
-    """Draws of a fitted line, read from a folder and evenly thinned.
-
-    Parameters
-    ----------
-    folder : Path
-        Holds a ``posterior.nc``.
-    count : int
-        Largest number of draws.
-    experiment : str, optional
-        May be left out where the posterior has one.
-    own_effects : Path, optional
-        File of a user's own effects.
-
-    Raises
-    ------
-    InputError
-        If there is no posterior, or its model cannot be used on a robot.
-    """
-    below = sorted(str(path.parent) for path in folder.glob("*/**/posterior.nc"))
-    if below and not (folder / POSTERIOR).is_file():
-        raise InputError(f"{folder}: found no posterior.nc in it, expected one of {', '.join(below)}")
-    return _usable(read_back.load_posterior(folder, experiment, own_effects), str(folder), count)
-
-
-def _usable(stored: Stored, where: str, count: int) -> WireDraws:
-    """Draws of a posterior that knows the stiffness."""
-    if stored.likelihood == "hold":
-        raise InputError(
-            f"{where}: found a fit with --likelihood hold, which does not determine the stiffness k1, expected one "
-            "with --likelihood chain, for a robot needs k1"
-        )
-    return wire_draws(stored, count)
-
-
-def wire_draws(stored: Stored, count: int) -> WireDraws:
-    """Material parameters of a stored posterior with what was tested; bench quantities stay behind."""
-    sample = stored.sample
-    effects = tuple(sample.model.effects)
-    names = list(CORE)
-    for effect in material(effects):
-        names += effect.columns()
-    pick = evenly(len(stored.draws["k1"]), count)
-    parameters = {name: stored.draws[name][pick] for name in names}
-    if stored.length_exponent is not None:
-        parameters[LENGTH_EXPONENT] = stored.length_exponent[pick]
-    tensions = sample.tensions_N
-    longest_s = float(sample.protocol.duration_s.max())
-    return WireDraws(
-        parameters,
-        sample.protocol.length_mm,
-        sample.model.law,
-        sample.model.history,
-        effects,
-        tension_range_N=(float(tensions.min()), float(tensions.max())),
-        time_range_s=(0.0, longest_s),
-        tension_ref_N=sample.model.tension_ref_N,
-        doubts=stored.doubts,
-    )
 
 
 def configuration(

@@ -54,15 +54,23 @@ def families_of(
         Each name in one family, the family's best first.
     """
     names = list(found)
-    parts = []
+    signatures = []
     for b, (block, ratio) in enumerate(zip(plain, ratios, strict=True)):
-        here = [i for i, name in enumerate(names) if b in found[name]]
-        seen = projected(expand(block.target, block.z, [found[names[i]][b] for i in here]), ratio)
-        part = np.zeros((seen.shape[0], len(names)))
-        part[:, here] = seen
-        parts.append(part)
-    is_material = [next(iter(found[name].values())).effect.scope == "material" for name in names]
-    return grouped(names, cosines(parts, np.array(is_material, bool) & (len(plain) > 1)))
+        probes = {i: found[name][b] for i, name in enumerate(names) if b in found[name]}
+        signatures.append(_signatures(block, probes, ratio, len(names)))
+    effects = [next(iter(found[name].values())).effect for name in names]
+    is_material = np.array([effect.scope == "material" for effect in effects], bool)
+    has_own = is_material & (len(plain) > 1)
+    return grouped(names, cosines(signatures, has_own))
+
+
+def _signatures(block: LaplaceFit, probes: Mapping[int, Probe], ratio: float, count: int) -> Array:
+    """(N, count) projected signatures of a block's probes, by number; zero for numbers without a probe."""
+    expansion = expand(block.target, block.z, list(probes.values()))
+    seen = projected(expansion, ratio)
+    every = np.zeros((seen.shape[0], count))
+    every[:, list(probes)] = seen
+    return every
 
 
 def grouped(names: Sequence[str], cosine: Array) -> list[Family]:

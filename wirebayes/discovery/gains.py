@@ -6,10 +6,11 @@ import numpy as np
 from scipy.special import logsumexp
 
 from wirebayes.discovery.families import Family
-from wirebayes.discovery.fitted_sets import Fits, FittedSet
+from wirebayes.discovery.fitted_sets import Fits, FittedSet, Key
 from wirebayes.discovery.held_out import LeftOut
 from wirebayes.discovery.model_space import ModelPosterior
 from wirebayes.discovery.settings import LEAST_ALTERNATIVE
+from wirebayes.inference.laplace_fit import LaplaceFit
 from wirebayes.numeric.typing import Array
 
 
@@ -48,10 +49,13 @@ def name_gain(candidate: FittedSet, name: str, fits: Fits, left_out: LeftOut) ->
     left_out : LeftOut
         Scores them.
     """
-    on = _acting(candidate, (name,))
     without = fits.of(candidate.effects.key - {name})
-    elpd = left_out.of([version[b] for version in (candidate.blocks, without) for b in on])
-    return float(np.sum([v.sum() for v in elpd[: len(on)]]) - np.sum([v.sum() for v in elpd[len(on) :]]))
+    on = _acting(candidate, (name,))
+    scored = [candidate.blocks[b] for b in on]
+    scored += [without[b] for b in on]
+    elpd = [holds.sum() for holds in left_out.of(scored)]
+    gained = np.sum(elpd[: len(on)]) - np.sum(elpd[len(on) :])
+    return float(gained)
 
 
 def family_gain(candidate: FittedSet, family: Family, found: ModelPosterior, fits: Fits, left_out: LeftOut) -> float:
@@ -69,16 +73,40 @@ def family_gain(candidate: FittedSet, family: Family, found: ModelPosterior, fit
     left_out : LeftOut
         Scores them.
     """
-    rest = frozenset(name for name in candidate.effects.names if name not in family)
-    on = _acting(candidate, family)
-    members = {k: w for k, w in found.weights.items() if k > rest and all(name in family for name in k - rest)}
-    least = LEAST_ALTERNATIVE * sum(members.values())
-    kept = [k for k, w in members.items() if k == candidate.effects.key or (w >= least and fits.knows(k))]
-    versions = [candidate.blocks if k == candidate.effects.key else fits.of(k) for k in kept]
-    elpd = left_out.of([version[b] for version in (*versions, fits.of(rest)) for b in on])
-    each = np.array([np.concatenate(elpd[i * len(on) : (i + 1) * len(on)]) for i in range(len(versions) + 1)])
-    log_weight = np.log(np.maximum([members[k] for k in kept], 1e-300))
-    return float((mixed(log_weight, each[:-1]) - each[-1]).sum())
+    others = frozenset(name for name in candidate.effects.names if name not in family)
+    weights = _weights_of_members(family, others, found)
+    mixture = _worth_scoring(weights, candidate, fits)
+    models = [candidate.blocks if key == candidate.effects.key else fits.of(key) for key in mixture]
+    models.append(fits.of(others))
+    elpd = _elpd_of_each(models, _acting(candidate, family), left_out)
+    log_weight = np.log(np.maximum([weights[key] for key in mixture], 1e-300))
+    with_family = mixed(log_weight, elpd[:-1])
+    without = elpd[-1]
+    return float((with_family - without).sum())
+
+
+def _weights_of_members(family: Family, others: Key, found: ModelPosterior) -> dict[Key, float]:
+    """Weights of the sets that hold members of a family beside the same other effects."""
+    weights = {}
+    for key, weight in found.weights.items():
+        if key > others and all(name in family for name in key - others):
+            weights[key] = weight
+    return weights
+
+
+def _worth_scoring(weights: dict[Key, float], candidate: FittedSet, fits: Fits) -> list[Key]:
+    """The candidate, and the other sets that are fitted and whose weight could change the mixture."""
+    least = LEAST_ALTERNATIVE * sum(weights.values())
+    own = candidate.effects.key
+    return [key for key, weight in weights.items() if key == own or (weight >= least and fits.knows(key))]
+
+
+def _elpd_of_each(models: Sequence[Sequence[LaplaceFit]], on: Sequence[int], left_out: LeftOut) -> Array:
+    """(models, H) log density of each left-out hold of some blocks by each model."""
+    scored = [model[b] for model in models for b in on]
+    elpd = left_out.of(scored)
+    first_of_each = range(0, len(scored), len(on))
+    return np.array([np.concatenate(elpd[first : first + len(on)]) for first in first_of_each])
 
 
 def mixed(log_weight: Array, elpd: Array) -> Array:

@@ -4,7 +4,7 @@ A set is evaluated together with the remainder, so an effect is credited for wha
 probability of a remainder is part of the answer.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -94,14 +94,23 @@ class ModelPosterior:
     @property
     def best(self) -> EffectSet:
         """The most probable set of those that begin with the most probable first family, and in it the first name."""
-        sets = list(zip((self.without + self.beside).tolist(), self.sets, strict=True))
-        for kind in (lambda s: self.family(s.first), lambda s: s.first):
-            weights: dict[Any, float] = {}
-            for weight, s in sets:
-                weights[kind(s)] = weights.get(kind(s), 0.0) + weight
-            leading = max(weights, key=lambda k: weights[k])
-            sets = [(weight, s) for weight, s in sets if kind(s) == leading]
-        return max(sets, key=lambda item: item[0])[1]
+        weights = (self.without + self.beside).tolist()
+        weighted = list(zip(weights, self.sets, strict=True))
+        weighted = _most_probable(weighted, lambda s: self.family(s.first))
+        weighted = _most_probable(weighted, lambda s: s.first)
+        _, best = max(weighted, key=lambda item: item[0])
+        return best
+
+
+def _most_probable(
+    weighted: Sequence[tuple[float, EffectSet]], kind: Callable[[EffectSet], Any]
+) -> list[tuple[float, EffectSet]]:
+    """Of sets with their weights, those of the kind that has the most weight."""
+    weights: dict[Any, float] = {}
+    for weight, effects in weighted:
+        weights[kind(effects)] = weights.get(kind(effects), 0.0) + weight
+    leading = max(weights, key=lambda each: weights[each])
+    return [(weight, effects) for weight, effects in weighted if kind(effects) == leading]
 
 
 def family_of(name: str, families: Sequence[Family]) -> Family:

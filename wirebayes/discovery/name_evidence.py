@@ -162,12 +162,19 @@ def _tasks(
     for form in forms:
         best = max(form.linear)
         for place, value, candidate in zip(form.places, form.linear, form.candidates, strict=True):
-            if value == best or value > _HOPELESS or best <= _HOPELESS:  # where the scan sees nothing, it may be blind
-                _, guess, per_delta = log_bayes(candidate, scans)
-                chosen = best_probes(candidate, scans)
-                own: list[Mapping[str, float]] = [trials[int(number[0])].own for number in chosen]
-                tasks[place] = form.effect, float(per_delta[0]), float(guess[0]), reach.get(place, np.inf), own
+            if not _has_a_chance(value, best):
+                continue
+            _, guess, per_delta = log_bayes(candidate, scans)
+            chosen = best_probes(candidate, scans)
+            shapes: list[Mapping[str, float]] = [trials[int(number[0])].own for number in chosen]
+            tasks[place] = form.effect, float(per_delta[0]), float(guess[0]), reach.get(place, np.inf), shapes
     return tasks
+
+
+def _has_a_chance(value: float, best: float) -> bool:
+    """Whether a form is refitted at a place, by its linear log Bayes factor there and at the best of its places."""
+    scan_may_be_blind = best <= _HOPELESS
+    return value == best or value > _HOPELESS or scan_may_be_blind
 
 
 def _forms(trials: Sequence[Probe], candidates: Sequence[Candidate], scans: Sequence[Scan]) -> list[_Form]:
@@ -276,15 +283,18 @@ def _best_of_each_name(refits: Iterable[Refit]) -> dict[str, float]:
 def _over_blocks(form: _Form, found: Mapping[_Place, Refit], most: float, blocks: int) -> _Summed:
     """One form at all its places; what was not refitted counts for no more than `most`, the best of its name."""
     refits = [found.get(place) for place in form.places]
-    pairs = zip(refits, form.linear, strict=True)
-    values = np.array([min(linear, most) if r is None else r.log_bayes for r, linear in pairs])
-    total, each, chosen = over_subsets(values)
+    values = []
+    for refitted, linear in zip(refits, form.linear, strict=True):
+        value = min(linear, most) if refitted is None else refitted.log_bayes
+        values.append(value)
+    total, shares, chosen = over_subsets(np.array(values))
     presence = np.zeros(blocks)
-    for share, (_, on) in zip(each, form.places, strict=True):
+    for share, (_, on) in zip(shares, form.places, strict=True):
         presence[list(on)] = share
     winners = [refits[i] for i in chosen]
-    known = [r for r in winners if r is not None]
-    return _Summed(total, presence, known if len(known) == len(winners) else [])
+    known = [refitted for refitted in winners if refitted is not None]
+    all_are_known = len(known) == len(winners)
+    return _Summed(total, presence, known if all_are_known else [])
 
 
 def _over_variants(each: Sequence[_Summed]) -> tuple[float, Array]:

@@ -170,8 +170,10 @@ class Functions(NamedTuple):
 
     def of(self, columns: Ints) -> "Functions":
         """Some of them, by a row of numbers (n, q) each."""
-        plain, levels = (np.take_along_axis(v, columns[:, None], axis=2) for v in (self.plain, self.levels))
-        return Functions(plain, np.take_along_axis(self.taken, columns[:, None, None], axis=3), levels)
+        plain = np.take_along_axis(self.plain, columns[:, None], axis=2)
+        taken = np.take_along_axis(self.taken, columns[:, None, None], axis=3)
+        levels = np.take_along_axis(self.levels, columns[:, None], axis=2)
+        return Functions(plain, taken, levels)
 
     def between(self, first: int, last: int) -> "Functions":
         """Those from the column `first` to the one before `last`."""
@@ -180,7 +182,8 @@ class Functions(NamedTuple):
     def squares(self, shrink: Array) -> Array:
         """(n, k, q) inner product of each with itself."""
         plain = np.einsum("nif,nif->nf", self.plain, self.plain)[:, None]
-        return plain - shrink @ self.levels**2 - np.einsum("nkpf,nkpf->nkf", self.taken, self.taken)
+        taken = np.einsum("nkpf,nkpf->nkf", self.taken, self.taken)
+        return plain - shrink @ self.levels**2 - taken
 
     def along(self, one: "Functions", shrink: Array) -> Array:
         """(n, k, q) inner product of each with a single other function."""
@@ -190,9 +193,11 @@ class Functions(NamedTuple):
 
     def products(self, other: "Functions", shrink: Array) -> Array:
         """(n, k, q, m) inner products with other functions, as `project` has them."""
-        plain = (np.swapaxes(self.plain, 1, 2) @ other.plain)[:, None]
-        whole_holds = (np.swapaxes(self.levels, 1, 2)[:, None] * shrink[:, :, None]) @ other.levels[:, None]
-        return plain - np.swapaxes(self.taken, 2, 3) @ other.taken - whole_holds
+        plain = np.swapaxes(self.plain, 1, 2) @ other.plain
+        shrunk = np.swapaxes(self.levels, 1, 2)[:, None] * shrink[:, :, None]
+        whole_holds = shrunk @ other.levels[:, None]
+        taken = np.swapaxes(self.taken, 2, 3) @ other.taken
+        return plain[:, None] - taken - whole_holds
 
 
 def evidences(x: Expansion) -> tuple[Array, Array]:
@@ -209,15 +214,16 @@ def evidences(x: Expansion) -> tuple[Array, Array]:
 
 def without_and_with(x: Expansion, found: Projected) -> tuple[Array, Array]:
     """(n, k) and (n, k, s) log evidence as `evidences` has them, of rows that all have a tangent."""
-    shared, rss, degrees, least = found.shared, found.rss, x.degrees, x.least[:, None]
-    plain = shared - 0.5 * degrees * np.log(np.maximum(rss, least))
-    loose = []
+    half = 0.5 * x.degrees
+    least = x.least[:, None]
+    plain = found.shared - half * np.log(np.maximum(found.rss, least))
+    beside = []
     for square, along in zip(found.smooth_square, found.smooth_along, strict=True):
-        log_volume, less = _taken_by(square, along)
+        log_volume, taken = _taken_by(square, along)
         # The process is measured in units of the noise that is left beside it.
-        left_beside = np.maximum(rss[..., None] - less, least[..., None])
-        loose.append(shared[..., None] - log_volume - 0.5 * degrees * np.log(left_beside))
-    return plain, np.concatenate(loose, axis=2)
+        left = np.maximum(found.rss[..., None] - taken, least[..., None])
+        beside.append(found.shared[..., None] - log_volume - half * np.log(left))
+    return plain, np.concatenate(beside, axis=2)
 
 
 def _taken_by(square: Array, along: Array) -> tuple[Array, Array]:
@@ -242,14 +248,21 @@ def _bordered(square: Array, along: Array) -> Array:
     The corner is not used.
     """
     q = along.shape[-1]
-    whole = np.einsum("...ff->...", square)
-    share = SIZES**2 / np.maximum(whole, 1e-300)[..., None]
+    whole = np.einsum("...ff->...", square)[..., None]
+    share = SIZES**2 / np.maximum(whole, 1e-300)
     out = np.zeros((*share.shape, q + 1, q + 1))
     out[..., :q, :q] = share[..., None, None] * square[..., None, :, :]
-    out.reshape(-1, (q + 1) ** 2)[:, :: q + 2] += 1.0
+    _add_to_diagonals(out, 1.0)
     out[..., q, :q] = np.sqrt(share)[..., None] * along[..., None, :]
     out[..., q, q] = LARGEST_SLOPE
     return out
+
+
+def _add_to_diagonals(matrices: Array, value: float) -> None:
+    """Add a number to all diagonals (..., q, q), in place."""
+    q = matrices.shape[-1]
+    flat = matrices.reshape(-1, q * q)
+    flat[:, :: q + 1] += value
 
 
 def has_tangent(x: Expansion) -> Bools:

@@ -29,12 +29,13 @@ def outlook(gate: Gate, i: int, settings: Settings, answer: MaterialAnswer, alik
     alike : dict of (name, name) to float
         |cos| of the projected signatures of two names.
     """
-    block, trials, candidates = gate.blocks[i], gate.trials, gate.candidates
-    found = power.detectable(gate.nulls[i], trials, candidates, gate.test, i)
-    seen: dict[str, DetectableAmplitude] = {
-        name: _detectable(block, trials[k].effect, amplitude) for name, (k, amplitude) in found.items()
-    }
-    possible = [c.name for c in candidates if i in c.blocks]
+    block = gate.blocks[i]
+    trials = gate.trials
+    found = power.detectable(gate.nulls[i], trials, gate.candidates, gate.test, i)
+    seen: dict[str, DetectableAmplitude] = {}
+    for name, (trial, amplitude) in found.items():
+        seen[name] = _detectable(block, trials[trial].effect, amplitude)
+    possible = [candidate.name for candidate in gate.candidates if i in candidate.blocks]
     hidden = power.not_identifiable(block, list(settings.kinds.values()), possible)
     rivals = [trials[found[name][0]] for name in _rivals(answer, alike) if name in found]
     proposal = _proposal(block, answer, rivals, found, trials)

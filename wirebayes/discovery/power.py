@@ -173,14 +173,16 @@ def cosines(parts: Sequence[Array], has_own: Array) -> Array:
     has_own : (m,) array of bool
         Signatures that may have any size on each block.
     """
-    lengths = np.array([(p**2).sum(axis=0) for p in parts])
     products = np.array([p.T @ p for p in parts])
-    total = lengths.sum(axis=0)
+    squares = np.array([(p**2).sum(axis=0) for p in parts])
+    total = squares.sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        together = products.sum(axis=0) ** 2 / (total[:, None] * total[None])
-        loose = np.nan_to_num(products**2 / lengths[:, None, :]).sum(axis=0) / total[:, None]
-    square = np.nan_to_num(np.where(has_own[None, :], loose, together))
-    return np.sqrt(np.minimum(np.maximum(square, square.T), 1.0))
+        same_size = products.sum(axis=0) ** 2 / (total[:, None] * total[None])
+        explained = np.nan_to_num(products**2 / squares[:, None, :])
+        own_sizes = explained.sum(axis=0) / total[:, None]
+    square = np.nan_to_num(np.where(has_own[None, :], own_sizes, same_size))
+    either_way = np.maximum(square, square.T)
+    return np.sqrt(np.minimum(either_way, 1.0))
 
 
 def group_of(members: Sequence[str], alike: Cosines) -> list[str]:
@@ -278,7 +280,15 @@ def _absorbed(block: LaplaceFit, control: Control, known: Sequence[type[Effect]]
             effect = kind().under(control)
             trials.append(Probe(effect, {effect.columns()[0]: 1e-3}, 1e-3, False))
     x = expand(block.target, block.z, trials)
-    wholes = np.sqrt((x.signatures[0] ** 2).sum(axis=0))
-    left = np.sqrt((projected(x, 0.0) ** 2).sum(axis=0))
-    each = zip(trials, wholes, left, strict=True)
-    return {trial.effect.name: 1 - rest / whole for trial, whole, rest in each if rest < 0.1 * whole}
+    wholes = _lengths(x.signatures[0])
+    rests = _lengths(projected(x, 0.0))
+    absorbed = {}
+    for trial, whole, rest in zip(trials, wholes, rests, strict=True):
+        if rest < 0.1 * whole:
+            absorbed[trial.effect.name] = 1 - rest / whole
+    return absorbed
+
+
+def _lengths(signatures: Array) -> Array:
+    """(m,) lengths of signatures (N, m)."""
+    return np.sqrt((signatures**2).sum(axis=0))

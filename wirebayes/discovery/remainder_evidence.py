@@ -6,6 +6,7 @@ it its evidence is off by some nats. Names are refitted, and compete with it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,34 +48,46 @@ def remainder_evidence(block: LaplaceFit, reference: Reference) -> float:
     float
         The mean over processes and over their sizes.
     """
-    target = block.target
-    best = block.z
-    fit = expand(target, best, [], reference=reference)
+    fit = expand(block.target, block.z, [], reference=reference)
     plain, beside = evidences(fit)
     without = float(log_sum(plain, axis=1)[0])
     if not np.isfinite(without):
         return 0.0
-    found = [_mean(beside)]
-    for start, here, known in [(best, fit, beside), *_at_other_modes(block, reference)]:
-        z, moved = _refitted(target, start, here, _most_probable(known), reference)
-        _, beside_moved = evidences(moved)
-        at_z, with_noise_of_fit = _priors(target, z, best)
-        tops = _top_of_prior(moved) - at_z + with_noise_of_fit - _top_of_prior(fit)
-        units = _log_units(target, z) - _log_units(target, best)
-        found.append(_mean(beside_moved) + tops - units)
-    values = np.array(found)
+    at_best_mode = _Start(block.z, fit, beside)
+    starts = [at_best_mode, *_at_other_modes(block, reference)]
+    refitted = [_refitted_evidence(block.target, start, at_best_mode, reference) for start in starts]
+    values = np.array([_mean(beside), *refitted])
     finite = values[np.isfinite(values)]
     return float(finite.max(initial=-np.inf)) - without
 
 
-def _at_other_modes(block: LaplaceFit, reference: Reference) -> list[tuple[Array, Expansion, Array]]:
-    """Further modes of the fit, the expansion at each, and the evidence of remainders there."""
+class _Start(NamedTuple):
+    """A mode (1, d) of the fit without a remainder, the expansion there, and the evidence of remainders by it."""
+
+    z: Array
+    expansion: Expansion
+    beside: Array
+
+
+def _refitted_evidence(target: LogPosterior, start: _Start, best: _Start, reference: Reference) -> float:
+    """Log evidence of a remainder with the parameters refitted from a mode, on the scale of that at the best mode."""
+    which = _most_probable(start.beside)
+    z, moved = _refitted(target, start.z, start.expansion, which, reference)
+    _, beside = evidences(moved)
+    at_z, with_noise_of_fit = _priors(target, z, best.z)
+    tops = _top_of_prior(moved) - at_z + with_noise_of_fit - _top_of_prior(best.expansion)
+    units = _log_units(target, z) - _log_units(target, best.z)
+    return float(_mean(beside) + tops - units)
+
+
+def _at_other_modes(block: LaplaceFit, reference: Reference) -> list[_Start]:
+    """Further modes of the fit."""
     out = []
     for mode in block.modes.z[1:_MODES]:
         z = mode[None]
         there = expand(block.target, z, [], reference=reference)
         _, beside = evidences(there)
-        out.append((z, there, beside))
+        out.append(_Start(z, there, beside))
     return out
 
 
@@ -126,18 +139,24 @@ def _refitted(
         along, noise = remainder.step(x)
         if not np.isfinite([*along, noise]).all():  # the model has no tangent here
             break
-        tried = np.repeat(z, len(_LENGTHS), axis=0)
-        tried[:, moving_columns(target.problem)] += _LENGTHS[:, None] * along
+        tried = _along(target, z, along)
         height = remainder.height(x, *residuals(target, tried))
-        best = int(np.argmax(height))
         if not np.isfinite(height[0]):
             break
-        gain = float(height[best] - height[0])
+        best = int(np.argmax(height))
         z = _with_noise(target, tried[best : best + 1], noise)
         x = expand(target, z, [], reference=reference)
+        gain = float(height[best] - height[0])
         if gain < _SETTLED and abs(np.log(noise)) < _SETTLED:
             break
     return z, x
+
+
+def _along(target: LogPosterior, z: Array, step: Array) -> Array:
+    """Points at several shares of a step (p,) of the parameters that move the mean, the start (1, d) first."""
+    tried = np.repeat(z, len(_LENGTHS), axis=0)
+    tried[:, moving_columns(target.problem)] += _LENGTHS[:, None] * step
+    return tried
 
 
 def _with_noise(target: LogPosterior, z: Array, factor: float) -> Array:
@@ -182,21 +201,26 @@ class _Remainder:
             δ of its part that the parameters leave.
         """
         first = sum(x.processes[:process])
-        own = whitened(x, x.flexible[0][:, first : first + x.processes[process]], ratio)
-        free = own - _taken(whitened(x, x.parameters[0], ratio), own, x.prior_precision[0])
-        share = size**2 / max(float((own * free).sum()), 1e-300)
-        return _Remainder(np.sqrt(share) * own, ratio)
+        last = first + x.processes[process]
+        functions = whitened(x, x.flexible[0][:, first:last], ratio)
+        parameters = whitened(x, x.parameters[0], ratio)
+        free = functions - _taken(parameters, functions, x.prior_precision[0])
+        square = float((functions * free).sum())
+        share = size**2 / max(square, 1e-300)
+        return _Remainder(np.sqrt(share) * functions, ratio)
 
     def step(self, x: Expansion) -> tuple[Array, float]:
         """(p,) Gauss-Newton step of the parameters that move the mean, and the noise left, in units of the fit's."""
         parameters = whitened(x, x.parameters[0], self.ratio)
         residual = whitened(x, x.residual[0][:, None], self.ratio)
         left = self._left(np.concatenate([parameters, residual], axis=1))
-        curvature = parameters.T @ left[:, :-1] + x.prior_precision[0]
-        slope = parameters.T @ left[:, -1] + x.prior_gradient[0]
+        parameters_left, residual_left = left[:, :-1], left[:, -1]
+        curvature = parameters.T @ parameters_left + x.prior_precision[0]
+        slope = parameters.T @ residual_left + x.prior_gradient[0]
         along = solve(curvature[None], slope[None, :, None])[0, :, 0]
-        square = float(residual[:, 0] @ left[:, -1]) + float(x.prior_square[0]) - float(slope @ along)
-        return along, _noise(square, x)
+        before = float(residual[:, 0] @ residual_left) + float(x.prior_square[0])
+        after = before - float(slope @ along)
+        return along, _noise(after, x)
 
     def height(self, x: Expansion, residual: Array, prior: Array) -> Array:
         """(n,) log density of readings and parameters.

@@ -200,10 +200,13 @@ def findings(listed: Sequence[Pattern], skip: int, data: Scan, null: Scan, names
     names : str
         The experiments, for the sentence.
     """
+    columns_of: dict[str, list[int]] = {}
+    for column, pattern in enumerate(listed, start=skip):
+        columns_of.setdefault(pattern.covariate, []).append(column)
     out: list[Disagreement] = []
-    for covariate in dict.fromkeys(p.covariate for p in listed):
-        columns = [skip + i for i, p in enumerate(listed) if p.covariate == covariate]
-        best = columns[int(np.argmax(data.effects[0, columns]))]
+    for covariate, columns in columns_of.items():
+        evidence = data.effects[0, columns]
+        best = columns[int(np.argmax(evidence))]
         pattern = listed[best - skip]
         p = _p_value(columns, data, null)
         said = _sentence(pattern, float(data.amplitude[0, best]), p)

@@ -69,15 +69,22 @@ class Pieces:
 
     def log_bayes(self, added: float) -> Array:
         """(n,) of the only probe, had its amplitude `added` been in the data besides."""
-        c = np.where(np.isfinite(self.square[..., 0]), self.square[..., 0], 0.0)
-        rss = self.rss + 2.0 * added * self.along[..., 0] + added**2 * c
-        b = self.along[..., 0] + added * c
-        b = np.where(self.one_sided[0], np.maximum(b, 0.0), b)
-        left = rss - b**2 / np.where(c > 0, c, np.inf)
-        half = -0.5 * self.degrees
-        with_it = self.shared + half * np.log(np.maximum(left, self.least))
-        without = self.shared + half * np.log(np.maximum(rss, self.least))
+        finite = np.isfinite(self.square[..., 0])
+        square = np.where(finite, self.square[..., 0], 0.0)
+        along = self.along[..., 0]
+        rss = self.rss + 2.0 * added * along + added**2 * square
+        along = along + added * square
+        if self.one_sided[0]:
+            along = np.maximum(along, 0.0)
+        explained = along**2 / np.where(square > 0, square, np.inf)
+        with_it = self._log_evidence(rss - explained)
+        without = self._log_evidence(rss)
         return log_sum(with_it, axis=0) - log_sum(without, axis=0)
+
+    def _log_evidence(self, rss: Array) -> Array:
+        """(k, n) of what leaves a sum of squares (k, n)."""
+        left = np.maximum(rss, self.least)
+        return self.shared - 0.5 * self.degrees * np.log(left)
 
 
 def joined(scans: Sequence[Scan]) -> Scan:

@@ -1,6 +1,6 @@
 """Does the gap shrink on unseen holds? Plain model, each accepted effect in turn, smooth discrepancy, final model."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import repeat
@@ -90,14 +90,26 @@ def shrinking(
         elpd = left_out.of(_fits_compared(plain, stages[-1:], smooth))
         gain = _gain(elpd, len(stages[-1:]), len(train), remains)
     found = list(predicted)  # handed over before, so that no core idles
-    by_step = found[: len(models)]
-    beside_smooth = [part[0] for part in found[len(models) :]]
-    flexible = beside_smooth[: len(train)]
-    final = beside_smooth[-len(train) :] if remains else by_step[-1]
+    by_step, beside_smooth = found[: len(models)], found[len(models) :]
+    return _of_each_experiment(models, by_step, beside_smooth, gain, remains)
+
+
+def _of_each_experiment(
+    models: Sequence[str],
+    by_step: Sequence[Sequence[held_out.HeldOut]],
+    beside_smooth: Sequence[Sequence[held_out.HeldOut]],
+    gain: "_Gain | None",
+    remains: bool,
+) -> list[Shrinking]:
+    """What is said of each experiment of a block, by the predictions of models and of what has a discrepancy."""
+    plain = by_step[0]
+    alone = [predicted[0] for predicted in beside_smooth]
+    flexible = alone[: len(plain)]
+    final = alone[-len(plain) :] if remains else by_step[-1]
     out = []
-    for i in range(len(train)):
+    for i in range(len(plain)):
         own_flexible = flexible[i] if flexible else None
-        report = _compared(by_step[0][i], final[i], own_flexible, gain)
+        report = _compared(plain[i], final[i], own_flexible, gain)
         out.append(Shrinking(report, _steps(models, by_step, i)))
     return out
 
@@ -164,22 +176,29 @@ def _beside_discrepancy(
 ) -> list[_Smooth]:
     """A smooth discrepancy beside the effects of each base, its size what they leave over in the holds trained on."""
     # everything is handed over before anything is waited for
-    handed_over = []
+    added = []
+    generators = []
     for base in bases:
         first = [e.train(k) for e, k in zip(base.experiments, train, strict=True)]
         experiments = [*base.experiments, *first]
-        added = parallel_map(with_discrepancy, repeat(base), experiments, rng.spawn(len(experiments)))
-        handed_over.append((base, added, rng.spawn(len(train))))
+        added.append(parallel_map(with_discrepancy, repeat(base), experiments, rng.spawn(len(experiments))))
+        generators.append(rng.spawn(len(train)))
     fitting = []
-    for base, added, generators in handed_over:
-        effects = list(added)
+    for base, of_base, own in zip(bases, added, generators, strict=True):
+        effects = list(of_base)
         of_whole, of_first = effects[: len(train)], effects[len(train) :]
-        singly = [(e,) for e in base.experiments]
-        one_scale = partial(fitted, scales=base.scales)
-        fits = parallel_map(one_scale, singly, of_whole, repeat(base.spec), generators)
-        trained = _each_trained(base, train, of_first)
-        fitting.append((fits, trained))
+        fits = _each_fitted(base, of_whole, own, parallel_map)
+        fitting.append((fits, _each_trained(base, train, of_first)))
     return [_Smooth(list(fits), trained) for fits, trained in fitting]
+
+
+def _each_fitted(
+    base: LaplaceFit, effects: Sequence[tuple[Effect, ...]], generators: Sequence[Generator], parallel_map: ParallelMap
+) -> Iterable[LaplaceFit]:
+    """Each experiment of a block fitted by itself, with effects of its own."""
+    singly = [(e,) for e in base.experiments]
+    one_scale = partial(fitted, scales=base.scales)
+    return parallel_map(one_scale, singly, effects, repeat(base.spec), generators)
 
 
 def _each_trained(base: LaplaceFit, train: Sequence[int], effects: Sequence[tuple[Effect, ...]]) -> list[_Trained]:

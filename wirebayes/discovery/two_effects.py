@@ -52,15 +52,15 @@ def log_bayes_of_each_pair(x: Expansion) -> Array:
     if not has_tangent(first_row)[0]:
         return np.full((len(groups), len(groups)), -np.inf)
     found = project(first_row)
-    _, each = with_each_signature(first_row, found)
-    single = log_sum(each, axis=1)
+    _, by_ratio = with_each_signature(first_row, found)
+    single = log_sum(by_ratio, axis=1)
     best = _best_forms(single, groups)
-    [value] = _log_evidence(first_row, found, best, groups)
-    pairs = np.stack([log_sum(value[:, group], axis=1) for group in groups], axis=1)
-    alone = single[0] + _log_shares(x, groups)
-    np.fill_diagonal(pairs, [log_sum(alone[group]) for group in groups])
+    [of_pairs] = _log_evidence(first_row, found, best, groups)
+    of_singles = single[0] + _log_shares(x, groups)
+    evidence = np.stack([log_sum(of_pairs[:, group], axis=1) for group in groups], axis=1)
+    np.fill_diagonal(evidence, [log_sum(of_singles[group]) for group in groups])
     [none] = _log_evidence_of_none(first_row, found)
-    return pairs - none
+    return evidence - none
 
 
 def _log_evidence_of_none(x: Expansion, found: Projected) -> Array:
@@ -82,11 +82,12 @@ def _log_evidence(x: Expansion, found: Projected, first: Ints, groups: list[Ints
     shared = found.shared[:, :, None, None]
     with np.errstate(invalid="ignore"):  # what explains nothing, with as many readings as parameters
         evidence = log_sum(shared - 0.5 * x.degrees * np.log(left), axis=1)
-    prior = _log_shares(x, groups)
-    different = x.kinds[first][:, :, None] != x.kinds
     # with no more readings than parameters, what explains nothing has no finite evidence
-    value = or_impossible(evidence) + prior[first][:, :, None] + prior
-    return np.where(different, value, -np.inf)
+    evidence = or_impossible(evidence)
+    prior = _log_shares(x, groups)
+    value = evidence + prior[first][:, :, None] + prior
+    kind_of_first = x.kinds[first][:, :, None]
+    return np.where(kind_of_first != x.kinds, value, -np.inf)
 
 
 def _log_shares(x: Expansion, groups: list[Ints]) -> Array:
@@ -112,19 +113,17 @@ def _leading(single: Array, groups: list[Ints]) -> Ints:
 def _explained(x: Expansion, found: Projected, first: Ints) -> Array:
     """(n, k, j, m) of the sum of squares by some signatures with each one; -inf where an amplitude has no meaning."""
     each = _Signatures(found.along[:, :, None, :], found.square[:, :, None, :])
-    along_first = np.take_along_axis(found.along, first[:, None], axis=2)
-    square_first = np.take_along_axis(found.square, first[:, None], axis=2)
-    leading = _Signatures(along_first[..., None], square_first[..., None])
+    leading = _Signatures.chosen(found, first)
     cross = found.form.of(first).products(found.form, found.shrink)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         of_leading = leading.beside(each, cross)
         of_each = each.beside(leading, cross)
         explained = of_leading * leading.along + of_each * each.along
         are_two = leading.determinant(each, cross) > LEAST_LEFT * leading.square * each.square
+    possible = are_two & np.isfinite(explained)
     either_sign = ~x.one_sided
-    leading_allowed = (of_leading >= 0.0) | either_sign[first][:, None, :, None]
-    each_allowed = (of_each >= 0.0) | either_sign
-    possible = are_two & np.isfinite(explained) & leading_allowed & each_allowed
+    possible &= (of_leading >= 0.0) | either_sign[first][:, None, :, None]
+    possible &= (of_each >= 0.0) | either_sign
     return np.where(possible, explained, -np.inf)
 
 
@@ -134,10 +133,19 @@ class _Signatures(NamedTuple):
     along: Array
     square: Array
 
+    @classmethod
+    def chosen(cls, found: Projected, numbers: Ints) -> "_Signatures":
+        """Those of some numbers (n, j), as (n, k, j, 1)."""
+        at = numbers[:, None]
+        along = np.take_along_axis(found.along, at, axis=2)
+        square = np.take_along_axis(found.square, at, axis=2)
+        return cls(along[..., None], square[..., None])
+
     def determinant(self, other: "_Signatures", cross: Array) -> Array:
         """Of the products of pairs, `cross` those of one with the other."""
         return self.square * other.square - cross**2
 
     def beside(self, other: "_Signatures", cross: Array) -> Array:
         """Best amplitudes with the others at their best."""
-        return (other.square * self.along - cross * other.along) / self.determinant(other, cross)
+        free = other.square * self.along - cross * other.along
+        return free / self.determinant(other, cross)

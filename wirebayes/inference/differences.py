@@ -40,24 +40,31 @@ def gradient_and_hessian(
     -------
     (n, d) and (n, d, d) arrays
     """
-    n, d = z.shape
-    i, j = np.triu_indices(d, 1)
+    d = z.shape[1]
     found = _beside(density, z, rows, value, _differences(d, sides) * h[:, None])
     centre = value[:, None]
     plus = found[:, :d]
     minus = found[:, d : 2 * d]
+    gradient = (plus - minus) / (2.0 * h)
+    i, j = np.triu_indices(d, 1)
     both_plus, both_minus = np.split(found[:, 2 * d :], [len(i)], axis=1)
     mixed = both_plus - plus[:, i] - plus[:, j] + centre
     if sides == 2:
         mixed = 0.5 * (mixed + both_minus - minus[:, i] - minus[:, j] + centre)
-    mixed = mixed / (h[:, i] * h[:, j])
-    diagonal = np.arange(d)
-    hessian = np.zeros((n, d, d))
-    hessian[:, i, j] = mixed
-    hessian[:, j, i] = mixed
-    hessian[:, diagonal, diagonal] = (plus + minus - 2.0 * centre) / h**2
-    gradient = (plus - minus) / (2.0 * h)
+    hessian = _symmetric((plus + minus - 2.0 * centre) / h**2, mixed / (h[:, i] * h[:, j]))
     return gradient, hessian
+
+
+def _symmetric(diagonal: Array, above: Array) -> Array:
+    """(n, d, d) matrices by their diagonals (n, d), and what stands above these, row by row (n, d (d - 1) / 2)."""
+    n, d = diagonal.shape
+    on_diagonal = np.arange(d)
+    i, j = np.triu_indices(d, 1)
+    out = np.zeros((n, d, d))
+    out[:, on_diagonal, on_diagonal] = diagonal
+    out[:, i, j] = above
+    out[:, j, i] = above
+    return out
 
 
 def _beside(density: Density, z: Array, rows: Array, value: Array, moves: Array) -> Array:

@@ -161,8 +161,10 @@ class _SideBySide:
     """
 
     def __init__(self, target: LogPosterior, n: int, readings: Sequence[Array] | None) -> None:
-        self.n, self.noises = n, target.coordinates.noises
-        self.sensors, self.settings = target.coordinates.sensor_columns, target.coordinates.setting_columns
+        self.n = n
+        self.noises = target.coordinates.noises
+        self.sensors = target.coordinates.sensor_columns
+        self.settings = target.coordinates.setting_columns
         self.density, self.residuals = target.rowwise(readings)
 
     def climbed(self, begin: Sequence[Array], before: Sequence[Optimum]) -> list[Optimum]:
@@ -204,30 +206,37 @@ class _SideBySide:
         a climb ends. Whatever they were, both grow at first from a start that fits badly, and the wire's parameters
         follow them. With the ratio kept, the wire is fitted as if it were known; the climb that comes after frees it.
         """
-        ratio = np.concatenate([np.resize(_RATIOS, len(b)) for b in begin])
+        if not self.noises:
+            return begin
+        ratio = np.concatenate([np.resize(_RATIOS, len(places)) for places in begin])
 
         def kept(z: Array, rows: Array) -> Array:
             for pair in self.noises:
                 z[:, pair.setting] = z[:, pair.sensor] + pair.middle + pair.spread * ratio[rows]
             return z
 
-        return [led.z for led in self._led(begin, [p.setting for p in self.noises], kept)] if self.noises else begin
+        settings = [pair.setting for pair in self.noises]
+        return [led.z for led in self._led(begin, settings, kept)]
 
     def further(self, found: Sequence[Optimum], begin: Sequence[Array]) -> list[Optimum]:
         """The modes of each density, with those found from further (m, d) places with the noises held for some steps.
 
         Climbs that come to the same place meanwhile go on as one.
         """
-        best = np.repeat([f.z[np.argmax(f.log_evidence)] for f in found], [len(b) for b in begin], axis=0)
+        best = [modes.z[np.argmax(modes.log_evidence)] for modes in found]
+        best_of_row = np.repeat(best, [len(places) for places in begin], axis=0)
 
         def held(z: Array, rows: Array) -> Array:
-            z[:, self.settings] = best[rows][:, self.settings] + _SETTING_UP
-            z[:, self.sensors] = best[rows][:, self.sensors] - _SENSOR_DOWN
+            z[:, self.settings] = best_of_row[rows][:, self.settings] + _SETTING_UP
+            z[:, self.sensors] = best_of_row[rows][:, self.sensors] - _SENSOR_DOWN
             return z
 
-        if noises := [*self.settings, *self.sensors]:
-            begin = [distinct([led]).z for led in self._led(begin, noises, held, together=True)]
-        return [distinct([old, new]) for old, new in zip(found, self.climbed(begin, found), strict=True)]
+        noises = [*self.settings, *self.sensors]
+        if noises:
+            led = self._led(begin, noises, held, together=True)
+            begin = [distinct([places]).z for places in led]
+        climbed = self.climbed(begin, found)
+        return [distinct([old, new]) for old, new in zip(found, climbed, strict=True)]
 
     def _led(
         self, begin: Sequence[Array], fixed: list[int], kept: Callable[[Array, Array], Array], together: bool = False

@@ -11,6 +11,7 @@ import numpy as np
 from wirebayes.io import gross_events
 from wirebayes.io.checked_test import CheckedTest
 from wirebayes.io.experiment import Experiment
+from wirebayes.io.isolated_readings import ISOLATED, outlier
 from wirebayes.io.readings import READ, times_run_on
 from wirebayes.io.zero_shifts import slack_below, zero_shift
 from wirebayes.numeric.typing import Floats
@@ -24,8 +25,6 @@ FLAT = 3.0  # noise levels by which the holds' means must differ to say anything
 FALLS = -0.9  # correlation of displacement and tension: creep and friction bend the line, but do not turn it
 LEAST_STRAIN = 5e-5  # 10 N/mm² in steel: benches that step so little cannot set their steps
 LARGEST_STRAIN = 0.5  # lines and ropes break below; rubber is no wire of this model
-ISOLATED = 10.0  # times as far from its neighbours as nine in ten readings
-GROSS = 0.2  # of the range of all other tensions; smaller ones are the model check's affair
 RISING_HOLDS, RISING_SHARE, RISE = 5, 0.8, 2.0  # holds on loading, share that rise, rise in noise levels: not by chance
 SHRINKING_HOLDS = 4  # no wire shrinks under a load: fewer are enough, if all of them do
 JUMP, JUMP_STAYS = 2.0, 0.2  # times the changes before and after it; share of it that is left to the hold's end
@@ -189,53 +188,6 @@ def strain_scale(readings: CheckedTest) -> str:
         f"the displacements differ by {much}{short(strain, 2)} of the wire's length of "
         f"{readings.protocol.length_mm:g} mm: check that displacement_mm and length_mm are both in mm"
     )
-
-
-def outlier(readings: CheckedTest) -> str:
-    """One reading far from its neighbours, in a test whose other readings are close to theirs.
-
-    Creep runs one way within a hold, so a reading counts by what it stands above both neighbours, or below both. A
-    hold's last one counts beyond the range of all others once more; creep may be over after the first.
-    """
-    each, unit = readings.each, readings.unit
-    places: list[tuple[int, int]] = []
-    distances = []
-    for j, row in enumerate(each):
-        if len(row) >= 3:
-            places += [(j, i) for i in range(len(row))]
-            distances.append(_apart(each, j))
-    if not distances:
-        return ""
-    distance = np.concatenate(distances)
-    worst = int(distance.argmax())
-    hold, at = places[worst]
-    others = np.delete(distance, worst)
-    usual = max(float(np.quantile(others, 0.9)), readings.noise)
-    span = np.ptp(_others(each, hold, at))
-    if distance[worst] <= max(ISOLATED * usual, GROSS * span):
-        return ""
-    return (
-        f"the reading of {short(each[hold][at], 5)} {unit} in hold {readings.number[hold]} at "
-        f"{readings.times_s[hold][at]:g} s is {short(distance[worst], 3)} {unit} from its neighbours: check it, "
-        "correct a misprint or leave its row out"
-    )
-
-
-def _apart(each: Sequence[Floats], j: int) -> Floats:
-    """(r,) how far each reading of a hold stands apart, as `outlier` counts it."""
-    row = each[j]
-    inner = row[1:-1]
-    before, after = inner - row[:-2], inner - row[2:]
-    nearest = np.minimum(np.abs(before), np.abs(after))
-    peaks = np.where(before * after > 0, nearest, 0.0)
-    last, rest = row[-1], _others(each, j, -1)
-    beyond = max(last - rest.max(), rest.min() - last) - np.ptp(rest)
-    return np.concatenate([[0.0], peaks, [max(0.0, beyond)]])
-
-
-def _others(each: Sequence[Floats], j: int, at: int) -> Floats:
-    """All readings of the test but one of hold j."""
-    return np.concatenate([np.delete(row, at) if k == j else row for k, row in enumerate(each)])
 
 
 def rising(readings: CheckedTest) -> str:

@@ -139,13 +139,19 @@ def _material_priors(
 ) -> dict[str, Any]:
     """Default priors of what the samples of one material share; `mark` distinguishes materials in the names."""
     defaults = wire_defaults(_reference_length(members), scales)
-    stiff = spec.likelihood == "chain" or any(e.control == "displacement" for e in members)
-    wanted = MATERIAL if stiff else tuple(name for name in MATERIAL if name != "k1")
-    out: dict[str, Any] = {f"{name}{mark}": defaults[name] for name in wanted}
-    if len({e.length_mm for e in members}) > 1:
+    tells_stiffness = spec.likelihood == "chain" or any(e.control == "displacement" for e in members)
+    out: dict[str, Any] = {}
+    for name in MATERIAL:
+        if name != "k1" or tells_stiffness:
+            out[f"{name}{mark}"] = defaults[name]
+    lengths = {e.length_mm for e in members}
+    if len(lengths) > 1:
         out[f"{LENGTH_EXPONENT}{mark}"] = spec.length_exponent
     of_wire = [effect for effect in effects if effect.scope == "material"]
-    return out | {f"{c}{mark}": a.prior for c, a in _amplitudes(of_wire) if not a.of_each_test}
+    for column, amplitude in _amplitudes(of_wire):
+        if not amplitude.of_each_test:
+            out[f"{column}{mark}"] = amplitude.prior
+    return out
 
 
 def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effect]) -> dict[str, Any]:
@@ -200,14 +206,16 @@ def _amplitudes(effects: Sequence[Effect]) -> list[tuple[str, Amplitude]]:
 
 def _samples(members: Sequence[Experiment], effects: Sequence[Effect], spec: ModelSpec) -> list[Sample]:
     """The experiments of one material as the likelihood sees them."""
-    tension = tension_reference(np.concatenate([e.tension()[e.protocol().mask] for e in members]))
+    read = [e.tension()[e.protocol().mask] for e in members]
+    tension = tension_reference(np.concatenate(read))
     length = _reference_length(members) if len(members) > 1 else 0.0
     out = []
     for e in members:
-        present = tuple(x for x in effects if x.acts_on(e.name, e.control))
+        present = tuple(effect for effect in effects if effect.acts_on(e.name, e.control))
         model = Model(spec.law, spec.history, present, tension, length)
         finest = max(e.resolution, FINEST * _extent(e))
-        out.append(Sample(e.name, e.material, e.protocol(), e.readings()[..., None], finest, model))
+        readings = e.readings()[..., None]
+        out.append(Sample(e.name, e.material, e.protocol(), readings, finest, model))
     return out
 
 
@@ -223,18 +231,25 @@ def _extent(experiment: Experiment) -> float:
 def _apply_tables(distributions: dict[str, Any], experiments: Sequence[Experiment]) -> set[str]:
     """Put the priors of the files in place of the defaults, and return the columns that have one."""
     stated = set()
-    everything = set(MATERIAL) | set(SAMPLE) | {LENGTH_EXPONENT}
+    known = {*MATERIAL, *SAMPLE, LENGTH_EXPONENT}
     for experiment in experiments:
+        marks = experiment.name, experiment.material, experiment.control
         for name, table in experiment.priors.items():
-            line = experiment.prior_lines.get(name)
-            key = f"{experiment.source}{f', line {line}' if line else ''}: prior.{name}"
+            key = _place_of_prior(experiment, name)
             wanted = possible(key, name, from_table(key, table))
-            marks = experiment.name, experiment.material, experiment.control
-            hits = [c for c in (*(f"{name}[{mark}]" for mark in marks), name) if c in distributions]
-            if hits:
-                distributions[hits[0]] = wanted
-                stated.add(hits[0])
-            elif name not in everything and "." not in name:
-                known = f"one of {', '.join(sorted(everything))}, or effect.parameter"
-                raise InputError(f"{key}: found no such parameter{hint(name, sorted(everything))}, expected {known}")
+            columns = [*(f"{name}[{mark}]" for mark in marks), name]
+            column = next((each for each in columns if each in distributions), None)
+            if column is not None:
+                distributions[column] = wanted
+                stated.add(column)
+            elif name not in known and "." not in name:
+                expected = f"one of {', '.join(sorted(known))}, or effect.parameter"
+                raise InputError(f"{key}: found no such parameter{hint(name, sorted(known))}, expected {expected}")
     return stated
+
+
+def _place_of_prior(experiment: Experiment, name: str) -> str:
+    """File, line and key of a parameter's prior, for messages."""
+    line = experiment.prior_lines.get(name)
+    place = f"{experiment.source}, line {line}" if line else f"{experiment.source}"
+    return f"{place}: prior.{name}"

@@ -308,12 +308,13 @@ def without_each_hold(line: Linearised, filtered: Filtered, measured: Measured) 
     """
     holds, _, n = line.reading.shape
     noise = measured.noise
-    out = np.zeros((holds, n))
-    out[1:] = np.cumsum(filtered.log_likelihood[:-1], axis=0)
+    earlier = np.zeros((holds, n))
+    earlier[1:] = np.cumsum(filtered.log_likelihood[:-1], axis=0)
+    out = np.empty((holds, n))
     later = Later(np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n))
     for j in reversed(range(holds)):
         mean, var = carried_unread(line, j, filtered.carried_mean[j], filtered.carried_var[j], noise)
-        log_density = out[j] + later.log_density(mean, var)
+        log_density = earlier[j] + later.log_density(mean, var)
         out[j] = np.where(later.square < _ABSURD, log_density, -np.inf)
         later = later.with_hold(line, j, measured, noise)
     return out

@@ -233,10 +233,11 @@ def completed(problem: Problem, theta: Array, rng: Generator) -> tuple[Problem, 
     """
     if not isinstance(problem, MarginalisedProblem):
         return problem, theta, np.zeros(len(theta))
-    whole = problem.whole
     amplitudes, log_density = problem.drawn(theta, rng)
-    known = np.hstack([theta, amplitudes])
-    values = dict(zip((*problem.names, *problem.columns), known.T, strict=True))
+    names = [*problem.names, *problem.columns]
+    columns = [*theta.T, *amplitudes.T]
+    values = dict(zip(names, columns, strict=True))
+    whole = problem.whole
     for name, distribution in whole.prior.distributions.items():
         if name not in values:
             values[name] = distribution.rvs(len(theta), random_state=rng)

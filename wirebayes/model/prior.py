@@ -132,14 +132,15 @@ class Prior:
 
     def log_density(self) -> Function:
         """A function of (n, d) parameters that returns the (n,) log density."""
-        forms = dict(enumerate(map(ours, self.distributions.values())))
+        forms = [ours(distribution) for distribution in self.distributions.values()]
         # most columns are of this form, and a call for each would take longer than the arithmetic
-        log_normals = {i: d for i, d in forms.items() if isinstance(d, LogNormal)}
+        log_normals = {i: form for i, form in enumerate(forms) if isinstance(form, LogNormal)}
         positive = list(log_normals)
-        sd_log = np.array([d.sd_log for d in log_normals.values()])
-        middle = np.array([d.middle for d in log_normals.values()])
-        together = log_normal(sd_log, middle)
-        others = [(i, log_density_of(d)) for i, d in forms.items() if i not in positive]
+        together = log_normal(
+            np.array([form.sd_log for form in log_normals.values()]),
+            np.array([form.middle for form in log_normals.values()]),
+        )
+        others = [(i, log_density_of(form)) for i, form in enumerate(forms) if i not in positive]
         powers = [name for name in self.distributions if name in self.powers]
 
         def evaluate(theta: Array) -> Array:

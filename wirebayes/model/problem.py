@@ -161,17 +161,18 @@ class Problem:
                 own = self.hold_log_likelihood(theta)
                 whole = np.sum([holds.sum(axis=0) for holds in own], axis=0)
                 return whole, [whole - holds for holds in own]
-            each = []
-            without = []
-            for sample in self.samples:
-                line, measured = self.linearised(theta, sample)
-                by_side = likelihoods.on_sides(line, measured)
-                beside = by_side.beside.sum(axis=0)
-                each.append(by_side.filtered.log_likelihood.sum(axis=0) + beside)
-                rest = likelihoods.without_each_hold(by_side.line, by_side.filtered, measured)
-                without.append(rest + (beside - by_side.beside))
-            whole = np.sum(each, axis=0)
-            return whole, [rest + (whole - own) for rest, own in zip(without, each, strict=True)]
+            pairs = [self._sample_without_each_hold(theta, sample) for sample in self.samples]
+            whole = np.sum([own for own, _ in pairs], axis=0)
+            return whole, [rest + (whole - own) for own, rest in pairs]
+
+    def _sample_without_each_hold(self, theta: Array, sample: Sample) -> tuple[Array, Array]:
+        """(n,) log-likelihood of a sample under the chain, and (H, n) of its readings of all holds but one."""
+        line, measured = self.linearised(theta, sample)
+        by_side = likelihoods.on_sides(line, measured)
+        beside = by_side.beside.sum(axis=0)
+        whole = by_side.filtered.log_likelihood.sum(axis=0) + beside
+        rest = likelihoods.without_each_hold(by_side.line, by_side.filtered, measured)
+        return whole, rest + (beside - by_side.beside)
 
     def leave_one_hold_out(self, theta: Array) -> list[Array]:
         """Per sample the (H, n) log p(readings of a hold | all other readings, parameters); 0 for an unrecorded hold.
@@ -227,13 +228,15 @@ class Problem:
 
     def theta_in(self, units: Units, theta: Array) -> Array:
         """(n, d) parameters of this problem in other units."""
+        names = self.names
         out = theta.copy()
-        for i, name in enumerate(self.names):
+        for i, name in enumerate(names):
             out[:, i] *= self._ratio(name, units)
         for name, (exponent, log_ratio) in self._exponents(units).items():
-            if name in self.names:
-                value = theta[:, self.names.index(exponent)] if isinstance(exponent, str) else exponent
-                out[:, self.names.index(name)] *= np.exp(-log_ratio * value)
+            if name not in names:
+                continue
+            value = theta[:, names.index(exponent)] if isinstance(exponent, str) else exponent
+            out[:, names.index(name)] *= np.exp(-log_ratio * value)
         return out
 
     def _ratio(self, name: str, units: Units) -> float:
@@ -258,13 +261,16 @@ class Problem:
 
     def _prior_in(self, units: Units) -> Prior:
         prior = self.prior
-        distributions = {name: scaled(d, self._ratio(name, units)) for name, d in prior.distributions.items()}
+        distributions = {}
+        for name, distribution in prior.distributions.items():
+            distributions[name] = scaled(distribution, self._ratio(name, units))
         fixed = {name: value * self._ratio(name, units) for name, value in prior.fixed.items()}
         exponents = self._exponents(units)
         for name, (exponent, log_ratio) in exponents.items():
             if name in fixed and isinstance(exponent, float):
                 fixed[name] *= float(np.exp(-log_ratio * exponent))
-        return replace(prior, distributions=distributions, fixed=fixed, powers=self._powers_with(exponents))
+        powers = self._powers_with(exponents)
+        return replace(prior, distributions=distributions, fixed=fixed, powers=powers)
 
     def _powers_with(self, more: Mapping[str, PowerScaled]) -> dict[str, PowerScaled]:
         """The prior's powers with those of a change of units; what has become a factor of one is left out."""

@@ -32,13 +32,15 @@ def readings(problem: Problem, theta: Array, sample: Sample, rng: np.random.Gene
     own = problem.parameters(theta, sample)
     protocol = sample.protocol
     holds, width = protocol.time_s.shape
-    noise = rng.normal(size=(holds, width, len(theta))) * own["sensor_sd"]
+    n = len(theta)
+    noise = rng.normal(size=(holds, width, n)) * own["sensor_sd"]
     if problem.likelihood == "hold":
         first = sample.readings[:, 0, 0]
-        return rounded(from_first_readings(protocol, own, sample.model, first, noise), sample.resolution)
-    setting_error = rng.normal(size=(holds, len(theta))) * own["setting_sd"]
-    out = simulate(protocol, own, sample.model, setting_error) + noise
-    return rounded(out, sample.resolution)
+        read = from_first_readings(protocol, own, sample.model, first, noise)
+    else:
+        setting_error = rng.normal(size=(holds, n)) * own["setting_sd"]
+        read = simulate(protocol, own, sample.model, setting_error) + noise
+    return rounded(read, sample.resolution)
 
 
 def rounded(readings: Array, resolution: float) -> Array:

@@ -97,12 +97,14 @@ def thinned(weight: Array, n: int, rng: Generator) -> tuple[Indices, Array]:
         return np.arange(len(weight)), weight
     order = np.argsort(-weight, kind="stable")
     falling = weight[order]
-    rest = np.cumsum(falling[::-1])[::-1]  # of each row and all lighter ones
-    sure = np.arange(n)
-    kept = int(np.argmax(falling[:n] * (n - sure) <= rest[:n]))  # the first row that no longer stays as it is
+    of_lighter = np.cumsum(falling[::-1])[::-1]  # each row's own weight included
+    still_to_keep = n - np.arange(n)
+    is_drawn = falling[:n] * still_to_keep <= of_lighter[:n]
+    kept = int(np.argmax(is_drawn))  # the first row that no longer stays as it is
     drawn = kept + np.unique(systematic_rows(falling[kept:], n - kept, rng))
+    threshold = of_lighter[kept] / (n - kept)
     rows = order[np.append(np.arange(kept), drawn)]
-    return rows, np.append(falling[:kept], np.full(len(drawn), rest[kept] / (n - kept)))
+    return rows, np.append(falling[:kept], np.full(len(drawn), threshold))
 
 
 def next_power(log_weight: Array, most: float, share: float) -> float:
@@ -119,16 +121,17 @@ def next_power(log_weight: Array, most: float, share: float) -> float:
     share : float
         Between 0 and 1: of the rows' effective number, (sum w)² / sum w².
     """
-
-    def effective(power: float) -> float:
-        return effective_number(np.exp(power * (log_weight - log_weight.max())))
-
-    if effective(most) >= share * len(log_weight):
+    relative = log_weight - log_weight.max()
+    enough = share * len(log_weight)
+    if effective_number(np.exp(most * relative)) >= enough:
         return most
     low, high = _LEAST, float(np.log(most))
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if effective(np.exp(middle)) > share * len(log_weight) else (low, middle)
+        if effective_number(np.exp(np.exp(middle) * relative)) > enough:
+            low = middle
+        else:
+            high = middle
     return float(np.exp(low))
 
 

@@ -31,12 +31,20 @@ def strata(dimensions: int, size: int) -> NDArray[np.uint32]:
     if dimensions > 1 + len(_DIRECTIONS):
         from scipy.stats import qmc
 
-        return np.asarray(qmc.Sobol(dimensions, scramble=False).random(size) * size, np.uint32)
+        unscrambled = qmc.Sobol(dimensions, scramble=False)
+        return np.asarray(unscrambled.random(size) * size, np.uint32)
     digits = size.bit_length() - 1
-    steps = np.stack([_steps(row, digits) for row in ((), *_DIRECTIONS[: dimensions - 1])], axis=1)
-    turned = [(point & -point).bit_length() - 1 for point in range(1, size)]  # the lowest digit that is one
-    moves = np.concatenate([np.zeros((1, dimensions), np.uint32), steps[turned]])
+    rows = [(), *_DIRECTIONS[: dimensions - 1]]
+    steps = np.stack([_steps(row, digits) for row in rows], axis=1)
+    turned = [_lowest_one(point) for point in range(1, size)]
+    origin = np.zeros((1, dimensions), np.uint32)
+    moves = np.concatenate([origin, steps[turned]])
     return np.bitwise_xor.accumulate(moves, axis=0)
+
+
+def _lowest_one(number: int) -> int:
+    """The place of the lowest binary digit that is one."""
+    return (number & -number).bit_length() - 1
 
 
 def _steps(row: tuple[int, ...], digits: int) -> NDArray[np.uint32]:

@@ -180,20 +180,19 @@ def _normal_equations(own: Theta, sample: Sample) -> tuple[Floats, Floats]:
     unit = own["setting_sd"] / sensor_sd
     holds, _, n = line.reading.shape
     carried = np.zeros((holds, n))
-    square = np.zeros((n, holds, holds))
+    matrix = np.zeros((n, holds, holds))
     right = np.zeros((n, holds))
     for j, keep in enumerate(sample.protocol.mask):
-        by_error = line.by_creep[j][:, None, :] * carried[None]
-        by_error[:, j] = line.by_setting[j]
-        kept = by_error[keep] * unit
-        scaled = np.moveaxis(kept, -1, 0)
-        left = sample.readings[j] - line.reading[j]
-        residual = (left[keep] / sensor_sd).T
-        square += np.swapaxes(scaled, 1, 2) @ scaled
-        right += np.einsum("nrh,nr->nh", scaled, residual)
+        slope = line.by_creep[j][:, None, :] * carried[None]
+        slope[:, j] = line.by_setting[j]
+        slope = np.moveaxis(slope[keep] * unit, -1, 0)
+        residual = sample.readings[j] - line.reading[j]
+        residual = (residual[keep] / sensor_sd).T
+        matrix += np.swapaxes(slope, 1, 2) @ slope
+        right += np.einsum("nrh,nr->nh", slope, residual)
         carried = line.carry_by_creep[j] * carried
         carried[j] = line.carry_by_setting[j]
-    return square, right
+    return matrix, right
 
 
 def given_first(drawn: Floats, request: PredictionRequest) -> Floats:

@@ -43,20 +43,20 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
         In the order of the problem's parameters.
     """
     problem = fitted.problem
-    prior, names = problem.prior, problem.names
+    prior = problem.prior
     theta = _thinned(fitted.flat)
-    positive = np.array([name in prior.logarithmic for name in names])
+    positive = np.array([name in prior.logarithmic for name in problem.names])
     logs = np.log(np.where(positive, theta, 1.0))
     z = np.where(positive, logs, theta)
     own_prior = log_priors(fitted, theta)
-    likelihood = problem.log_likelihood(theta)
     correlation = np.atleast_2d(np.corrcoef(z.T))
     drawn = prior.rvs(20000, np.random.default_rng(0))
-    by_likelihood = distances_per_doubling(z, likelihood)
+    by_likelihood = distances_per_doubling(z, problem.log_likelihood(theta))
     out: dict[str, Identifiability] = {}
-    for i, name in enumerate(names):
+    for i, name in enumerate(problem.names):
         is_factor = bool(positive[i])
-        before, after = drawn[:, i], theta[:, i]
+        before = drawn[:, i]
+        after = theta[:, i]
         (by_prior,) = distances_per_doubling(z[:, [i]], own_prior[:, i])
         figures: IdentifiabilityFigures = {
             "contraction": contraction(after, before),
@@ -65,7 +65,7 @@ def identifiability(fitted: Fit) -> dict[str, Identifiability]:
             "range_is_factor": is_factor,
             "prior_sensitivity": by_prior,
             "likelihood_sensitivity": by_likelihood[i],
-            "ridges": _ridges(names, correlation, i),
+            "ridges": _ridges(problem.names, correlation, i),
         }
         out[name] = {**figures, "sentence": parameter_in_words(name, figures)}
     return out

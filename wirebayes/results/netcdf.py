@@ -97,23 +97,32 @@ def read_groups(path: Path, names: Sequence[str]) -> dict[str, Group]:
 def _write(node: Any, group: Group, numbers: Iterator[int]) -> None:
     """Fill a group of HDF5; each dimension takes the next of the file's numbers."""
     _describe(node, group.attributes)
-    both = group.coordinates | group.variables
-    written = {name: _dataset(node, name, variable.values) for name, variable in both.items()}
-    sizes = _sizes(both.values())
+    every = group.coordinates | group.variables
+    written = {name: _dataset(node, name, variable.values) for name, variable in every.items()}
+    sizes = _sizes(every.values())
     _make_scales(node, written, sizes, numbers)
-    auxiliary = {name: set(variable.dims) for name, variable in group.coordinates.items() if name not in sizes}
-    for name, variable in both.items():
+    labels = {name: set(variable.dims) for name, variable in group.coordinates.items() if name not in sizes}
+    for name, variable in every.items():
         dataset = written[name]
         if name not in sizes:
-            for axis, dim in zip(dataset.dims, variable.dims, strict=True):
-                axis.attach_scale(node[dim])
+            _attach_scales(node, dataset, variable)
         if name in group.units:
             dataset.attrs["units"] = group.units[name]
-        if name not in group.variables:
-            continue
-        labelling = [other for other, dims in auxiliary.items() if dims <= set(variable.dims)]
-        if labelling:  # as the conventions for climate and forecast (CF) have it
-            dataset.attrs["coordinates"] = " ".join(labelling)
+        if name in group.variables:
+            _name_labels(dataset, variable, labels)
+
+
+def _attach_scales(node: Any, dataset: Any, variable: Variable) -> None:
+    """Join each axis of a dataset to the scale of its dimension."""
+    for axis, dim in zip(dataset.dims, variable.dims, strict=True):
+        axis.attach_scale(node[dim])
+
+
+def _name_labels(dataset: Any, variable: Variable, labels: Mapping[str, set[str]]) -> None:
+    """Say which coordinates that are no dimensions label a variable, as the conventions for climate and forecast do."""
+    own = [other for other, dims in labels.items() if dims <= set(variable.dims)]
+    if own:
+        dataset.attrs["coordinates"] = " ".join(own)
 
 
 def _sizes(variables: Iterable[Variable]) -> dict[str, int]:

@@ -51,7 +51,8 @@ def posterior_warnings(fit: Fit, sample: Sample) -> list[Notice]:
     """
     problem = fit.problem
     own = problem.parameters(fit.flat, sample)
-    prior = problem.parameters(problem.prior.rvs(4000, np.random.default_rng(0)), sample)
+    drawn = problem.prior.rvs(4000, np.random.default_rng(0))
+    prior = problem.parameters(drawn, sample)
     of_readings = data_checks.warnings(sample.protocol, sample.readings[..., 0], sample.resolution)
     if problem.likelihood == "chain":
         stated = {name for name in ("k1", "preload") if problem.column(name, sample) in problem.stated}
@@ -123,18 +124,11 @@ def slackening(own: Mapping[str, Floats], sample: Sample) -> str:
     protocol = sample.protocol
     if "setting_sd" not in own or protocol.control == "force":
         return ""
-    few = {name: draws[:: 1 + len(draws) // _FEW] for name, draws in own.items()}
-    with np.errstate(all="ignore"):
-        line = linearise(protocol, few, sample.model)
-        taut = line.reading > NEAR * few["setting_sd"] * line.by_setting
-    readings, mask = sample.readings[..., 0], protocol.mask
-    least = np.where(mask, readings, np.inf).min(axis=1)
-    first = np.argmax(mask, axis=1)
-    begins = taut[np.arange(len(mask)), first]
-    stays = (taut | ~mask[..., None]).all(axis=1)
-    share = (begins & ~stays).mean(axis=1)
+    share = _share_that_slackens(own, sample)
+    readings = sample.readings[..., 0]
+    lowest = np.where(protocol.mask, readings, np.inf).min(axis=1)
     test = CheckedTest(protocol, readings, sample.resolution)
-    near = (share > OFTEN) & (least > slack_below(test))
+    near = (share > OFTEN) & (lowest > slack_below(test))
     if not near.any():
         return ""
     holds = some_of([str(number) for number in protocol.number[near]])
@@ -145,6 +139,19 @@ def slackening(own: Mapping[str, Floats], sample: Sample) -> str:
         f"({percent:.0f} % of the draws): when it goes slack depends on that error, as the likelihood does not know, "
         "and intervals may be too narrow; test it where it stays taut"
     )
+
+
+def _share_that_slackens(own: Mapping[str, Floats], sample: Sample) -> Floats:
+    """(H,) share of the draws by which a hold begins taut and does not stay so, but for `NEAR` setting errors."""
+    few = {name: draws[:: 1 + len(draws) // _FEW] for name, draws in own.items()}
+    mask = sample.protocol.mask
+    with np.errstate(all="ignore"):
+        line = linearise(sample.protocol, few, sample.model)
+        taut = line.reading > NEAR * few["setting_sd"] * line.by_setting
+    first = np.argmax(mask, axis=1)
+    begins = taut[np.arange(len(mask)), first]
+    stays = (taut | ~mask[..., None]).all(axis=1)
+    return (begins & ~stays).mean(axis=1)
 
 
 def noise(own: Mapping[str, Floats], sample: Sample) -> str:

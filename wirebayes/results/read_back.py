@@ -234,12 +234,8 @@ def _one_of(group: Group, at: int) -> dict[str, Array]:
 
 def _measured(constant: Group, observed: Group, test: _Test) -> tuple[Protocol, Array]:
     """One experiment's holds, unrecorded ones at their place, and its (H, R) readings, padded with zeros."""
-    read_as = READ[test.control]
-    if read_as not in observed:
-        read_as = READING
-    set_as = SET[test.control]
-    if set_as not in constant:
-        set_as = SETTING
+    read_as = READ[test.control] if READ[test.control] in observed else READING
+    set_as = SET[test.control] if SET[test.control] in constant else SETTING
     own = _of_experiment(constant, observed, test.name)
     number = constant["number" if "number" in constant else "hold"][own]
     before, unrecorded = _unrecorded(constant, test.name, set_as)

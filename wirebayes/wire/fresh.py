@@ -70,12 +70,14 @@ class FreshSample:
         effects, theta = self._wire
         if "k1" not in theta:
             return np.full(len(theta["B"]), np.nan)
+        k1 = theta["k1"]
         hold = self._hold(tension_N, np.zeros((1, 1)))
         with np.errstate(all="ignore"):
-            strain = strain_of(effects, np.asarray(tension_N / theta["k1"])[None], hold)
-            slope = bent(effects, strain, hold)[1]
+            bent_strain = np.asarray(tension_N / k1)[None]
+            strain = strain_of(effects, bent_strain, hold)
+            _, slope = bent(effects, strain, hold)
             shrunk = 1.0 if self.model.law == "hooke" else np.square(1.0 - strain)
-            return (theta["k1"] * slope * shrunk)[0]
+            return (k1 * slope * shrunk)[0]
 
     @cached_property
     def _wire(self) -> tuple[Placed, Theta]:
@@ -99,10 +101,15 @@ class FreshSample:
     def _creep(self, tension_N: float, time_s: Array) -> Array:
         """`creep_mm` at times ``(t, 1)``, or at one time of each draw ``(1, n)``."""
         effects, theta = self._wire
-        law, hold = Creep(effects, theta, self.model.history), self._hold(tension_N, time_s)
+        law = Creep(effects, theta, self.model.history)
+        hold = self._hold(tension_N, time_s)
         with np.errstate(all="ignore"):
-            amount, k2 = law.amount(hold.initial_tension, hold), law.rate(hold)
-            hold.grown = law.creep(amount * law.fraction(k2, hold), hold)
+            amount = law.amount(hold.initial_tension, hold)
+            k2 = law.rate(hold)
+            reached = amount * law.fraction(k2, hold)
+            hold.grown = law.creep(reached, hold)
             hold.past = [(0.0, amount, k2)]
-            whole = law.elongation(hold.grown, law.beside({}, hold), hold)
-        return np.array(np.broadcast_to(whole, (len(time_s), hold.carried.shape[1])))
+            beside = law.beside({}, hold)
+            whole = law.elongation(hold.grown, beside, hold)
+        draws = hold.carried.shape[1]
+        return np.array(np.broadcast_to(whole, (len(time_s), draws)))

@@ -15,6 +15,7 @@ from wirebayes.inference.sampler.mixture import Mixture
 from wirebayes.inference.sampler.overlooked import left_by_search, overlooked_nats
 from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.settings import EXPLORING_SHARES, OUTWEIGHS, ROUGH_SHARES, SHARES
+from wirebayes.inference.sampler.start import finite_draws, overdispersed
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers
 from wirebayes.numeric.resampling import effective_number
 
@@ -69,12 +70,12 @@ def test_the_start_has_no_walker_where_the_density_is_zero() -> None:
         return np.where(z[:, 0] > 0, -0.5 * (z**2).sum(axis=1), -np.inf)
 
     target = type("Half", (), {"__call__": lambda self, z: half(z), "problem": gaussian(D).problem})()
-    z, value = burn_in._finite_draws(target, NORMAL, 501, np.random.RandomState(0))
+    z, value = finite_draws(target, NORMAL, 501, np.random.RandomState(0))
     assert z.shape == (501, D) and (z[:, 0] > 0).all()
     assert np.array_equal(value, half(z))
     # where all draws will do, none is thrown away
     whole = gaussian(D)
-    z, value = burn_in._finite_draws(whole, NORMAL, 501, np.random.RandomState(0))  # type: ignore[arg-type]
+    z, value = finite_draws(whole, NORMAL, 501, np.random.RandomState(0))  # type: ignore[arg-type]
     assert np.array_equal(z, NORMAL.rvs(501, np.random.RandomState(0))) and whole.evaluations == len(value) == 501
 
 
@@ -275,7 +276,7 @@ def test_a_mode_found_by_a_few_walkers_begins_the_run_anew(known: int, modes: in
     d, n = len(target.mean), 300
     centres = np.zeros((2, d))
     centres[1, 0] = 10.0
-    start = burn_in._overdispersed(
+    start = overdispersed(
         Optimum(centres, target(centres), np.repeat(np.eye(d)[None], 2, axis=0), np.ones(2, bool)).rows(slice(known))
     )
     z = rng.normal(size=(n, 16, d))

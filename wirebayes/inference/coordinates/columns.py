@@ -59,7 +59,9 @@ class ColumnMap:
     def coordinate(self, theta: Array, column: int) -> Array:
         """(n,) coordinate of a parameter that is not sampled by its logarithm."""
         value = theta[:, column]
-        return self.edges[column].score(value) if column in self.edges else value / self.scale[column]
+        if column in self.edges:
+            return self.edges[column].score(value)
+        return value / self.scale[column]
 
     def to_sampled(self, theta: Array) -> Array:
         """(n, d) coordinates of natural parameters (n, d)."""
@@ -91,7 +93,8 @@ class ColumnMap:
         """
         columns, most = self._logarithmic
         value = theta[:, columns]
-        total = (np.log(value) + np.log1p(-value / most)).sum(axis=1) + self._log_scale
+        log_slopes = np.log(value) + np.log1p(-value / most)
+        total = log_slopes.sum(axis=1) + self._log_scale
         for i, at in self.edges.items():
             if i not in replaced:
                 total = total + at.log_slope(theta[:, i])
@@ -100,14 +103,25 @@ class ColumnMap:
 
 def columns_of(problem: Problem) -> ColumnMap:
     """How each parameter of a problem is measured."""
-    distributions = list(problem.prior.distributions.values())
-    positive = np.array([name in problem.prior.logarithmic for name in problem.names], dtype=bool)
-    edges = {i: at for i, d in enumerate(distributions) if not positive[i] and (at := edge(d)) is not None}
-    linear = [not positive[i] and i not in edges for i in range(len(distributions))]
-    most = [d.most if isinstance(d, LogitNormal) else np.inf for d in distributions]
-    scale = [_spread(d) if own else 1.0 for d, own in zip(distributions, linear, strict=True)]
-    spread = [_log_spread(d, m) if p else 1.0 for d, m, p in zip(distributions, most, positive, strict=True)]
-    return ColumnMap(positive, np.array(most), edges, np.array(scale), np.array(spread))
+    logarithmic = problem.prior.logarithmic
+    positive = np.array([name in logarithmic for name in problem.names], dtype=bool)
+    d = len(positive)
+    most = np.full(d, np.inf)
+    scale = np.ones(d)
+    log_spread = np.ones(d)
+    edges: dict[int, Edge] = {}
+    for i, distribution in enumerate(problem.prior.distributions.values()):
+        if isinstance(distribution, LogitNormal):
+            most[i] = distribution.most
+        if positive[i]:
+            log_spread[i] = _log_spread(distribution, most[i])
+            continue
+        at = edge(distribution)
+        if at is not None:
+            edges[i] = at
+        else:
+            scale[i] = _spread(distribution)
+    return ColumnMap(positive, most, edges, scale, log_spread)
 
 
 def _log_odds(value: Any, most: Any) -> Any:

@@ -12,8 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
+from wirebayes.inference.coordinates.find_ridges import for_sample
 from wirebayes.inference.coordinates.one_setting import is_one_setting
-from wirebayes.inference.coordinates.ridge import Ridge, for_sample
+from wirebayes.inference.coordinates.ridge import Ridge
 from wirebayes.model.problem import Problem
 from wirebayes.model.sample import Sample
 from wirebayes.numeric.typing import Array, Bools

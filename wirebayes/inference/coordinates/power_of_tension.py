@@ -60,8 +60,10 @@ def _log_likelihood(lost: Array, gained: Array) -> Array:
 
 def _gained(powers: Array, log_tension: Array, relative_s: Array) -> Array:
     """(H, m, p) elongation gained in every hold for B = 1 and N = 1, at each hazard and each power U."""
-    reached = -np.expm1(-np.exp(_LOG_HAZARDS)[:, None, None] * relative_s)  # (m, 1, H)
-    drive = np.exp(powers[:, None] * (log_tension - log_tension.max()))  # (p, H)
+    hazards = np.exp(_LOG_HAZARDS)[:, None, None]
+    reached = -np.expm1(-hazards * relative_s)  # (m, 1, H)
+    below_largest = log_tension - log_tension.max()
+    drive = np.exp(powers[:, None] * below_largest)  # (p, H)
     carried = np.zeros((len(_LOG_HAZARDS), len(powers)))
     gained = np.empty((len(log_tension), *carried.shape))
     for j in range(len(log_tension)):

@@ -51,15 +51,20 @@ class Elongation:
         theta : (n, d) array
             Natural parameters.
         """
-        own: dict[str, Floats] = {self.effect.amplitudes[0].name: np.ones(len(theta))}
+        n = len(theta)
+        own: dict[str, Floats] = {self.effect.amplitudes[0].name: np.ones(n)}
         for name, x in self.others.items():
-            own[name] = theta[:, x] if isinstance(x, int) else np.full(len(theta), x)
-        carried, square = np.zeros((1, len(theta))), np.zeros(len(theta))
+            own[name] = theta[:, x] if isinstance(x, int) else np.full(n, x)
+        carried = np.zeros((1, n))
+        square = np.zeros(n)
         for hold in self.holds:
-            until = self.effect.apply(self.kept * carried, own, hold.carrying(carried))
-            square = square + (until - self.kept * carried)[0] ** 2
-            carried = until
-        return np.asarray(0.5 * np.log(np.maximum(square / len(self.holds), 1e-300)))
+            begin = self.kept * carried
+            end = self.effect.apply(begin, own, hold.carrying(carried))
+            gained = (end - begin)[0]
+            square = square + gained**2
+            carried = end
+        mean_square = square / len(self.holds)
+        return np.asarray(0.5 * np.log(np.maximum(mean_square, 1e-300)))
 
 
 def score(log_amount: Array, log_other: Array) -> Array:
@@ -70,8 +75,10 @@ def score(log_amount: Array, log_other: Array) -> Array:
     log_amount, log_other : (n,) arrays
     """
     total = np.logaddexp(log_amount, log_other)
-    share, rest = np.maximum(log_amount - total, _LEAST), np.maximum(log_other - total, _LEAST)
-    low, high = (ndtri_exp(np.minimum(each, np.log(0.5))) for each in (share, rest))
+    share = np.maximum(log_amount - total, _LEAST)
+    rest = np.maximum(log_other - total, _LEAST)
+    low = ndtri_exp(np.minimum(share, np.log(0.5)))
+    high = ndtri_exp(np.minimum(rest, np.log(0.5)))
     return np.where(share < rest, low, -high)  # the smaller share keeps its digits
 
 

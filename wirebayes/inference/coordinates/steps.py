@@ -76,7 +76,8 @@ class Loss(Step):
         return 0.0 if self.level is None else self.level.log_beyond(theta, self.ridge.get(theta, "U"))
 
     def to_sampled(self, z: Array, theta: Array) -> None:
-        column, stiffness = self.ridge.where["B"], self.ridge.log_stiffness(theta)
+        column = self.ridge.where["B"]
+        stiffness = self.ridge.log_stiffness(theta)
         lost = z[:, column] + (self.ridge.log_creep(theta) + stiffness) + self._beyond(theta)
         for part in self.ridge.beside:
             own = np.log(theta[:, part.column]) + part.log_gained(theta) + stiffness
@@ -85,14 +86,16 @@ class Loss(Step):
         z[:, column] = lost
 
     def to_natural(self, theta: Array, z: Array) -> None:
-        column, stiffness = self.ridge.where["B"], self.ridge.log_stiffness(theta)
+        column = self.ridge.where["B"]
+        stiffness = self.ridge.log_stiffness(theta)
         lost = z[:, column]
         for part in reversed(self.ridge.beside):
             share, rest = shares.log_shares(z[:, part.column])
             gained = part.log_gained(theta) + stiffness
             theta[:, part.column] = np.exp(lost + share - gained)
             lost = lost + rest
-        theta[:, column] = np.exp(lost - (self.ridge.log_creep(theta) + stiffness) - self._beyond(theta))
+        gained = self.ridge.log_creep(theta) + stiffness
+        theta[:, column] = np.exp(lost - gained - self._beyond(theta))
 
     def log_jacobian(self, theta: Array, z: Array) -> Array | float:
         return sum(shares.log_slope(theta[:, part.column], z[:, part.column]) for part in self.ridge.beside)

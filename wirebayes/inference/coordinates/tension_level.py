@@ -101,10 +101,15 @@ def tension_level(problem: Problem, slack_edges: list[SlackEdge]) -> TensionLeve
     if not is_one_displacement(sample):
         return None
     protocol = sample.protocol
-    k1, preload = problem.names.index(problem.column("k1", sample)), problem.place("preload", sample)
-    begin_s, end_s = float(protocol.time_s[0, 0]), float(protocol.duration_s[0])
-    at, length = float(protocol.setting[0]), protocol.length_mm
-    return TensionLevel(k1, preload, at, length, float(sample.readings[0, 0, 0]), begin_s, end_s)
+    return TensionLevel(
+        problem.names.index(problem.column("k1", sample)),
+        problem.place("preload", sample),
+        float(protocol.setting[0]),
+        protocol.length_mm,
+        float(sample.readings[0, 0, 0]),
+        float(protocol.time_s[0, 0]),
+        float(protocol.duration_s[0]),
+    )
 
 
 _LEAST = 1e-3  # of the stretch without a preload: with less the wire is slack, and k1 is what it is

@@ -49,9 +49,10 @@ import numpy as np
 from wirebayes.inference.coordinates.columns import ColumnMap, columns_of
 from wirebayes.inference.coordinates.common_error import common_error
 from wirebayes.inference.coordinates.displacement_level import DisplacementLevel, displacement_levels
+from wirebayes.inference.coordinates.find_ridges import ridges_of
 from wirebayes.inference.coordinates.first_stretch import FirstStretch, first_stretches
 from wirebayes.inference.coordinates.last_readings import LastReadings, last_readings
-from wirebayes.inference.coordinates.ridge import Ridge, ridges_of
+from wirebayes.inference.coordinates.ridge import Ridge
 from wirebayes.inference.coordinates.slack_edge import SlackEdge, slack_edge
 from wirebayes.inference.coordinates.steps import (
     AddedCompliance,
@@ -319,14 +320,17 @@ def _slack_edges(problem: Problem, columns: ColumnMap) -> list[SlackEdge]:
 
 def _toes(problem: Problem, columns: ColumnMap) -> list[Straightened]:
     """The samples whose preload and whose toe are both open."""
+    if problem.likelihood != "chain":
+        return []
+    names = problem.names
     out = []
-    for sample in problem.samples if problem.likelihood == "chain" else ():
+    for sample in problem.samples:
         preload = problem.column("preload", sample)
-        for own in (e.straightens for e in sample.model.effects if e.straightens):
-            toe = problem.column(own, sample)
-            if {preload, toe} <= set(problem.names) and columns.is_linear(problem.names.index(preload)):
-                at = problem.names.index(preload)
-                out.append(Straightened(at, problem.names.index(toe), float(columns.scale[at])))
+        if preload not in names or not columns.is_linear(names.index(preload)):
+            continue
+        at = names.index(preload)
+        toes = [problem.column(e.straightens, sample) for e in sample.model.effects if e.straightens]
+        out += [Straightened(at, names.index(toe), float(columns.scale[at])) for toe in toes if toe in names]
     return out
 
 
@@ -346,14 +350,21 @@ def _is_usual(problem: Problem, columns: ColumnMap, ridges: Sequence[Ridge]) -> 
 
 def _noises(problem: Problem, columns: ColumnMap) -> tuple[Noises, ...]:
     """Of every sample of which neither noise is fixed; holds by themselves have no setting errors."""
+    if problem.likelihood != "chain":
+        return ()
     out = []
-    for sample in problem.samples if problem.likelihood == "chain" else ():
+    for sample in problem.samples:
         names = [problem.column(name, sample) for name in NOISES]
-        pair = [problem.names.index(name) for name in names if name in problem.names]
-        if len(pair) == len(names) and columns.positive[pair].all():
-            middle = np.diff([np.log(problem.prior.distributions[name].median()) for name in names])[0]
-            sensor, setting = pair
-            out.append(Noises(sensor, setting, float(middle), float(np.hypot(*columns.log_spread[pair]))))
+        if not set(names) <= set(problem.names):
+            continue
+        pair = [problem.names.index(name) for name in names]
+        if not columns.positive[pair].all():
+            continue
+        log_medians = [np.log(problem.prior.distributions[name].median()) for name in names]
+        middle = np.diff(log_medians)[0]
+        spread = np.hypot(*columns.log_spread[pair])
+        sensor, setting = pair
+        out.append(Noises(sensor, setting, float(middle), float(spread)))
     return tuple(out)
 
 

@@ -12,7 +12,6 @@ At the end walkers are placed by weight, so that none is left in a distant mode 
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -21,8 +20,7 @@ from wirebayes.inference.log_posterior import LogPosterior
 from wirebayes.inference.modes import search
 from wirebayes.inference.optimum import Optimum, distinct
 from wirebayes.inference.policy import Policy
-from wirebayes.inference.sampler import mixture, net, proposal
-from wirebayes.inference.sampler.mixture import Mixture
+from wirebayes.inference.sampler import net, proposal
 from wirebayes.inference.sampler.overlooked import left_by_search
 from wirebayes.inference.sampler.points import WeightedPoints
 from wirebayes.inference.sampler.proposal import Proposal
@@ -39,7 +37,6 @@ from wirebayes.inference.sampler.settings import (
     LONGEST_SETTLING,
     MORE_COMPONENTS,
     MOST_COMPONENTS,
-    OVERDISPERSED,
     PASSING_POINTS,
     POINTS,
     REMEMBERED,
@@ -49,6 +46,7 @@ from wirebayes.inference.sampler.settings import (
     USEFUL,
     WARM,
 )
+from wirebayes.inference.sampler.start import finite_draws, modes_below, overdispersed
 from wirebayes.inference.sampler.state import BurnIn, Kept, Learned, Sampling, Walkers, advance, move_of
 from wirebayes.numeric.resampling import effective_number, next_power, truncated_rows
 from wirebayes.numeric.spread_rows import spread_rows
@@ -89,10 +87,10 @@ def init(
         witness = searched.cold, searched.height
         if rough is None:
             hot, cold = searched.warm, searched.cold
-    known = _overdispersed(found)
+    known = overdispersed(found)
     random = np.random.RandomState(np.random.MT19937(of_walkers))
     count = _walking(target, policy)
-    places = _finite_draws(target, known, count, random)
+    places = finite_draws(target, known, count, random)
     walkers = Walkers(*places, random.get_state())
     learned = Learned(known, known, len(found.z), witness)
     state = BurnIn(walkers, learned, rng, target.evaluations - before)
@@ -121,22 +119,28 @@ def burn_in_round(target: LogPosterior, state: BurnIn, policy: Policy) -> BurnIn
         state, walk = _walked(target, state, policy)
         state = _fitted(target, state, policy, *_weighted_twice(*walk))
     state, drawn = _drawn(target, state, policy)
-    z, value, base = drawn
+    _, value, base = drawn
     weight = value - base
     acceptance, middle, high = _quality(weight, state.generator)
     state = state.knowing(acceptance=acceptance)
-    settled = acceptance >= GOOD_ACCEPTANCE and high - middle < policy.tail
-    last = state.round >= policy.rounds and settled or state.round >= policy.most_rounds
+    last = _is_last(state, policy, high - middle)
     if acceptance >= USEFUL:
         points = POINTS if last else PASSING_POINTS
         state = _fitted(target, state, policy, *_weighted_twice(*drawn), points=points)
         left = left_by_search(state.learned, middle) if last else None
-        state = _with_excess(state, z, value, weight, left)
+        state = _with_excess(state, drawn[0], value, weight, left)
     if not last:
         return state
     # Places of great weight are few among the draws: walkers need about so many steps to find their share of them.
     steps = int(np.clip(np.exp(high - middle), 1, LONGEST_SETTLING))
     return _frozen(target, state, policy, drawn, steps)
+
+
+def _is_last(state: BurnIn, policy: Policy, tail: float) -> bool:
+    """Whether no round follows: the proposal is good, with such a tail of its log weights, or there were enough."""
+    settled = state.learned.acceptance >= GOOD_ACCEPTANCE and tail < policy.tail
+    enough = settled and state.round >= policy.rounds
+    return enough or state.round >= policy.most_rounds
 
 
 def _quality(weight: Array, rng: np.random.Generator) -> tuple[float, float, float]:
@@ -221,14 +225,14 @@ def refined(target: LogPosterior, state: Sampling, policy: Policy, *, draws_stay
     """
     before = target.evaluations
     learned = state.learned
-    known = _modes_of(target, learned.start)
+    known = modes_below(target, learned.start)
     climbed = _climbed(target, state, known)
     found = distinct([known, climbed])
     evaluations = state.evaluations + target.evaluations - before
     state = replace(state, evaluations=evaluations)
     modes = len(found.z)
     if modes > len(known.z):
-        learned = replace(learned, start=_overdispersed(found), modes=modes)
+        learned = replace(learned, start=overdispersed(found), modes=modes)
         return again(target, replace(state, learned=learned), policy)
     earlier = state.all_kept if draws_stay else Kept()
     previous = learned.proposal if earlier.steps else None
@@ -248,17 +252,6 @@ def _climbed(target: LogPosterior, state: Sampling, known: Optimum) -> Optimum:
     density, residuals = target.rowwise()
     found = climb(density, begin, residuals, of=np.zeros(len(begin), np.int64), known=[known])
     return found.rows(found.converged & np.isfinite(found.log_density))
-
-
-def _overdispersed(modes: Optimum) -> Mixture:
-    return mixture.from_modes(modes.z, modes.covariance * OVERDISPERSED, modes.log_evidence)
-
-
-def _modes_of(target: LogPosterior, start: Mixture) -> Optimum:
-    """The modes that `_overdispersed` gave this mixture of."""
-    inverse = np.linalg.inv(start.factors)
-    curvature = OVERDISPERSED * np.swapaxes(inverse, 1, 2) @ inverse
-    return Optimum(start.centres, target(start.centres), curvature, np.ones(len(start.centres), bool))
 
 
 def _of_kept(target: LogPosterior, state: Sampling, policy: Policy, done: int) -> BurnIn:
@@ -303,16 +296,25 @@ def _walked(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn
 
 def _drawn(target: LogPosterior, state: BurnIn, policy: Policy) -> tuple[BurnIn, tuple[Array, Array, Array]]:
     """Draws of the proposal, fewer in the first rounds: places (n, d), their log densities and the proposal's."""
-    drawn_from = state.learned.proposal
-    most = policy.round_draws * (TO_FIND_MORE if _hard_to_find(state.learned) else 1)
-    n = max(most >> max(IN_FULL - state.round, 0), min(most, LEAST_DRAWS * state.learned.modes))
-    points = net.even(n, len(target.problem.names) + 1, state.generator)
-    z = proposal.components(drawn_from).from_cube(points, state.generator)
+    learned = state.learned
+    points = net.even(_how_many(state, policy), len(target.problem.names) + 1, state.generator)
+    z = proposal.components(learned.proposal).from_cube(points, state.generator)
     before = target.evaluations
     value = target(z)
-    state = replace(state, evaluations=state.evaluations + target.evaluations - before)
+    made = target.evaluations - before
     good = np.isfinite(value)
-    return state, (z[good], value[good], drawn_from.log_density(z[good]))
+    drawn = z[good], value[good], learned.proposal.log_density(z[good])
+    return replace(state, evaluations=state.evaluations + made), drawn
+
+
+def _how_many(state: BurnIn, policy: Policy) -> int:
+    """Draws of the proposal in this round."""
+    most = policy.round_draws
+    if _hard_to_find(state.learned):
+        most = most * TO_FIND_MORE
+    halvings = max(IN_FULL - state.round, 0)
+    least = min(most, LEAST_DRAWS * state.learned.modes)
+    return max(most >> halvings, least)
 
 
 def _fitted(
@@ -376,16 +378,3 @@ def _walking(target: LogPosterior, policy: Policy) -> int:
     """Walkers in burn-in: few, for the same number of evaluations takes them further."""
     each = min(policy.walkers, max(policy.walkers // 4, 2 * len(target.problem.names) + 2))
     return each * policy.ensembles
-
-
-def _finite_draws(target: LogPosterior, known: Mixture, n: int, random: Any) -> tuple[Array, Array]:
-    """Draws of a mixture where the density is above zero, and its logarithm there."""
-    drawn = np.empty((0, len(target.problem.names)))
-    values = np.empty(0)
-    while len(drawn) < n:
-        z = known.rvs(n, random)
-        value = target(z)
-        good = np.isfinite(value)
-        drawn = np.vstack([drawn, z[good]])
-        values = np.concatenate([values, value[good]])
-    return drawn[:n], values[:n]

@@ -51,14 +51,17 @@ class Components:
         -------
         (n, d) array
         """
-        which = np.minimum(np.searchsorted(self._until, points[:, 0]), len(self._until) - 1)
-        degrees = self.mixture.degrees[which]
+        which = np.searchsorted(self._until, points[:, 0])
+        which = np.minimum(which, len(self._until) - 1)
         within = np.clip(points[:, 1:], _SMALLEST, 1.0 - _SMALLEST)
-        deviates = ndtri(within) * np.sqrt(degrees / random.chisquare(degrees))[:, None]
-        x = self.mixture.centres[which] + np.einsum("nij,nj->ni", self.mixture.factors[which], deviates)
-        bent = which < self.straightened
+        degrees = self.mixture.degrees[which]
+        stretch = np.sqrt(degrees / random.chisquare(degrees))
+        deviates = ndtri(within) * stretch[:, None]
+        from_centre = np.einsum("nij,nj->ni", self.mixture.factors[which], deviates)
+        x = self.mixture.centres[which] + from_centre
         if self.straight is not None:
-            x[bent] = self.straight.inverse(x[bent])
+            straightened = which < self.straightened
+            x[straightened] = self.straight.inverse(x[straightened])
         return x
 
     def to_cube(self, x: Array, random: Any) -> Array:
@@ -79,20 +82,20 @@ class Components:
         distances = np.einsum("knd,knd->kn", deviates, deviates)
         logs = self.mixture.log_parts(distances)
         logs[: self.straightened] += jacobian
-        perturbed = logs + random.gumbel(size=logs.shape)
-        which = np.argmax(perturbed, axis=0)
+        # with Gumbel numbers added the largest is a draw by weight
+        which = np.argmax(logs + random.gumbel(size=logs.shape), axis=0)
         chosen = which, np.arange(n)
         degrees = self.mixture.degrees[which]
         square = random.chisquare(degrees + d)
-        stretch = square / (degrees + distances[chosen])
+        stretch = np.sqrt(square / (degrees + distances[chosen]))
+        within = ndtr(deviates[chosen] * stretch[:, None])
         back = self.mixture.weights[which] * random.uniform(size=n)
-        first = self._until[which] - back
-        within = deviates[chosen] * np.sqrt(stretch)[:, None]
-        return np.column_stack([first, ndtr(within)])
+        return np.column_stack([self._until[which] - back, within])
 
     def _deviates(self, x: Array) -> tuple[Array, Any]:
         """(components, n, d) of places (n, d), each in a component's own units, and what straightening adds to logs."""
-        centres, k = self.mixture.centres[:, None], self.straightened
+        centres = self.mixture.centres[:, None]
+        k = self.straightened
         straight, jacobian = (x, 0.0) if self.straight is None else self.straight.forward(x)
         apart = np.concatenate([straight - centres[:k], x - centres[k:]])
         inverse = np.linalg.inv(self.mixture.factors)

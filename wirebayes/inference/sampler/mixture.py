@@ -209,7 +209,8 @@ def _em(
     points would shrink onto them. One with fewer points than `fewest` for each coordinate is an error: it would take
     the others with it.
     """
-    x, weight = x.astype(kind), weight.astype(kind)
+    x = x.astype(kind)
+    weight = weight.astype(kind)
     n, d = x.shape
     degrees = mixture.degrees
     squares = (x[:, :, None] * x[:, None, :]).reshape(n, d * d)
@@ -223,10 +224,10 @@ def _em(
         if not (members >= fewest * d).all():
             raise np.linalg.LinAlgError("empty component")
         heavy = share * (degrees + d) / (degrees + distances)
-        centres, scale = _moments(heavy, x, squares)
-        scale += of_the_whole * np.eye(d)
+        centres, scatter = _moments(heavy, x, squares)
+        scatter += of_the_whole * np.eye(d)
         counted = members + of_the_whole
-        factors = np.linalg.cholesky(scale / counted[:, None, None])
+        factors = np.linalg.cholesky(scatter / counted[:, None, None])
         mixture = Mixture(members / members.sum(), centres, factors, degrees)
         log_likelihood = float(weight @ total)
         if log_likelihood - last < EM_GAIN * members.sum():

@@ -67,26 +67,34 @@ class PoolMove(Move):  # type: ignore[misc]
     def _pooled(self, model: Any, state: EmceeState, k: int) -> list[tuple[Array, Array, Bools]]:
         """The next k places of all walkers: (n, d), their log densities (n,), and whether they changed (n,)."""
         pool, value = self._pools(model, state, k)
-        taken = _taken(value - self._log_proposal(pool), k, model.random)
+        log_weight = value - self._log_proposal(pool)
+        taken = _taken(log_weight, k, model.random)
         changed = np.diff(taken, axis=1, prepend=0) != 0
         walker = np.arange(len(pool))
         return [(pool[walker, i], value[walker, i], new) for i, new in zip(taken.T, changed.T, strict=True)]
 
     def _pools(self, model: Any, state: EmceeState, k: int) -> tuple[Array, Array]:
         """(n, 1 + k, d) each walker's place and k draws, and their log densities (n, 1 + k)."""
-        x, random = state.coords, model.random
+        x = state.coords
         n, d = x.shape
-        points = net.around(self.components.to_cube(x, random), k + 1, random)
-        # not in the net's own order: that goes to and fro between halves of the cube, as equal steps do not expect
-        drawn_points = points[:, 1 + random.permutation(k)]
-        drawn = self.components.from_cube(drawn_points.reshape(n * k, -1), random)
+        cube = self._draws_in_cube(x, k, model.random)
+        drawn = self.components.from_cube(cube.reshape(n * k, -1), model.random)
         drawn, beyond = _within(drawn, np.repeat(x, k, axis=0))
-        value = np.where(beyond, -np.inf, model.compute_log_prob_fn(drawn)[0])
+        value, *_ = model.compute_log_prob_fn(drawn)
+        value = np.where(beyond, -np.inf, value)
         pool = np.concatenate([x[:, None], drawn.reshape(n, k, d)], axis=1)
         return pool, np.column_stack([state.log_prob, value.reshape(n, k)])
 
+    def _draws_in_cube(self, x: Array, k: int, random: Any) -> Array:
+        """(n, k, dimensions of the cube) points of a net around each walker (n, d), in random order."""
+        around_each = net.around(self.components.to_cube(x, random), k + 1, random)
+        # not in the net's own order: that goes to and fro between halves of the cube, as equal steps do not expect
+        return around_each[:, 1 + random.permutation(k)]
+
     def _log_proposal(self, pool: Array) -> Array:
-        return self.proposal.log_density(pool.reshape(-1, pool.shape[-1])).reshape(pool.shape[:2])
+        n, size, d = pool.shape
+        value = self.proposal.log_density(pool.reshape(-1, d))
+        return value.reshape(n, size)
 
 
 def _taken(log_weight: Array, k: int, random: Any) -> Array:
@@ -139,11 +147,12 @@ class EvolutionMove(RedBlueMove):  # type: ignore[misc]
         u, slope = self._forward(x)
         pool, _ = self._forward(others[0])
         difference = self._differences(pool, len(x), random)
-        lengths = self._lengths(x.shape[1])
-        u = u + random.choice(lengths, size=(len(x), 1)) * difference
+        length = random.choice(self._lengths(x.shape[1]), size=(len(x), 1))
+        u = u + length * difference
         moved = self.straight.inverse(u) if self.straight else u
         y, _ = _within(moved, x)
-        return y, slope - self._forward(y)[1]
+        _, slope_there = self._forward(y)
+        return y, slope - slope_there
 
     def _differences(self, pool: Array, n: int, random: Any) -> Array:
         """(n, d) differences, for each of n walkers between two of its own ensemble's part of the pool (m, d)."""

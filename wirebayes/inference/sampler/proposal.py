@@ -94,14 +94,18 @@ class Proposal:
     def components(self) -> Components:
         """All components of all parts."""
         straightened, others = self._parts
-        parts = [*straightened, *others]
+        every = [*straightened, *others]
+        mixtures = [part for _, part in every]
+        weights = [share * part.weights for share, part in every]
+        degrees = [np.full(len(part.weights), part.degrees) for part in mixtures]
         together = Mixture(
-            np.concatenate([share * part.weights for share, part in parts]),
-            np.concatenate([part.centres for _, part in parts]),
-            np.concatenate([part.factors for _, part in parts]),
-            np.concatenate([np.full(len(part.weights), part.degrees) for _, part in parts]),
+            np.concatenate(weights),
+            np.concatenate([part.centres for part in mixtures]),
+            np.concatenate([part.factors for part in mixtures]),
+            np.concatenate(degrees),
         )
-        return Components(together, self.straight, sum(len(part.weights) for _, part in straightened))
+        in_straightened = sum(len(part.weights) for _, part in straightened)
+        return Components(together, self.straight, in_straightened)
 
     def rvs(self, n: int, rng: Any) -> Array:
         """(n, d) independent draws; `rng` is a numpy RandomState or Generator."""
@@ -169,16 +173,26 @@ def fit_proposal(
     numpy.linalg.LinAlgError
         If the points do not span their space.
     """
-    hot, cold = hot.thinned(points, rng), cold.thinned(points, rng)
+    hot = hot.thinned(points, rng)
+    cold = cold.thinned(points, rng)
     elsewhere = before is None or (hot.spread > ELSEWHERE * cold.spread).any()
     straight = transport_map.fit_map(hot if along_tails and not elsewhere else cold, order, scores)
-    near, far = (replace(each, z=straight.forward(each.z)[0]) for each in (cold, hot))
-    far, plain = far.thinned(points // 2, rng), hot.thinned(points // 2, rng)
-    old_close, old_wide, old_plain = (before.close, before.wide, before.plain) if before else (None, None, None)
+    near = _straightened(cold, straight)
+    far = _straightened(hot, straight).thinned(points // 2, rng)
+    plain = hot.thinned(points // 2, rng)
+    old_close = None if before is None else before.close
+    old_wide = None if before is None else before.wide
+    old_plain = None if before is None else before.plain
     close = mixture.fit_mixture(near, rng, most=most, degrees=LIGHT_DEGREES, before=old_close)
     wide = mixture.fit_mixture(far, rng, most=most // 2, before=old_wide)
     as_it_is = mixture.fit_mixture(plain, rng, most=most // 2, before=old_plain)
     return Proposal(shares, straight, close, wide, as_it_is, start)
+
+
+def _straightened(points: WeightedPoints, straight: Straight) -> WeightedPoints:
+    """The same points in the coordinates of a map."""
+    u, _ = straight.forward(points.z)
+    return replace(points, z=u)
 
 
 def with_excess(of: Proposal, drawn: WeightedPoints, value: Array, rng: Generator) -> Proposal:

@@ -4,14 +4,10 @@ The mean is a quadratic and the logarithm of the scale a linear function of the 
 and a funnel (a setting error that widens everything it allows) become nearly round. What follows an amount that is
 sampled by a score (`wirebayes.inference.coordinates.shares`) follows the amount, not the score, which goes on where the
 amount is next to nothing: in means and scales its share stands for it. The residual of each coordinate is made
-symmetric by a sinh-arcsinh transformation, for skewed marginals such as that of an exponent U whose lower end the data
-hardly bound. Heavy tails are left to the mixtures: they seldom belong to one coordinate alone. The map is triangular,
-so its Jacobian is the product of the slopes, and it has an inverse for any coefficients. Outside the range of the
-points to which it was fitted, quadratics continue as straight lines and scales keep their value at the border.
-
-References
-----------
-M. C. Jones and A. Pewsey, Sinh-arcsinh distributions, Biometrika 96 (2009).
+symmetric (`wirebayes.inference.sampler.symmetry`), for skewed marginals such as that of an exponent U whose lower end
+the data hardly bound. Heavy tails are left to the mixtures: they seldom belong to one coordinate alone. The map is
+triangular, so its Jacobian is the product of the slopes, and it has an inverse for any coefficients. Outside the range
+of the points to which it was fitted, quadratics continue as straight lines and scales keep their value at the border.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,12 +24,10 @@ from wirebayes.inference.sampler.settings import (
     FEW,
     MOST_PAIRS,
     POINTS_A_TERM,
-    RESERVE,
     RIDGE,
-    SCORES,
     SETTLED,
-    SKEWNESSES,
 )
+from wirebayes.inference.sampler.symmetry import fitted_shapes, made_skewed, made_symmetric
 from wirebayes.numeric.typing import Array, Bools, Ints
 
 
@@ -93,23 +87,37 @@ class Straight:
         """(n, d) straightened points and the (n,) logarithm of the map's Jacobian, of points (n, d)."""
         # points last: sums over coordinates are several times as fast
         v = np.ascontiguousarray(((x[:, self.order] - self.centre) / self.scale).T)
-        before = v
-        if len(self.scores):
-            before = v.copy()
-            share = ndtr(x[:, self.order[self.scores]]).T
-            before[self.scores] = self._standardised_share(share, slice(None))
-        held = np.clip(before, self.low[:, None], self.high[:, None])
-        mean, bend = self.linear @ before + self.constant[:, None], before - 0.5 * held
-        for j in range(1, len(v)):
-            mean[j] += ((self.quadratic[j, :j, :j] @ held[:j]) * bend[:j]).sum(axis=0)
+        before = self._regressors(x, v)
+        mean = self._means(before)
         log_scale = self.log_scale[:, 1:] @ before + self.log_scale[:, :1]
         log_scale = np.clip(log_scale, self.least[:, None], self.most[:, None])
-        u, slopes = _normal((v - mean) * np.exp(-log_scale), self.shape[:, :, None])
-        return u.T, np.log(slopes.prod(axis=0)) - log_scale.sum(axis=0) - np.log(self.scale).sum()
+        left = (v - mean) * np.exp(-log_scale)
+        u, slopes = made_symmetric(left, self.shape[:, :, None])
+        log_jacobian = np.log(slopes.prod(axis=0)) - log_scale.sum(axis=0) - np.log(self.scale).sum()
+        return u.T, log_jacobian
+
+    def _regressors(self, x: Array, v: Array) -> Array:
+        """(d, n) what means and scales depend on: the standardised points (d, n), and the shares in place of scores."""
+        if not len(self.scores):
+            return v
+        share = ndtr(x[:, self.order[self.scores]]).T
+        regressors = v.copy()
+        regressors[self.scores] = self._standardised_share(share, slice(None))
+        return regressors
+
+    def _means(self, before: Array) -> Array:
+        """(d, n) mean of each coordinate, given those before it; a straight line beyond the points fitted."""
+        held = np.clip(before, self.low[:, None], self.high[:, None])
+        bend = before - 0.5 * held
+        mean = self.linear @ before + self.constant[:, None]
+        for j in range(1, len(mean)):
+            slope = self.quadratic[j, :j, :j] @ held[:j]
+            mean[j] += (slope * bend[:j]).sum(axis=0)
+        return mean
 
     def inverse(self, u: Array) -> Array:
         """(n, d) points of straightened ones."""
-        left = _skewed(np.ascontiguousarray(u.T), self.shape[:, :, None])
+        left = made_skewed(np.ascontiguousarray(u.T), self.shape[:, :, None])
         v = np.zeros_like(left)
         regressors = np.zeros_like(left)
         held = np.zeros_like(left)
@@ -117,15 +125,19 @@ class Straight:
             before = regressors[:j]
             mean = self._mean(j, before, held[:j])
             v[j] = mean + left[j] * np.exp(self._log_scale(j, before))
-            regressors[j] = v[j]
-            is_score = self.scores == j
-            if is_score.any():
-                share = ndtr(v[j] * self.scale[j] + self.centre[j])
-                regressors[j] = self._standardised_share(share, is_score)
+            regressors[j] = self._regressor(j, v[j])
             held[j] = np.clip(regressors[j], self.low[j], self.high[j])
         x = np.empty(v.T.shape)
         x[:, self.order] = v.T * self.scale + self.centre
         return x
+
+    def _regressor(self, j: int, v: Array) -> Array:
+        """(n,) what later coordinates depend on: the standardised coordinate j (n,), of a score its share."""
+        is_score = self.scores == j
+        if not is_score.any():
+            return v
+        share = ndtr(v * self.scale[j] + self.centre[j])
+        return self._standardised_share(share, is_score)
 
     def _standardised_share(self, share: Array, which: slice | Bools) -> Array:
         """(k, n) what stands for k of the scores in means and scales, by their shares (k, n)."""
@@ -189,7 +201,7 @@ def fit_map(points: WeightedPoints, order: Ints, scores: Sequence[int] = ()) -> 
         high=before.max(axis=0),
         least=spread.min(axis=0),
         most=spread.max(axis=0),
-        shape=_shapes(left, weight),
+        shape=fitted_shapes(left, weight),
         **_coefficients(found),
     )
 
@@ -210,12 +222,12 @@ def _coefficients(found: Sequence["_Straightened"]) -> dict[str, Array]:
     quadratic = np.zeros((d, d, d))
     log_scale = np.zeros((d, d + 1))
     for j, of in enumerate(found):
-        mean = of.of_mean
-        constant[j] = mean[0]
-        linear[j, :j] = mean[1 : j + 1]
+        constant[j] = of.of_mean[0]
+        linear[j, :j] = of.of_mean[1 : j + 1]
+        of_pairs = of.of_mean[j + 1 :]
         one, other = of.pairs
-        np.add.at(quadratic[j], (one, other), mean[j + 1 :])
-        np.add.at(quadratic[j], (other, one), mean[j + 1 :])
+        np.add.at(quadratic[j], (one, other), of_pairs)
+        np.add.at(quadratic[j], (other, one), of_pairs)
         log_scale[j, : j + 1] = of.of_scale
     return {"constant": constant, "linear": linear, "quadratic": quadratic, "log_scale": log_scale}
 
@@ -297,64 +309,6 @@ def _seen_at_once(products: Array, lines: Array, y: Array, weight: Array, clear:
     return best
 
 
-def _normal(x: Array, shape: Array) -> tuple[Array, Array]:
-    """What is even where x has this shape, sinh(arcsinh w - skewness), and the slopes; w is x in units of the shape."""
-    location, width, skewness = shape
-    even, odd = np.cosh(skewness), np.sinh(skewness)
-    w = (x - location) / width
-    root = np.sqrt(1.0 + w * w)
-    return w * even - root * odd, (even - w / root * odd) / width
-
-
-def _skewed(u: Array, shape: Array) -> Array:
-    """The inverse of `_normal`: its sinh(arcsinh u + skewness), written out."""
-    location, width, skewness = shape
-    w = u * np.cosh(skewness) + np.sqrt(1.0 + u * u) * np.sinh(skewness)
-    return location + width * w
-
-
-def _shapes(x: Array, weight: Array) -> Array:
-    """(3, m) shapes of weighted points (n, m), by which their quantiles come nearest to those of a normal.
-
-    For each of many skewnesses location and width are a weighted straight-line fit; the weights, slopes of the map,
-    make of a distance between quantiles one between scores.
-    """
-    worth = weight.sum()
-    middle = weight @ x / worth
-    variance = weight @ (x - middle) ** 2 / worth
-    spread = np.maximum(np.sqrt(variance), 1e-12)
-    quantiles = (_quantiles(x, weight, ndtr(SCORES)) - middle) / spread
-    locations, widths, misfit = _line_of_each_skewness(quantiles)
-    reserve = (RESERVE * SKEWNESSES[:, None]) ** 2
-    best = np.argmin(misfit + reserve, axis=0)
-    chosen = best, np.arange(x.shape[1])
-    return np.array([middle + spread * locations[chosen], spread * widths[chosen], SKEWNESSES[best]])
-
-
-def _line_of_each_skewness(quantiles: Array) -> tuple[Array, Array, Array]:
-    """(skewnesses, m) location and width that suit quantiles (scores, m) best at each skewness, and the misfit left."""
-    inner = np.arcsinh(SCORES) + SKEWNESSES[:, None]
-    curve = np.sinh(inner)
-    slope = np.cosh(inner) / np.sqrt(1.0 + SCORES**2)
-    slope = slope[..., None]
-    lines = np.stack([np.ones_like(curve), curve], axis=-1) / slope
-    weighted = quantiles / slope
-    line = np.linalg.pinv(lines) @ weighted
-    left = weighted - lines @ line
-    width = np.maximum(line[:, 1], 1e-3)
-    return line[:, 0], width, (left**2).sum(axis=1) / width**2
-
-
-def _quantiles(x: Array, weight: Array, shares: Array) -> Array:
-    """(k, m) quantiles of weighted points (n, m)."""
-    rows = np.argsort(x, axis=0)
-    ranked = np.take_along_axis(x, rows, axis=0)
-    until = np.cumsum(weight[rows], axis=0)
-    middles = (until - 0.5 * weight[rows]) / until[-1]
-    of_each = [np.interp(shares, *column) for column in zip(middles.T, ranked.T, strict=True)]
-    return np.stack(of_each, axis=1)
-
-
 def _regress(
     terms: Array, lines: Array, y: Array, points: Array, of_scale: Array | None = None
 ) -> tuple[Array, Array, Array]:
@@ -365,26 +319,36 @@ def _regress(
     worth = points.sum()
     if of_scale is None:
         of_scale = np.zeros(lines.shape[1])
-    bend = RIDGE * worth * np.eye(terms.shape[1])
+    prior = _weak_prior(terms, worth)
     information = 2.0 * (lines.T * points) @ lines
-    information = information + RIDGE * worth * np.eye(lines.shape[1])
+    information = information + _weak_prior(lines, worth)
     for _ in range(ALTERNATIONS):
         precision = _precision(lines, of_scale)
         weighted = terms.T * _of_worth(points * precision, worth)
-        of_mean = np.linalg.solve(weighted @ terms + bend, weighted @ y)
+        of_mean = np.linalg.solve(weighted @ terms + prior, weighted @ y)
         # a point far out says where the scale grows, but no single one decides
         square = np.minimum((y - terms @ of_mean) ** 2 * precision, 9.0)
-        step = np.linalg.solve(information, lines.T @ (points * (square - 1.0)))
+        slope = lines.T @ (points * (square - 1.0))
+        step = np.linalg.solve(information, slope)
         of_scale = of_scale + step
         moved = lines @ step
         if points @ moved**2 < SETTLED**2 * worth:
             break
     weight = _of_worth(points * _precision(lines, of_scale), worth)
-    inverse = np.linalg.inv((terms.T * weight) @ terms + bend)
-    left = y - terms @ of_mean
+    errors = _standard_errors(terms, y - terms @ of_mean, weight, worth)
+    return of_mean, of_scale, of_mean / errors
+
+
+def _weak_prior(terms: Array, worth: Any) -> Array:
+    """Information (k, k) that keeps coefficients of terms (n, k) finite, where the points' weights sum to so much."""
+    return RIDGE * worth * np.eye(terms.shape[1])
+
+
+def _standard_errors(terms: Array, left: Array, weight: Array, worth: Any) -> Array:
+    """(k,) of the coefficients of terms (n, k), by what these leave (n,) of weighted points."""
+    information = (terms.T * weight) @ terms + _weak_prior(terms, worth)
     variance = weight @ left**2 / worth
-    error = np.sqrt(variance * np.diag(inverse))
-    return of_mean, of_scale, of_mean / error
+    return np.sqrt(variance * np.diag(np.linalg.inv(information)))
 
 
 def _precision(lines: Array, of_scale: Array) -> Array:

@@ -126,9 +126,12 @@ def _drifts(
     robot: Robot, wires: Wires, poses: Poses, tension_N: Floats, time_s: float, loaded_s: float
 ) -> tuple[Floats, Floats, float]:
     """Distances and tilts (p, n) after a time, and the share of positions and draws that still have a pose."""
-    n, p = wires.count, len(tension_N)
+    n = wires.count
+    p = len(tension_N)
     many = _at_each(wires, n, p)
-    where, turn, pull = (np.repeat(values, n, 0) for values in (*poses, tension_N))
+    where = np.repeat(poses[0], n, 0)
+    turn = np.repeat(poses[1], n, 0)
+    pull = np.repeat(tension_N, n, 0)
     state = _loaded(many, pull, loaded_s)
     commands = inverse.commands(robot, many, where, turn, pull, state.strain(many))
     held = drift.stably(robot, many, commands, where, commands.rotation)

@@ -99,10 +99,12 @@ class CreepingHold:
 
     def to(self, stop_s: float) -> None:
         """Go on to a time, by steps of bounded error."""
+        end = stop_s**self.power
         while self.creep.time_s < stop_s:
-            clock, end = self.creep.time_s**self.power, stop_s**self.power
-            whole = clock + self.step >= end * (1 - 1e-12) or not self.live.any()
-            time = stop_s if whole else (clock + self.step) ** (1 / self.power)
+            clock = self.creep.time_s**self.power
+            ahead = clock + self.step
+            whole = ahead >= end * (1 - 1e-12) or not self.live.any()
+            time = stop_s if whole else ahead ** (1 / self.power)
             length = end - clock if whole else self.step
             least = length <= _LEAST_STEP * (clock + self.first)
             error = self._try(time, least)
@@ -151,24 +153,20 @@ class CreepingHold:
         least : bool
             It is taken in any case.
         """
-        creep = self.creep
         long = not least and self._is_long(time)
-        done = np.maximum(creep.progress(time), 1e-300)
-        guess = creep.onward(time, self.slope)
-        smallest = _GLANCE if long else path.SMALLEST
-        there = self._follow(guess, time, smallest)
+        done = np.maximum(self.creep.progress(time), 1e-300)
+        guess = self.creep.onward(time, self.slope)
+        there = self._follow(guess, time, _GLANCE if long else path.SMALLEST)
         found = there.here.found
         last, off = self._corrected(guess, there.here, time, done)
         worst = self._worst(off, last, self.live & found)
         if worst > self.tolerance and not least:
             return worst
         here = self._settle(last, time, there.here)
-        held = found & here.found
-        fell = self.live & ~held
+        fell = self.live & ~(found & here.found)
         if long and fell.any():
             return np.inf
-        span_s = creep.time_s, time
-        self._note(fell, there, here, span_s)
+        self._note(fell, there, here, (self.creep.time_s, time))
         self._take(last, here, done)
         return worst
 

@@ -217,11 +217,11 @@ def _iterate(robot: Robot, cases: _Cases) -> tuple[_Cases, Ints]:
     noise = 1e-14 * (np.abs(cases.at.energy) + lifted)
     accept = _leads_down(robot, cases, step, new, noise)
     moved = cases.moved(accept, x, R, new)
-    bare = moved.at.size <= cases.floor  # balanced: the next step uses the bare stiffness
     less = _calmer(cases, step, new, noise)
     more = np.maximum(1e-3, cases.damping * 10)
     damping = np.where(accept, less, more)
-    damping = np.where(bare, 0.0, damping)
+    balanced = moved.at.size <= cases.floor
+    damping = np.where(balanced, 0.0, damping)  # the next step uses the bare stiffness
     moved = replace(moved, damping=damping)
     still = step.length < 1e-9 * robot.size_m
     return moved, _ended(cases, moved, step, accept & still)

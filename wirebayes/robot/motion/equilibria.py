@@ -11,6 +11,8 @@ from wirebayes.robot.mechanics.description import Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion.forward import Equilibria, solve_equilibrium
 
+_MOST_STEPS = 400  # from a random start the way down is longer than from a pose nearby
+
 
 def equilibria(
     robot: Robot,
@@ -40,29 +42,32 @@ def equilibria(
     Equilibria
         Distinct ones, the lowest energy first.
     """
-    begin, turn = plane.onto(robot, *_starts(robot, float(zero_m.max()), rng, starts, known))
-    tiled = np.broadcast_to(zero_m, (len(begin), len(zero_m)))
-    found = solve_equilibrium(robot, wires, tiled, offset_m, begin, turn, 400)
+    position, rotation = _starts(robot, float(zero_m.max()), rng, starts, known)
+    position, rotation = plane.onto(robot, position, rotation)
+    same_length = np.broadcast_to(zero_m, (len(position), len(zero_m)))
+    found = solve_equilibrium(robot, wires, same_length, offset_m, position, rotation, _MOST_STEPS)
     pose = found.position_m.T, batch_last(found.rotation)
     energy = statics.potential(robot, wires, *pose, zero_m[:, None], offset_m[:, None])
     good = np.flatnonzero(found.found)
-    order = np.argsort(energy[good], kind="stable")
-    return rows_of(found, _distinct(robot, found, good[order]))
+    lowest_first = good[np.argsort(energy[good], kind="stable")]
+    return rows_of(found, _distinct(robot, found, lowest_first))
 
 
 def _starts(
     robot: Robot, longest_m: float, rng: np.random.Generator, count: int, known: Poses | None
 ) -> tuple[Floats, Floats]:
     """Poses anywhere below and among the exit points, the known one first."""
-    low, high = robot.exit_m.min(0), robot.exit_m.max(0)
-    low = low - np.array([0.0, 0.0, 0.5 * longest_m])
+    low = robot.exit_m.min(0) - np.array([0.0, 0.0, 0.5 * longest_m])
+    high = robot.exit_m.max(0)
     position = rng.uniform(low, high, (count, 3))
-    turn = np.broadcast_to(np.eye(3), (count, 3, 3))
+    rotation = np.broadcast_to(np.eye(3), (count, 3, 3))
     if robot.degrees == 6:
-        turn = turning.matrix(1.2 * rng.standard_normal((count, 3)))
+        rotation = turning.matrix(1.2 * rng.standard_normal((count, 3)))
     if known is None:
-        return position, turn
-    return np.concatenate([known[0][None], position]), np.concatenate([known[1][None], turn])
+        return position, rotation
+    known_position, known_rotation = known
+    position = np.concatenate([known_position[None], position])
+    return position, np.concatenate([known_rotation[None], rotation])
 
 
 def _distinct(robot: Robot, found: Equilibria, order: Indices) -> Indices:

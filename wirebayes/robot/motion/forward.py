@@ -76,14 +76,18 @@ def solve_equilibrium(
     """
     n = len(zero_m)
     offset_m = np.broadcast_to(offset_m, zero_m.shape)
-    start_m, start_rotation = np.broadcast_to(start_m, (n, 3)), np.broadcast_to(start_rotation, (n, 3, 3))
+    start_m = np.broadcast_to(start_m, (n, 3))
+    start_rotation = np.broadcast_to(start_rotation, (n, 3, 3))
     finite = [np.isfinite(values).all(1) for values in (zero_m, offset_m, start_m)]
     sane = np.flatnonzero(np.logical_and.reduce(finite))
     if not len(sane):
         return put_back(None, sane, n, robot.legs)
-    lengths, start = (zero_m[sane], offset_m[sane]), (start_m[sane], start_rotation[sane])
-    found = _solved(robot, wires if len(sane) == n else wires.part(sane), lengths, start, max_iterations)
-    return found if len(sane) == n else put_back(found, sane, n)
+    all_are_sane = len(sane) == n
+    own_wires = wires if all_are_sane else wires.part(sane)
+    lengths = zero_m[sane], offset_m[sane]
+    start = start_m[sane], start_rotation[sane]
+    found = _solved(robot, own_wires, lengths, start, max_iterations)
+    return found if all_are_sane else put_back(found, sane, n)
 
 
 def _solved(robot: Robot, wires: Wires, lengths: Lengths, start: Poses, max_iterations: int) -> Equilibria:
@@ -93,11 +97,13 @@ def _solved(robot: Robot, wires: Wires, lengths: Lengths, start: Poses, max_iter
     robot = replace(robot, exit_m=robot.exit_m - middle)
     position = np.array(start[0].T) - middle[:, None]
     rotation = np.array(batch_last(start[1]))
-    zero, offset = np.ascontiguousarray(lengths[0].T), np.ascontiguousarray(lengths[1].T)
+    zero = np.ascontiguousarray(lengths[0].T)
+    offset = np.ascontiguousarray(lengths[1].T)
     solved = downhill.lead_downhill(robot, wires, zero, offset, position, rotation, max_iterations)
     _look_again(robot, wires, zero, offset, solved)
-    turn = batch_first(solved.R)
-    return Equilibria(solved.x.T + middle, turn, solved.tau.T, solved.status, solved.count, solved.left)
+    return Equilibria(
+        solved.x.T + middle, batch_first(solved.R), solved.tau.T, solved.status, solved.count, solved.left
+    )
 
 
 def _look_again(robot: Robot, wires: Wires, zero: Floats, offset: Floats, solved: downhill.Solved) -> None:

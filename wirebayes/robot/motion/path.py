@@ -204,12 +204,13 @@ def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, lengths: Leng
     loose = np.flatnonzero(there.status == outcome.NOT_HELD)
     if not loose.size:
         return
-    zero, offset = lengths[0], np.broadcast_to(lengths[1], lengths[0].shape)
-    part, own = wires.part(loose), (zero[loose], offset[loose])
+    zero, offset = np.broadcast_arrays(*lengths)
+    own_lengths = zero[loose], offset[loose]
+    own_wires = wires.part(loose)
     balance = there.position_m[loose], there.rotation[loose]
-    softest = _softest(robot, part, balance, own)
+    softest = _softest(robot, own_wires, balance, own_lengths)
     aside = mixed.after_step(robot, balance, _ASIDE * robot.size_m * softest)
-    found = forward.solve_equilibrium(robot, part, *own, *aside)
+    found = forward.solve_equilibrium(robot, own_wires, *own_lengths, *aside)
     put_rows(there, loose[found.found], rows_of(found, found.found))
 
 

@@ -122,29 +122,43 @@ class _Held:
 def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, content: PoseJson) -> PoseAnswer:
     """What is said of a pose that can be held, besides what `content` has already."""
     robot, line, request = held.robot, held.line, held.request
-    wires, commands, tension_N = held.wires, held.commands, held.tension_N[0]
     x, R = request.position_m, request.rotation
     rng = np.random.default_rng(request.seed)
-    content["inverse"] = _inverse(robot, commands, tension_N)
-    if robot.plane is not None:
-        content["plane"] = on_plane.on_plane(robot, wires, commands, x, R, tension_N)
-    content["forward"] = round_trip(robot, wires, commands, x, R)
-    poses = stable_poses(robot, wires, x, R, rng)
-    content["equilibria"] = poses
-    proved = proofs.only_equilibrium(robot, wires, x, R)
+    _describe_pose(held, rng, content)
     courses = _courses(held, rng)
-    content["certificate"] = {**proved, **proofs.enclosed(robot, wires, courses[0.0], x, R)}
-    content["drift"] = [{"specimen_spread": spread, **_drift(one, x, R)} for spread, one in courses.items()]
-    content["stability"] = [{"specimen_spread": spread, **stability.summary(one)} for spread, one in courses.items()]
-    content["claim"] = _claim(courses, x, R)
+    _describe_creep(held, courses, content)
     content["pose_error"] = controllers.errors(robot, line, request, rng, other)
     content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
     content["variance_shares"] = _shares(robot, line, courses, x, R)
-    warnings = _warnings(held, courses, poses["commanded_stable"], turned)
+    warnings = _warnings(held, courses, content["equilibria"]["commanded_stable"], turned)
     content["warnings"] = to_json([*warnings, *on_plane.friction_notices(content.get("plane"))])
     spaces = map_slices(robot, line, request.slices)
     content["workspace"] = _workspace(spaces)
     return PoseAnswer(content, courses, spaces)
+
+
+def _describe_pose(held: _Held, rng: Generator, content: PoseJson) -> None:
+    """Add what is said of the pose of new wires: its joint values, the way back from these, and other equilibria."""
+    robot, wires, commands = held.robot, held.wires, held.commands
+    x, R = held.request.position_m, held.request.rotation
+    tension_N = held.tension_N[0]
+    content["inverse"] = _inverse(robot, commands, tension_N)
+    if robot.plane is not None:
+        content["plane"] = on_plane.on_plane(robot, wires, commands, x, R, tension_N)
+    content["forward"] = round_trip(robot, wires, commands, x, R)
+    content["equilibria"] = stable_poses(robot, wires, x, R, rng)
+
+
+def _describe_creep(held: _Held, courses: dict[float, Course], content: PoseJson) -> None:
+    """Add what is said of the pose while its wires creep."""
+    robot, wires = held.robot, held.wires
+    x, R = held.request.position_m, held.request.rotation
+    only = proofs.only_equilibrium(robot, wires, x, R)
+    enclosed = proofs.enclosed(robot, wires, courses[0.0], x, R)
+    content["certificate"] = {**only, **enclosed}
+    content["drift"] = [{"specimen_spread": spread, **_drift(one, x, R)} for spread, one in courses.items()]
+    content["stability"] = [{"specimen_spread": spread, **stability.summary(one)} for spread, one in courses.items()]
+    content["claim"] = _claim(courses, x, R)
 
 
 def _workspace(spaces: tuple[Map, ...]) -> Workspace | None:

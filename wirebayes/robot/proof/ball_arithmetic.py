@@ -39,17 +39,20 @@ class Balance:
     def __init__(
         self, robot: Robot, law: ElasticLaw, k1: Bounds, zero: Bounds, offset: Floats, x: Floats, R: Floats
     ) -> None:
-        import flint
+        from flint import arb
 
-        self.robot, self.law, self.arb = robot, LAWS[law], flint.arb
-        self.k1 = [self._hull(*pair) for pair in zip(*k1, strict=True)]
-        self.zero = [self._hull(*pair) for pair in zip(*zero, strict=True)]
-        self.offset = [flint.arb(float(v)) for v in offset]
-        self.x = [flint.arb(float(v)) for v in x]
+        self.robot = robot
+        self.law = LAWS[law]
+        self.arb = arb
+        self.k1 = [self._hull(low, high) for low, high in zip(*k1, strict=True)]
+        self.zero = [self._hull(low, high) for low, high in zip(*zero, strict=True)]
+        self.offset = [arb(float(v)) for v in offset]
+        self.x = [arb(float(v)) for v in x]
         # The turn starts from the given matrix as it is; that it is orthogonal only to rounding is part of the robot.
         self.R = ball_matrix(R)
-        self.size = flint.arb(robot.size_m)
-        self.weight = [flint.arb(0), flint.arb(0), -flint.arb(robot.mass_kg) * flint.arb(GRAVITY)]
+        self.size = arb(robot.size_m)
+        weight_N = -arb(robot.mass_kg) * arb(GRAVITY)
+        self.weight = [arb(0), arb(0), weight_N]
 
     def _hull(self, low: float, high: float) -> Any:
         return self.arb(float(low)).union(self.arb(float(high)))
@@ -116,15 +119,17 @@ class Balance:
     def at_centre(self) -> tuple[Any, list[tuple[Any, Any]]]:
         """Balance at the centre in parts: the weight's, and each wire's wrench of 1 N with its tension."""
         robot = self.robot
+        centre_of_mass = _times(self.R, robot.centre_of_mass_m)
+        moment = [v / self.size for v in _cross(centre_of_mass, self.weight)]
+        of_weight = column([*self.weight, *moment[: robot.degrees - 3]])
         still = [self.arb(0)] * robot.degrees
-        arm = _cross(_times(self.R, robot.centre_of_mass_m), self.weight)
-        moment = [v / self.size for v in arm][: robot.degrees - 3]
         pulls = []
         for i in range(robot.legs):
             strand = self.strand(i, still)
-            tau, _ = self.pull(i, self.strain(i, strand.length), strand.length)
+            strain = self.strain(i, strand.length)
+            tau, _ = self.pull(i, strain, strand.length)
             pulls.append((column(strand.wrench), tau))
-        return column([*self.weight, *moment]), pulls
+        return of_weight, pulls
 
     def strand(self, i: int, y: list[Any]) -> "Strand":
         """One wire's geometry over a box of poses."""

@@ -184,7 +184,8 @@ def _image(
     beside: Floats,
 ) -> Floats:
     """Largest distance of Krawczyk's image from the linear answer, (d,)."""
-    box = _Box(balls((along + beside) * _UP), balls(beside), ball_matrix(Y))
+    whole = balls((along + beside) * _UP)
+    box = _Box(whole, balls(beside), ball_matrix(Y))
     wires = []
     for i, (G, H) in enumerate(zip(*generators, strict=True)):
         wires.append(_wire_in_box(middle, wide, i, box, G, H))
@@ -193,7 +194,8 @@ def _image(
     turned = precondition * slope
     remainder = (identity(len(C)) - turned) * column(box.beside)
     by_parameters = _by_parameters(precondition, turned * box.line, wires)
-    return upper_bounds(remainder + image_of_centre(middle, precondition) - by_parameters)
+    image = remainder + image_of_centre(middle, precondition) - by_parameters
+    return upper_bounds(image)
 
 
 def _by_parameters(precondition: Any, change: Any, wires: list[_WireInBox]) -> Any:
@@ -219,12 +221,16 @@ def _strain(middle: Balance, wide: Balance, i: int, strand: Strand, box: _Box, H
     arb = wide.arb
     by_strain = wide.law.by_stretched(strand.length, wide.zero[i])
     by_own = wide.law.by_zero(strand.length, wide.zero[i])
-    at_centre = middle.strand(i, [arb(0)] * len(box.whole))
-    strain = middle.strain(i, at_centre.length)
+    still = [arb(0)] * len(box.whole)
+    strain = middle.strain(i, middle.strand(i, still).length)
+    rows = range(len(strand.slope))
     for j, h in enumerate(H):
-        stretch = _sum_of_products(strand.slope, [box.line[k, j] for k in range(len(strand.slope))], arb)
-        strain += (by_strain * stretch + by_own * arb(float(h))) * arb(0, 1)
-    return strain + by_strain * _sum_of_products(strand.slope, box.beside, arb)
+        along = [box.line[k, j] for k in rows]
+        stretch = _sum_of_products(strand.slope, along, arb)
+        change = by_strain * stretch + by_own * arb(float(h))
+        strain += change * arb(0, 1)
+    beside = _sum_of_products(strand.slope, box.beside, arb)
+    return strain + by_strain * beside
 
 
 def _sum_of_products(a: list[Any], b: list[Any], arb: Any) -> Any:
