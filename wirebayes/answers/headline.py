@@ -198,7 +198,7 @@ def comparison_in_words(name: str, table: ComparedModels) -> str:
 
 
 def _ahead(gain: Difference) -> str:
-    """By how much a model predicts better."""
+    """How much better a model predicts."""
     elpd, error = number(gain["elpd"], 2), number(gain["se"], 2)
     return f"by {elpd} ± {error} elpd (log probability of their readings)"
 
@@ -245,7 +245,7 @@ def batch_in_sentences(found: BatchJson) -> list[str]:
 
 
 def _stiffnesses(rows: Sequence[Row]) -> str:
-    """Of the materials with most specimens: k1, and how far specimens differ, or how well a single one is known."""
+    """The stiffness k1 of the materials with most specimens, and how far specimens differ or how well one is known."""
     each: dict[str, list[Statistics]] = {}
     for row in rows:
         if row["material"] and "k1" in row["parameters"]:

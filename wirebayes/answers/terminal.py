@@ -30,7 +30,7 @@ from wirebayes.sentences import (
 
 
 def of_fit(summary: SummaryJson) -> list[str]:
-    """Of a fit: its state, the parameters and the creep, with units and 90 % intervals."""
+    """Lines about a fit: its state, the parameters and the creep, with units and 90 % intervals."""
     name = summary["experiment"]
     state = "converged" if summary["converged"] else "NOT CONVERGED"
     checked = "model not checked"
@@ -63,7 +63,7 @@ def _parameters(summary: SummaryJson, title: str, wanted: Sequence[str]) -> list
 
 
 def of_findings(name: str, report: ExperimentFindings) -> list[str]:
-    """Of one experiment that something may be missing in: what, how large, and what it is worth."""
+    """Lines about one experiment that something may be missing in: what, how large, and what it is worth."""
     verdict, effects = report["verdict"], report["effects"]
     missing = _verdict(report)
     sure = p_in_words(report["p_global"], report["p_simulations"])
@@ -125,20 +125,20 @@ def _unit_and_meaning(effect: str, unit: str) -> str:
 
 
 def in_other_tests(report: ExperimentFindings) -> list[str]:
-    """Which accepted effects are those of other tests: an event there, or an instrument that reads only those."""
+    """The accepted effects that belong to other tests: an event there, or an instrument that reads only those."""
     others = [effect for effect in report.get("accepted", []) if effect not in report["amplitudes"]]
     return [f"{spoken(effect)}: in other tests of the same material, not in this one" for effect in others]
 
 
 def of_import(name: str, test: ImportedExperiment) -> list[str]:
-    """Of a raw file: what was found in it and what was done."""
+    """Lines about a raw file: what was found in it and what was done."""
     sample = f"{test['length_mm']:g} mm of {test['material']}"
     first = f"{name}: {counted(test['holds'], 'hold')}, {counted(test['readings'], 'reading')}, {sample}"
     return [first, *(f"  {note}" for note in test["notes"])]
 
 
 def of_batch(found: BatchJson) -> list[str]:
-    """Of many experiments: how many, what was found, and which stand apart."""
+    """Lines about many experiments: how many, what was found, and which stand apart."""
     rows, far = found["experiments"], found["outliers"]
     failed = sum(row["error"] is not None for row in rows)
     converged = sum(bool(row["converged"]) for row in rows)
@@ -213,7 +213,7 @@ def _expected(row: JudgedProtocol) -> list[str]:
 
 
 def of_plan(row: JudgedProtocol) -> list[str]:
-    """Of a planned test: its rank and length, and what would be known afterwards."""
+    """Lines about a planned test: its rank and length, and what would be known afterwards."""
     budget = "" if row["within_budget"] else ", longer than the available time"
     name = f"{row['rank']}. {row['name']}"
     minutes, bits = short(row["duration_min"], 3), short(row["information_bits"], 3)
@@ -230,7 +230,7 @@ MOST_OUTLIERS = 10  # of outliers, on a terminal
 
 
 def of_check(name: str, test: CheckedExperiment) -> list[str]:
-    """Of a test that is not fitted yet: its holds, and what it can determine."""
+    """Lines about a test that is not fitted yet: its holds, and what it can determine."""
     unit = unit_read(test, "resolution")
     recorded = _recorded(test, unit)
     wire = f"{test['length_mm']:g} mm of {test['material']}"
@@ -251,7 +251,7 @@ def of_check(name: str, test: CheckedExperiment) -> list[str]:
 
 
 def _shown(test: CheckedExperiment) -> list[str]:
-    """Which effects the test would show, and which not."""
+    """The effects that the test would show, and those that it would not."""
     lines = []
     for shows, words in _SHOWS.items():
         sizes = [_size(effect, found) for effect, found in test["effects"].items() if found["shows"] == shows]
@@ -327,7 +327,7 @@ def _list(title: str, items: list[str]) -> list[str]:
 
 
 def of_comparison(name: str, table: ComparedModels) -> list[str]:
-    """Of one experiment: which models predict what they have not seen best, and with which error."""
+    """Lines about one experiment: the models that best predict what they have not seen, and with which error."""
     rows = [row for row in table["models"] if row["failed"] is None]
     if not rows:
         return [f"{name}: no model could be judged"]

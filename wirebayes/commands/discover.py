@@ -343,7 +343,7 @@ def _warnings(found: Investigation, output: Path) -> None:
 
 
 def _pictures(found: Investigation, output: Path, own_effects: Path | None) -> None:
-    """Before and after, hold by hold, and one of each finding."""
+    """Pictures of readings and models before and after, hold by hold, and one of each finding."""
     from wirebayes.report.drawn import save_together  # matplotlib only where it is needed
     from wirebayes.report.pictures.discover import pictures
 

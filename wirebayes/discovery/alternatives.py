@@ -70,7 +70,7 @@ def alternatives(
 def _weights_of_acting(
     found: ModelPosterior, fits: Fits, i: int, names: Key, undecided: Sequence[str]
 ) -> dict[Key, float]:
-    """Of what acts in block `i`: the names of the final model, and fitted sets that differ in undecided names alone."""
+    """Weights of what may act in block `i`: the final model, and fitted sets that differ only in undecided names."""
     weights: dict[Key, float] = {}
     for s, weight in zip(found.sets, found.weights.values(), strict=True):
         acting = frozenset(name for name in s.names if s.presence[name][i] > 0.5)

@@ -222,7 +222,7 @@ class _Climbs:
         return best
 
     def tangent(self, z: Array, rows: Ints, moving: list[int]) -> Tangent:
-        """Of some climbs at their places (m, d), by the columns that move."""
+        """The tangents of some climbs at their places (m, d), by the columns that move."""
         with np.errstate(all="ignore"):
             return tangent(self.target, z, self._readings_of(rows), moving)
 
@@ -316,7 +316,7 @@ class _Ascent(_Climbs):
 
     @property
     def _scale(self) -> float:
-        """Of the amplitude's coordinate."""
+        """The scale of the amplitude's coordinate."""
         return float(self.target.coordinates.scale[self.column])
 
     def _stretch(self, amplitude: Array) -> tuple[Array, Array, Array]:

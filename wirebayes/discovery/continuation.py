@@ -176,7 +176,7 @@ class Continuation:
 
 
 def _surprise(value: float, chance: Array) -> float:
-    """Of a value along a path, by the simulations' (n,): no more than the line through them says, and than the count.
+    """How surprising a value along a path is, given simulations (n,): by their count or by a line, whichever is less.
 
     The most surprising of all names, which it is compared with, is read off lines alone, and hardly varies. A count
     varies by a factor of two, and some would by chance come out on the other side.

@@ -122,7 +122,7 @@ class Frontier:
         return sorted(near, key=lambda key: rank[key])  # the order within a rank stays
 
     def origins(self, keys: Sequence[Key], root: FittedSet) -> tuple[list[FittedSet], list[str]]:
-        """Of each set the fitted one, at first the `root`, that has one effect less, and the name of that effect."""
+        """For each set, the fitted set with one effect less (at first the `root`), and the name of that effect."""
         parents = []
         names = []
         for key in keys:
@@ -144,7 +144,7 @@ class Frontier:
         self.towards += sorted(singles, key=self.promise)[-1:]
 
     def step_aside(self, key: Key) -> None:
-        """From a set close to the best, go towards one where a name of it may give way to another of its family.
+        """Go from a set close to the best towards sets in which one of its names gives way to another of its family.
 
         A look-alike that explains little by itself is not met beside the others of the set.
         """

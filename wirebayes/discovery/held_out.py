@@ -137,7 +137,7 @@ def _scored(sample: Sample, model: Model, own: dict[str, Array], train: int, rng
 
 @dataclass(frozen=True)
 class _ScoredHold:
-    """Of each reading: the error of the mean, the variance that noise alone leaves, whether the 90 % band holds it."""
+    """For each reading: the error of the mean, the variance of noise alone, and whether the 90 % band holds it."""
 
     error: Array
     floor: Array

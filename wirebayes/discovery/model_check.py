@@ -80,7 +80,7 @@ class ModelCheck:
 
     @property
     def notices(self) -> list[Notice]:
-        """That the check failed, if so, and every reading that it set aside."""
+        """A notice that the check failed, if it did, and one for every reading that it set aside."""
         failed = [Notice("model-check", self._failed_in_words())] if self.passed is False else []
         return failed + [Notice("gross-error", text) for text in self._gross_errors_in_words()]
 

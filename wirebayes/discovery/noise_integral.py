@@ -121,7 +121,7 @@ def _beside_parameters(x: Expansion, shrink: Array) -> tuple[Array, "Functions"]
 
 
 def _eliminated(gram: Array) -> tuple[Array, Array]:
-    """Of inner products (n, k, p, c) of p parameters: their log volume, and what they take of the other columns.
+    """From inner products (n, k, p, c) of p parameters: their log volume, and what they take of the other columns.
 
     That is in coordinates in which it is a sum of squares.
     """
@@ -169,14 +169,14 @@ class Functions(NamedTuple):
     levels: Array
 
     def of(self, columns: Ints) -> "Functions":
-        """Some of them, by a row of numbers (n, q) each."""
+        """Some of the functions, chosen by a row of numbers (n, q) each."""
         plain = np.take_along_axis(self.plain, columns[:, None], axis=2)
         taken = np.take_along_axis(self.taken, columns[:, None, None], axis=3)
         levels = np.take_along_axis(self.levels, columns[:, None], axis=2)
         return Functions(plain, taken, levels)
 
     def between(self, first: int, last: int) -> "Functions":
-        """Those from the column `first` to the one before `last`."""
+        """The functions from the column `first` to the one before `last`."""
         return Functions(*(part[..., first:last] for part in self))
 
     def squares(self, shrink: Array) -> Array:

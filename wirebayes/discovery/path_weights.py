@@ -35,7 +35,7 @@ class Weighed:
     promise: Array
 
     def of(self, rows: Array) -> "Weighed":
-        """That of some places."""
+        """The same for some of the places."""
         return rows_of(self, rows)
 
 

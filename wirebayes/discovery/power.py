@@ -88,7 +88,7 @@ def detectable(
 
 
 def _strongest(null: Scan, trials: Sequence[Probe], candidates: Sequence[Candidate]) -> dict[str, dict[float, int]]:
-    """Of each name the number of the strongest probe at each amplitude."""
+    """For each name, the number of the strongest probe at each amplitude."""
     strength = np.median(null.norm, axis=0)
     best: dict[str, dict[float, int]] = {}
     for c in candidates:

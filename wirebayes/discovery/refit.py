@@ -129,7 +129,7 @@ class _Amplitude:
 
     @classmethod
     def of(cls, blocks: Sequence[LaplaceFit], effect: Effect, per_delta: float, reach: float) -> "_Amplitude":
-        """That of an effect on some blocks.
+        """The same for an effect on some blocks.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class _Amplitude:
         return self.profile(amplitudes, ends)
 
     def profile(self, amplitudes: Array, ends: Sequence[Optimum]) -> Profile:
-        """That of climbs that have ended, one an amplitude and block."""
+        """The profile along climbs that have ended, one for each amplitude and block."""
         total = np.sum([np.where(end.converged, end.log_evidence, -np.inf) for end in ends], axis=0)
         if len(self.pinned) > 1 and self.pinned[0].common:
             total = total + _one_value_each(self.pinned, ends, amplitudes)

@@ -241,7 +241,7 @@ def _sentence(pattern: Pattern, amplitude: float, p: float) -> str:
 
 
 def _change(amplitude: float, covariate: str) -> str:
-    """Which way, and by how much, a parameter changes whose logarithm changes by `amplitude` a standard deviation."""
+    """Whether a parameter grows or falls, and by how much, if its logarithm changes by `amplitude` for an sd."""
     grows = amplitude > 0
     factor = np.exp(np.clip(2 * abs(amplitude), 0, 20))
     share = factor - 1 if grows else 1 - 1 / factor

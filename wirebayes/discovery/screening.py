@@ -80,7 +80,7 @@ def candidate_probes(blocks: Sequence[LaplaceFit], kinds: Kinds) -> tuple[list[P
 
 
 def _candidates_of(effect: Effect, trials: dict[int, Probe], on: tuple[int, ...]) -> list[Candidate]:
-    """Of one effect in its blocks: each of its numbered trials in each block alone, and in all together."""
+    """The candidates of one effect: each trial in each of its blocks alone, and in all of them together."""
     name = effect.name
     several = len(on) > 1
     if several and effect.scope in FILE_WIDE:
@@ -313,7 +313,7 @@ class Scale:
         return Scale(high, float((beyond.sum() + ONE_NAT) / (len(beyond) + ONE_NAT)), chance)
 
     def surprise(self, value: Any) -> Any:
-        """Of a value, or of each of an array; none where the evidence is against the name."""
+        """How surprising a value is, or each value of an array; not at all where the evidence is against the name."""
         along = np.maximum((value - self.high) / self.fall - np.log(UPPER), 0.0)
         most = empirical_surprise(value, self.chance) + ABOVE_COUNT
         return np.where(np.greater(value, _AGAINST), np.minimum(along, most), 0.0)

@@ -272,7 +272,7 @@ def _group(members: Sequence[str], alike: Cosines) -> list[str]:
 
 
 def _amplitudes(answer: MaterialAnswer, i: int, e: Experiment) -> dict[str, AmplitudeEstimate]:
-    """Of each effect in the final model of material `i` that acts on an experiment."""
+    """The amplitudes of each effect in the final model of material `i` that acts on an experiment."""
     out = {}
     for accepted in answer.accepted:
         effect = accepted.effects[i]

@@ -122,7 +122,7 @@ def _bases(plain: LaplaceFit, stages: Sequence[LaplaceFit], remains: bool) -> li
 
 
 def _not_predicted(models: Sequence[str]) -> Shrinking:
-    """Of an experiment of which no holds can be held out."""
+    """The report on an experiment that has no holds to hold out."""
     return Shrinking(_NOT_HELD_OUT.copy(), [{"model": model, **_NOTHING} for model in models])
 
 
@@ -209,7 +209,7 @@ def _each_trained(base: LaplaceFit, train: Sequence[int], effects: Sequence[tupl
 
 @dataclass(frozen=True)
 class _Gain:
-    """By how much the final model, and the plain one with a smooth discrepancy, predict left-out holds better."""
+    """How much better the final model, and the plain one with a smooth discrepancy, predict left-out holds."""
 
     final: float
     standard_error: float
@@ -229,7 +229,7 @@ class _Gain:
 
 
 def _gain(elpd: Sequence[Array], named: int, n: int, remains: bool) -> _Gain:
-    """From (H,) densities of left-out holds: plain, with the effects (`named` is 1 or 0), then n of each smooth lot."""
+    """The gain by densities (H,) of left-out holds: plain, with effects (`named` is 1 or 0), n of each smooth lot."""
     plain, others = elpd[0], elpd[1 + named :]
     smooth = np.concatenate(others[:n])
     final = np.concatenate(elpd[-n:]) if remains else elpd[1]

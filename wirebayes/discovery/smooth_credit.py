@@ -40,7 +40,7 @@ def beside_smooth(x: Expansion) -> Array:
 
 
 class _Products(NamedTuple):
-    """Of `Projected`, at k ratios and s sizes of a remainder that is in the model."""
+    """The inner products of `Projected`, at k ratios and s sizes of a remainder that is in the model."""
 
     shared: Array
     rss: Array

@@ -35,7 +35,7 @@ class _Readings:
         return _Readings(j, place, np.log1p(protocol.time_s[j, r] / (0.2 * typical)))
 
     def rows(self, which: Ints) -> "_Readings":
-        """Some of them."""
+        """Some of the readings."""
         return rows_of(self, which)
 
 

@@ -112,7 +112,7 @@ def _looks(done: int) -> int:
 
 
 def _log_evidence(blocks: Sequence[LaplaceFit]) -> float:
-    """Of fits to all blocks."""
+    """The log evidence of fits to all blocks."""
     return sum(block.log_evidence for block in blocks)
 
 

@@ -62,7 +62,7 @@ class Tangent:
     prior: Array
 
     def of(self, rows: Array) -> Self:
-        """That of some parameter sets."""
+        """The same for some of the parameter sets."""
         alike = ("one_sided", "kinds", "processes")  # for all parameter sets
         every = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in alike}
         return replace(self, **{name: value[rows] for name, value in every.items()})

@@ -135,14 +135,14 @@ class _Signatures(NamedTuple):
 
     @classmethod
     def chosen(cls, found: Projected, numbers: Ints) -> "_Signatures":
-        """Those of some numbers (n, j), as (n, k, j, 1)."""
+        """Signatures with the numbers (n, j), as (n, k, j, 1)."""
         at = numbers[:, None]
         along = np.take_along_axis(found.along, at, axis=2)
         square = np.take_along_axis(found.square, at, axis=2)
         return cls(along[..., None], square[..., None])
 
     def determinant(self, other: "_Signatures", cross: Array) -> Array:
-        """Of the products of pairs, `cross` those of one with the other."""
+        """Determinants of the (2, 2) products of pairs, `cross` being those of one with the other."""
         return self.square * other.square - cross**2
 
     def beside(self, other: "_Signatures", cross: Array) -> Array:

@@ -119,7 +119,7 @@ class LaplaceFit:
 
     @property
     def scales(self) -> Scales | None:
-        """Those of the tests, which its units are made of."""
+        """The scales of the tests, which its units are made of."""
         return self.target.problem.scales
 
     @property

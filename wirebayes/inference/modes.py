@@ -143,7 +143,7 @@ def search(target: LogPosterior, rng: Generator, *, extra: Array | None = None) 
 
 
 def _landmarks(passed: Array, height: Array, rng: Generator) -> Array:
-    """Of the places (n, d) that the annealing passed the highest one, and some far from one another."""
+    """The highest of the places (n, d) that the annealing passed, and some that are far from one another."""
     apart = spread_in_widths(passed, _FIRST, rng)
     highest = int(np.argmax(height))
     return passed[[highest, *apart]]
@@ -288,7 +288,7 @@ def _some(z: Array, n: int, rng: Generator) -> Array:
 
 
 def _possible(z: Array, value: Array) -> Array:
-    """Those of (m, d) places where the density is above zero; all, if it is nowhere."""
+    """The places among (m, d) where the density is above zero; all, if it is nowhere."""
     inside = np.isfinite(value)
     return z[inside] if inside.any() else z
 

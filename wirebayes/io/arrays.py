@@ -115,7 +115,7 @@ def from_arrays(
 
 
 def _stated(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Those of some arguments that are not left out."""
+    """The arguments that are not left out."""
     return {name: value for name, value in values.items() if value is not None}
 
 

@@ -47,22 +47,22 @@ class CheckedTest:
 
     @property
     def setting(self) -> Floats:
-        """Of each recorded hold."""
+        """What was set in each recorded hold."""
         return self.protocol.setting[self.protocol.recorded]
 
     @property
     def number(self) -> Ints:
-        """Of each recorded hold."""
+        """The number of each recorded hold."""
         return self.protocol.number[self.protocol.recorded]
 
     @property
     def unit(self) -> str:
-        """Of what was read."""
+        """The unit of what was read."""
         return READ_UNIT[self.protocol.control]
 
     @property
     def means(self) -> Floats:
-        """Of each recorded hold."""
+        """The mean reading of each recorded hold."""
         return np.array([row.mean() for row in self.each])
 
     @property

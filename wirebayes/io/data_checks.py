@@ -218,7 +218,7 @@ def _is_furthest(setting: Floats, j: int) -> bool:
 
 
 def _in_most(changes: Sequence[float], noise: float) -> tuple[int, float] | None:
-    """In how many holds something grows, and by how much in the middle; None where in few, or by little."""
+    """The number of holds in which something grows, and the middle growth; None where it grows in few, or by little."""
     grown = sum(change > 0 for change in changes)
     middle = float(np.median(changes))
     if grown / len(changes) < RISING_SHARE or middle <= RISE * noise:

@@ -282,7 +282,7 @@ def _jumps(test: _Test) -> list[Event]:
 
 
 def _beyond_weight(test: _Test, i: int) -> float:
-    """By how much a displacement changes to a reading beyond what a further weight adds, by the readings before."""
+    """How far a displacement moves to a reading, beyond what a further weight adds by the readings before."""
     read, weight = test.read, test.setting
     before, hung = np.ptp(read[:i]), np.ptp(weight[:i])
     added = 0.0

@@ -113,7 +113,7 @@ def _fixed_and_free(every: Mapping[str, Any]) -> tuple[dict[str, float], dict[st
 
 
 def _default_powers(names: Sequence[str], fixed: Mapping[str, float], units: Units) -> dict[str, PowerScaled]:
-    """Of the defaults of B and k2, which speak of the creep at the typical tension and of the hazard after a hold."""
+    """How the defaults of B and k2 change with the units of tension and time in which they are stated."""
     logs = {"B": ("U", float(np.log(units.tension_N))), "k2": ("N", float(np.log(units.time_s)))}
     out = {}
     for name in names:

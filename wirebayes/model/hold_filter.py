@@ -17,7 +17,7 @@ LOG_2PI = float(np.log(2.0 * np.pi))
 
 @dataclass(frozen=True, slots=True)
 class ReadingNoise:
-    """Of each of n parameter sets: 1 / variance of a reading, its log normal density's constant, setting variance."""
+    """The noise of n parameter sets: 1 / variance of a reading, constant of its log density, setting variance."""
 
     weight: Array
     log_variance: Array
@@ -67,7 +67,7 @@ class Measured:
 
     @property
     def first_readings(self) -> FirstReadings:
-        """Of every hold, NaN where it has none."""
+        """The first reading of every hold, NaN where it has none."""
         column = np.argmax(self.mask, axis=1)
         value = self.readings[np.arange(len(column)), column]  # every evaluation asks for it
         value[~self.mask.any(axis=1)] = np.nan
@@ -224,7 +224,7 @@ class HoldInformation(NamedTuple):
         return creep, setting
 
     def pulls(self, along_c: Array, along_s: Array, p: Array, q: Array) -> tuple[Array, Array]:
-        """By how much the readings pull at either.
+        """How much the readings pull at either.
 
         Parameters
         ----------
@@ -275,7 +275,7 @@ class Later:
     square: Array
 
     def log_density(self, mean: Array, var: Array) -> Array:
-        """Of those readings, the carried creep being normal with this mean and variance."""
+        """The log density of those readings, the carried creep being normal with this mean and variance."""
         wider = 1.0 + self.precision * var
         square = self.precision * mean**2 - 2.0 * self.pull * mean - self.pull**2 * var
         return self.constant - 0.5 * (square / wider + np.log(wider))

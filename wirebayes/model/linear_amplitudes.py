@@ -202,7 +202,7 @@ def integrated(problem: Problem) -> Problem:
 
 
 def _additive_effects(problem: Problem) -> dict[str, Effect]:
-    """By key the effects that only add to the reading of a sample, and come last of all that act on it."""
+    """The effects, by key, that only add to the reading of a sample, and come last of all that act on it."""
     found = {}
     for sample in problem.samples:
         for effect in sample.model.at("reading")[-1:]:

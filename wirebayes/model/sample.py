@@ -92,7 +92,7 @@ class Sample:
 
     @property
     def tested_tension_N(self) -> float:
-        """Of the tensions with which recorded holds begin, the one nearest to the reference.
+        """The tension nearest to the reference, of those with which recorded holds begin.
 
         The reference, a geometric mean, may lie far from all that was tested. Where no hold begins under tension it
         stands in.

@@ -68,7 +68,7 @@ def standardised_hold_by_hold(
 
 
 class _SingleHold(NamedTuple):
-    """Of one hold: where its length is known (n,), later residuals (r, n) and the first reading's error at their best.
+    """One hold where its length is known (n,): later residuals (r, n) and the first reading's error at their best.
 
     And the squared ratio (n,) of slopes, summed over the later readings.
     """

@@ -67,7 +67,7 @@ class EitherSide:
         return np.where(self.near, within + between, self.as_it_is.var)
 
     def residuals(self) -> list[Array]:
-        """Those of the side that is more probable."""
+        """The residuals of the side that is more probable."""
         is_taut = self.log_taut > self.log_slack
         each = zip(self.as_it_is.residuals(), self.taut.residuals(), self.slack.residuals(), strict=True)
         return [np.where(self.near, np.where(is_taut, taut, slack), usual) for usual, taut, slack in each]
@@ -115,7 +115,7 @@ class _Stretch(NamedTuple):
 def _stretches(
     edges: Edges, j: int, m: Array, p: Array, noise: ReadingNoise, taut: HoldRead
 ) -> tuple[_Stretch, _Stretch]:
-    """Of a hold before it is read, and as its readings say where the wire is taut."""
+    """How far the wire is stretched before a hold is read, and by its readings where the wire is taut."""
     by_setting, by_creep = edges.stretch_by_setting[j], edges.stretch_by_creep[j]
     q = noise.setting_var
     mean = edges.stretch[j] + by_creep * m

@@ -9,7 +9,7 @@ from wirebayes.wire.laws import ElasticLaw, History
 
 @dataclass(frozen=True)
 class ModelSpec:
-    """Which model is fitted, beside its effects: these are keys where a worker loads them, objects where they act.
+    """The model that is fitted, beside its effects: these are keys where a worker loads them, objects where they act.
 
     Attributes
     ----------

@@ -133,7 +133,7 @@ class HalfNormal(Distribution):
 
 @dataclass(frozen=True)
 class TruncatedNormal(Distribution):
-    """Of a normal distribution what lies at `least_sd` standard deviations from its centre, or above."""
+    """The part of a normal distribution that lies at `least_sd` standard deviations from its centre, or above."""
 
     least_sd: float
     centre: float

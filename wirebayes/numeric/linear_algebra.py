@@ -56,7 +56,7 @@ def _harmless(matrices: Array, usable: Bools) -> Array:
 
 
 def _computable(function: Callable[..., tuple[Array, ...]], matrices: Array, *others: Array) -> Bools:
-    """Which matrices of a stack a function takes, ``(...)``, by trying ever smaller parts of the stack."""
+    """Where a function can take the matrices of a stack, ``(...)``, found by trying ever smaller parts of the stack."""
     stack = matrices.shape[:-2]
     flat = matrices.reshape(-1, *matrices.shape[-2:])
     right = []

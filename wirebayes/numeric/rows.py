@@ -33,7 +33,7 @@ def rows_of(record: Record, rows: Any) -> Record:
 
 
 def chosen_records(first: Bools, one: Record, other: Record) -> Record:
-    """Of two dataclasses of arrays ``(n, ...)`` the rows of one or of the other.
+    """A dataclass of arrays ``(n, ...)`` made of the rows of two others, each row from one or from the other.
 
     Parameters
     ----------

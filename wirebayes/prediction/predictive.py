@@ -29,7 +29,7 @@ _CHUNK = 500  # draws at a time: bounds the memory of the normal equations
 
 @dataclass(frozen=True)
 class PredictionRequest:
-    """Which readings are to be predicted, after which history.
+    """The readings that are to be predicted, and the history that they follow.
 
     Attributes
     ----------

@@ -134,7 +134,7 @@ _FRESH = "predicted as a fresh sample with no history: the protocol is all that 
 
 
 def _tested(replicates: Sequence[int], later: Sequence[int], last: int, likelihood: str) -> str:
-    """Which holds of the tested sample are predicted, given what, and which hold numbers its history leaves out."""
+    """Which holds of the tested sample are predicted, what is given of them, and which holds the history omits."""
     parts = []
     if replicates:
         parts.append(f"{_listed(_ranges(replicates))} predicted as replicates of the tested ones")

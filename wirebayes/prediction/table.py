@@ -163,7 +163,7 @@ def beyond_tested(rows: Sequence[Sequence[Any]], stored: Stored) -> list[Notice]
 
 
 def _drawn(members: Members, seed: int, draws: int) -> dict[int, Floats]:
-    """Of each requested hold the readings (R, n) of all models, each with as many draws as it is probable there."""
+    """The readings (R, n) of each requested hold by all models, each with as many draws as it is probable there."""
     experiment = members[0][1].stored.sample.name
     rng = np.random.default_rng(seed_of(seed, "predict", experiment))
     asked = members[0][1].prediction

@@ -129,14 +129,14 @@ def _with_pipe(function: Callable[..., None], *arguments: object) -> "tuple[Base
 
 
 def _begin(here: "Connection[Any, Any]", function: Callable[..., None], arguments: tuple[object, ...]) -> None:
-    """In a copy: let go of the end of the pipe that is its parent's, so that it hears when the parent is gone."""
+    """Let go, in a copy, of the end of the pipe that is its parent's, so that it hears when the parent is gone."""
     watch_silently()
     here.close()
     function(*arguments)
 
 
 def _prepare_and_serve(prepare: Callable[[], object], there: "Connection[Any, Any]") -> None:
-    """In a copy: prepare, and then do what is asked for until the parent needs no more."""
+    """Prepare, in a copy, and then do what is asked for until the parent needs no more."""
     try:
         prepare()
     except Exception:
@@ -167,7 +167,7 @@ def _numbers(waiting: int) -> Iterator[int]:
 
 
 def _work(pieces: Sequence[Callable[[], T]], waiting: int, answers: "Connection[Any, Any]") -> None:
-    """In a copy: do pieces until none is left, and send all results, or what went wrong."""
+    """Do pieces, in a copy, until none is left, and send all results, or what went wrong."""
     try:
         answers.send({number: pieces[number]() for number in _numbers(waiting)})
     except Exception as error:

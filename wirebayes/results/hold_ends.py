@@ -79,7 +79,7 @@ def cost(problem: Problem, best: Array, spread: Array) -> HoldEnds | None:
 
 
 def _moved(problem: Problem, shifts: Array, spread: Array) -> dict[str, MovedByHoldEnds]:
-    """By how much each parameter moves of which is told, also in its standard deviations."""
+    """How far each parameter that is reported moves, also in its standard deviations."""
     moved: dict[str, MovedByHoldEnds] = {}
     for name, shift, sd in zip(problem.names, shifts.tolist(), spread.tolist(), strict=True):
         if _is_told(name):

@@ -115,7 +115,7 @@ def begin(
 
 
 def _left(jobs: Sequence[Job], directory: Path) -> list[Job]:
-    """Those that are not done yet."""
+    """The jobs that are not done yet."""
     return [job for job in jobs if not all((directory / f / "summary.json").exists() for f in job.folders)]
 
 

@@ -16,7 +16,7 @@ from wirebayes.wire.protocol import Control
 
 
 def parameter_of(column: str) -> str:
-    """Of which parameter a column is, whatever sample or material it belongs to."""
+    """The parameter that a column belongs to, whatever its sample or material."""
     return column.split("[")[0]
 
 

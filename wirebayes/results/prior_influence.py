@@ -59,7 +59,7 @@ def leaning(prior: Prior, theta: Array, columns: Sequence[str]) -> list[Notice]:
 
 @dataclass(frozen=True)
 class _Intervals:
-    """Of columns (n, d): the draws in rising order and how to get there, (d, n), the intervals' ends and widths."""
+    """Intervals of columns (n, d): the sorted draws, how to sort them, (d, n), and the intervals' ends and widths."""
 
     ordered: Array
     order: Array

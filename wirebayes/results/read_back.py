@@ -82,7 +82,7 @@ def experiments_in(path: Path) -> tuple[str, ...]:
 
 @contextmanager
 def _opened(path: Path, *groups: str) -> Iterator[dict[str, Group]]:
-    """Some groups of a ``posterior.nc``, for each costs time to read; whatever is wrong there is an `InputError`."""
+    """Read some groups of a ``posterior.nc``, as each costs time; whatever is wrong there is an `InputError`."""
     with stored_results(path):
         yield netcdf.read_groups(path, groups)
 
@@ -280,7 +280,7 @@ def _padded(values: Array, width: int) -> Array:
 
 
 def _of_experiment(constant: Group, observed: Group, name: str) -> Array:
-    """Which holds are those of an experiment."""
+    """The holds that belong to an experiment."""
     holds = constant["hold"]
     if not np.array_equal(observed["hold"], holds):
         raise ValueError("readings and holds that do not belong together")
@@ -288,7 +288,7 @@ def _of_experiment(constant: Group, observed: Group, name: str) -> Array:
 
 
 def _unrecorded(constant: Group, name: str, set_as: str) -> tuple[Array, dict[str, Array]]:
-    """Of an experiment's unrecorded holds the recorded one that each stands before, what was set, and how long."""
+    """The unrecorded holds of an experiment: the recorded one that each stands before, what was set, and how long."""
     if "unrecorded_before_hold" not in constant:
         return np.zeros(0, int), {}
     mine = constant["unrecorded_experiment"] == name

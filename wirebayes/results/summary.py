@@ -57,7 +57,7 @@ def statistics(values: Array) -> Mixed:
 
 
 def _warnings(fit: Fit, sample: Sample | None, ends: HoldEnds | None) -> list[NoticeJson]:
-    """That the fit has not converged, and what is suspicious, with the experiment's name where there are several."""
+    """Notices that the fit has not converged and of what is suspicious, with the experiment where there are several."""
     found = [] if fit.chains.converged else [Notice("not-converged", fit.chains.why)]
     if sample is not None:
         found += posterior_checks.posterior_warnings(fit, sample)

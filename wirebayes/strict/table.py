@@ -33,7 +33,7 @@ _NEWLINE = re.compile(r"\r\n|\n|\r")
 
 @dataclass(frozen=True)
 class Header:
-    """Which columns a table must and may have; groups come whole or not at all.
+    """The columns that a table must and may have; groups come whole or not at all.
 
     Attributes
     ----------

@@ -225,7 +225,7 @@ class Posteriors(Result[dict[str, SummaryJson | list[NoticeJson]]], Mapping[str,
 
     @property
     def warnings(self) -> tuple[Notice, ...]:
-        """Of all of them."""
+        """The warnings of all posteriors."""
         return tuple(notice for posterior in self.members.values() for notice in posterior.warnings)
 
     def lines(self) -> list[str]:

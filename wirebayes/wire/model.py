@@ -14,7 +14,7 @@ from wirebayes.wire.effect import Effect
 
 @dataclass(frozen=True)
 class Model:
-    """Which wire: elastic law, history, effects, and the constant the effects refer to.
+    """The model of a wire: elastic law, history, effects, and the constant the effects refer to.
 
     Attributes
     ----------

@@ -55,7 +55,7 @@ class LastReadings:
 
     @cached_property
     def mean_tension(self) -> float:
-        """Of the holds that were read, N."""
+        """The mean tension of the holds that were read, N."""
         return float(self.tension[self.read].mean())
 
     @cached_property
@@ -93,7 +93,7 @@ class LastReadings:
 
 
 def last_readings(ridge: Ridge, problem: Problem, sample: Sample) -> LastReadings:
-    """Those of a sample.
+    """What the last readings of a sample say.
 
     Parameters
     ----------

@@ -279,7 +279,7 @@ def _after_creep(ridge: Ridge, lasts: Sequence[LastReadings]) -> Step | None:
 
 
 def _last_readings(problem: Problem, ridges: Sequence[Ridge]) -> list[list[LastReadings]]:
-    """Those of the tests of each ridge that samples k1, where some do not show how holds begin."""
+    """The last readings of the tests of each ridge that samples k1, where some tests do not show how holds begin."""
     if problem.likelihood != "chain":  # hold by hold there is no preload, and under weights no k1
         return [[] for _ in ridges]
     out = []
@@ -349,7 +349,7 @@ def _is_usual(problem: Problem, columns: ColumnMap, ridges: Sequence[Ridge]) -> 
 
 
 def _noises(problem: Problem, columns: ColumnMap) -> tuple[Noises, ...]:
-    """Of every sample of which neither noise is fixed; holds by themselves have no setting errors."""
+    """The pair of noises of every sample that has neither fixed; holds by themselves have no setting errors."""
     if problem.likelihood != "chain":
         return ()
     out = []

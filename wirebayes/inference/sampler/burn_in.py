@@ -144,7 +144,7 @@ def _is_last(state: BurnIn, policy: Policy, tail: float) -> bool:
 
 
 def _quality(weight: Array, rng: np.random.Generator) -> tuple[float, float, float]:
-    """Of a proposal by its draws' log weights: acceptance rate, and the weights' median and 99.9 % quantile."""
+    """The quality of a proposal by log weights of its draws: acceptance rate, their median and 99.9 % quantile."""
     rows = truncated_rows(weight, len(weight), rng)
     typical = weight[rows]
     against = rng.permutation(typical)

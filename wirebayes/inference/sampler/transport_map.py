@@ -215,7 +215,7 @@ def _standardised(x: Array, weight: Array) -> tuple[Array, Array, Array]:
 
 
 def _coefficients(found: Sequence["_Straightened"]) -> dict[str, Array]:
-    """Those of all coordinates, each in one array, under their names in `Straight`."""
+    """The coefficients of all coordinates, each kind in one array, under their names in `Straight`."""
     d = len(found)
     constant = np.zeros(d)
     linear = np.zeros((d, d))

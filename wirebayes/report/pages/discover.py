@@ -205,7 +205,7 @@ def _p(v: ExperimentFindings) -> str:
 
 
 def _alone(v: ExperimentFindings) -> list[Block]:
-    """That other effects look alike here, if so: a headline that hides them would promise too much."""
+    """A note that other effects look alike here, if they do: a headline that hides them would promise too much."""
     if v["verdict"] not in ("named", "ambiguous"):
         return []
     named = {*v["effects"], *v["set"], "unknown"}
@@ -257,7 +257,7 @@ def _parameters_of(folder: Path) -> dict[str, Parameter]:
 
 
 def _plain_parameters(parameters: Mapping[str, Parameter]) -> Table:
-    """Those of the plain model, to which nothing had to be added."""
+    """The parameters of the plain model, to which nothing had to be added."""
     rows = []
     for name, parameter in parameters.items():
         rows.append([name, unit_or_dash(parameter["unit"]), *median_and_interval(parameter), _means(name)])

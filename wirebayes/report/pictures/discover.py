@@ -98,7 +98,7 @@ def _added(verdict: ExperimentFindings) -> str:
 
 
 def _join_bars(axis: Axes, heights: Sequence[float]) -> None:
-    """From where one bar ends to where the next begins."""
+    """Lines from where one bar ends to where the next begins."""
     for x, height in enumerate(heights):
         ends = [x + 0.35, x + 0.65]
         axis.plot(ends, [height, height], color="0.4", lw=0.8)

@@ -67,7 +67,7 @@ def save_pose(folder: Path, robot: Robot, request: PoseRequest, found: PoseAnswe
 
 
 def _maps(maps: Sequence[Map]) -> dict[str, Figure]:
-    """Those of the workspace, by the names of their files."""
+    """The maps of the workspace, by the names of their files."""
     figures = {}
     with_places = [one for one in maps if len(one.drift.position_m)]
     for i, one in enumerate(with_places):
@@ -110,7 +110,7 @@ def scene(robot: Robot, position_m: Floats, rotation: Floats, course: Course) ->
 
 
 def _draw_wire(axes: Any, robot: Robot, i: int, end: Floats, **style: Any) -> None:
-    """From its exit point, around its pulley, to its platform point."""
+    """Draw a wire from its exit point, around its pulley, to its platform point."""
     begin = robot.exit_m[i]
     points = begin + traced(robot.pulleys, i, end - begin)
     axes.plot(*points.T, **style)

@@ -90,7 +90,7 @@ def _headed(name: str, title: str) -> str:
 
 
 def _size(across: Floats, along: Floats, slices: int) -> tuple[float, float]:
-    """Of a figure with so many slices above each other, inches."""
+    """The size of a figure with so many slices above each other, inches."""
     ratio = np.ptp(along) / max(np.ptp(across), 1e-9) if len(across) > 1 else 1.0
     height = min(max(2.6 * ratio, 1.0), 3.6)
     return 4.0, 0.8 + slices * (height + 0.35)

@@ -199,7 +199,7 @@ def _changed(reference: Floats, tension_N: Floats, share: float) -> bool:
 
 
 def _first_changed(reference: Floats, before: Floats, after: Floats, share: float) -> tuple[float, Floats]:
-    """Which part of an even change a wire's tension is the first to have changed by a share, and all tensions then."""
+    """The share of an even change after which a first tension has changed by `share`, and all tensions then."""
     limit = share * float(reference.mean())
     beyond = np.abs(after - reference) > limit
     edge = reference + limit * np.sign(after - reference)
@@ -279,7 +279,7 @@ def uncreeping(wires: Wires) -> Wires:
 
 
 def _neutral_values(wires: Wires) -> dict[str, float]:
-    """Of each amplitude of the wires' effects, the value at which it changes nothing."""
+    """The value of each amplitude of the wires' effects at which it changes nothing."""
     neutral = {}
     for effect in wires.effects:
         for amplitude, column in zip(effect.amplitudes, effect.columns(), strict=True):

@@ -35,7 +35,7 @@ class GivenWire:
 
 @dataclass(frozen=True)
 class TensionRule:
-    """Which of the many tensions of a redundant robot is meant: the stated, swappable choice."""
+    """The rule that chooses one of the many tensions of a redundant robot: stated in its file, and swappable."""
 
     choice: str
     lowest_N: float

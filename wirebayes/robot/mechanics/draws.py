@@ -101,7 +101,7 @@ class WireDraws:
 
 
 def material(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Those effects that a wire shows wherever it hangs."""
+    """The effects that a wire shows wherever it hangs."""
     return tuple(e for e in effects if e.scope == "material" and e.place not in OF_THE_BENCH)
 
 
@@ -354,7 +354,7 @@ def _of_one(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -
 
 
 def _beyond(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -> list[str]:
-    """In which ways a use leaves what was tested."""
+    """The ways in which a use leaves what was tested."""
     out = _other_tensions(line, tension_N[np.isfinite(tension_N) & (tension_N > 0)])
     if line.time_range_s is not None and time_s > line.time_range_s[1]:
         out.append(f"{lasting(time_s)} is longer than the longest tested hold, {lasting(line.time_range_s[1])}")
@@ -363,7 +363,7 @@ def _beyond(line: WireDraws, tension_N: Floats, time_s: float, zero_m: Floats) -
 
 
 def _other_lengths(line: WireDraws, length_mm: Floats) -> list[str]:
-    """That wires are much shorter or longer than what was tested, and what is then taken of creep."""
+    """A notice that wires are much shorter or longer than what was tested, and what is then taken of creep."""
     if length_mm.min() >= 0.5 * line.length_mm and length_mm.max() <= 2.0 * line.length_mm:
         return []
     rule = "is taken to be a strain of the whole wire"
@@ -373,7 +373,7 @@ def _other_lengths(line: WireDraws, length_mm: Floats) -> list[str]:
 
 
 def _other_tensions(line: WireDraws, loads: Floats) -> list[str]:
-    """That tensions leave the tested range."""
+    """A notice that tensions leave the tested range."""
     if line.tension_range_N is None or not loads.size:
         return []
     low, high = line.tension_range_N

@@ -67,7 +67,7 @@ def _layers(drums: Drums, leg: int) -> int:
 
 
 def _layer_of(begins: Floats, values: Floats) -> Indices:
-    """In which layer values lie, of where each layer begins."""
+    """The layer in which values lie, of layers that begin at these places."""
     layer = np.searchsorted(begins, values, side="right") - 1
     return np.clip(layer, 0, None)
 

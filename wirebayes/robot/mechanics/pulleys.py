@@ -82,7 +82,7 @@ def wire_run(pulleys: Pulleys, line_m: Floats) -> WireRun:
 
 @dataclass(frozen=True)
 class _Tangent:
-    """From a rim to a point in the pulley's plane: how long, at which angle it leaves, and whether there is one."""
+    """The tangent from a rim to a point in the pulley's plane: its length, its angle, and whether there is one."""
 
     straight_m: Floats
     sine: Floats

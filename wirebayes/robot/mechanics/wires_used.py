@@ -9,7 +9,7 @@ from wirebayes.sentences import short
 
 
 def wires_summary(robot: Robot, line: WireDraws) -> WiresUsed:
-    """Which wires an answer is for, as ``pose.json`` says it."""
+    """The wires that an answer is for, as ``pose.json`` says it."""
     kept = line.material()
     used: WiresUsed = {
         "draws": line.count,

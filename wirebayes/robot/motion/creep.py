@@ -126,7 +126,7 @@ class HoldCreep:
         return self._passed(self.law.clock(self.hold))
 
     def _passed(self, clock: Floats) -> Floats:
-        """By what ``k2 t^N`` has grown since the last step."""
+        """How much ``k2 t^N`` has grown since the last step."""
         N = self.law.N
         return self.k2 * (np.power(clock, N) - np.power(self.counted, N))
 

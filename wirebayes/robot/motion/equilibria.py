@@ -71,7 +71,7 @@ def _starts(
 
 
 def _distinct(robot: Robot, found: Equilibria, order: Indices) -> Indices:
-    """Of poses in an order those that no earlier one is near to, rotations being compared at the platform's edge."""
+    """The poses, in an order, that no earlier one is near to, rotations being compared at the platform's edge."""
     near_m = 1e-6 * robot.span_m
     kept: list[int] = []
     for i in order:

@@ -232,7 +232,7 @@ class _Aim:
 
     @property
     def unit(self) -> float:
-        """In which forces are counted, N."""
+        """The unit in which forces are counted, N."""
         return float(max(self.robot.mass_kg * GRAVITY, self.robot.rule.lowest_N))
 
     def step(self, at: tuple[Floats, Floats, Floats], goal: Poses, bound: Ints) -> _Step:

@@ -134,7 +134,7 @@ def robot_notices(robot: Robot) -> list[Notice]:
 
 
 def _outside(robot: Robot) -> list[Notice]:
-    """That the home position is not in the workspace of the same file; one that is far from all has been said."""
+    """A notice that the home position is outside the workspace of the same file, unless it is far from everything."""
     if _home(robot):
         return []
     beyond = np.maximum(robot.lower_m - robot.home_m, robot.home_m - robot.upper_m)
@@ -211,7 +211,7 @@ def _home(robot: Robot) -> str:
 
 
 def _lengths_of_legs(robot: Robot) -> list[str]:
-    """Of each key of a leg that is longer than the robot, or any part of that kind, lets it be, the first leg."""
+    """For each length of a leg that is longer than the robot or any such part allows, the first such leg."""
     size = max(robot.span_m, min(float(_straight_at_home(robot).max()), _FAR * robot.span_m))
     half = 0.5 * size  # a drum as wide as the robot
     wheel = min(half, _WHEEL_M)
@@ -240,7 +240,7 @@ def _straight_at_home(robot: Robot) -> Floats:
 
 
 def _beyond(size_m: float, times: float) -> str:
-    """That something is larger than it can be for the robot's size."""
+    """A sentence that something is larger than it can be for the robot's size."""
     many = "half" if times == 0.5 else f"{times:g} times"
     return f"more than {many} the robot's size, {number(size_m)} m"
 
@@ -268,7 +268,7 @@ def strain_notices(robot: Robot, line: WireDraws, tension_N: Floats) -> list[Not
 
 
 def _strained(wire: WireDraws, leg: int, pull_N: float) -> str:
-    """That a tension stretches a wire, or lets it creep, by more than its own length; empty where it does not."""
+    """A sentence that a tension stretches a wire, or lets it creep, by more than its length; empty if it does not."""
     mean = {name: values[0] for name, values in wire.centre().parameters.items()}
     stretch = pull_N / mean["k1"]
     if stretch > _TWICE - 1:

@@ -377,6 +377,6 @@ def _parameters(line: WireDraws) -> dict[str, Floats]:
 
 
 def _sd_mm(distance_m: Floats) -> float | None:
-    """Of the draws that have a distance; None where none has."""
+    """Standard deviation over the draws that have a distance; None where none has."""
     known = distance_m[np.isfinite(distance_m)]
     return 1e3 * float(known.std()) if known.size else None

@@ -23,7 +23,7 @@ TABLE = (
 
 @dataclass(frozen=True)
 class Slices:
-    """Which slices are mapped.
+    """The slices that are mapped.
 
     Attributes
     ----------

@@ -166,7 +166,7 @@ def _held(robot: Robot, x: Floats, R: Floats) -> bool:
 
 
 def _to_be_had(ways: Floats, asked: Bools) -> Bools:
-    """Of the components asked for, those that a platform can be given, which turns in so many ways (k, 3)."""
+    """The components asked for that a platform can be given which turns in so many ways (k, 3)."""
     out = np.zeros(3, bool)
     left = ways * asked
     for _ in range(len(ways)):
@@ -208,7 +208,7 @@ def _described(robot: Robot, x: Floats, found: hanging.Hanging, asked: Floats, h
 
 
 def _missed(asked: Floats, vector: Floats, refused: Bools) -> str:
-    """That components asked for cannot be had, where balance makes others of them; else empty."""
+    """A notice that components asked for cannot be had, where balance makes others of them; else empty."""
     missed = []
     for i in np.flatnonzero(refused):
         if abs(asked[i] - vector[i]) > _SAME:
@@ -249,7 +249,7 @@ def _summary(robot: Robot, degrees: int, places: int, left: int, free: list[str]
 
 
 def _out_of_reach(asked: Floats, had: Bools, found: hanging.Hanging) -> str:
-    """That components cannot have the values asked for, and what hangs in balance instead."""
+    """A notice that components cannot have the values asked for, and what hangs in balance instead."""
     wanted = ", ".join(f"{COMPONENTS[i]} = {asked[i]:g}" for i in np.flatnonzero(had))
     return (
         f"No tensions within the bounds hold the platform here with {wanted}; without that it hangs with the rotation "
@@ -258,7 +258,7 @@ def _out_of_reach(asked: Floats, had: Bools, found: hanging.Hanging) -> str:
 
 
 def _nowhere(robot: Robot, x: Floats, reference: Floats) -> Orientation:
-    """That no orientation is in balance, and where the nearest position with one is."""
+    """A notice that no orientation is in balance, and where the nearest position with one is."""
     said = "No orientation hangs in stable balance at this position with tensions within the bounds"
     if robot.freedom == "position":
         said = "No tensions within the bounds hold the platform at this position"

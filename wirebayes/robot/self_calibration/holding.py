@@ -218,7 +218,7 @@ class _Walk:
         return worst
 
     def _share_of_error(self, done: Floats) -> Floats:
-        """Of what a correction changes, the part that is the corrected one's own error.
+        """The part of a correction's change that is the corrected value's own error.
 
         Errors of prediction and correction are in a known ratio, once there is a slope to predict by.
         """
@@ -243,7 +243,7 @@ class _Walk:
 
 
 def _factor(error: float, order: int) -> float:
-    """By how much a step may be longer whose error grows with this power of it."""
+    """How much longer a step may be whose error grows with this power of it."""
     return float(_SAFE * (_ERROR / max(error, 1e-300)) ** (1 / order))
 
 

@@ -88,7 +88,7 @@ def _empty(unknowns: Unknowns, holds: Holds) -> Equations:
 
 @dataclass(frozen=True)
 class _Lengths:
-    """Of what wires are as long as they are, ``(p, w)``: bare lengths that creep and tension make longer, and offsets.
+    """Parts of the wires' lengths, ``(p, w)``: bare lengths that creep and tension make longer, and offsets.
 
     Attributes
     ----------

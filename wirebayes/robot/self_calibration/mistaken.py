@@ -58,7 +58,7 @@ def refuse_mistaken(robot: Robot, session: Session, tension_N: Floats, table: Cs
 
 
 def tension_notices(robot: Robot, session: Session, readings: Floats) -> list[Notice]:
-    """That tensions were read far outside the range of the robot's file, if so; no pose need be known.
+    """Notices that tensions were read far outside the range of the robot's file; no pose need be known.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _refuse_tensions(robot: Robot, session: Session, tension_N: Floats, rows: Bo
 
 
 def column_notices(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -> list[Notice]:
-    """That tensions are those of another unit or order, by the poses that a calibration has found.
+    """Notices that tensions are those of another unit or order, by the poses that a calibration has found.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def column_notices(robot: Robot, position_m: Floats, rotation: Floats, tension_N
 def _tension_mistake(
     robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats
 ) -> tuple[str, str, str] | None:
-    """Which columns do not carry the platform at its poses, though in another unit or order they would.
+    """The columns that do not carry the platform at its poses, though in another unit or order they would.
 
     The columns, what was found and what was expected.
     """
@@ -198,7 +198,7 @@ class _Balance:
         return float(np.linalg.norm(pull - self.load) / np.linalg.norm(self.load))
 
     def times(self, pull: Floats) -> float:
-        """By what a pull is to be multiplied to balance the load best."""
+        """The factor by which a pull is to be multiplied to balance the load best."""
         along = (pull * self.load).sum()
         return float(along / max((pull * pull).sum(), 1e-300))
 

@@ -81,7 +81,7 @@ def length_sensitivity(
 
 @dataclass(frozen=True)
 class Observability:
-    """Which combinations of lengths the readings show.
+    """The combinations of lengths that the readings show.
 
     Attributes
     ----------

@@ -171,7 +171,7 @@ def sensor_notices(found: Suspects | None) -> list[Notice]:
 
 
 def _how_much(found: Suspects) -> str:
-    """Of what contradicts, what any of the sensors explains; empty where it is all."""
+    """How much of what contradicts any of the sensors explains; empty where it is all."""
     share = 100 * found.explains[found.wires].min()
     all_explain = bool((found.p_alone[found.wires] >= SIGNIFICANT).all())
     return "" if all_explain or share >= _NEARLY_ALL else f"{share:.0f} % of "
