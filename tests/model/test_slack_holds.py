@@ -1,6 +1,7 @@
 """Holds whose setting error decides whether the wire is taut, against integrals over the errors themselves."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -54,6 +55,13 @@ def integral(theta, readings, p=TEST, mask=None):
     return logsumexp(log_density + log_weight) - logsumexp(log_weight)
 
 
+@cache
+def read_and_integrated(theta, seed):
+    """Readings and their log density, once for both ways of computing the staircase."""
+    readings = read(dict(theta), seed)
+    return readings, integral(dict(theta), readings)
+
+
 @pytest.fixture(params=["compiled", "numpy"])
 def computed(request, monkeypatch):
     if request.param == "numpy":
@@ -67,9 +75,9 @@ def computed(request, monkeypatch):
 def test_the_density_is_the_integral_over_the_errors(computed, wire, preload):
     """Linear in the errors about none, the readings of a taut wire would have been impossible by thousands of nats."""
     theta = WIRE | wire | {"preload": preload}
-    for seed in range(4):
-        readings = read(theta, seed)
-        assert found(theta, readings) == pytest.approx(integral(theta, readings), abs=0.05)
+    for seed in range(2):
+        readings, expected = read_and_integrated(tuple(theta.items()), seed)
+        assert found(theta, readings) == pytest.approx(expected, abs=0.05)
 
 
 def test_residuals_have_the_same_density():
@@ -84,7 +92,7 @@ def test_residuals_have_the_same_density():
 @pytest.mark.parametrize("preload", [-0.05, 0.0, 0.05])
 def test_leaving_a_hold_out_is_the_ratio_of_two_integrals(preload):
     theta = WIRE | {"preload": preload}
-    for seed in range(4):
+    for seed in range(2):
         readings = read(theta, seed)
         seen = measured(theta, readings)
         by_side = likelihoods.on_sides(linearise(TEST, columns(theta), Model(), seen.first_readings), seen)

@@ -123,7 +123,7 @@ def test_falls_are_found_at_their_time_and_reported(kind, seed):
 
 
 def test_where_a_fall_is_within_a_step_is_looked_for_once_the_step_is_short(monkeypatch):
-    d = _top_heavy("body-7", 2, 6, 0.05)
+    d = _top_heavy("body-7", 2, 2, 0.05)
     taken, step = [], path._step
     monkeypatch.setattr(path, "_step", lambda *given: taken.append(1) or step(*given))
 
@@ -135,7 +135,7 @@ def test_where_a_fall_is_within_a_step_is_looked_for_once_the_step_is_short(monk
     times, steps = fallen()
     monkeypatch.setattr(creeping_hold, "_GLANCE", path.SMALLEST)
     exact, more = fallen()
-    assert np.isfinite(exact).sum() >= 3
+    assert np.isfinite(exact).all()
     np.testing.assert_allclose(times, exact, rtol=1e-3)
     assert steps < 0.75 * more
 

@@ -15,7 +15,7 @@ from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.draws import WireDraws, for_robot
 from wirebayes.robot.mechanics.rotation import matrix
 from wirebayes.robot.motion import inverse
-from wirebayes.robot.self_calibration import answer, estimate
+from wirebayes.robot.self_calibration import answer, estimate, holding
 from wirebayes.robot.self_calibration.mistaken import tension_notices
 from wirebayes.robot.self_calibration.session import LengthPrior
 from wirebayes.robot.self_calibration.session_file import POSITION, TURN, may_be_empty, parse_session
@@ -203,6 +203,7 @@ def test_a_search_is_given_up_where_the_readings_are_absurd(session, monkeypatch
     robot, cells = session
     read, values = _read(robot, cells)
     absurd = np.abs(np.random.default_rng(2).normal(0.0, 5.0 * 12.0 * 9.81 / SD_N, values.shape))
+    monkeypatch.setattr(holding, "_MOST", 3)  # steps of a hold: a hundred that lead nowhere take a minute
     predicted, made = [], estimate.predict_session
     monkeypatch.setattr(estimate, "predict_session", lambda *given, **more: predicted.append(1) or made(*given, **more))
     with np.errstate(all="ignore"):
