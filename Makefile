@@ -7,6 +7,8 @@ INPUTS := pyproject.toml constraints.txt wirebayes/wire/_kernel.pyx
 # One thread each for the linear algebra: the package's own processes share the cores.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
+# Tests start hundreds of processes, each of which would compile the package anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 # A process a core; the tests of a file share fits and stay together. More than four would wait for the longest file.
 SIDE_BY_SIDE := -n logical --maxprocesses 4 --dist loadfile
