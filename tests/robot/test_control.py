@@ -8,6 +8,7 @@ from tests.robot.lines import STRONGER, line_about
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.motion import claim, control, inverse
 from wirebayes.robot.motion.creep import HoldCreep, fresh
+from wirebayes.robot.motion.creeping_hold import CreepingHold
 from wirebayes.robot.pose.variance_shares import shares
 
 
@@ -56,12 +57,16 @@ def test_loaded_wires_drift_less_after_a_calibration():
 def test_longest_interval_reads_the_probability():
     distance = np.tile(np.array([0.0, 1.0, 2.0, 3.0]), (100, 1))
     distance[:10, 2] = 9.0  # a tenth is out at the third time
-    errors = control.PoseError(np.array([0.0, 10.0, 20.0, 30.0]), distance, 0 * distance, np.ones(100, bool))
+    times = np.array([0.0, 10.0, 20.0, 30.0])
+    errors = control.PoseError(times, distance, 0 * distance, np.ones((100, 4), bool))
     assert control.longest_interval(errors, 5.0) == 10.0
     assert control.longest_interval(errors, 5.0, probability=0.85) == np.inf
     assert control.longest_interval(errors, 0.5) == 0.0
-    lost = replace(errors, found=np.arange(100) > 9)
+    lost = replace(errors, held=np.tile(np.arange(100) > 9, (4, 1)).T)
     assert control.longest_interval(lost, 50.0) == 0.0
+    late = replace(errors, held=lost.held | (times < 15.0))  # what falls later was within before
+    assert control.longest_interval(late, 50.0) == 10.0
+    assert late.found.tolist() == lost.found.tolist()
 
 
 def test_the_workspace_agrees_with_single_poses():
@@ -132,3 +137,37 @@ def test_shares_split_what_two_parameters_share():
 
 def test_shares_of_a_certain_output_are_none():
     assert shares({"a": np.arange(5.0)}, np.ones(5)) == {"a": 0.0, "unexplained": 0.0}
+
+
+@pytest.mark.parametrize(("limit_m", "looks"), [(1e-3, [3, 4]), (1.0, [4, 4])])
+def test_a_pose_followed_until_it_leaves_its_limits_lasts_as_long_as_one_followed_to_the_end(limit_m, looks):
+    robot = schema.read_robot_file("cogiro-desk")
+    wires = draws.for_robot(robot, _line(20), 0.05, np.random.default_rng(0))
+    at, state = (robot.home_m, np.eye(3)), fresh(robot.legs, 20)
+    times = np.array([0.0, 10.0, 60.0, 600.0])
+    schedules = control.calibrated_schedules(robot, wires, state, *at)
+    whole = control.after_calibration(robot, wires, state, *at, times)
+    limits = control.Limits(*at, limit_m)
+    for schedule, error, most in zip(schedules, whole, looks, strict=True):
+        shares = []
+        found = control.lasting_within(robot, wires, schedule, limits, times, state, shares.append)
+        assert found.longest_s == control.longest_interval(error, limit_m)
+        assert found.held == 1.0 and shares == sorted(shares) and shares[-1] == 1.0
+        assert len(shares) == most
+
+
+def test_a_hold_is_not_followed_when_too_many_platforms_have_fallen():
+    robot = schema.read_robot_file("cogiro-desk")
+    wires = draws.for_robot(robot, _line(20))
+    joint = inverse.commands_at(robot, wires, robot.home_m, np.eye(3)).joint_m.copy()
+    joint[:2] = np.nan  # a tenth has no pose at all
+    limits = control.Limits(robot.home_m, np.eye(3), 1.0)
+    times = np.array([0.0, 600.0])
+    found = control.lasting_within(robot, wires, lambda time_s: joint, limits, times, fresh(robot.legs, 20))
+    assert (found.longest_s, found.held) == (0.0, 0.9)
+    walk = CreepingHold(robot, wires, joint, (robot.home_m, np.eye(3)), needed=0.95)
+    walk.to(600.0)
+    assert walk.creep.time_s == 0.0
+    enough = CreepingHold(robot, wires, joint, (robot.home_m, np.eye(3)), needed=0.9)
+    enough.to(600.0)
+    assert enough.creep.time_s == 600.0

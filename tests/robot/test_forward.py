@@ -477,3 +477,20 @@ def test_a_stiffness_that_has_overflowed_gives_no_step_and_spoils_no_other():
     step = downhill._off_saddle(H, gradient, level, floor)
     assert np.isnan(step[:, 1]).all()
     np.testing.assert_allclose(step[:, [0, 2]], alone)
+
+
+def test_what_strays_from_its_start_is_not_followed_to_where_it_would_end():
+    robot = schema.read_robot_file("cogiro-desk")
+    c = cases.commanded(robot, "hooke", 20, np.random.default_rng(3))
+    start = c.position_m + np.array([0.0, 0.0, 0.2 * robot.size_m])
+    free = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation)
+    far = np.linalg.norm(free.position_m - start, axis=1)
+    assert free.found.all()
+    loose = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation, leash_m=10 * far)
+    np.testing.assert_array_equal(loose.position_m, free.position_m)
+    np.testing.assert_array_equal(loose.iterations, free.iterations)
+    leash = np.where(np.arange(20) < 10, 0.1 * far, np.inf)
+    held = forward.solve_equilibrium(robot, c.wires, c.zero_m, c.offset_m, start, c.rotation, leash_m=leash)
+    assert (held.status[:10] == outcome.NOT_CONVERGED).all() and held.found[10:].all()
+    assert (held.iterations[:10] < free.iterations[:10]).all()
+    np.testing.assert_allclose(held.position_m[10:], free.position_m[10:], atol=1e-12)

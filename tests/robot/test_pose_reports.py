@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.robot.lines import STRONGER, line_about
+from wirebayes.report.pages import pose as pose_page
 from wirebayes.result_warnings import Notice
 from wirebayes.robot.mechanics import draws, schema
 from wirebayes.robot.mechanics.description import GivenWire
@@ -122,7 +123,9 @@ def test_nearly_all_is_not_all(share: float, words: str) -> None:
 def test_a_time_within_tolerance_is_the_last_one_where_it_holds_the_probability() -> None:
     """Distances grow by a millimetre a time in every draw; the angle leaves its tolerance earlier."""
     times = np.array([0.0, 1.0, 10.0, 100.0])
-    error = control.PoseError(times, np.tile([0.0, 1e-3, 2e-3, 3e-3], (20, 1)), np.zeros((20, 4)), np.ones(20, bool))
+    error = control.PoseError(
+        times, np.tile([0.0, 1e-3, 2e-3, 3e-3], (20, 1)), np.zeros((20, 4)), np.ones((20, 4), bool)
+    )
     request = PoseRequest(np.zeros(3), np.eye(3), times, 2.5e-3, 0.01)
     assert controllers._lasts(error, request) == {"longest_time_within_s": 10.0, "still_within_at_the_end": False}
     always = PoseRequest(np.zeros(3), np.eye(3), times, 3.5e-3, 0.01)
@@ -517,3 +520,28 @@ def test_what_leaves_the_tests_is_said_of_the_whole_request(monkeypatch: pytest.
         assert found[:2] == words[:2] and len(found) == len(words)
         assert asked[:2] == [([[5.0]], 90.0, [[1.0], [1.0]]), (request.position_m, [5.0])]
         assert asked[2:] == ([] if known is None else [[[2.0]]])
+
+
+def test_a_report_says_how_far_its_parts_have_come(hung: Any) -> None:
+    robot, line, request = hung
+    said: dict[str, list[float]] = {}
+
+    def note(name: str, done: float, total: float) -> None:
+        said.setdefault(name, []).append(done / total)
+
+    answer.pose_report(robot, line, request, progress=note)
+    assert list(said) == ["drift", "pose error", "time between calibrations", "workspace"]
+    for shares in said.values():
+        assert shares == sorted(shares) and shares[-1] == pytest.approx(1.0)
+    # a part for each spread and time; another for each controller; the workspace begins and ends
+    assert (len(said["drift"]), len(said["pose error"]), len(said["workspace"])) == (4, 8, 2)
+    assert len(said["time between calibrations"]) > 8
+
+
+def test_times_on_a_page_are_in_the_unit_in_which_they_are_read() -> None:
+    kept: Any = {"longest_time_within_s": 1e5, "still_within_at_the_end": True}
+    lost: Any = {"longest_time_within_s": 177.8, "still_within_at_the_end": False}
+    assert [pose_page._longest_time(kept), pose_page._longest_time(lost)] == ["more than 27.8 h", "2.96 min"]
+    bands = {"q05": [0.0, 0.1], "q50": [0.0, 0.2], "q95": [0.0, 0.3]}
+    drifted: Any = {"specimen_spread": 0.05, "times_s": [0.0, 3600.0], "distance_mm": bands}
+    assert [row[:2] for row in pose_page._drifted(drifted, False)] == [["5 %", "1 h"]]

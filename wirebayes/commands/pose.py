@@ -300,7 +300,9 @@ def pose_at(asked: AskedPose, request: PoseRequest, other: WireDraws | None, beg
     with open_run(begun.place.path, begun.decides) as run, computing():
         if run.state == "done":
             return Pose(begun.place, asked.own_effects, computed=False)
-        _write(run.directory, asked.robot, request, pose_report(asked.robot, asked.line, request, other))
+        _write(
+            run.directory, asked.robot, request, pose_report(asked.robot, asked.line, request, other, begun.progress)
+        )
         run.finish()
     return Pose(begun.place, asked.own_effects)
 

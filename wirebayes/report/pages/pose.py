@@ -225,7 +225,7 @@ def _drift(pose: PoseJson) -> list[Block]:
     entries = pose.get("drift", [])
     angles = [entry[name] for entry in entries for name in ("tilt_deg", "from_vertical_deg")]
     turns = any(any(band["q95"] or ()) for band in angles)  # there are no bands where no draw could be solved
-    header = ["specimen spread", "after, s", "moved, mm", "90 %"]
+    header = ["specimen spread", "after", "moved, mm", "90 %"]
     caption = "Draws whose platform falls are left out."
     if turns:
         header += ["tilt, degrees", "90 %", "from vertical, degrees", "90 %"]
@@ -247,7 +247,7 @@ def _drifted(entry: Drift, turns: bool) -> list[list[str]]:
     for i, time in enumerate(entry["times_s"]):
         if time <= 0:
             continue
-        cells = [spread, f"{time:g}"]
+        cells = [spread, lasting(time)]
         for band in bands:
             low, middle, high = at_row(band, i)
             cells += [number(middle), span(low, high)]
@@ -268,15 +268,15 @@ def _errors(pose: PoseJson) -> list[Block]:
         for i, time in enumerate(times):
             if distance["q50"] and time in (60, 600, times[-1]):
                 low, middle, high = at_row(distance, i)
-                lines.append([*who, f"{time:g}", number(middle), span(low, high), _longest_time(entry)])
+                lines.append([*who, lasting(time), number(middle), span(low, high), _longest_time(entry)])
     if not lines:
         return []
-    header = ["controller", "specimen spread", "after, s", "pose error, mm", "90 %"]
-    header.append("last requested time within tolerance, s")
+    header = ["controller", "specimen spread", "after", "pose error, mm", "90 %"]
+    header.append("last requested time within tolerance")
     first = entries[0]
-    evaluated = ", ".join(f"{time:g}" for time in first["times_s"])
+    evaluated = ", ".join(map(lasting, first["times_s"]))
     caption = (
-        f"{_limits(first)} The last column is the last of the requested times that is ({evaluated} s); "
+        f"{_limits(first)} The last column is the last of the requested times that is ({evaluated}); "
         "the next section has finer ones."
     )
     return [Table(header, lines, caption)]
@@ -295,7 +295,7 @@ def _between(pose: PoseJson) -> list[Block]:
             hours = entry["loaded_before_s"] / 3600
             loaded = f"{hours:g} h"
         lines.append([controller, spread, loaded, _longest_time(entry)])
-    header = ["controller", "specimen spread", "loaded before", "longest time between calibrations, s"]
+    header = ["controller", "specimen spread", "loaded before", "longest time between calibrations"]
     limits = _limits(entries[0])
     grid = "The last column is the last of eight times a decade, from 1 s on: it is at most a quarter too short."
     return [Table(header, lines, f"The pose is exact when a calibration ends. {limits} {grid}")]
@@ -307,7 +307,7 @@ def _limits(entry: Tolerances) -> str:
 
 
 def _longest_time(entry: TimeWithin) -> str:
-    longest = number(float(entry["longest_time_within_s"]))
+    longest = lasting(float(entry["longest_time_within_s"]))
     return f"more than {longest}" if entry["still_within_at_the_end"] else longest
 
 

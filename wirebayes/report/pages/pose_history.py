@@ -28,7 +28,7 @@ from wirebayes.report.cells import NONE, at_row
 from wirebayes.report.glossary import meaning
 from wirebayes.report.pages.wires_known import wires_known
 from wirebayes.robot.mechanics.wires_used import specimens_in_words
-from wirebayes.sentences import counted, from_to
+from wirebayes.sentences import counted, from_to, lasting
 
 _CAPTIONS = {
     "motion": "The whole history: where the platform is meant to be (blue) and, enlarged, where it is (red).",
@@ -149,7 +149,7 @@ def _began(history: HistoryOfRobot) -> str:
     sd = known["reference_error_mm"]["sd"]
     return (
         f"The history goes on where a calibration of {counted(known['holds'], 'hold')} and "
-        f"{_seconds(known['duration_s'])} s ended: its posterior gives the wires, their creep so far and their "
+        f"{lasting(known['duration_s'])} ended: its posterior gives the wires, their creep so far and their "
         f"reference lengths, which it knows to {from_to(min(sd), max(sd))} mm (standard error)."
     )
 

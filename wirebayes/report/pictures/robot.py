@@ -24,6 +24,7 @@ from wirebayes.robot.motion.course import Course
 from wirebayes.robot.pose.answer import PoseAnswer
 from wirebayes.robot.pose.maps import Map
 from wirebayes.robot.pose.request import PoseRequest
+from wirebayes.sentences import lasting
 
 CONTROLLERS = {
     "hooke_only": "ignores creep",
@@ -158,7 +159,7 @@ def scene_points(robot: Robot, position_m: Floats, rotation: Floats, course: Cou
     tensions = course.tension_N[found][:, shown]
     points = still_points(robot, position_m, rotation)
     points["drifted"] = position[shown, None] + platform
-    points["times"] = [_seconds(time) for time in course.times_s[shown]]
+    points["times"] = [lasting(time) for time in course.times_s[shown]]
     points["tensions_N"] = np.median(tensions, axis=0)
     points["exaggeration"] = _exaggeration(robot, last_drift)
     return points
@@ -169,10 +170,6 @@ def _exaggeration(robot: Robot, drift_m: Floats) -> float:
     size = np.ptp(robot.exit_m, axis=0).max()
     distance = max(float(np.linalg.norm(drift_m)), 1e-12)
     return round_factor(0.05 * size / distance)
-
-
-def _seconds(time: float) -> str:
-    return f"{time:.3g} s" if time < 1000 else f"{time:.0f} s"
 
 
 def still_points(robot: Robot, position_m: Floats, rotation: Floats) -> SceneJson:
@@ -287,7 +284,7 @@ def _banded(axes: Any, times_s: Numbers, band: Band, colour: str, label: str) ->
 def error_budget(result: VarianceShares) -> Figure:
     """Shares of the drift's variance by parameter."""
     shares = result["shared_draw"]
-    label = f"share of the variance of the drift\nafter {result['time_s']:g} s, %"
+    label = f"share of the variance of the drift\nafter {lasting(result['time_s'])}, %"
     size = (4.7, 2.0 + 0.2 * len(shares))
     figure, axes = panel(label, "", "Sources of uncertainty", size)
     names = list(shares)[::-1]

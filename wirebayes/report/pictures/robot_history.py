@@ -21,6 +21,7 @@ from wirebayes.robot.history.answer import HistoryAnswer
 from wirebayes.robot.history.follow import Track
 from wirebayes.robot.history.history import History
 from wirebayes.robot.mechanics.description import Robot
+from wirebayes.sentences import lasting
 
 _COLOURS = (CHAIN, HOLD, "#5d8c4a", "#c59a2e", "#7b5ea7", "#4a9aa8", "#8a6d5c", "#b0708e", "#6b7780")
 _PANELS, _FRAMES, _SECONDS = 5, 60, 12
@@ -184,7 +185,7 @@ def strip(robot: Robot, history: History, found: HistoryAnswer) -> Figure:
         here = meant[i] @ _OBLIQUE.T
         there = moved[i] @ _OBLIQUE.T
         _draw_robot(axes, robot, here, there)
-        title = f"{history.times_s[row]:g} s"
+        title = lasting(history.times_s[row])
         if carries:
             title += f", {history.payload_kg[row]:g} kg"
         axes.set_title(title, fontsize=9, color=INK)
@@ -239,7 +240,7 @@ def moving(robot: Robot, history: History, found: HistoryAnswer) -> str:
     fixed = canvas.at(exits)
     solid = f'stroke="{QUIET}" stroke-width="0.9"'
     dashed = f'stroke="{HOLD}" stroke-width="0.9" stroke-dasharray="2 3"'
-    parts = canvas.head(f"drift enlarged {factor:g} times; {history.times_s[-1]:g} s in {_SECONDS} s")
+    parts = canvas.head(f"drift enlarged {factor:g} times; {lasting(history.times_s[-1])} in {_SECONDS} s")
     parts += _moving_platform(robot, fixed, canvas.at(commanded), CHAIN, solid)
     parts += _moving_platform(robot, fixed, canvas.at(drifted), HOLD, dashed)
     for x, y in fixed:

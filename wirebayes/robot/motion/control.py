@@ -6,12 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.numeric.typing import Bools, Floats
+from wirebayes.progress import ShareDone, unseen
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.wires import Wires
-from wirebayes.robot.motion import drift, inverse
+from wirebayes.robot.motion import drift, inverse, outcome
 from wirebayes.robot.motion.creep import CreepState, HoldCreep, fresh, without_creep
+from wirebayes.robot.motion.creeping_hold import CreepingHold
 
 Schedule = Callable[[float], Floats]
+PROBABILITY = 0.95  # with which a pose is to be within tolerance
 
 
 def known(wires: Wires) -> Wires:
@@ -80,17 +83,23 @@ class PoseError:
     times_s : (t,) array
     distance_m : (n, t) array
     angle_rad : (n, t) array
-    found : (n,) bool array
+    held : (n, t) bool array
+        Whether there is an equilibrium: not before the first, and not from a fall on.
     """
 
     times_s: Floats
     distance_m: Floats
     angle_rad: Floats
-    found: Bools
+    held: Bools
+
+    @property
+    def found(self) -> Bools:
+        """(n,) True where every time has an equilibrium."""
+        return np.asarray(self.held.all(1))
 
     def probability(self, tolerance_m: float, tolerance_rad: float = np.inf) -> Floats:
-        """(t,) share of draws within both tolerances; a draw without equilibrium is never within."""
-        inside = (self.distance_m < tolerance_m) & (self.angle_rad < tolerance_rad) & self.found[:, None]
+        """(t,) share of draws within both tolerances; a draw without equilibrium at a time is not within then."""
+        inside = (self.distance_m < tolerance_m) & (self.angle_rad < tolerance_rad) & self.held
         return inside.mean(0)
 
 
@@ -102,6 +111,7 @@ def error(
     rotation: Floats,
     times_s: Floats,
     carried: CreepState | None = None,
+    progress: ShareDone = unseen,
 ) -> PoseError:
     """Pose error over time of uncertain wires under one controller's commands.
 
@@ -117,14 +127,15 @@ def error(
     times_s : (t,) array
     carried : CreepState, optional
         Creep that the wires bring along; default: they were never loaded.
+    progress : function of a share between 0 and 1
     """
-    course = drift.hold(robot, wires, schedule, times_s, position_m, rotation, carried)
+    course = drift.hold(robot, wires, schedule, times_s, position_m, rotation, carried, progress=progress)
     shift, angle = drift.distance_moved(course, position_m, rotation)
-    return PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.found)
+    return PoseError(course.times_s, np.linalg.norm(shift, axis=-1), angle, course.status == outcome.FOUND)
 
 
 def longest_interval(
-    errors: PoseError, tolerance_m: float, tolerance_rad: float = np.inf, probability: float = 0.95
+    errors: PoseError, tolerance_m: float, tolerance_rad: float = np.inf, probability: float = PROBABILITY
 ) -> float:
     """Longest time up to which the pose is within tolerance with a probability, at every time before, s.
 
@@ -151,6 +162,87 @@ def longest_interval(
     return float(errors.times_s[first - 1]) if first else 0.0
 
 
+@dataclass(frozen=True)
+class Limits:
+    """A pose, and how far from it a platform may be.
+
+    Attributes
+    ----------
+    position_m, rotation : (3,), (3, 3) arrays
+    distance_m, angle_rad : float
+    """
+
+    position_m: Floats
+    rotation: Floats
+    distance_m: float
+    angle_rad: float = np.inf
+
+    def keeps(self, walk: CreepingHold) -> Bools:
+        """(n,) Which draws of a hold are within them now.
+
+        Parameters
+        ----------
+        walk : CreepingHold
+        """
+        shift, angle = drift.shift_and_turn(walk.here.position_m, walk.here.rotation, self.position_m, self.rotation)
+        near = np.linalg.norm(shift, axis=-1) < self.distance_m
+        return np.asarray(walk.live & near & (angle < self.angle_rad))
+
+
+@dataclass(frozen=True)
+class Lasting:
+    """How long a pose stays within limits with `PROBABILITY`.
+
+    Attributes
+    ----------
+    longest_s : float
+        The last time before one at which it is not: one of those looked at, or zero; infinite where there is none.
+    held : float
+        Share of draws that have not lost their equilibrium by the last time that was looked at.
+    """
+
+    longest_s: float
+    held: float
+
+
+def lasting_within(
+    robot: Robot,
+    wires: Wires,
+    schedule: Schedule,
+    limits: Limits,
+    times_s: Floats,
+    carried: CreepState,
+    progress: ShareDone = unseen,
+) -> Lasting:
+    """How long a pose stays within limits, followed no longer than until it does not.
+
+    Parameters
+    ----------
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    schedule : function
+        Of a time, s, to the joint values ``(1, w)`` or ``(n, w)``.
+    limits : Limits
+    times_s : (t,) array
+        Rising times at which it is looked at.
+    carried : CreepState
+        Creep that the wires bring along.
+    progress : function of a share between 0 and 1
+    """
+    start = limits.position_m, limits.rotation
+    walk = CreepingHold(robot, wires, schedule, start, carried, needed=PROBABILITY)
+    longest = 0.0
+    for k, time in enumerate(times_s):
+        walk.to(float(time))
+        if limits.keeps(walk).mean() < PROBABILITY:
+            progress(1.0)
+            return Lasting(longest, float(walk.live.mean()))
+        longest = float(time)
+        progress((k + 1) / len(times_s))
+    return Lasting(np.inf, float(walk.live.mean()))
+
+
 def after_calibration(
     robot: Robot, wires: Wires, carried: CreepState, position_m: Floats, rotation: Floats, times_s: Floats
 ) -> tuple[PoseError, PoseError]:
@@ -170,7 +262,29 @@ def after_calibration(
     Returns
     -------
     still, foreseen : PoseError
-        `foreseen`: the controller compensates for the mean creep of the draws, given the same history.
+        As the schedules of `calibrated_schedules` command.
+    """
+    still, foreseen = (
+        error(robot, wires, schedule, position_m, rotation, times_s, carried)
+        for schedule in calibrated_schedules(robot, wires, carried, position_m, rotation)
+    )
+    return still, foreseen
+
+
+def calibrated_schedules(
+    robot: Robot, wires: Wires, carried: CreepState, position_m: Floats, rotation: Floats
+) -> tuple[Schedule, Schedule]:
+    """Commands from a perfect calibration on, after a load history.
+
+    Parameters
+    ----------
+    robot, wires, carried, position_m, rotation
+        As for `after_calibration`.
+
+    Returns
+    -------
+    still, foreseen : functions of a time, s, to the joint values (n, w)
+        `foreseen` compensates for the mean creep of the draws, given the same history.
     """
     at = position_m[None], rotation[None]
     tau = inverse.tensions(robot, *at)
@@ -189,5 +303,4 @@ def after_calibration(
         growth = (strain - before).mean(1, keepdims=True)
         return joint_of(before + growth)
 
-    still = error(robot, wires, lambda time_s: joint, position_m, rotation, times_s, carried)
-    return still, error(robot, wires, expected, position_m, rotation, times_s, carried)
+    return lambda time_s: joint, expected

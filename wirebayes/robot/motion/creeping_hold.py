@@ -37,6 +37,8 @@ class CreepingHold:
         Where the first forward solution starts from.
     error_m : (n, w) array or float
         What the zero-tension lengths before creep are beyond what the joint values say.
+    needed : float
+        Share of the draws of whom it is worth going on: it is not once more of them have fallen.
 
     Attributes
     ----------
@@ -57,12 +59,14 @@ class CreepingHold:
         follow: Follow = "current",
         tolerance: float = TOLERANCE,
         error_m: Floats | float = 0.0,
+        needed: float = 0.0,
     ) -> None:
         self.robot = robot
         self.wires = wires
         self.joint = joint_m
         self.tolerance = tolerance
         self.error_m = error_m
+        self.needed = needed
         self.n = wires.count
         state = carried or fresh(robot.legs, self.n)
         self.lengths = self._lengths(0.0, state)
@@ -98,9 +102,9 @@ class CreepingHold:
         return bare * (1.0 + state.strain(self.wires).T), np.broadcast_to(offset, bare.shape)
 
     def to(self, stop_s: float) -> None:
-        """Go on to a time, by steps of bounded error."""
+        """Go on to a time, by steps of bounded error, while as many draws as needed have not fallen."""
         end = stop_s**self.power
-        while self.creep.time_s < stop_s:
+        while self.creep.time_s < stop_s and self.live.mean() >= self.needed:
             clock = self.creep.time_s**self.power
             ahead = clock + self.step
             whole = ahead >= end * (1 - 1e-12) or not self.live.any()

@@ -77,7 +77,14 @@ class Solved:
 
 
 def lead_downhill(
-    robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
+    robot: Robot,
+    wires: Wires,
+    zero: Floats,
+    offset: Floats,
+    x: Floats,
+    R: Floats,
+    max_iterations: int,
+    leash_m: Floats | float = np.inf,
 ) -> Solved:
     """Lead all cases downhill: by a few iterations, and the slow ones of all chunks together.
 
@@ -94,30 +101,48 @@ def lead_downhill(
     x, R : (3, n) and (3, 3, n) arrays
         Where each begins.
     max_iterations : int
+    leash_m : (n,) array or float
+        How far from there, rotations counted at the platform's edge, each is led at most.
 
     Returns
     -------
     Solved
     """
     quick = min(_QUICK, max_iterations)
-    solved = _in_chunks(robot, wires, zero, offset, x, R, quick)
-    slow = np.flatnonzero(solved.status == NOT_CONVERGED)
+    leash = np.broadcast_to(leash_m, x.shape[1:])
+    solved = _in_chunks(robot, wires, zero, offset, x, R, quick, leash)
+    open_ = solved.status == NOT_CONVERGED
+    slow = np.flatnonzero(open_ & (_away_m(robot, solved.x - x, solved.R - R) <= leash))
     if slow.size and max_iterations > quick:
         part = wires.part(slow), zero[:, slow], offset[:, slow]
         reached = solved.x[:, slow], solved.R[..., slow]
-        later = _in_chunks(robot, *part, *reached, max_iterations - quick)
+        later = _in_chunks(robot, *part, *reached, max_iterations - quick, leash[slow])
         solved.go_on(slow, later)
     return solved
 
 
+def _away_m(robot: Robot, displaced: Floats, turned: Floats) -> Floats:
+    """(n,) Larger of displacements (3, n) and of changes of rotations (3, 3, n) at the platform's edge."""
+    square = (displaced * displaced).sum(0)
+    turn_square = (turned * turned).sum((0, 1))
+    return np.sqrt(np.maximum(square, robot.size_m**2 * turn_square))
+
+
 def _in_chunks(
-    robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
+    robot: Robot,
+    wires: Wires,
+    zero: Floats,
+    offset: Floats,
+    x: Floats,
+    R: Floats,
+    max_iterations: int,
+    leash_m: Floats,
 ) -> Solved:
     parts = []
     for first in range(0, zero.shape[1], _CHUNK):
         cut = slice(first, first + _CHUNK)
         part = wires.part(cut), zero[:, cut], offset[:, cut], x[:, cut], R[..., cut]
-        parts.append(_in_one_chunk(robot, *part, max_iterations))
+        parts.append(_in_one_chunk(robot, *part, max_iterations, leash_m[cut]))
     return joined_rows(parts, axis=-1)
 
 
@@ -170,14 +195,26 @@ class _Cases:
 
 
 def _in_one_chunk(
-    robot: Robot, wires: Wires, zero: Floats, offset: Floats, x: Floats, R: Floats, max_iterations: int
+    robot: Robot,
+    wires: Wires,
+    zero: Floats,
+    offset: Floats,
+    x: Floats,
+    R: Floats,
+    max_iterations: int,
+    leash_m: Floats,
 ) -> Solved:
     """One chunk; solved cases leave the batch as they finish."""
     solved = Solved.not_yet(x, R, robot.legs)
     cases = _begin(robot, wires, zero, offset, x, R)
+    leashed = np.isfinite(leash_m).any()
     for iteration in range(1, max_iterations + 1):
         cases, ended = _iterate(robot, cases)
         solved.count[cases.number] = iteration
+        if leashed:
+            away_m = _away_m(robot, cases.x - x[:, cases.number], cases.R - R[..., cases.number])
+            strayed = away_m > leash_m[cases.number]
+            ended = np.where((ended == _GOING_ON) & strayed, NOT_CONVERGED, ended)
         cases = solved.without_ended(cases, ended)
         if not cases.number.size:
             return solved

@@ -7,6 +7,7 @@ import numpy as np
 
 from wirebayes.numeric.rows import chosen_rows
 from wirebayes.numeric.typing import Bools, Floats, Ints
+from wirebayes.progress import ShareDone, unseen
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.rotation import antisymmetric
 from wirebayes.robot.mechanics.wires import Wires
@@ -26,6 +27,7 @@ def hold(
     carried: CreepState | None = None,
     follow: Follow = "current",
     tolerance: float = TOLERANCE,
+    progress: ShareDone = unseen,
 ) -> Course:
     """Hold the actuators still, or let them follow a slow schedule, while the wires creep.
 
@@ -51,6 +53,7 @@ def hold(
     tolerance : float
         Error allowed in a step, of the creep so far. A tenth of the draws may err ten times as much where a wire goes
         slack, which each does but once.
+    progress : function of a share between 0 and 1
 
     Returns
     -------
@@ -62,6 +65,7 @@ def hold(
     for k, time in enumerate(times):
         walk.to(float(time))
         rows.put(k, walk)
+        progress((k + 1) / len(times))
     carried_on, falls = walk.creep.state(), walk.falls()
     return Course(times, rows.position_m, rows.rotation, rows.tension_N, rows.status, carried_on, falls)
 
@@ -90,7 +94,13 @@ class _Rows:
 
 
 def from_command(
-    robot: Robot, wires: Wires, position_m: Floats, rotation: Floats, times_s: Floats, follow: Follow = "current"
+    robot: Robot,
+    wires: Wires,
+    position_m: Floats,
+    rotation: Floats,
+    times_s: Floats,
+    follow: Follow = "current",
+    progress: ShareDone = unseen,
 ) -> Course:
     """Drift from a pose that every draw takes exactly when the hold begins (its own inverse kinematics).
 
@@ -101,6 +111,9 @@ def from_command(
     position_m : (3,) array
     rotation : (3, 3) array
     times_s : (t,) array
+    follow : {"current", "start"}
+        As for `hold`.
+    progress : function of a share between 0 and 1
 
     Returns
     -------
@@ -110,7 +123,7 @@ def from_command(
     commands = inverse.commands_at(robot, wires, position_m, rotation)
     stable = stably(robot, wires, commands, position_m, commands.rotation)
     joint = np.where(stable[:, None], commands.joint_m, np.nan)
-    course = hold(robot, wires, joint, times_s, position_m, commands.rotation, follow=follow)
+    course = hold(robot, wires, joint, times_s, position_m, commands.rotation, follow=follow, progress=progress)
     course.status[commands.feasible & ~stable] = outcome.NOT_HELD
     return course
 
@@ -159,8 +172,21 @@ def distance_moved(course: Course, origin_m: Floats, origin_rotation: Floats) ->
     draws = len(course.position_m)
     origin = np.broadcast_to(origin_m, (draws, 3))[:, None]
     origin_turn = np.broadcast_to(origin_rotation, (draws, 3, 3))[:, None]
-    turn = course.rotation @ origin_turn.mT
+    return shift_and_turn(course.position_m, course.rotation, origin, origin_turn)
+
+
+def shift_and_turn(
+    position_m: Floats, rotation: Floats, origin_m: Floats, origin_rotation: Floats
+) -> tuple[Floats, Floats]:
+    """How far poses are from an origin: displacements ``(..., 3)``, m, and angles ``(...)`` of the rotations, rad.
+
+    Parameters
+    ----------
+    position_m, origin_m : (..., 3) arrays
+    rotation, origin_rotation : (..., 3, 3) arrays
+    """
+    turn = rotation @ origin_rotation.mT
     # The antisymmetric part keeps small angles exact where the trace would lose half the digits.
     sine = np.linalg.norm(antisymmetric(turn), axis=-1)
     cosine = 0.5 * (np.trace(turn, axis1=-2, axis2=-1) - 1.0)
-    return course.position_m - origin, np.arctan2(sine, cosine)
+    return position_m - origin_m, np.arctan2(sine, cosine)

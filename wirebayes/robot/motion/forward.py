@@ -56,6 +56,7 @@ def solve_equilibrium(
     start_m: Floats,
     start_rotation: Floats,
     max_iterations: int = 200,
+    leash_m: Floats | float = np.inf,
 ) -> Equilibria:
     """Find the equilibrium reached downhill from each start.
 
@@ -69,6 +70,10 @@ def solve_equilibrium(
         Stretched length that is not between exit and platform point: wire beyond the exit point, and ``r q``.
     start_m : (n, 3) or (3,) array
     start_rotation : (n, 3, 3) or (3, 3) array
+    max_iterations : int
+    leash_m : (n,) array or float
+        How far from its start an equilibrium is looked for, rotations counted at the platform's edge; what strays
+        farther is not followed to where it would end.
 
     Returns
     -------
@@ -86,11 +91,14 @@ def solve_equilibrium(
     own_wires = wires if all_are_sane else wires.part(sane)
     lengths = zero_m[sane], offset_m[sane]
     start = start_m[sane], start_rotation[sane]
-    found = _solved(robot, own_wires, lengths, start, max_iterations)
+    leash = np.broadcast_to(leash_m, (n,))[sane]
+    found = _solved(robot, own_wires, lengths, start, max_iterations, leash)
     return found if all_are_sane else put_back(found, sane, n)
 
 
-def _solved(robot: Robot, wires: Wires, lengths: Lengths, start: Poses, max_iterations: int) -> Equilibria:
+def _solved(
+    robot: Robot, wires: Wires, lengths: Lengths, start: Poses, max_iterations: int, leash_m: Floats
+) -> Equilibria:
     """The equilibria of finite lengths."""
     # Counted from the middle of the exit points, so that nothing depends on where the robot's origin is.
     middle = robot.exit_m.mean(0)
@@ -99,7 +107,7 @@ def _solved(robot: Robot, wires: Wires, lengths: Lengths, start: Poses, max_iter
     rotation = np.array(batch_last(start[1]))
     zero = np.ascontiguousarray(lengths[0].T)
     offset = np.ascontiguousarray(lengths[1].T)
-    solved = downhill.lead_downhill(robot, wires, zero, offset, position, rotation, max_iterations)
+    solved = downhill.lead_downhill(robot, wires, zero, offset, position, rotation, max_iterations, leash_m)
     _look_again(robot, wires, zero, offset, solved)
     return Equilibria(
         solved.x.T + middle, batch_first(solved.R), solved.tau.T, solved.status, solved.count, solved.left

@@ -23,6 +23,7 @@ _TRUST = 0.5  # a step that ends further from its prediction, relative to its le
 # The longest prediction that is believed, of the robot's span, and rad: where wires slacken at the new lengths the
 # stiffness is all but singular, the prediction goes anywhere, and any jump would be within its trust.
 _FARTHEST, _FARTHEST_RAD = 0.05, 0.5
+_STRAY = 4.0  # times what is trusted: Newton's method comes back from as far, a platform that falls goes on
 _ASIDE = 1e-6  # of the platform's size: a disturbance too small to be seen, too large to be rounding
 _SMALL = 1e-7  # of the platform's size: so short a Newton step leaves only rounding
 _JUMP = 1e-7  # of the robot's span: the smallest jump that counts as one
@@ -170,11 +171,13 @@ def _step(
     ahead = np.where(np.isfinite(ahead), ahead, 0.0)
     believed = _believed(robot, ahead)
     solvable = chosen_rows(believed, zero, np.nan)
-    there = forward.solve_equilibrium(robot, wires, solvable, offset, *near)
-    _let_go(robot, wires, there, lengths)
     way = np.linalg.norm(ahead, axis=1)
     trusted = _TRUST * way + _JUMP * robot.span_m
-    near_prediction = _apart_m(robot, there, predicted) <= trusted
+    # what strays farther than this and ends there is farther from its prediction than is trusted
+    leash = _STRAY * (trusted + _apart_m(robot, near, predicted))
+    there = forward.solve_equilibrium(robot, wires, solvable, offset, *near, leash_m=leash)
+    _let_go(robot, wires, there, lengths)
+    near_prediction = _apart_m(robot, (there.position_m, there.rotation), predicted) <= trusted
     held = there.found & believed & near_prediction
     return there, np.asarray(held)
 
@@ -187,11 +190,11 @@ def _believed(robot: Robot, ahead: Floats) -> Bools:
     return short & (turned <= _FARTHEST_RAD * robot.size_m)
 
 
-def _apart_m(robot: Robot, there: forward.Equilibria, predicted: Poses) -> Floats:
-    """(n,) how far solutions lie from predicted poses: in place, or by the turn at the platform's edge."""
+def _apart_m(robot: Robot, there: Poses, predicted: Poses) -> Floats:
+    """(n,) how far poses lie from predicted ones: in place, or by the turn at the platform's edge."""
     position, rotation = predicted
-    displaced = np.linalg.norm(there.position_m - position, axis=1)
-    turn = there.rotation @ rotation.mT - np.eye(3)
+    displaced = np.linalg.norm(there[0] - position, axis=1)
+    turn = there[1] @ rotation.mT - np.eye(3)
     turned = np.linalg.norm(turn, axis=(1, 2))
     return np.maximum(displaced, robot.size_m * turned)
 

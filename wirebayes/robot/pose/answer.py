@@ -17,6 +17,7 @@ from wirebayes.json_files.pose import (
 )
 from wirebayes.json_files.values import Band
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import Progress, ShareDone, part_of, shares_of, silent
 from wirebayes.result_warnings import Notice, NoticeJson, to_json
 from wirebayes.robot.mechanics import draws, drums, sag, statics
 from wirebayes.robot.mechanics import rotation as turning
@@ -58,7 +59,13 @@ class PoseAnswer:
     maps: tuple[Map, ...] = ()
 
 
-def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: WireDraws | None = None) -> PoseAnswer:
+def pose_report(
+    robot: Robot,
+    line: WireDraws,
+    request: PoseRequest,
+    other: WireDraws | None = None,
+    progress: Progress = silent,
+) -> PoseAnswer:
     """Inverse and forward kinematics, drift, pose error and where it comes from.
 
     Parameters
@@ -68,10 +75,11 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
     request : PoseRequest
     other : WireDraws, optional
         Another fit of the same line, used by one more controller.
+    progress : function of name, done and total
 
     Returns
     -------
-    Answer
+    PoseAnswer
     """
     x, R = request.position_m, request.rotation
     tau = inverse.tensions(robot, x[None], R[None])
@@ -92,7 +100,7 @@ def pose_report(robot: Robot, line: WireDraws, request: PoseRequest, other: Wire
     held = _Held(robot, line, shared, request, commands, tau)
     if robot.winch is not None:
         held = _by_winches(held, content)
-    return _held_answer(held, other, turned, content)
+    return _held_answer(held, other, turned, content, progress)
 
 
 def _by_winches(held: "_Held", content: PoseJson) -> "_Held":
@@ -119,20 +127,23 @@ class _Held:
     tension_N: Floats
 
 
-def _held_answer(held: _Held, other: WireDraws | None, turned: Orientation, content: PoseJson) -> PoseAnswer:
+def _held_answer(
+    held: _Held, other: WireDraws | None, turned: Orientation, content: PoseJson, progress: Progress
+) -> PoseAnswer:
     """What is said of a pose that can be held, besides what `content` has already."""
     robot, line, request = held.robot, held.line, held.request
     x, R = request.position_m, request.rotation
     rng = np.random.default_rng(request.seed)
     _describe_pose(held, rng, content)
-    courses = _courses(held, rng)
+    courses = _courses(held, rng, part_of(progress, "drift"))
     _describe_creep(held, courses, content)
-    content["pose_error"] = controllers.errors(robot, line, request, rng, other)
-    content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng)
+    content["pose_error"] = controllers.errors(robot, line, request, rng, other, part_of(progress, "pose error"))
+    lasting = part_of(progress, "time between calibrations")
+    content["between_calibrations"] = controllers.between_calibrations(robot, line, request, rng, lasting)
     content["variance_shares"] = _shares(robot, line, courses, x, R)
     warnings = _warnings(held, courses, content["equilibria"]["commanded_stable"], turned)
     content["warnings"] = to_json([*warnings, *on_plane.friction_notices(content.get("plane"))])
-    spaces = map_slices(robot, line, request.slices)
+    spaces = map_slices(robot, line, request.slices, part_of(progress, "workspace"))
     content["workspace"] = _workspace(spaces)
     return PoseAnswer(content, courses, spaces)
 
@@ -169,13 +180,15 @@ def _workspace(spaces: tuple[Map, ...]) -> Workspace | None:
     return {**claim.claim_summary(reached[0].drift), "slices": summaries(spaces)}
 
 
-def _courses(held: _Held, rng: Generator) -> dict[float, Course]:
+def _courses(held: _Held, rng: Generator, progress: ShareDone) -> dict[float, Course]:
     """The drift from the pose, by the spread between specimens."""
-    request = held.request
+    robot, request = held.robot, held.request
+    at = request.position_m, request.rotation, request.times_s
     courses = {}
+    done = shares_of(progress, len(request.spreads))
     for spread in request.spreads:
-        wires = draws.for_robot(held.robot, held.line, spread, rng)
-        courses[spread] = drift.from_command(held.robot, wires, request.position_m, request.rotation, request.times_s)
+        wires = draws.for_robot(robot, held.line, spread, rng)
+        courses[spread] = drift.from_command(robot, wires, *at, progress=next(done))
     return courses
 
 

@@ -5,6 +5,8 @@ from numpy.random import Generator
 
 from wirebayes.json_files.pose import BetweenCalibrations, ControllerError, TimeWithin, Tolerances
 from wirebayes.numeric.evenly import evenly
+from wirebayes.numeric.typing import Floats
+from wirebayes.progress import ShareDone, shares_of, unseen
 from wirebayes.robot.mechanics import draws
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -19,7 +21,12 @@ _DRAWS = 300  # each drifts through all of these times; a 95 % probability is th
 
 
 def errors(
-    robot: Robot, line: WireDraws, request: PoseRequest, rng: Generator, other: WireDraws | None = None
+    robot: Robot,
+    line: WireDraws,
+    request: PoseRequest,
+    rng: Generator,
+    other: WireDraws | None = None,
+    progress: ShareDone = unseen,
 ) -> list[ControllerError]:
     """Pose error under controllers that know the posterior, and how long each stays within tolerance.
 
@@ -32,6 +39,7 @@ def errors(
     rng : numpy Generator
     other : WireDraws, optional
         Another fit of the same line (the plain model beside one with effects), used by a third controller.
+    progress : function of a share between 0 and 1
     """
     known = draws.for_robot(robot, line)
     schedules = {
@@ -42,10 +50,12 @@ def errors(
         less = draws.for_robot(robot, other)
         schedules["creep_aware_other_fit"] = control.creep_aware(robot, less, request.position_m, request.rotation)
     out: list[ControllerError] = []
+    at = request.position_m, request.rotation, request.times_s
+    done = shares_of(progress, len(request.spreads) * len(schedules))
     for spread in request.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
         for name, schedule in schedules.items():
-            error = control.error(robot, wires, schedule, request.position_m, request.rotation, request.times_s)
+            error = control.error(robot, wires, schedule, *at, progress=next(done))
             out.append(
                 {
                     "specimen_spread": spread,
@@ -62,7 +72,7 @@ def errors(
 
 
 def between_calibrations(
-    robot: Robot, line: WireDraws, request: PoseRequest, rng: Generator
+    robot: Robot, line: WireDraws, request: PoseRequest, rng: Generator, progress: ShareDone = unseen
 ) -> list[BetweenCalibrations]:
     """Longest time between calibrations with P(within tolerance) of 95 %, after a load history.
 
@@ -76,6 +86,7 @@ def between_calibrations(
         The pose, the tolerances and the specimen spreads.
     rng : numpy.random.Generator
         Draws the specimens.
+    progress : function of a share between 0 and 1
 
     Returns
     -------
@@ -83,8 +94,10 @@ def between_calibrations(
         For each spread, load history and controller: joints held still, or commands that compensate for the creep.
     """
     x, R = request.position_m, request.rotation
+    limits = control.Limits(x, R, request.tolerance_m, request.tolerance_rad)
     line = line.part(evenly(line.count, _DRAWS))
     load = np.repeat(inverse.tensions(robot, x[None], R[None]).T, line.count, 1)
+    done = shares_of(progress, 2 * len(HISTORIES_S) * len(request.spreads))
     out: list[BetweenCalibrations] = []
     for spread in request.spreads:
         wires = draws.for_robot(robot, line, spread, rng)
@@ -92,19 +105,17 @@ def between_calibrations(
             state = fresh(robot.legs, line.count)
             if loaded_s:
                 state = HoldCreep(wires, state, load).advance(loaded_s, load)
-            for name, error in zip(
-                ("held_still", "creep_aware"),
-                control.after_calibration(robot, wires, state, x, R, _SINCE_S),
-                strict=True,
-            ):
+            schedules = control.calibrated_schedules(robot, wires, state, x, R)
+            for name, schedule in zip(("held_still", "creep_aware"), schedules, strict=True):
+                lasting = control.lasting_within(robot, wires, schedule, limits, _SINCE_S, state, next(done))
                 out.append(
                     {
                         "specimen_spread": spread,
                         "loaded_before_s": loaded_s,
                         "controller": name,
-                        "solved": float(error.found.mean()),
+                        "solved": lasting.held,
                         **_tolerances(request),
-                        **_lasts(error, request),
+                        **_time_within(lasting.longest_s, _SINCE_S),
                     }
                 )
     return out
@@ -116,8 +127,12 @@ def _tolerances(request: PoseRequest) -> Tolerances:
 
 def _lasts(error: control.PoseError, request: PoseRequest) -> TimeWithin:
     within = control.longest_interval(error, request.tolerance_m, request.tolerance_rad)
-    at_end = not np.isfinite(within)
+    return _time_within(within, error.times_s)
+
+
+def _time_within(longest_s: float, times_s: Floats) -> TimeWithin:
+    at_end = not np.isfinite(longest_s)
     return {
-        "longest_time_within_s": float(error.times_s[-1]) if at_end else within,
+        "longest_time_within_s": float(times_s[-1]) if at_end else longest_s,
         "still_within_at_the_end": at_end,
     }

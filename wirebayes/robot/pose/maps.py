@@ -7,6 +7,7 @@ import numpy as np
 from wirebayes.json_files.pose import SliceOfWorkspace
 from wirebayes.numeric.evenly import evenly
 from wirebayes.numeric.typing import Floats
+from wirebayes.progress import ShareDone, shares_of, unseen
 from wirebayes.robot.mechanics import draws, plane
 from wirebayes.robot.mechanics.description import Robot
 from wirebayes.robot.mechanics.draws import WireDraws
@@ -64,7 +65,7 @@ class Map:
         return 2 if not flat.size or 2 in flat else int(flat[0])
 
 
-def map_slices(robot: Robot, line: WireDraws, slices: Slices) -> tuple[Map, ...]:
+def map_slices(robot: Robot, line: WireDraws, slices: Slices, progress: ShareDone = unseen) -> tuple[Map, ...]:
     """A minute's drift over the slices, one draw for all wires of the line, an orientation after the other.
 
     Parameters
@@ -72,6 +73,7 @@ def map_slices(robot: Robot, line: WireDraws, slices: Slices) -> tuple[Map, ...]
     robot : Robot
     line : WireDraws
     slices : Slices
+    progress : function of a share between 0 and 1
 
     Returns
     -------
@@ -83,9 +85,13 @@ def map_slices(robot: Robot, line: WireDraws, slices: Slices) -> tuple[Map, ...]
     wires = draws.for_robot(robot, few)
     where = _points(robot, slices.heights_m)
     maps = []
+    done = shares_of(progress, len(slices.rotations_rad))
     for turn in slices.rotations_rad:
+        share_done = next(done)
+        share_done(0.0)
         drift = claim.over_workspace(robot, wires, where, rotation=matrix(turn))
         maps.append(Map(turn, where, drift))
+        share_done(1.0)
     return tuple(maps)
 
 
