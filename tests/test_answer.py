@@ -11,6 +11,7 @@ import pytest
 import wirebayes as wb
 from tests.simulated import simulated_tests
 from wirebayes.answers import terminal
+from wirebayes.answers.headline import findings_in_a_sentence
 from wirebayes.answers.lines import for_terminal
 from wirebayes.cli import answer
 from wirebayes.sentences import p_in_words, spoken
@@ -88,6 +89,18 @@ def test_findings_name_effects_with_hold_unit_and_what_is_alike(tmp_path: Path) 
     assert two.lines() == ["b: nothing stands out (p = 0.4)"]
 
 
+def test_under_weights_an_effect_is_one_of_the_instrument_that_is_there(tmp_path: Path) -> None:
+    """Where the force is set no force sensor drifts: the gauge does, and it is read in mm."""
+    drift = {"mean": 2e-5, "q05": 1e-5, "q95": 3e-5, "hold": None}
+    named = SLIP | {"verdict": "named", "effects": ["sensor_drift"], "group": ["sensor_drift"]}
+    for unit, what in (("N", "the force sensor drifts with time"), ("mm", "the gauge drifts with time")):
+        held_out = {"plain": {f"rmse_{unit}": 0.25}, "final": {f"rmse_{unit}": 0.05}}
+        report = named | {"held_out": held_out, "amplitudes": {"sensor_drift": drift | {"unit": f"{unit}/s"}}}
+        found = stored(Findings, tmp_path, "discovery.json", {"experiments": {"a": report}})
+        assert found.lines()[1] == f"  sensor drift 2e-05 [1e-05, 3e-05] {unit}/s: {what}"
+        assert f"sensor drift is missing ({what})" in findings_in_a_sentence("a", report)
+
+
 def test_files_for_other_programs_say_where_each_belongs(tmp_path: Path) -> None:
     exported = stored(Export, tmp_path, "export.json", {})
     assert exported.next_step() == f"read {tmp_path}"
@@ -128,8 +141,8 @@ def test_something_unknown_does_not_hide_the_names_that_are_likely_beside_it(tmp
     alone = open_ | {"set": ["unknown"], "probabilities": {"toe": 0.04, "unknown": 0.96}}
     found = stored(Findings, tmp_path, "discovery.json", {"version": 2, "experiments": {"a": likely, "b": alone}})
     assert found.lines() == [
-        "a: something is missing that no effect in the catalogue explains (p < 0.001)",
-        "  its largest part may be toe (89 %) or none of the catalogue (8 %); nothing is established",
+        "a: something is missing that has no established name (p < 0.001)",
+        "  its largest part may be toe (89 %) or none of the catalogue (8 %)",
         "b: something is missing that no effect in the catalogue explains (p < 0.001)",
     ]
 

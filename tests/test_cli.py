@@ -226,6 +226,8 @@ def test_effects_lists_the_catalogue_and_describes_one(capsys: pytest.CaptureFix
     assert main(["effects", "strain_stiffening"]) == 0
     shown = capsys.readouterr().out
     assert "k1 s (1 + c s)" in shown and "strain_stiffening.c in 1, neutral value 0" in shown
+    assert main(["effects", "sensor_drift"]) == 0
+    assert "  weights    The gauge drifts with time." in capsys.readouterr().out
     assert main(["effects", "stiffening"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "stiffening" in line and "strain_stiffening" in line

@@ -37,6 +37,7 @@ def scan_of(delta: np.ndarray, one_sided: bool, flexible: float = 0.0) -> Scan:
         rss=np.full((1, n), float(degrees)),
         along=NORM * delta[None, :, None],
         square=np.full((1, n, 1), NORM**2),
+        is_left=np.ones((1, n, 1), bool),
         degrees=degrees,
         least=np.zeros(n),
         one_sided=np.array([one_sided]),

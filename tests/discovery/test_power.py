@@ -76,7 +76,7 @@ def test_the_probe_that_shows_best_says_what_is_detectable(monkeypatch: pytest.M
     """Of each name that the block can show, at one amplitude; thresholds are the name's own."""
     norms = np.array([[1.0, 3.0, 2.0, 9.0], [1.0, 3.0, 2.0, 9.0], [5.0, 3.0, 2.0, 9.0]])
     monkeypatch.setattr(power, "amplitude_80", lambda null, trial, k, threshold: 10.0 * k + threshold)
-    trials: Any = [SimpleNamespace(step=1.0)] * 4
+    trials: Any = [SimpleNamespace(step=1.0, effect=effect_named("ageing"))] * 4
     where = [("a", 0, (0,)), ("a", 1, (0, 1)), ("b", 2, (0,)), ("b", 3, (1,))]
     candidates = [Candidate(k, name, blocks, True) for name, k, blocks in where]
     level = SimpleNamespace(threshold=lambda name, alpha: {"a": 5.0, "b": 6.0}[name])
@@ -98,6 +98,16 @@ def test_an_effect_that_grows_with_the_square_of_its_amplitude_is_not_promised_b
     assert power.smallest_seen([(0.1, 7, 0.5)]) == (7, 0.5)
     assert power.smallest_seen([(0.1, 0, None), (0.3, 1, 0.2)]) == (1, 0.3)  # nothing is known in between
     assert power.smallest_seen([(0.1, 0, 0.9), (0.3, 1, None)]) == (1, None)
+
+
+def test_no_amplitude_is_promised_that_the_effect_cannot_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A share of superposition of three does not exist, an ageing of three does; both would be seen."""
+    monkeypatch.setattr(power, "amplitude_80", lambda null, trial, k, threshold: 3.0)
+    trials: Any = [SimpleNamespace(step=0.9, effect=effect_named(name)) for name in ("superposition", "ageing")]
+    candidates = [Candidate(k, trial.effect.name, (0,), True) for k, trial in enumerate(trials)]
+    level: Any = SimpleNamespace(threshold=lambda name, alpha: 5.0)
+    null: Any = SimpleNamespace(norm=np.ones((3, 2)))
+    assert power.detectable(null, trials, candidates, level) == {"superposition": (0, None), "ageing": (1, 3.0)}
 
 
 def test_what_does_not_show_is_not_detectable() -> None:
@@ -189,14 +199,14 @@ def test_pieces_are_those_of_the_first_simulations() -> None:
 
     def made(n: int) -> Scan:
         shared, rss, along, square = rng.normal(size=(2, n)), rng.normal(size=(2, n)), *rng.normal(size=(2, 2, n, 3))
-        pieces = Pieces(shared, rss, along, square, 5, rng.normal(size=n), np.zeros(3, bool))
+        pieces = Pieces(shared, rss, along, square, square > 0.0, 5, rng.normal(size=n), np.zeros(3, bool))
         ones = np.ones((n, 3))
         return Scan(rng.normal(size=(n, 3)), rng.normal(size=n), rng.normal(size=n), ones, ones, pieces)
 
     parts = [made(n) for n in (200, 150, 150)]
     first = joined(parts[:2])
     both = joined([first, parts[2]])
-    for name, axis in (("shared", 1), ("rss", 1), ("along", 1), ("square", 1), ("least", 0)):
+    for name, axis in (("shared", 1), ("rss", 1), ("along", 1), ("square", 1), ("is_left", 1), ("least", 0)):
         whole = np.concatenate([getattr(p.pieces, name) for p in parts], axis=axis)
         expected = whole[:, :300] if axis else whole[:300]
         np.testing.assert_array_equal(getattr(first.pieces, name), expected)

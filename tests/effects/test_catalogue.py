@@ -1,5 +1,6 @@
 """Every effect: neutral to the last bit, its formula re-derived in a few lines, differentiable; and a user's own."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -296,6 +297,17 @@ def test_every_effect_says_what_it_is():
         assert kind.amplitudes
         for amplitude in kind.amplitudes:
             assert np.isfinite(amplitude.prior.logpdf(amplitude.prior.median()))
+
+
+def test_under_weights_no_effect_speaks_of_the_instruments_of_a_test_by_steps():
+    hung = replace(bench(), control="force")
+    shown = [kind for kind in CATALOGUE.values() if kind.variants([hung])]
+    assert {"sensor_drift", "lost_motion"} <= {kind.name for kind in shown}
+    for kind in shown:
+        said = kind.sentence_under("force")
+        assert said.endswith(".")
+        assert not re.search("force sensor|screw|relaxes|at a displacement|each move|the move", said), kind.name
+        assert kind.sentence_under("displacement") == kind.sentence
 
 
 def test_unknown_names_are_refused_with_what_there_is():

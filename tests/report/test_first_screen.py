@@ -125,7 +125,7 @@ def test_a_batch_does_not_say_of_undecided_effects_that_each_is_missing() -> Non
     assert headline.batch_in_sentences({"experiments": rows, "outliers": []})[1:] == [  # type: ignore[arg-type]
         "Toe is missing in one test (c).",
         "Power strain or toe is missing in 2 tests (a and b); these readings do not tell which.",
-        "Something that no effect in the catalogue explains is missing in one test (c).",
+        "Something that has no established name is missing in one test (c).",
     ]
 
 

@@ -361,7 +361,7 @@ def test_a_page_says_of_a_name_that_it_is_the_nearest_of_the_catalogue(changes, 
         ({"verdict": "unknown", "effects": [], "set": ["unknown"]}, "that no effect in the catalogue explains"),
         (
             {"verdict": "unknown", "effects": [], "probabilities": {"unknown": 0.2, "strain_stiffening": 0.8}},
-            "explains; its largest part may be strain stiffening (80 %), and nothing is established",
+            "something is missing that has no established name; its largest part may be strain stiffening (80 %)",
         ),
         (
             {"verdict": "unknown", "effects": [], "probabilities": {}, "warnings": FEW},

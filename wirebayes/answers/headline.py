@@ -6,7 +6,7 @@ import numpy as np
 
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
 from wirebayes.answers.terminal import MOST_OUTLIERS, missing_in
-from wirebayes.answers.verdict import verdict_in_words, what_it_is
+from wirebayes.answers.verdict import control_judged, verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.calibrate import CalibrateJson
 from wirebayes.json_files.check import CheckedExperiment
@@ -142,13 +142,13 @@ def _missing(report: ExperimentFindings, effects: Sequence[str]) -> str:
         return f"{verdict_in_words(report)}: the plain model and its noise explain them"
     if verdict == "unknown":
         candidates = likely(report)
-        largest = f"; its largest part may be {candidates}, and nothing is established" if candidates else ""
+        largest = f"; its largest part may be {candidates}" if candidates else ""
         return f"{verdict_in_words(report)}{largest}"
     if verdict == "ambiguous":
         return undecided(report)
     if len(effects) > 1:
         return f"{listed(effects)} are missing"
-    known = what_it_is(report["effects"][0]) if effects else ""
+    known = what_it_is(report["effects"][0], control_judged(report)) if effects else ""
     meaning = f" ({known})" if known else ""
     return f"{listed(effects)} is missing{meaning}"
 

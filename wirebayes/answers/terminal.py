@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from wirebayes.answers.creep import creep_as_long_as_held, lengths_in_words
-from wirebayes.answers.verdict import verdict_in_words, what_it_is
+from wirebayes.answers.verdict import control_judged, verdict_in_words, what_it_is
 from wirebayes.json_files.batch import BatchJson, Row
 from wirebayes.json_files.check import CheckedExperiment, EffectSize, HoldUnderstood, ParameterRange
 from wirebayes.json_files.comparison import ComparedModel, ComparedModels
@@ -27,6 +27,7 @@ from wirebayes.sentences import (
     undecided,
     unit_text,
 )
+from wirebayes.wire.protocol import Control
 
 
 def of_fit(summary: SummaryJson) -> list[str]:
@@ -70,10 +71,10 @@ def of_findings(name: str, report: ExperimentFindings) -> list[str]:
     lines = [f"{name}: {missing} ({sure})"]
     candidates = likely(report)
     if verdict == "unknown" and candidates:
-        lines.append(f"  its largest part may be {candidates}; nothing is established")
+        lines.append(f"  its largest part may be {candidates}")
     sentences = list(said_beside(report))
     for effect, size in report["amplitudes"].items():
-        sentences.append(_effect_size(effect, size))
+        sentences.append(_effect_size(effect, size, control_judged(report)))
     sentences += in_other_tests(report)
     lines += [f"  {sentence}" for sentence in sentences]
     if verdict in ("named", "ambiguous"):
@@ -98,11 +99,11 @@ def _verdict(report: ExperimentFindings) -> str:
     return f"{named}, and something that is not in the catalogue" if report["verdict"] == "partial" else named
 
 
-def _effect_size(effect: str, size: AmplitudeEstimate) -> str:
+def _effect_size(effect: str, size: AmplitudeEstimate, control: Control) -> str:
     """How large an effect is, and what it is."""
     hold = "" if size["hold"] is None else f" at hold {size['hold']}"
     middle, low, high = (short(size[name], 3) for name in ("mean", "q05", "q95"))
-    return f"{spoken(effect)}{hold} {middle} [{low}, {high}]{_unit_and_meaning(effect, size['unit'])}"
+    return f"{spoken(effect)}{hold} {middle} [{low}, {high}]{_unit_and_meaning(effect, size['unit'], control)}"
 
 
 def _gain(report: ExperimentFindings) -> str:
@@ -117,9 +118,9 @@ def _gain(report: ExperimentFindings) -> str:
     return f"error on holds kept out of the fit: {change} rms{worse}"
 
 
-def _unit_and_meaning(effect: str, unit: str) -> str:
+def _unit_and_meaning(effect: str, unit: str, control: Control) -> str:
     """What stands behind the size of an effect."""
-    known = what_it_is(effect)
+    known = what_it_is(effect, control)
     size = "" if unit == "-" else f" {unit}"
     return f"{size}: {known}" if known else size
 
@@ -168,7 +169,7 @@ def missing_in(rows: Sequence[Row]) -> list[str]:
     nameless = [row["name"] for row in rows if row["verdict"] in ("unknown", "partial")]
     if nameless:
         where = _tests(nameless)
-        out.append(f"Something that no effect in the catalogue explains is missing in {where}.")
+        out.append(f"Something that has no established name is missing in {where}.")
     return out
 
 

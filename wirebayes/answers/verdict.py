@@ -2,11 +2,16 @@
 
 from wirebayes.effects import CATALOGUE
 from wirebayes.json_files.discovery import ExperimentFindings
+from wirebayes.json_files.read_units import unit_read
+from wirebayes.sentences import likely
+from wirebayes.wire.protocol import Control
 
 _NAMED = {
     "nothing-missing": "nothing is missing that these readings can show",
     "unknown": "something is missing that no effect in the catalogue explains",
 }
+# of names that are likely, none of which is established
+UNSURE = "something is missing that has no established name"
 # with fewer than three holds, where no effect of the catalogue can be established or ruled out
 _FEW_HOLDS = {"nothing-missing": "nothing stands out", "unknown": "something is missing; so few holds do not say what"}
 
@@ -14,14 +19,21 @@ _FEW_HOLDS = {"nothing-missing": "nothing stands out", "unknown": "something is 
 def verdict_in_words(report: ExperimentFindings) -> str | None:
     """Of a verdict without names; None for the others."""
     few = any(warning["kind"] == "few-holds" for warning in report.get("warnings", []))
+    if report["verdict"] == "unknown" and not few and likely(report):
+        return UNSURE
     words = _FEW_HOLDS if few else _NAMED
     return words.get(report["verdict"])
 
 
-def what_it_is(effect: str) -> str:
+def control_judged(report: ExperimentFindings) -> Control:
+    """What was set in an experiment that was searched: what is read in mm is read under weights."""
+    return "force" if unit_read(report["held_out"]["plain"]) == "mm" else "displacement"
+
+
+def what_it_is(effect: str, control: Control = "displacement") -> str:
     """An effect of the catalogue as the part of a sentence; empty for a user's own."""
     kind = CATALOGUE.get(effect.partition("@")[0])
     if kind is None:
         return ""
-    first = kind.sentence.split(". ")[0].rstrip(".")
+    first = kind.sentence_under(control).split(". ")[0].rstrip(".")
     return first[:1].lower() + first[1:]

@@ -50,6 +50,8 @@ def _described(effect: "EffectDescription") -> list[str]:
         f"  belongs to {effect.scope}",
         f"  shows as   {effect.shows}",
     ]
+    if effect.meaning_of_weights != effect.meaning:
+        lines.append(f"  weights    {effect.meaning_of_weights}")
     for a in effect.amplitudes:
         neutral = "" if a.is_shape else f", neutral value {a.neutral:g}"
         lines.append(f"  parameter  {effect.name}.{a.name} in {'1' if a.unit == '-' else a.unit}{neutral}")

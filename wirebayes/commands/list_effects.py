@@ -29,6 +29,8 @@ class EffectDescription:
         What it belongs to, so what else shares its amplitude.
     shows : str
         What it looks like in the readings.
+    meaning_of_weights : str
+        What it says of the wire or the bench where weights are set and displacements are read.
 
     Examples
     --------
@@ -43,6 +45,7 @@ class EffectDescription:
     unit: str
     scope: str
     shows: str
+    meaning_of_weights: str
 
 
 def list_effects(own_effects: PathLike | None = None) -> list[EffectDescription]:
@@ -76,4 +79,5 @@ def list_effects(own_effects: PathLike | None = None) -> list[EffectDescription]
 def _described(kind: type[Effect]) -> EffectDescription:
     formula = inspect.cleandoc(kind.__doc__ or "").split("\n\n")[0]
     unit = kind.amplitudes[0].unit
-    return EffectDescription(kind.name, formula, kind.sentence, kind.amplitudes, unit, kind.scope, kind.shows)
+    weights = kind.sentence_under("force")
+    return EffectDescription(kind.name, formula, kind.sentence, kind.amplitudes, unit, kind.scope, kind.shows, weights)

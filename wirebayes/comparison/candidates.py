@@ -131,7 +131,8 @@ def _with_effects(experiment: Experiment, base: ModelToCompare, known: Kinds) ->
         if kind.needs_saturation and base.spec.history == "additive":
             continue
         keys = [name] if issubclass(kind, EventEffect) else [each.key for each in kind.variants([protocol])]
-        out += [_beside(base, key, EFFECT, kind.sentence, effects=(key,)) for key in keys]
+        sentence = kind.sentence_under(experiment.control)
+        out += [_beside(base, key, EFFECT, sentence, effects=(key,)) for key in keys]
     return out
 
 

@@ -60,7 +60,7 @@ def amplitude_80(null: Scan, probe: Probe, i: int, threshold: float) -> float | 
 def detectable(
     null: Scan, trials: Sequence[Probe], candidates: Sequence[Candidate], level: GlobalTest, block: int = 0
 ) -> dict[str, tuple[int, float | None]]:
-    """For each effect that a block can show, a probe and the amplitude that is detected in 80 % of tests.
+    """For each effect that a block can show, a probe and the amplitude that is detected in 80 % of tests, if any is.
 
     The parameters bend themselves to some effects as long as these are small. A signature holds about the amplitude at
     which it was taken, so the probes of an effect are followed from the smallest amplitude up.
@@ -83,8 +83,16 @@ def detectable(
         for step, k in sorted(ladder.items()):
             seen = amplitude_80(null, trials[k], k, threshold)
             rungs.append((step, k, seen))
-        found[name] = smallest_seen(rungs)
+        k, seen = smallest_seen(rungs)
+        found[name] = k, _possible(trials[k].effect.amplitudes[0], seen)
     return found
+
+
+def _possible(main: Amplitude, seen: float | None) -> float | None:
+    """A distance from neutral where an amplitude can be so far from it, else None: a share is never more than one."""
+    low, high = main.prior.support()
+    farthest = max(high - main.neutral, main.neutral - low)
+    return seen if seen is not None and seen <= farthest else None
 
 
 def _strongest(null: Scan, trials: Sequence[Probe], candidates: Sequence[Candidate]) -> dict[str, dict[float, int]]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.numeric.log_sum import log_sum
-from wirebayes.numeric.typing import Array
+from wirebayes.numeric.typing import Array, Bools
 
 _PIECES_OF = 300  # simulations whose pieces are kept, for they are large: enough for what 80 % of them show
 
@@ -49,6 +49,9 @@ class Pieces:
     shared, rss : (k, n)
     along, square : (k, n, m)
         Inner product of projected signature and residual, and the signature with itself.
+    is_left : (k, n, m) bool
+        False where the parameters take all but nothing of a signature: then none of it is found, but what is left of a
+        large effect is still in the readings.
     degrees : int
     least : (n,)
     one_sided : (m,) bool
@@ -58,6 +61,7 @@ class Pieces:
     rss: Array
     along: Array
     square: Array
+    is_left: Bools
     degrees: int
     least: Array
     one_sided: Array
@@ -65,18 +69,17 @@ class Pieces:
     def of(self, probe: int) -> "Pieces":
         """One probe's pieces."""
         one = slice(probe, probe + 1)
-        return replace(self, along=self.along[..., one], square=self.square[..., one], one_sided=self.one_sided[one])
+        along, square, is_left = (values[..., one] for values in (self.along, self.square, self.is_left))
+        return replace(self, along=along, square=square, is_left=is_left, one_sided=self.one_sided[one])
 
     def log_bayes(self, added: float) -> Array:
         """(n,) of the only probe, had its amplitude `added` been in the data besides."""
-        finite = np.isfinite(self.square[..., 0])
-        square = np.where(finite, self.square[..., 0], 0.0)
-        along = self.along[..., 0]
+        along, square, is_left = self.along[..., 0], self.square[..., 0], self.is_left[..., 0]
         rss = self.rss + 2.0 * added * along + added**2 * square
         along = along + added * square
         if self.one_sided[0]:
             along = np.maximum(along, 0.0)
-        explained = along**2 / np.where(square > 0, square, np.inf)
+        explained = np.where(is_left, along**2, 0.0) / np.where(is_left, square, 1.0)
         with_it = self._log_evidence(rss - explained)
         without = self._log_evidence(rss)
         return log_sum(with_it, axis=0) - log_sum(without, axis=0)
@@ -116,5 +119,6 @@ def _first_pieces(parts: Sequence[Pieces]) -> Pieces:
         rss=first([p.rss for p in few]),
         along=first([p.along for p in few]),
         square=first([p.square for p in few]),
+        is_left=first([p.is_left for p in few]),
         least=np.concatenate([p.least for p in few])[:_PIECES_OF],
     )

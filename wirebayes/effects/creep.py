@@ -154,6 +154,7 @@ class Ageing(Effect):
     # the tenth hold creeps a third as much as the first, or three times as much
     amplitudes = (Amplitude("a", "-", 0.0, Normal(0.0, 0.5)),)
     sentence = "Each hold relaxes less than the one before, whatever its tension."
+    sentence_of_weights = "Each hold creeps less than the one before, whatever its weight."
     shows = "relaxation amplitude by order, not displacement"
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:

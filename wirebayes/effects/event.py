@@ -35,6 +35,7 @@ class UnrecordedHold(EventEffect):
     # some holds long: from a pause between two holds to a break at noon in a test of minutes
     amplitudes = (Amplitude("T", "s", 0.0, HalfNormal(2.5)),)
     sentence = "Time passed at a displacement before its first reading."
+    sentence_of_weights = "Time passed under a weight before its first reading."
     shows = "step in level; names the hold"
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:

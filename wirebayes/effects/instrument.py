@@ -41,6 +41,7 @@ class LateClock(Effect):
     # the seconds between the end of a move and the start of a clock by hand, in holds of minutes
     amplitudes = (Amplitude("t_d", "s", 0.0, HalfNormal(0.05)),)
     sentence = "The clock of each hold was started some time after the move."
+    sentence_of_weights = "The clock of each hold was started some time after the change of weight."
     shows = "first readings of all holds low"
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
@@ -58,6 +59,7 @@ class SensorDrift(Effect):
     # a tenth of the typical tension a hold: a sensor that drifts faster is seen before the test
     amplitudes = (Amplitude("a", "N/s", 0.0, Normal(0.0, 0.1)),)
     sentence = "The force sensor drifts with time."
+    sentence_of_weights = "The gauge drifts with time."
     shows = "grows with elapsed time, also within holds"
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
@@ -75,6 +77,7 @@ class SensorNonlinearity(Effect):
     # at the typical tension the reading is wrong by a few per cent: a sensor half wrong is no sensor
     amplitudes = (Amplitude("a", "1/N", 0.0, Normal(0.0, 0.08)),)
     sentence = "The force sensor is nonlinear at higher tension."
+    sentence_of_weights = "The gauge is nonlinear at larger displacements."
     shows = "like stiffening; distinguishable with several wires"
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
@@ -95,6 +98,7 @@ class ClampTransient(Effect):
         Amplitude("T", "s", 0.08, LogNormal(1.0, 0.08), is_shape=True),
     )
     sentence = "After each move the clamp or sensor settles, in proportion to the tension."
+    sentence_of_weights = "After each change of weight the gauge settles, in proportion to the displacement."
     shows = "decays inside the hold, scales with tension"
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
@@ -203,6 +207,7 @@ class LostMotion(_NeedsReversal):
     # play of a tenth of a step
     amplitudes = (Amplitude("w", "mm", 0.0, HalfNormal(0.1)),)
     sentence = "The screw has play: after a reversal the true position lags behind."
+    sentence_of_weights = "The gauge has play: after a reversal what it shows lags behind."
     shows = "unloading branch"
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:
@@ -220,6 +225,9 @@ class GuideFriction(_NeedsReversal):
     # a guide or a pulley takes a few per cent of the tension
     amplitudes = (Amplitude("mu", "-", 0.0, Normal(0.0, 0.05)),)
     sentence = "Friction in the guide raises the reading while loading and lowers it while unloading."
+    sentence_of_weights = (
+        "Friction in the guide bears a part of the weight while loading and adds to it while unloading."
+    )
     shows = "unloading branch"
 
     def apply(self, value: Array, own: Own, hold: HoldContext) -> Array:

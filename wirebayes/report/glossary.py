@@ -8,7 +8,7 @@ from wirebayes.effects.unknown import Discrepancy
 from wirebayes.report.blocks import Block, Definitions, Section, Text, unit_text
 from wirebayes.results.parameters import unit_of
 from wirebayes.sentences import spoken
-from wirebayes.wire.effect import Effect
+from wirebayes.wire.effect import Amplitude, Effect
 
 SYMBOLS = {
     "k1": "stiffness: the tension per unit of strain",
@@ -125,8 +125,16 @@ def _effect(kind: type[Effect]) -> str:
     formula = inspect.cleandoc(kind.__doc__ or "").split("\n\n")[0]
     formula = formula.replace("\n", " ").replace("->", "→").rstrip(".")
     text = f"{kind.sentence} {formula}."
-    sizes = ", ".join(f"{amplitude.name}{_unit(amplitude.unit)}" for amplitude in kind.amplitudes)
+    if kind.sentence_of_weights:
+        text += f" Under weights: {kind.sentence_of_weights}"
+    sizes = ", ".join(f"{amplitude.name}{_units(kind, amplitude)}" for amplitude in kind.amplitudes)
     return f"{text} Size: {sizes}." if sizes else text
+
+
+def _units(kind: type[Effect], amplitude: Amplitude) -> str:
+    """Its unit in brackets, and that under weights where it is another."""
+    unit, weighed = (kind.unit_under(amplitude, control) for control in ("displacement", "force"))
+    return _unit(unit) if unit == weighed else f" ({unit_text(unit)}; under weights {unit_text(weighed)})"
 
 
 def _unit(unit: str) -> str:

@@ -156,6 +156,7 @@ class Effect:
     scope: ClassVar[Scope]
     amplitudes: ClassVar[tuple[Amplitude, ...]]
     sentence: ClassVar[str]
+    sentence_of_weights: ClassVar[str] = ""  # where weights are set, if another: the gauge is read, not the sensor
     shows: ClassVar[str] = ""
     pattern: ClassVar[str] = ""  # what it has in common with others that look like it: a key of `families.PATTERNS`
     adds: ClassVar[bool] = False  # a sum to the reading, of each amplitude times a function of hold and time alone
@@ -244,6 +245,16 @@ class Effect:
     def referred(self, hold_s: float) -> "Effect":
         """The effect for a test whose holds typically last so long; itself unless its form refers to that."""
         return self
+
+    @classmethod
+    def sentence_under(cls, control: Control) -> str:
+        """What the effect says of the wire or the bench.
+
+        Parameters
+        ----------
+        control : {"displacement", "force"}
+        """
+        return (control == "force" and cls.sentence_of_weights) or cls.sentence
 
     @classmethod
     def unit_under(cls, amplitude: Amplitude, control: Control) -> str:

@@ -42,6 +42,7 @@ from wirebayes.results.parameters import unit_of
 from wirebayes.results.read_back import Stored, load_with_priors
 from wirebayes.sentences import counted, lasting, listed, middle_and_span
 from wirebayes.wire.effect import Effect
+from wirebayes.wire.protocol import Control
 
 _MOST_SENTENCES = 3  # at the head of a page; more hide its first picture
 _DRAWS = 1000  # for bands in pictures: a 5 % quantile is then one between 3.6 % and 6.4 %
@@ -294,7 +295,7 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], sample: Sampl
         interval = middle_and_span(middle, low, high)
         unit = unit_or_dash(unit_of(name, effects, (control,)))
         share = percent(shrunk.get(name))
-        lines.append([name, unit, *interval, share, _means(name, effects)])
+        lines.append([name, unit, *interval, share, _means(name, effects, control)])
     caption = (
         "The interval contains the parameter with a probability of 90 %, if the model is right. "
         "Contraction is the share of the prior's variance that the readings took away, of the logarithm where a "
@@ -304,11 +305,11 @@ def _parameters(draws: dict[str, Array], shrunk: dict[str, float], sample: Sampl
     return Table(header, lines, caption)
 
 
-def _means(name: str, effects: tuple[Effect, ...]) -> str:
+def _means(name: str, effects: tuple[Effect, ...], control: Control) -> str:
     """A parameter's meaning in a line."""
     for effect in reversed(effects):
         if name in effect.columns():
-            return SYMBOLS.get(name) or effect.sentence.rstrip(".")
+            return SYMBOLS.get(name) or effect.sentence_under(control).rstrip(".")
     return SYMBOLS.get(name, NONE)
 
 
