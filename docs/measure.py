@@ -37,6 +37,10 @@ STUDIES = {
         "-m analyses.discovery.clean_any_scale --rows {folder} --output {folder}/clean.json",
         "clean.json",
     ),
+    "hidden_any_scale": (
+        "-m analyses.discovery.hidden_any_scale --tests 29 --rows {folder} --output {folder}/hidden.json",
+        "hidden.json",
+    ),
     "calibration": ("-m analyses.calibration --output {folder}", "calibration.json"),
     # ../before is a checkout of the commit before priors were free of scale
     "wires_before": (
@@ -146,6 +150,7 @@ def texts() -> dict[Path, str]:
         DOCS / "real-files.inc": intervals.public_recordings(kept["real_files"]),
         DOCS / "weights.inc": intervals.steps_and_weights(kept["weights"]),
         DOCS / "clean-any-scale.inc": discovery.false_alarms_at_any_scale(kept["clean_any_scale"]),
+        DOCS / "hidden-any-scale.inc": discovery.hidden_effects_at_any_scale(kept["hidden_any_scale"]),
         DOCS / "calibration.inc": intervals.ranks(kept["calibration"]),
         DOCS / "wires-before.inc": intervals.wires_before(kept["wires_before"]),
         DOCS / "coverage.inc": intervals.intervals_and_bands(kept["coverage"]),

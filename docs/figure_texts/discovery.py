@@ -38,6 +38,39 @@ def false_alarms_at_any_scale(kept: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def hidden_effects_at_any_scale(kept: dict[str, Any]) -> str:
+    """A paragraph and a table on hidden effects in tests of any scale."""
+    found = kept["result"]
+    kinds = {"all": "all tests", "steps": "steps", "weights": "weights", "rests": "with recorded rests"}
+    kinds |= {kind: kind for kind in ("few readings", "many readings")}
+    rows = {words: found["kinds"][kind] for kind, words in kinds.items()}
+    rows |= {f"δ = {delta}": rates for delta, rates in found["by_delta"].items()}
+    missed = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in found["missed"].items())
+    wrong = "; ".join(f"{_spoken(names)} for {effect.replace('_', ' ')}" for effect, names in found["misnamed"])
+    said = f"{run_of(kept)}. Not detected: {missed or 'none'}. Named wrongly: {wrong or 'none'}."
+    lines = [fill(said, 110), ""]
+    lines += table_head(
+        "tests",
+        "number",
+        "detected, % [90 % interval]",
+        "of these: the most probable answer is right, %",
+        "of these: a right name is given, %",
+        "a wrong name is given, %",
+    )
+    for words, rates in rows.items():
+        cells = [_share(rates[of]) for of in ("detected", "best", "named", "wrong")]
+        lines += table_row(words, rates["tests"], *cells)
+    return "\n".join(lines) + "\n"
+
+
+def _share(rate: dict[str, float] | None) -> str:
+    """A share with its interval, %; a dash where there are no cases."""
+    if rate is None:
+        return "–"
+    value, low, high = (100 * rate[key] for key in ("value", "low", "high"))
+    return f"{value:.0f} [{low:.0f}, {high:.0f}]"
+
+
 def _rate(rate: dict[str, float]) -> list[str]:
     """A share with its interval, and its upper bound, %."""
     value, low, high, upper = (100 * rate[key] for key in ("value", "low", "high", "upper_95"))

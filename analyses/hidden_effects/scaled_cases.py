@@ -1,0 +1,293 @@
+"""One test at any scale and what an effect does to it: sizes, and names that look alike.
+
+An effect's size is what is left of its signature, in standard deviations of the noise, once the plain model's
+parameters have taken theirs. Nothing of the package is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from .rig import Array
+from .scaled_law import Hidden, ScaledTest, readings
+
+SAME_GROUP = 0.95  # |cos| of two projected signatures, from which the names count as one
+PLAIN = ("k1", "B", "U", "k2", "N", "preload")
+_DIFFERENCE = 1e-4
+_FIRST, _STEPS = 0.02, 20  # share of the largest sensible amplitude that is tried first, and how many are tried
+_NEARLY = 0.15  # relative error of a size that is only compared by its direction
+
+
+@dataclass(frozen=True)
+class Kind:
+    """An effect that can be hidden.
+
+    Attributes
+    ----------
+    signs : tuple of int
+    largest : float
+        Largest sensible amplitude, in typical moves, typical readings or holds.
+    unit : str
+        Which of these it is in; empty for a share or a power.
+    """
+
+    signs: tuple[int, ...]
+    largest: float
+    unit: str = ""
+
+
+_BOTH, _UP = (1, -1), (1,)
+KINDS = {
+    "strain_stiffening": Kind(_BOTH, 0.45, "1/strain"),
+    "toe": Kind(_UP, 4.0, "move"),
+    "power_strain": Kind(_BOTH, 0.7),
+    "permanent_creep": Kind(_UP, 1.0),
+    "superposition": Kind(_UP, 1.0),
+    "prior_creep": Kind(_UP, 40.0, "hold"),
+    "second_relaxation": Kind(_UP, 1.0, "move/tension"),
+    "steady_creep": Kind(_UP, 1.0, "move/tension/hold"),
+    "tension_dependent_rate": Kind(_BOTH, 1.5),
+    "ageing": Kind(_BOTH, 1.2),
+    "creep_threshold": Kind(_UP, 1.2, "tension"),
+    "reading_delay": Kind(_UP, 0.9, "gap"),
+    "late_clock": Kind(_UP, 0.15, "hold"),
+    "screw_error": Kind(_UP, 0.2, "move"),
+    "grip_slip": Kind(_BOTH, 1.0, "move"),
+    "unrecorded_hold": Kind(_UP, 8.0, "hold"),
+    "sensor_drift": Kind(_BOTH, 0.3, "reading/hold"),
+    "sensor_nonlinearity": Kind(_BOTH, 0.25, "1/reading"),
+    "thermal_expansion": Kind(_BOTH, 4e-4),
+    "lost_motion": Kind(_UP, 0.4, "move"),
+    "guide_friction": Kind(_BOTH, 0.2),
+    "clamp_transient": Kind(_BOTH, 0.2),
+}
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """A share of the largest amplitude that is tried, between one too small and one too large.
+
+    Attributes
+    ----------
+    share, low, high : float
+    power : float
+        How the size of the effect grows with the amplitude, from the last two tries.
+    before : (float, float)
+        The last share and its size.
+    """
+
+    share: float = _FIRST
+    low: float = 0.0
+    high: float = np.inf
+    power: float = 1.0
+    before: tuple[float, float] = (0.0, 0.0)
+
+    def next(self, size: float, delta: float) -> _Guess:
+        """What to try after a share that has this size."""
+        share, power, (last, last_size) = self.share, self.power, self.before
+        low, high = (share, self.high) if size < delta else (self.low, share)
+        if last and share != last and 0.0 < size < np.inf and 0.0 < last_size < np.inf:
+            power = float(np.clip(np.log(size / last_size) / np.log(share / last), 0.4, 4.0))
+        wanted = float(np.clip(delta / max(size, 1e-12), 1e-3, 1e3))
+        after = min(1.0, share * wanted ** (1.0 / power))
+        if not low < after < high:
+            after = float(np.sqrt(max(low, 1e-3 * high) * min(high, 1.0)))
+        return _Guess(after, low, high, power, (share, size))
+
+
+@dataclass(frozen=True)
+class ScaledCase:
+    """A test of a line, its truth and noise.
+
+    Attributes
+    ----------
+    test : ScaledTest
+    truth : dict
+        ``k1 B U k2 N preload``.
+    sensor_sd, setting_sd, resolution : float
+        In the units of what is read and of what is set.
+    about : dict
+        What kind of test it is.
+    """
+
+    test: ScaledTest
+    truth: dict[str, float]
+    sensor_sd: float
+    setting_sd: float
+    resolution: float
+    about: dict[str, Any]
+
+    def noise_free(self, hidden: Hidden = Hidden()) -> Array:  # noqa: B008 - it is frozen
+        """Readings without noise."""
+        return readings(self.test, self.truth, hidden, np.zeros(len(self.test.settings)))
+
+    @cached_property
+    def plain(self) -> Array:
+        """The same without an effect."""
+        return self.noise_free()
+
+    def measured(self, hidden: Hidden, rng: np.random.Generator) -> Array:
+        """Readings with noise."""
+        errors = self.setting_sd * rng.standard_normal(len(self.test.settings))
+        y = readings(self.test, self.truth, hidden, errors)
+        y = y + self.sensor_sd * rng.standard_normal(len(y))
+        return np.round(y / self.resolution) * self.resolution if self.resolution else y
+
+    @cached_property
+    def _metric(self) -> tuple[Array, Array]:
+        """Cholesky factor of the covariance, and a basis of what parameters can absorb, whitened."""
+        by_error = np.stack([self._by_error(j) for j in range(len(self.test.settings))], axis=1)
+        variance = self.sensor_sd**2 + self.resolution**2 / 12.0
+        v = variance * np.eye(len(by_error)) + self.setting_sd**2 * by_error @ by_error.T
+        factor = np.linalg.cholesky(v)
+        columns = solve_triangular(factor, np.stack([self._by(name) for name in PLAIN], axis=1), lower=True)
+        left, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
+        return np.asarray(factor, np.float64), np.asarray(left[:, sizes > 1e-7 * sizes[0]], np.float64)
+
+    def _by_error(self, j: int) -> Array:
+        step = _DIFFERENCE * float(np.abs(self.test.settings).mean())
+        up = step * np.eye(len(self.test.settings))[j]
+        above, below = (readings(self.test, self.truth, Hidden(), errors) for errors in (up, -up))
+        return np.asarray((above - below) / (2.0 * step))
+
+    def _by(self, name: str) -> Array:
+        step = _DIFFERENCE * (self.about["stretch_mm"] if name == "preload" else self.truth[name])
+        up, down = (replace(self, truth=self.truth | {name: self.truth[name] + d}) for d in (step, -step))
+        return (up.plain - down.plain) / (2.0 * step)
+
+    def whitened(self, dy: Array) -> Array:
+        """Readings in standard deviations of the noise, which are independent."""
+        return np.asarray(solve_triangular(self._metric[0], dy, lower=True, check_finite=False))
+
+    def projected(self, dy: Array) -> Array:
+        """The same less what the plain parameters can absorb."""
+        z, basis = self.whitened(dy), self._metric[1]
+        return np.asarray(z - basis @ (basis.T @ z))
+
+    def signature(self, hidden: Hidden) -> Array:
+        """What an effect does to the readings, projected."""
+        return self.projected(self.noise_free(hidden) - self.plain)
+
+    def delta(self, hidden: Hidden) -> float:
+        """Size of an effect; infinite where the wire cannot carry its weights with it."""
+        size = float(np.linalg.norm(self.signature(hidden)))
+        return size if np.isfinite(size) else np.inf
+
+    def largest(self, name: str) -> float:
+        """Largest sensible amplitude of an effect."""
+        test, kind = self.test, KINDS[name]
+        moves = np.abs(np.diff(test.settings, prepend=0.0))
+        hold_s = float(np.median(test.durations_s))
+        move = float(np.median(moves[moves > 0]))
+        if test.weights:
+            move *= test.length_mm / self.truth["k1"]
+        tension = test.tension_ref_N
+        units = {
+            "": 1.0,
+            "1/strain": self.truth["k1"] / tension,
+            "move": move,
+            "hold": hold_s,
+            "move/tension": move / tension,
+            "move/tension/hold": move / tension / hold_s,
+            "tension": tension,
+            "gap": min(float(t[1] - t[0]) for t in test.times_s),
+            "reading/hold": float(np.median(np.abs(self.plain))) / hold_s,
+            "1/reading": 1.0 / float(np.abs(self.plain).max()),
+        }
+        return kind.largest * units[kind.unit]
+
+    def of_delta(self, hidden: Hidden, delta: float, agrees: float = 0.02) -> Hidden | None:
+        """The effect with an amplitude of that size; none where no sensible one has it.
+
+        Parameters
+        ----------
+        hidden : Hidden
+            Of its amplitude only the sign counts.
+        delta : float
+        agrees : float
+            Relative error of the size.
+        """
+        most, sign = self.largest(hidden.name), float(np.sign(hidden.amplitude))
+        guess = _Guess()
+        for _ in range(_STEPS):
+            found = replace(hidden, amplitude=sign * guess.share * most)
+            size = self.delta(found)
+            if abs(size / delta - 1.0) < agrees:
+                return found
+            if size < delta and guess.share >= 1.0:
+                return None
+            guess = guess.next(size, delta)
+        return None
+
+    def shown(self) -> list[str]:
+        """Effects that such a test could show."""
+        back = bool(np.any(np.diff(self.test.settings) < 0))
+        out = []
+        for name in KINDS:
+            if name in ("lost_motion", "guide_friction") and not back:
+                continue
+            if name in ("screw_error", "prior_creep") and self.test.weights:
+                continue
+            if name == "screw_error" and (len(self.test.settings) < 7 or back):
+                continue
+            if name == "thermal_expansion" and self.test.warming_K is None:
+                continue
+            out.append(name)
+        return out
+
+    def forms(self, name: str, rng: np.random.Generator | None = None) -> Iterator[Hidden]:
+        """An effect with each sign and several values of its constants, or one drawn at random; without its size."""
+        axes = self._axes(name, rng)
+        signs = KINDS[name].signs if rng is None else (int(rng.choice(KINDS[name].signs)),)
+        for sign, *values in product(signs, *axes.values()):
+            yield Hidden(name, float(sign), dict(zip(axes, values, strict=True)))
+
+    def _axes(self, name: str, rng: np.random.Generator | None) -> dict[str, list[float]]:
+        test, hold_s = self.test, float(np.median(self.test.durations_s))
+        if name in ("grip_slip", "unrecorded_hold"):
+            return {"hold": _chosen(np.arange(2.0, len(test.settings) - 1), rng)}
+        if name == "second_relaxation":
+            return {"time_s": _between(0.06 * hold_s, 1.5 * hold_s, rng)}
+        if name == "clamp_transient":
+            return {"time_s": _between(0.02 * hold_s, 0.4 * hold_s, rng)}
+        if name == "steady_creep":
+            return {"carried": _chosen(np.array([0.0, 1.0]), rng)}
+        if name == "screw_error":
+            step = float(np.median(np.diff(test.settings)))
+            longest = 0.5 * float(test.settings.max())
+            return {
+                "period": _between(2.0 * step, longest, rng, 8),
+                "phase": _chosen(np.arange(0.3, 6.2, 1.0), rng),
+            }
+        return {}
+
+
+def _chosen(values: Array, rng: np.random.Generator | None) -> list[float]:
+    return [float(v) for v in values] if rng is None else [float(rng.choice(values))]
+
+
+def _between(low: float, high: float, rng: np.random.Generator | None, count: int = 4) -> list[float]:
+    shares = (np.arange(count) + 0.5) / count if rng is None else rng.uniform(size=1)
+    return [float(low * (high / low) ** share) for share in shares]
+
+
+def group(case: ScaledCase, hidden: Hidden, delta: float) -> dict[str, float]:
+    """Names that look like the effect in this test, each with the largest |cos| to it."""
+    own = case.signature(hidden)
+    alike = {hidden.name: 1.0}
+    for name in case.shown():
+        if name == hidden.name:
+            continue
+        forms = [case.of_delta(form, delta, _NEARLY) for form in case.forms(name)]
+        signatures = [case.signature(form) for form in forms if form is not None]
+        cosines = [abs(float(own @ s)) / float(np.linalg.norm(own) * np.linalg.norm(s)) for s in signatures]
+        if cosines and max(cosines) > SAME_GROUP:
+            alike[name] = max(cosines)
+    return alike
