@@ -22,7 +22,7 @@ def creep_as_long_as_held(summary: SummaryJson) -> tuple[str, Statistics | None]
 
 
 def lengths_in_words(summary: SummaryJson) -> tuple[str, str]:
-    """Of which length of wire the creep is, and of which B; empty where both are of the one sample's."""
+    """The lengths of wire that the creep and B are for, in words; empty where both are of the one sample's."""
     of_creep = summary["derived"].get("length_mm")
     of_amount = summary.get("B_length_mm")
     if of_creep is None or of_amount is None or isclose(of_creep, of_amount):

@@ -12,7 +12,7 @@ from wirebayes.sentences import coordinates, lasting, short, specimens_are
 
 
 def of_pose(found: PoseJson | PoseHistoryJson) -> list[str]:
-    """Of a robot: how it hangs, and how far its platform moves, for each spread of specimens."""
+    """Lines about a robot: how it hangs, and how far its platform moves, for each spread of specimens."""
     robot = found["robot"]
     if not found["feasible"]:
         return [f"{robot}: {found['sentence']}"]
@@ -48,7 +48,7 @@ def _turned(found: PoseJson) -> list[str]:
 
 
 def of_calibration(found: CalibrateJson) -> list[str]:
-    """Of a calibration: every wire's length."""
+    """Lines about a calibration: every wire's length."""
     known = found["with_creep_model"]
     if not known["converged"]:
         return [f"{found['robot']}: not converged, no lengths to use"]

@@ -17,7 +17,7 @@ _FEW_HOLDS = {"nothing-missing": "nothing stands out", "unknown": "something is 
 
 
 def verdict_in_words(report: ExperimentFindings) -> str | None:
-    """Of a verdict without names; None for the others."""
+    """The sentence for a verdict without names; None for the others."""
     few = any(warning["kind"] == "few-holds" for warning in report.get("warnings", []))
     if report["verdict"] == "unknown" and not few and likely(report):
         return UNSURE

@@ -119,7 +119,7 @@ def plan_content(rows: list[JudgedProtocol], request: PlanRequest, machine: Robo
 
 
 def _over_budget(best: JudgedProtocol, budget_min: float | None) -> list[Notice]:
-    """That no test is done within the time there is, if so."""
+    """A notice that no test is done within the time there is, if none is."""
     if best["within_budget"]:
         return []
     return [Notice("budget", f"no test is done within {budget_min:g} min")]

@@ -302,7 +302,7 @@ def _differences(model: ModelJson, reference: ModelJson) -> Differences:
 
 
 def _difference(one: _PerHold | None, other: _PerHold | None) -> Difference | None:
-    """By how much one is better than the other; None where either was not scored."""
+    """How much better one model is than the other; None where either was not scored."""
     if not one or not other:
         return None
     gained = np.asarray(one["per_hold"], float) - np.asarray(other["per_hold"], float)

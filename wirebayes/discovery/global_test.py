@@ -230,11 +230,14 @@ def with_more(
     each_block = [block for block in blocks for _ in sizes]
     each_size = sizes * len(blocks)
     generators = rng.spawn(len(each_block))
-    made = list(parallel_map(simulated_with_patterns, each_block, repeat(trials), each_size, generators))
-    of_block = range(0, len(made), len(sizes))
-    more = [screening.joined_replicates(made[first : first + len(sizes)]) for first in of_block]
-    pairs = zip(simulated, more, strict=True) if simulated else ((new,) for new in more)
-    return [screening.joined_replicates(parts) for parts in pairs]
+    pieces = list(parallel_map(simulated_with_patterns, each_block, repeat(trials), each_size, generators))
+    out = []
+    for i in range(len(blocks)):
+        own = pieces[i * len(sizes) : (i + 1) * len(sizes)]
+        more = screening.joined_replicates(own)
+        earlier = [simulated[i]] if simulated else []
+        out.append(screening.joined_replicates([*earlier, more]))
+    return out
 
 
 def _pieces(n: int) -> list[int]:
@@ -263,8 +266,10 @@ def _strike_gross_errors(
     own = [c.probe for c in candidates if i in c.blocks]
     struck: list[GrossError] = []
     share = gross_errors.MOST * gross_errors.readings_of(block.experiments)
-    while len(struck) < max(1, int(share)):
-        found = gross_errors.suspect(block, _best_rival(block, trials, own))
+    most = max(1, int(share))
+    while len(struck) < most:
+        rival = _best_rival(block, trials, own)
+        found = gross_errors.suspect(block, rival)
         if found is None:
             break
         name, hold, left, value = found

@@ -105,7 +105,7 @@ class ModelPosterior:
 def _most_probable(
     weighted: Sequence[tuple[float, EffectSet]], kind: Callable[[EffectSet], Any]
 ) -> list[tuple[float, EffectSet]]:
-    """Of sets with their weights, those of the kind that has the most weight."""
+    """The sets of the kind that has the most weight, with their weights."""
     weights: dict[Any, float] = {}
     for weight, effects in weighted:
         weights[kind(effects)] = weights.get(kind(effects), 0.0) + weight
@@ -254,7 +254,7 @@ class _Sums:
 
     @classmethod
     def over(cls, names: Iterable[str], families: Iterable[Family], blocks: int) -> "_Sums":
-        """Of nothing yet.
+        """Sums of nothing yet.
 
         Parameters
         ----------

@@ -85,9 +85,7 @@ def patterns(problem: Problem) -> tuple[list[Pattern], AddedColumns]:
     Along each covariate: smooth functions of it as an added tension, and the model's own parameters moving with it.
     """
     covariates = _covariates(problem)
-    moving = [name.split("[")[0] for name in problem.names]
-    moving = [name for name in moving if name not in NOISES]
-    parameters = {name: moving.index(name) for name in _PARAMETERS if name in moving}
+    parameters = _moving_parameters(problem)
     found = {name for name, _, _ in covariates}
     along = [name for name in (_set_in(problem), "elapsed time") if name in found]
     listed = []
@@ -99,6 +97,13 @@ def patterns(problem: Problem) -> tuple[list[Pattern], AddedColumns]:
     listed += [_of_hold(problem, problem.samples[at], j) for at, j in holds]
     columns = _Columns(covariates, along, list(parameters.values()), holds)
     return listed, columns
+
+
+def _moving_parameters(problem: Problem) -> dict[str, int]:
+    """The parameters that may move along a covariate, and the number of each among those that move the mean."""
+    kinds = [name.split("[")[0] for name in problem.names]
+    moving = [kind for kind in kinds if kind not in NOISES]
+    return {name: moving.index(name) for name in _PARAMETERS if name in moving}
 
 
 def _recorded_holds(problem: Problem) -> list[tuple[int, int]]:

@@ -307,7 +307,7 @@ class Scale:
 
     @staticmethod
     def of(chance: Array) -> "Scale":
-        """That of simulated values; where there are few, the fall is nearly one nat, as for many readings."""
+        """The scale of simulated values; where there are few, the fall is nearly one nat, as for many readings."""
         high = float(np.quantile(chance, 1.0 - UPPER))
         beyond = chance[chance > high] - high
         return Scale(high, float((beyond.sum() + ONE_NAT) / (len(beyond) + ONE_NAT)), chance)

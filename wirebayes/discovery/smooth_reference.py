@@ -82,17 +82,16 @@ def _functions(protocol: Protocol, covariance: _Covariance, most: int) -> Array:
     """
     every = _Readings.of(protocol)
     n = len(every.hold)
-    decomposed = evenly(n, min(n, _DECOMPOSED))
-    some = every.rows(decomposed)
+    some = every.rows(evenly(n, min(n, _DECOMPOSED)))
     values, vectors = np.linalg.eigh(covariance(some, some))
-    top = np.argsort(values)[::-1][:most]
-    size = np.sqrt(np.maximum(values[top], 0.0))
-    vectors = vectors[:, top]
+    largest = np.argsort(values)[::-1][:most]
+    size = np.sqrt(np.maximum(values[largest], 0.0))
+    vectors = vectors[:, largest]
     functions = vectors * size
     if n > _DECOMPOSED:
         scaled = vectors / np.maximum(size, _LEAST * size[0])
         functions = covariance(every, some) @ scaled
-    out = np.zeros((*protocol.mask.shape, len(top)))
+    out = np.zeros((*protocol.mask.shape, len(largest)))
     out[np.nonzero(protocol.mask)] = functions
     return out
 

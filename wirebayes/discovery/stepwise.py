@@ -122,27 +122,34 @@ def _keep(frontier: Frontier, key: Key, new: FittedSet, own_fit: float) -> None:
     `own_fit` is its log Bayes factor by its own fit.
     """
     known = frontier.known[key]
-    fitted_set = replace(new, effects=replace(known, remainder=new.effects.remainder))
-    frontier.fitted[key], frontier.known[key] = fitted_set, fitted_set.effects
-    assert new.effects.remainder is not None
-    frontier.credit[key] = known.log_bayes + float(np.maximum(new.effects.remainder, 0.0).sum())
+    remainder = new.effects.remainder
+    assert remainder is not None
+    fitted_set = replace(new, effects=replace(known, remainder=remainder))
+    frontier.fitted[key] = fitted_set
+    frontier.known[key] = fitted_set.effects
+    explained = float(np.maximum(remainder, 0.0).sum())
+    frontier.credit[key] = known.log_bayes + explained
     frontier.step_back(key)
     frontier.step_aside(key)
-    if new.further is not None and len(key) < MOST_EFFECTS:
-        for name in new.further.winners:
-            if new.further.log_bayes[name] > 0.0:
-                frontier.add(fitted_set.effects, name, new.further, own_fit=own_fit)
+    further = new.further
+    if further is None or len(key) >= MOST_EFFECTS:
+        return
+    for name in further.winners:
+        if further.log_bayes[name] > 0.0:
+            frontier.add(fitted_set.effects, name, further, own_fit=own_fit)
 
 
 def _left_over(frontier: Frontier) -> dict[Key, float]:
     """Log Bayes factor of a remainder that is not smooth beside each set that leaves something to further effects."""
     out = {}
+    log_weight = float(np.log(LEFT_OVER_WEIGHT / MORE))
     for key, fitted_set in frontier.fitted.items():
         further = fitted_set.further
-        if further is not None and further.winners:
-            explained = min(max(further.log_bayes[name] for name in further.winners), LEFT_OVER)
-            one_more = log_prior(len(key) + 1, frontier.names) - log_prior(len(key), frontier.names)
-            out[key] = float(np.log(LEFT_OVER_WEIGHT / MORE)) + one_more + explained
+        if further is None or not further.winners:
+            continue
+        best = max(further.log_bayes[name] for name in further.winners)
+        one_more = log_prior(len(key) + 1, frontier.names) - log_prior(len(key), frontier.names)
+        out[key] = log_weight + one_more + min(best, LEFT_OVER)
     return out
 
 

@@ -246,16 +246,17 @@ def curved(density: Density, found: Optimum, which: Ints | None = None) -> Optim
     which : (n,) int array, optional
         The row numbers of the places; their own where left out.
     """
-    which = np.arange(len(found.z)) if which is None else which
+    if which is None:
+        which = np.arange(len(found.z))
     rows = np.flatnonzero(np.isfinite(found.log_density))
     if not len(rows):
         return found
-    z, value, curvature = found.z[rows], found.log_density[rows], found.curvature.copy()
-    before = curvature[rows]
-    bend = np.einsum("nii->ni", before)
-    _, hessian = gradient_and_hessian(density, z, which[rows], value, steps_apart(bend), sides=2)
+    before = found.curvature[rows]
+    steps = steps_apart(np.einsum("nii->ni", before))
+    _, hessian = gradient_and_hessian(density, found.z[rows], which[rows], found.log_density[rows], steps, sides=2)
     exact = _composed(*_positive(-hessian))
     is_smooth = _log_volume(before) - _log_volume(exact) < _MOST_CURVED
+    curvature = found.curvature.copy()
     curvature[rows[is_smooth]] = exact[is_smooth]
     return replace(found, curvature=curvature)
 
@@ -309,17 +310,21 @@ def _by_residuals(residuals: Residuals, z: Array, rows: Ints, *_: Array) -> _Loc
     points = z[:, None] + _moves(d)
     flat, each = residuals(points.reshape(-1, d), np.repeat(rows, d + 1))
     values = flat.reshape(n, d + 1)
-    each = each.reshape(-1, n, d + 1)
     here = values[:, :1]
     with np.errstate(all="ignore"):
-        moved = each[..., 1:] - each[..., :1]
-        moved /= _NEAR
-        slopes = _finite(np.moveaxis(moved, 0, 1))
+        slopes = _slopes(each.reshape(-1, n, d + 1))
         curvature = np.swapaxes(slopes, 1, 2) @ slopes
         one_sided = (values[:, 1:] - here) / _NEAR
         bend = np.einsum("nii->ni", curvature)
         gradient = _finite(one_sided + 0.5 * _NEAR * bend)
     return _Local(here[:, 0], gradient, curvature)
+
+
+def _slopes(residuals: Array) -> Array:
+    """(n, k, d) derivatives of residuals (k, n, 1 + d), at each place and at its neighbours."""
+    moved = residuals[..., 1:] - residuals[..., :1]
+    moved /= _NEAR
+    return _finite(np.moveaxis(moved, 0, 1))
 
 
 @cache

@@ -51,7 +51,7 @@ class Distribution:
         raise NotImplementedError
 
     def scaled(self, factor: float) -> "Distribution":
-        """That of a number `factor` times as large, which is positive."""
+        """The distribution of a number `factor` times as large, which is positive."""
         raise NotImplementedError
 
     def logpdf(self, x: Any) -> Any:

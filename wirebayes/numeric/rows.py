@@ -27,6 +27,12 @@ def chosen_rows(first: Bools, one: Array, other: Array | float) -> Array:
     return np.where(first.reshape(-1, *[1] * (one.ndim - 1)), one, other)
 
 
+def pair_at(pair: tuple[Array, Array], rows: Any) -> tuple[Array, Array]:
+    """Some rows of both arrays ``(n, ...)`` of a pair, by number or mask."""
+    one, other = pair
+    return one[rows], other[rows]
+
+
 def rows_of(record: Record, rows: Any) -> Record:
     """A dataclass of arrays ``(n, ...)`` with some rows of each, by number or mask."""
     return replace(record, **{f.name: getattr(record, f.name)[rows] for f in fields(record)})

@@ -179,7 +179,7 @@ def _published_at(e: Experiment, published: Mapping[str, float], out: Forecast) 
 
 
 def _near_the_stiffest_step(e: Experiment, stiffness: float) -> str:
-    """That a published stiffness is that of the stiffest single step, in a sentence; empty where it is not."""
+    """A sentence that a published stiffness is that of the stiffest single step; empty where it is not."""
     jump = stiffest_step(e)
     if abs(jump / stiffness - 1) >= 0.02:
         return ""

@@ -183,7 +183,7 @@ def _simulated(problem: Problem, truth: Array, rng: Generator) -> tuple[Array, A
 
 @dataclass(frozen=True)
 class _Posteriors:
-    """Of some simulated tests: draws of all of them after each other (tests * draws, d), and their weights.
+    """Posteriors of some simulated tests: all draws after each other (tests * draws, d), and their weights.
 
     Parameters are in the problem's units.
     """

@@ -62,7 +62,7 @@ class Scores:
 
     @property
     def rmse_N(self) -> float:
-        """Of the predictive mean."""
+        """Root mean square error of the predictive mean."""
         return root_mean_square(self.observed_N - self.mean_N)
 
     def coverage(self) -> dict[float, float]:
@@ -156,7 +156,7 @@ class _HeldOutTest:
 
     @property
     def later(self) -> Bools:
-        """Those of them that are not the first of their hold."""
+        """The readings among them that are not the first of their hold."""
         later = self.unseen
         later[:, 0] = False
         return later

@@ -230,7 +230,7 @@ def log_mean(log_p: Floats, log_p_weighted: Floats) -> tuple[float, float]:
 
 
 def standard_error(values: Floats) -> float:
-    """Of the sum of (holds,) values, from their spread; NaN of a single one."""
+    """Standard error of the sum of (holds,) values, from their spread; NaN of a single one."""
     if len(values) < 2:
         return float("nan")
     return float(np.sqrt(len(values) * values.var(ddof=1)))

@@ -86,7 +86,7 @@ def _bear_witness(
     doubtful: Bools,
     rng: np.random.Generator,
 ) -> None:
-    """Of the doubtful holds that seem settled, those stay so of which a search of its own finds nothing overlooked."""
+    """Keep as settled only those of the doubtful holds of which a search of its own finds nothing overlooked."""
     told = np.flatnonzero(settled & doubtful).tolist()
     if not told:
         return

@@ -86,7 +86,7 @@ class Bench:
 
     @property
     def resolution(self) -> float:
-        """Of what is read."""
+        """The resolution of what is read."""
         return self.resolution_mm if self.control == "force" else self.resolution_N
 
     def setting(self, control: Control, settings: Sequence[float], resolution: float) -> "Bench":

@@ -81,7 +81,7 @@ def _mark(problem: Problem, material: str) -> str:
 
 
 def _shifted(problem: Problem, sample: Sample, free: set[str]) -> frozenset[str]:
-    """Those of the free parameters that have another coordinate than their logarithm."""
+    """The free parameters that have another coordinate than their logarithm."""
     shifted = {"k2", "U", "B", "k1"} & free
     if "B" not in shifted:
         shifted -= {"k1"}  # what is gained in a hold is not known

@@ -361,7 +361,7 @@ def _how_to_say(table: RawTable, unread: Sequence[int], missing: Sequence[Role])
 
 
 def _encoding_in_doubt(table: RawTable, names: Sequence[str]) -> str:
-    """That names may look wrong, for they were read by a code page; empty where there is no doubt."""
+    """A sentence that names may look wrong, for they were read by a code page; empty where there is no doubt."""
     encoding = table.sheet.encoding
     if encoding in ("utf-8", "utf-8-sig") or " ".join(names).isascii():
         return ""

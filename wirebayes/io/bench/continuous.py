@@ -217,7 +217,7 @@ def _notes(readings: Readings, found_holds: Sequence[Plateau], move_s: float) ->
 
 
 def _slow(moves_s: Floats, held_s: Floats) -> tuple[Notice, ...]:
-    """That most moves, (H,), took longer than the share of their holds, (H,), that is left out after them."""
+    """A notice that most moves, (H,), took longer than the share of their holds, (H,), that is left out after them."""
     if np.median(moves_s / held_s) <= AFTER_MOVE:
         return ()
     text = (

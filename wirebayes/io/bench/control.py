@@ -147,7 +147,7 @@ def _block_means(values: Floats) -> Floats:
 
 
 def drift(groups: Sequence[Rows], values: Floats) -> float:
-    """By how much of a step values drift in a hold, counted along the step that led to it, on average."""
+    """The share of a step by which values drift in a hold, counted along the step that led to it, on average."""
     levels = np.array([np.median(values[rows]) for rows in groups])
     if len(groups) == 1:
         steps = levels

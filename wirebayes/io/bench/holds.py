@@ -272,7 +272,7 @@ def _ends(times: list[Floats], zeros: list[float]) -> tuple[list[float | None], 
 
 
 def _unread_ends(times: list[Floats], ends: Sequence[float | None], role: str) -> list[str]:
-    """That holds go on long after their last readings, as rests do whose rows are not in the file."""
+    """Sentences that holds go on long after their last readings, as rests do whose rows are not in the file."""
     unread: dict[int, float] = {}
     for number, (of_hold, end) in enumerate(zip(times, ends, strict=True), start=1):
         after = 0.0 if end is None else unread_s(of_hold, end)

@@ -186,6 +186,6 @@ def _hidden(x: Floats, begin: int, end: int, scatter: float) -> int:
 
 
 def _drift(x: Floats) -> float:
-    """By how much a straight line through it rises or falls."""
+    """How much a straight line through it rises or falls."""
     place = np.arange(len(x)) - 0.5 * (len(x) - 1)
     return float(abs(place @ x) / (place @ place) * (len(x) - 1))

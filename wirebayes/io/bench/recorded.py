@@ -55,7 +55,7 @@ class Readings:
 
     @property
     def unit(self) -> str:
-        """Of the setting."""
+        """The unit of the setting."""
         return UNITS[self.role]
 
 

@@ -98,7 +98,7 @@ class RawTable:
 
     @cached_property
     def _columns(self) -> dict[int, list[str]]:
-        """Those that were asked for: most are, many times, and a recording has 100,000 rows."""
+        """The columns asked for so far: most are, many times, and a recording has 100,000 rows."""
         return {}
 
     def check_names(self) -> None:

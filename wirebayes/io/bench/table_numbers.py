@@ -227,7 +227,7 @@ def _plain_columns(table: RawTable, columns: Columns) -> Columns:
 
 
 def _whose(table: RawTable, columns: Columns) -> list[str]:
-    """Of which specimen these readings are, where there are several."""
+    """The specimen that these readings are of, where there are several."""
     if not table.specimen:
         return []
     places = [table.sheet.column_name(i) for i in sorted(column.index for column in columns.values())]

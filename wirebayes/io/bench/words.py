@@ -113,7 +113,7 @@ def words_in(text: str) -> set[str]:
 
 
 def last_named(header: str) -> Role | None:
-    """Of a header that speaks of several quantities the one named last, as languages put it: step time, load time."""
+    """The quantity that a header names last, if it names several, as languages put it: step time, load time."""
     if _numbers_what_is_set(header):
         return "hold"
     words = re.findall(r"[^\W\d_]+", plain_letters(header))

@@ -85,7 +85,7 @@ def elpd_differences(name: str, table: ComparedModels) -> Figure:
 
 
 def _size(rows: list[ComparedModel]) -> tuple[float, float]:
-    """Of a panel with a line for each model, inches."""
+    """The size of a panel with a line for each model, inches."""
     return 5.4, 1.2 + 0.22 * len(rows)
 
 

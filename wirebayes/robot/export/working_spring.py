@@ -99,7 +99,7 @@ def working_spring(robot: Robot, line: WireDraws, wire: str | None = None) -> Wo
 
 
 def _mean_tension_at_home(robot: Robot, wire: str) -> float | None:
-    """Of the legs that hang on a wire; None where no tensions hold the home pose."""
+    """The mean tension of the legs that hang on a wire; None where no tensions hold the home pose."""
     x, R = robot.home_m[None], matrix(robot.home_rotation_rad)[None]
     tau = inverse.tensions(robot, x, R)[0]
     if not np.isfinite(tau).all():

@@ -38,7 +38,7 @@ def balanced(robot: Robot, history: History) -> History:
 
 
 def turned_rows(robot: Robot, asked: History, history: History) -> list[Notice]:
-    """That balance does not give the rotations that were commanded, or that of the robot's file, if so.
+    """Notices that balance does not give the rotations that were commanded, or that of the robot's file.
 
     Parameters
     ----------

@@ -97,7 +97,7 @@ def _longest_hold(times_s: Floats, hold: Ints) -> float:
 
 
 def _lost(times_s: Floats, track: Track) -> list[Notice]:
-    """That the platform falls, or that wires go slack, in some of the draws."""
+    """Notices that the platform falls, or that wires go slack, in some of the draws."""
     out = []
     lost = 1.0 - track.held[:, -1].mean()
     if lost > 0:
@@ -111,7 +111,7 @@ def _lost(times_s: Floats, track: Track) -> list[Notice]:
 
 
 def _contradicted(history: History, found: Estimate, draws_used: int) -> list[Notice]:
-    """That the readings do not agree with the joint values, or that few draws agree with both."""
+    """Notices that the readings do not agree with the joint values, or that few draws agree with both."""
     out = []
     if history.read and not found.converged:
         text = "the readings could not be brought together with the joint values: no mode was reached"
@@ -133,7 +133,7 @@ def _contradicted(history: History, found: Estimate, draws_used: int) -> list[No
 
 
 def _unsure_clock(history: History, content: PoseHistoryJson) -> list[Notice]:
-    """That poses depend on when the wires' clocks restart."""
+    """A notice that poses depend on when the wires' clocks restart."""
     largest_mm = content["clock"]["largest_mm"]
     distance = content["drift"][0]["distance_mm"]
     widths = np.asarray(distance["q95"], float) - np.asarray(distance["q05"], float)
@@ -148,7 +148,7 @@ def _unsure_clock(history: History, content: PoseHistoryJson) -> list[Notice]:
 
 
 def _dynamics(times_s: Floats, position_m: Floats) -> list[Notice]:
-    """That a platform accelerates too much for its inertia to be left out.
+    """A notice that a platform accelerates too much for its inertia to be left out.
 
     Parameters
     ----------

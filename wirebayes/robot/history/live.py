@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wirebayes.errors import InputError
-from wirebayes.numeric.rows import chosen_rows
+from wirebayes.numeric.rows import chosen_rows, pair_at
 from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.history.beside import beside, beside_fresh
 from wirebayes.robot.history.follow import RESTART
@@ -322,8 +322,8 @@ class LiveEstimator:
 
     def _carefully(self, rows: Indices, zero: Floats, offset: Floats) -> None:
         """Columns whose way is long or unstable: followed in parts; lost where the platform falls."""
-        old_zero, old_offset = self._lengths
-        old, new = (old_zero[rows], old_offset[rows]), (zero[rows], offset[rows])
+        old = pair_at(self._lengths, rows)
+        new = pair_at((zero, offset), rows)
         start = self._x[rows], self._R[rows]
         there = path.follow(self.robot, self._wires.part(rows), start, old, new).here
         good = rows[there.found]

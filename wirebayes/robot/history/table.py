@@ -22,7 +22,7 @@ TILT = ("roll_deg", "pitch_deg")
 
 
 def measured_columns(robot: Robot, given: Sequence[str] = ()) -> Header:
-    """Of a table of measured joint values, in the units of a header that is given (`joint_columns`)."""
+    """Columns of a table of measured joint values, in the units of a header that is given (`joint_columns`)."""
     turn = TURN if robot.degrees == 6 else ()
     tilt = (TILT,) if robot.degrees == 6 else ()
     groups = (("hold",), (*POSITION, *turn), (PAYLOAD,), CENTRE, _tensions(robot), *tilt)
@@ -30,7 +30,7 @@ def measured_columns(robot: Robot, given: Sequence[str] = ()) -> Header:
 
 
 def commanded_columns(robot: Robot, given: Sequence[str] = ()) -> Header:
-    """Of a table of commanded poses."""
+    """Columns of a table of commanded poses."""
     turn = (TURN,) if robot.degrees == 6 else ()
     return Header(("time_s", *POSITION), (("hold",), *turn, (PAYLOAD,), CENTRE))
 

@@ -137,12 +137,10 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
             raise ValueError("a specimen spread needs a random generator")
         _spread_specimens(theta, robot, line, spread, rng)
     length = np.array([wire.length_mm for wire in lines])[:, None]
-    hung = 1e3 * nominal_length(robot)[:, None] / length
-    longer = np.where(_is_given(robot), 1.0, hung)
+    longer = _times_as_long(robot, length)
     if _grows_with_length(lines):
         exponents = [one.parameters.get(LENGTH_EXPONENT, np.ones(1)) for one in lines]
-        exponent = _of_legs(exponents, line.count)
-        theta["B"] = theta["B"] * longer ** (exponent - 1.0)
+        theta["B"] = theta["B"] * longer ** (_of_legs(exponents, line.count) - 1.0)
     reference = _reference_tension(line, lines)
     hold = steady_hold(theta, length * longer, reference, length_ref_mm=length)
     effects = _united(line)
@@ -150,6 +148,12 @@ def for_robot(robot: Robot, line: WireDraws, spread: float = 0.0, rng: np.random
     theta = dict(at_sample.change("sample", theta, hold))
     others = tuple(effect for effect in effects if effect.place != "sample")
     return Wires(line.law, line.history, theta, length, others, reference)
+
+
+def _times_as_long(robot: Robot, length_mm: Floats) -> Floats:
+    """(w, 1) how many times as long each wire hangs as the one tested (w, 1); 1 for a wire that the file gives."""
+    hung = 1e3 * nominal_length(robot)[:, None] / length_mm
+    return np.where(_is_given(robot), 1.0, hung)
 
 
 def _spread_specimens(

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wirebayes.numeric.rows import chosen_rows
+from wirebayes.numeric.rows import chosen_rows, pair_at
 from wirebayes.numeric.typing import Bools, Floats
 from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
@@ -139,8 +139,7 @@ class CreepingHold:
         self.robot = robot
         zero, offset = self.lengths
         zero = chosen_rows(self.live, zero, np.nan)
-        pose = self.here.position_m, self.here.rotation
-        self.here = forward.solve_equilibrium(robot, self.wires, zero, offset, *pose)
+        self.here = forward.solve_equilibrium(robot, self.wires, zero, offset, *self.here.poses)
         fell = self.live & ~self.here.found
         self.fall_s[fell] = self.creep.time_s
         self.live = self.live & ~fell
@@ -225,14 +224,12 @@ class CreepingHold:
         return np.broadcast_to(values, (self.robot.legs, self.n)).max(0)
 
     def _follow(self, creep: HoldCreep, time_s: float, smallest: float) -> path.Followed:
+        """The platforms that have not fallen, led along to the lengths at a time."""
         rows = np.flatnonzero(self.live)
-        zero, offset = self._lengths(time_s, creep.state())
-        new = zero[rows], offset[rows]
-        old_zero, old_offset = self.lengths
-        old = old_zero[rows], old_offset[rows]
-        start = self.here.position_m[rows], self.here.rotation[rows]
+        new = self._lengths(time_s, creep.state())
+        start = pair_at(self.here.poses, rows)
         wires = self.wires.part(rows)
-        found = path.follow(self.robot, wires, start, old, new, smallest)
+        found = path.follow(self.robot, wires, start, pair_at(self.lengths, rows), pair_at(new, rows), smallest)
         if len(rows) == self.n:
             return found
         here = forward.put_back(found.here, rows, self.n)
@@ -245,7 +242,7 @@ class CreepingHold:
         """The pose at corrected lengths, hardly away from one that was followed."""
         zero, offset = self._lengths(time_s, creep.state())
         zero = chosen_rows(near.found, zero, np.nan)
-        return path.settle(self.robot, self.wires, (near.position_m, near.rotation), (zero, offset))
+        return path.settle(self.robot, self.wires, near.poses, (zero, offset))
 
     def _note(self, fell: Bools, there: path.Followed, here: forward.Equilibria, span_s: tuple[float, float]) -> None:
         """Write down falls and slack wires of a step."""
@@ -257,9 +254,7 @@ class CreepingHold:
         lower = np.minimum(self.lowest_N, tau)
         self.lowest_N = np.where(moving, lower, self.lowest_N)
         if fell.any():
-            pose = last.position_m, last.rotation
-            stiffness = self._stiffness(pose)
-            self.left = np.where(fell, stiffness, self.left)
+            self.left = np.where(fell, self._stiffness(last.poses), self.left)
         self.live = self.live & ~fell
         self._note_status(fell, last, here)
 
@@ -290,7 +285,7 @@ class CreepingHold:
         self.slack_s = np.where(slackens, self.fall_s[:, None], self.slack_s)
 
     def _stiffness(self, pose: Poses | None = None) -> Floats:
-        pose = pose or (self.here.position_m, self.here.rotation)
+        pose = pose or self.here.poses
         return one_sided.lowest_stiffness(self.robot, self.wires, pose, self.lengths)
 
     def falls(self) -> Falls:

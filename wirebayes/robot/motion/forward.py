@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wirebayes.numeric.batches import batch_first, batch_last
-from wirebayes.numeric.rows import put_rows
+from wirebayes.numeric.rows import pair_at, put_rows
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import statics
 from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
@@ -41,6 +41,11 @@ class Equilibria:
     status: Ints
     iterations: Ints
     residual_N: Floats
+
+    @property
+    def poses(self) -> Poses:
+        """Positions and rotations, as functions of the robot take them together."""
+        return self.position_m, self.rotation
 
     @property
     def found(self) -> Bools:
@@ -89,8 +94,8 @@ def solve_equilibrium(
         return put_back(None, sane, n, robot.legs)
     all_are_sane = len(sane) == n
     own_wires = wires if all_are_sane else wires.part(sane)
-    lengths = zero_m[sane], offset_m[sane]
-    start = start_m[sane], start_rotation[sane]
+    lengths = pair_at((zero_m, offset_m), sane)
+    start = pair_at((start_m, start_rotation), sane)
     leash = np.broadcast_to(leash_m, (n,))[sane]
     found = _solved(robot, own_wires, lengths, start, max_iterations, leash)
     return found if all_are_sane else put_back(found, sane, n)

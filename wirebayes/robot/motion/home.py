@@ -13,7 +13,7 @@ TURNED_AWAY = 1.0  # degrees from the home orientation: nobody levels a platform
 
 
 def turned_away(robot: Robot, rotation: Floats) -> list[Notice]:
-    """That the platform hangs away from the orientation of the robot's file, if so.
+    """Notices that the platform hangs away from the orientation of the robot's file.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ _UNHELD = "no tensions within the bounds hold the home pose of the robot's file 
 
 
 def home_notices(robot: Robot) -> list[Notice]:
-    """That nothing holds the home pose of the robot's file, with the degrees or metres to the nearest balance.
+    """Notices that nothing holds the home pose of the robot's file, with the degrees or metres to the nearest balance.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ import numpy as np
 
 from wirebayes.numeric import cholesky
 from wirebayes.numeric.batches import batch_first
-from wirebayes.numeric.rows import chosen_rows, put_rows, rows_of
+from wirebayes.numeric.rows import chosen_rows, pair_at, put_rows, rows_of
 from wirebayes.numeric.typing import Bools, Floats, Indices
 from wirebayes.robot.mechanics.description import Lengths, Poses, Robot
 from wirebayes.robot.mechanics.wires import Wires
@@ -55,10 +55,11 @@ class Followed:
 
     def _fall(self, robot: Robot, wires: Wires, live: Indices, fell: Bools, lengths: Lengths, start: Poses) -> None:
         """Note where those of the `live` platforms that fell come to rest downhill from their poses."""
-        own, pose = (lengths[0][fell], lengths[1][fell]), (start[0][fell], start[1][fell])
         rows = live[fell]
-        caught = forward.solve_equilibrium(robot, wires.part(np.flatnonzero(fell)), *own, *pose)
-        distance = np.linalg.norm(caught.position_m - pose[0], axis=1)
+        begin = pair_at(start, fell)
+        own_wires = wires.part(np.flatnonzero(fell))
+        caught = forward.solve_equilibrium(robot, own_wires, *pair_at(lengths, fell), *begin)
+        distance = np.linalg.norm(caught.position_m - begin[0], axis=1)
         lost = caught.status == outcome.NOT_CONVERGED
         self.here.status[rows] = np.where(lost, outcome.NOT_CONVERGED, outcome.FELL)
         self.drop_m[rows] = np.where(caught.found, distance, np.inf)
@@ -101,7 +102,7 @@ def follow(
         share = np.minimum(ahead, 1.0)
         between = _between(old, new, live, share)
         part = wires.part(live)
-        pose = here.position_m[live], here.rotation[live]
+        pose = pair_at(here.poses, live)
         there, held = _step(robot, part, pose, here.tension_N[live], between)
         followed._go_on(live[held], there, held, share)
         divided.adapt(live, held)
@@ -207,10 +208,10 @@ def _let_go(robot: Robot, wires: Wires, there: forward.Equilibria, lengths: Leng
     loose = np.flatnonzero(there.status == outcome.NOT_HELD)
     if not loose.size:
         return
-    zero, offset = np.broadcast_arrays(*lengths)
-    own_lengths = zero[loose], offset[loose]
+    zero, offset = lengths
+    own_lengths = pair_at((zero, np.broadcast_to(offset, zero.shape)), loose)
     own_wires = wires.part(loose)
-    balance = there.position_m[loose], there.rotation[loose]
+    balance = pair_at(there.poses, loose)
     softest = _softest(robot, own_wires, balance, own_lengths)
     aside = mixed.after_step(robot, balance, _ASIDE * robot.size_m * softest)
     found = forward.solve_equilibrium(robot, own_wires, *own_lengths, *aside)
@@ -250,9 +251,7 @@ def settle(robot: Robot, wires: Wires, near: Poses, lengths: Lengths, small: flo
     exact = np.linalg.norm(step, axis=1) < small * robot.size_m
     far = np.flatnonzero(~exact)
     if far.size:
-        zero, offset = lengths
-        position, turn = near
-        rest = forward.solve_equilibrium(robot, wires.part(far), zero[far], offset[far], position[far], turn[far])
+        rest = forward.solve_equilibrium(robot, wires.part(far), *pair_at(lengths, far), *pair_at(near, far))
         put_rows(out, far, rest)
     return out
 

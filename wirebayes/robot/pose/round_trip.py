@@ -68,17 +68,15 @@ def stable_poses(robot: Robot, wires: Wires, x: Floats, R: Floats, rng: Generato
         R = commands.rotation[0]
     if not commands.feasible[0]:  # some draws are strong enough, their mean is not
         return {"stable_found": 0, "starts": 0, "commanded_stable": False, "poses": []}
-    zero_m, offset_m = commands.zero_m, commands.offset_m
-    here = forward.solve_equilibrium(robot, mean, zero_m, offset_m, x, R)
+    here = forward.solve_equilibrium(robot, mean, commands.zero_m, commands.offset_m, x, R)
     away_m = np.abs(here.position_m[0] - x).max()
     returned = here.found[0] and away_m < _SAME * robot.span_m
-    found = equilibria.equilibria(robot, mean, zero_m[0], offset_m[0], rng, known=(x, R))
-    own = _is_at(robot, found, x, R)
+    found = equilibria.equilibria(robot, mean, commands.zero_m[0], commands.offset_m[0], rng, known=(x, R))
+    is_own = _is_at(robot, found, x, R)
     poses = []
-    for i, is_own in enumerate(own):
-        one = _equilibrium(found.position_m[i], found.rotation[i], found.tension_N[i], is_own, stable=True)
-        poses.append(one)
-    if not own.any():
+    for position, turn, tension, own in zip(*found.poses, found.tension_N, is_own, strict=True):
+        poses.append(_equilibrium(position, turn, tension, own, stable=True))
+    if not is_own.any():
         poses.append(_equilibrium(x, R, tau[0], True, stable=False))
     return {
         "stable_found": len(found.position_m),

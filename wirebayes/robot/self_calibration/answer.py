@@ -237,7 +237,7 @@ def _at_fault(
 
 
 def _moment(known: LengthPosterior, part: slice) -> Moment:
-    """Of some of the unknowns."""
+    """The moments of some of the unknowns."""
     sd = np.sqrt(np.diag(known.covariance[0]))
     return Moment(known.unknowns[0, part], sd[part], _HALF)
 

@@ -152,8 +152,7 @@ class _Walk:
             step = longest if free else min(longest, longer)
         pace.next = min(longest, opening or step)
         zero = self._zero(self.creep.state())
-        pose = self.here.position_m, self.here.rotation
-        self.here = path.settle(self.robot, self.wires, pose, (zero, self.offset))
+        self.here = path.settle(self.robot, self.wires, self.here.poses, (zero, self.offset))
 
     def _begin(self, duration_s: float, pace: _Pace, free: bool) -> None:
         """Try a hold's first step, and say how long the next first one may be."""
@@ -184,7 +183,7 @@ class _Walk:
         ahead = self._by_growth(self.motion, grown_mm)
         short = np.linalg.norm(ahead, axis=1) < _FAR * self.size
         ahead = chosen_rows(short, ahead, 0.0)
-        near = mixed.after_step(self.robot, (self.here.position_m, self.here.rotation), ahead)
+        near = mixed.after_step(self.robot, self.here.poses, ahead)
         offset = np.broadcast_to(self.offset, zero.shape)
         small = _SMALL * self.size / self.robot.size_m
         return path.settle(self.robot, self.wires, near, (zero, offset), small)

@@ -52,7 +52,7 @@ def _open_wires(share: Floats) -> list[str]:
 
 
 def odd_hold(found: Whole, session: Session) -> list[Notice]:
-    """That one hold's lengths contradict the others, whose error was estimated with it, by far more than these do.
+    """A notice that one hold's lengths contradict the others, estimated with it, by far more than these do.
 
     Parameters
     ----------
