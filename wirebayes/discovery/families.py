@@ -93,13 +93,16 @@ def refitted_probe(block: LaplaceFit, found: Refit, b: int) -> Probe:
     found : Refit
     b : int
     """
-    names = [name.split("[")[0] for name in block.problem_with(found.effect).names]
-    theta = dict(zip(names, found.theta[found.blocks.index(b)].tolist(), strict=True))
-    own = {column: theta[column] for column in found.effect.columns()}
-    main = found.effect.amplitudes[0]
-    step = abs(found.amplitude - main.neutral) or found.sd
-    away = found.amplitude if found.amplitude != main.neutral else main.neutral + step
-    return Probe(found.effect, own | {found.effect.columns()[0]: away}, step, False)
+    effect = found.effect
+    names = [name.split("[")[0] for name in block.problem_with(effect).names]
+    values = found.theta[found.blocks.index(b)].tolist()
+    theta = dict(zip(names, values, strict=True))
+    own = {column: theta[column] for column in effect.columns()}
+    neutral = effect.amplitudes[0].neutral
+    step = abs(found.amplitude - neutral) or found.sd
+    away = found.amplitude if found.amplitude != neutral else neutral + step
+    own[effect.columns()[0]] = away
+    return Probe(effect, own, step, False)
 
 
 def block_ratio(block: LaplaceFit) -> float:

@@ -134,11 +134,15 @@ class Fits:
         return added(parent, name, self._settings, self._rng)[0]
 
     def _from_larger(self, key: Key) -> list[LaplaceFit]:
-        larger = min((s for k, s in self._explored.fitted.items() if k > key), key=lambda s: len(s.effects.names))
+        """Fits of a set that was not fitted itself, with its effects as the smallest fitted set around it has them."""
+        larger = [fitted_set for known, fitted_set in self._explored.fitted.items() if known > key]
+        smallest = min(larger, key=lambda fitted_set: len(fitted_set.effects.names))
         out = []
-        for plain, block in zip(self._known[frozenset()], larger.blocks, strict=True):
+        for plain, block in zip(self._known[frozenset()], smallest.blocks, strict=True):
+            own = plain
             effects = [effect for effect in block.effects if effect.name in key]
-            own = fitted(block.experiments, effects, plain.spec, self._rng, scales=plain.scales) if effects else plain
+            if effects:
+                own = fitted(block.experiments, effects, plain.spec, self._rng, scales=plain.scales)
             out.append(own)
         return out
 

@@ -64,9 +64,15 @@ def _families_of_singles(plain: list[LaplaceFit], found: NameEvidence) -> list[F
     ranked = sorted(found.winners, key=lambda name: -found.log_bayes[name])
     if not ranked:
         return []
-    probed = {n: {b: refitted_probe(plain[b], r, b) for b, r in found.amplitudes(n).items()} for n in ranked}
+    probed = {}
+    for name in ranked:
+        refits = found.amplitudes(name)
+        probed[name] = {b: refitted_probe(plain[b], refitted, b) for b, refitted in refits.items()}
     best = found.amplitudes(ranked[0])
-    ratios = [noise_ratio(block, best[b], b) if b in best else block_ratio(block) for b, block in enumerate(plain)]
+    ratios = []
+    for b, block in enumerate(plain):
+        ratio = noise_ratio(block, best[b], b) if b in best else block_ratio(block)
+        ratios.append(ratio)
     return families_of(plain, probed, ratios)
 
 

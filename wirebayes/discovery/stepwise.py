@@ -169,12 +169,15 @@ def _leading_pair(expansions: Sequence[Expansion], trials: Sequence[Probe]) -> K
     Two that only show together are not met one at a time: beside the plain model neither explains anything.
     """
     names = list(dict.fromkeys(trial.effect.name for trial in trials))
-    explained = np.sum([np.maximum(log_bayes_of_each_pair(x), 0.0) for x in expansions], axis=0)
+    in_each_block = [np.maximum(log_bayes_of_each_pair(x), 0.0) for x in expansions]
+    explained = np.sum(in_each_block, axis=0)
     alone = np.diag(explained).max(initial=0.0)
     np.fill_diagonal(explained, 0.0)
     one, other = np.unravel_index(np.argmax(explained), explained.shape)
     gain = explained[one, other] - alone + occam(one_sided=False)
-    return frozenset({names[one], names[other]}) if gain > WORTH_A_REFIT else frozenset()
+    if gain > WORTH_A_REFIT:
+        return frozenset({names[one], names[other]})
+    return frozenset()
 
 
 def _fit(

@@ -193,11 +193,15 @@ def _more_beside(sets: Sequence[EffectSet], without: Array, beside: Array, alike
         Log odds of a remainder beside it, to none.
     """
     alone = next(k for k, s in enumerate(sets) if not s.names)
-    whole = float(logsumexp(without[alike]))
-    share = 1.0 / (1.0 + np.exp(np.clip(beside[alone] - logsumexp(beside[alike]), -50.0, 50.0)))
+    log_odds_alone = np.clip(beside[alone] - logsumexp(beside[alike]), -50.0, 50.0)
+    share = 1.0 / (1.0 + np.exp(log_odds_alone))
+    more_beside = without[alike] + odds + np.log(share)
+    more_alone = -np.inf
+    if share < 1.0:
+        more_alone = float(logsumexp(without[alike])) + odds + np.log1p(-share)
     out = beside.copy()
-    out[alike] = np.logaddexp(out[alike], without[alike] + odds + np.log(share))
-    out[alone] = np.logaddexp(out[alone], whole + odds + np.log1p(-share) if share < 1.0 else -np.inf)
+    out[alike] = np.logaddexp(out[alike], more_beside)
+    out[alone] = np.logaddexp(out[alone], more_alone)
     return out
 
 

@@ -158,10 +158,15 @@ def _instrument_priors(experiments: Sequence[Experiment], effects: Sequence[Effe
     """Priors of what does not belong to the wire: steps and weights are read by different instruments, each its own."""
     controls = dict.fromkeys(e.control for e in experiments)
     out: dict[str, Any] = {}
-    for effect in (effect for effect in effects if effect.scope != "material"):
-        apart = len(controls) > 1 and effect.scope != "event"
-        marks = [f"[{control}]" for control in controls if effect.control in (None, control)] if apart else [""]
-        out |= {f"{c}{mark}": a.prior for mark in marks for c, a in _amplitudes([effect]) if not a.of_each_test}
+    for effect in effects:
+        if effect.scope == "material":
+            continue
+        marks = [""]
+        if len(controls) > 1 and effect.scope != "event":
+            marks = [f"[{control}]" for control in controls if effect.control in (None, control)]
+        shared = [(column, a.prior) for column, a in _amplitudes([effect]) if not a.of_each_test]
+        for mark in marks:
+            out |= {f"{column}{mark}": prior for column, prior in shared}
     return out
 
 

@@ -21,12 +21,16 @@ def spread_rows(x: Array, k: int, rng: np.random.Generator, weight: Array | None
     list of int
         Fewer than `k` where there are not so many different points.
     """
-    share = np.full(len(x), 1.0 / len(x)) if weight is None else weight
-    chosen = [int(rng.choice(len(x), p=share))]
-    nearest = ((x - x[chosen[0]]) ** 2).sum(axis=1)
+    n = len(x)
+    share = np.full(n, 1.0 / n) if weight is None else weight
+    newest = int(rng.choice(n, p=share))
+    chosen = [newest]
+    nearest = ((x - x[newest]) ** 2).sum(axis=1)
     while len(chosen) < k and nearest.any():
-        chosen.append(int(rng.choice(len(x), p=share * nearest / (share @ nearest))))
-        nearest = np.minimum(nearest, ((x - x[chosen[-1]]) ** 2).sum(axis=1))
+        by_distance = share * nearest / (share @ nearest)
+        newest = int(rng.choice(n, p=by_distance))
+        chosen.append(newest)
+        nearest = np.minimum(nearest, ((x - x[newest]) ** 2).sum(axis=1))
     return chosen
 
 

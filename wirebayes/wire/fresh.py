@@ -57,9 +57,12 @@ class FreshSample:
         low, high = (np.full(final.shape, end) for end in _LOG_TIMES)
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            early = self._creep(tension_N, np.exp(middle)[None])[0] < 0.5 * final
-            low, high = np.where(early, middle, low), np.where(early, high, middle)
-        return np.where(np.isfinite(final) & (final > 0), np.exp(high), np.nan)
+            (reached,) = self._creep(tension_N, np.exp(middle)[None])
+            early = reached < 0.5 * final
+            low = np.where(early, middle, low)
+            high = np.where(early, high, middle)
+        ends = np.isfinite(final) & (final > 0)
+        return np.where(ends, np.exp(high), np.nan)
 
     def stiffness_N(self, tension_N: float) -> Array:
         """Tangent stiffness at a tension, N per unit strain, ``(n,)``: zero-tension length times dτ/dS.

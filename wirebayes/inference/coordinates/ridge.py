@@ -148,15 +148,17 @@ class Ridge:
 
     def _squares(self, theta: Array) -> tuple[Array, Array]:
         """(n,) mean squares of the elongation gained in a hold, and of what it shows; B and mean tension are one."""
+        n = len(theta)
+        holds = len(self.which_end)
         driven = self._drive(theta), *self._shares(theta)
         if compiled.kernel is not None and not self.effects:
             # of parameters that are fixed there is one column
-            drive, reached, seen = (a if a.shape[1] == len(theta) else np.repeat(a, len(theta), axis=1) for a in driven)
-            holds = self.which_end, self.which_pair, self.kept
-            gained, shown = compiled.kernel.squares_gained(drive, reached, seen, *holds)
+            drive, reached, seen = (part if part.shape[1] == n else np.repeat(part, n, axis=1) for part in driven)
+            holds_of = self.which_end, self.which_pair, self.kept
+            gained, shown = compiled.kernel.squares_gained(drive, reached, seen, *holds_of)
         else:
             gained, shown = ((part**2).sum(axis=0) for part in self._gained(*driven, theta))
-        return gained / len(self.which_end), shown / len(self.which_end)
+        return gained / holds, shown / holds
 
     def _gained(self, drive: Array, reached: Array, seen: Array, theta: Array) -> tuple[Array, Array]:
         """(H, n) elongation gained in each hold, and what it shows: `compiled.kernel.squares_gained` sums the squares.

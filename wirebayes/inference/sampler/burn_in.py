@@ -157,13 +157,15 @@ def _frozen(
     target: LogPosterior, state: BurnIn, policy: Policy, drawn: tuple[Array, Array, Array], steps: int
 ) -> Sampling:
     """The run with its proposal as it will stay, every ensemble placed by weight and settled for some steps."""
-    learned = _as_frozen(replace(state.learned, trusted=state.learned.acceptance > policy.acceptance))
-    z, value, base = drawn if learned.trusted or state.walk is None else state.walk
+    trusted = state.learned.acceptance > policy.acceptance
+    learned = _as_frozen(replace(state.learned, trusted=trusted))
+    z, value, base = drawn if trusted or state.walk is None else state.walk
     rows = _placed(policy, value - base, state.generator)
     walkers = Walkers(z[rows], value[rows], state.walkers.random)
     move = move_of(learned, policy.ensembles, steps, frozen=True)
     settled = advance(target, walkers, move, steps)
-    return Sampling(settled.walkers, learned, state.generator, state.evaluations + settled.evaluations)
+    evaluations = state.evaluations + settled.evaluations
+    return Sampling(settled.walkers, learned, state.generator, evaluations)
 
 
 def _with_excess(

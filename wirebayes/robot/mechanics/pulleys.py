@@ -118,7 +118,9 @@ def traced(pulleys: Pulleys | None, leg: int, line_m: Floats, points: int = 12) 
     if pulleys is None or not pulleys.radius_m[leg]:
         return np.stack([np.zeros(3), line_m])
     own = Pulleys(pulleys.radius_m[leg : leg + 1], pulleys.axis[leg : leg + 1])
-    way, rho, s = wire_run(own, line_m[:, None, None]), own.radius_m[0], own.axis[0]
-    outward = np.cross(way.across[:, 0, 0], s)
+    way = wire_run(own, line_m[:, None, None])
+    axis = own.axis[0]
+    outward = np.cross(way.across[:, 0, 0], axis)
     turn = np.linspace(0.0, way.wrap_rad[0, 0], points)[:, None]
-    return np.vstack([rho * ((1 - np.cos(turn)) * outward + np.sin(turn) * s), line_m])
+    arc = (1 - np.cos(turn)) * outward + np.sin(turn) * axis
+    return np.vstack([own.radius_m[0] * arc, line_m])

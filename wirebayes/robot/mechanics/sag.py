@@ -38,13 +38,16 @@ def sag(robot: Robot, position_m: Floats, rotation: Floats, tension_N: Floats) -
     position_m, rotation : (3,), (3, 3) arrays
     tension_N : (w,) array
     """
-    mass = _mass_kg_m(robot)
     shape = geometry(robot, position_m[:, None], rotation[..., None])
-    length, direction = shape.distance_m[:, 0], shape.direction[:, :, 0]
+    length = shape.distance_m[:, 0]
+    direction = shape.direction[:, :, 0]
     level = np.hypot(direction[0], direction[1])
+    weight_N = _mass_kg_m(robot) * GRAVITY * length
     taut = tension_N > _ROUNDING * tension_N.max()
-    share = np.where(taut, mass * GRAVITY * length / np.where(taut, tension_N, 1.0), 0.0)
-    return share, share * level * length / 8.0, length * (share * level) ** 2 / 24.0
+    share = np.where(taut, weight_N / np.where(taut, tension_N, 1.0), 0.0)
+    depth_m = share * level * length / 8.0
+    extra_m = length * (share * level) ** 2 / 24.0
+    return share, depth_m, extra_m
 
 
 def _stated(robot: Robot) -> Bools:
