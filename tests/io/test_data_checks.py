@@ -7,7 +7,7 @@ import pytest
 
 from analyses.hidden_effects.noise import measure
 from analyses.hidden_effects.truth import PROTOCOLS, draw_rig
-from wirebayes.io import data_checks, paper
+from wirebayes.io import data_checks, isolated_readings, paper
 from wirebayes.io.arrays import from_arrays
 from wirebayes.simulation.synthetic import Bench, draw
 from wirebayes.wire.protocol import Protocol
@@ -94,7 +94,7 @@ def test_one_gross_outlier_is_named_with_its_place(sound):
     protocol, tension = sound
     for share, warned in ((0.9, False), (1.3, True)):  # of the range of all others
         gross = tension.copy()
-        gross[5, 2] += share * data_checks.GROSS * np.ptp(tension)
+        gross[5, 2] += share * isolated_readings.GROSS * np.ptp(tension)
         assert ("in hold 6 at 60 s is" in warning(protocol, gross)) == warned
     last = tension.copy()
     last[11, 4] *= 10
