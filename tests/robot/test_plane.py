@@ -181,3 +181,15 @@ def test_wires_that_need_not_pull_hold_nothing_on_a_level_plane(normal, choice, 
         InputError, match=r"sled.toml, line \d+, key tension.lowest_N: found 0, expected a number above 0"
     ):
         schema.parse(text, "sled.toml")
+
+
+@pytest.mark.parametrize(("friction", "ends"), [(0.2, ", so that no friction holds it."), (0.0, ".")])
+def test_a_plane_that_nothing_presses_on_holds_nothing_by_friction(friction, ends):
+    """Wires that run along a wall: a sentence without a place for distances that are none."""
+    sled = schema.read_robot_file("sled-4")
+    known = replace(sled.plane, friction=friction)
+    said = on_plane._sentence(sled, known, 0.0, np.zeros((5, 3)), np.zeros(5))
+    assert said == f"The plane carries nothing of the platform{ends}"
+    pressed = on_plane._sentence(sled, known, 2.0, np.tile([1e-3, 2e-3, 0.0], (5, 1)), np.zeros(5))
+    held = "; its friction, 0.4 N at most, can hold the platform ±1 mm along x, ±2 mm along y" if friction else ""
+    assert pressed == f"The plane carries the platform with 2 N{held}."

@@ -78,7 +78,8 @@ def _sentence(robot: Robot, known: Plane, force: float, width: Floats, turn: Flo
     """With how much the plane carries the platform, and how far friction can hold it."""
     said = f"The plane carries the platform with {short(force, 4)} N"
     if abs(force) < _ROUNDING * robot.mass_kg * GRAVITY:
-        said = "The plane carries nothing of the platform"
+        nothing = "The plane carries nothing of the platform"
+        return f"{nothing}, so that no friction holds it." if known.friction else f"{nothing}."
     if not known.friction:
         return f"{said}."
     middle = 1e3 * np.median(width, axis=0)
