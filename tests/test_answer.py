@@ -319,6 +319,9 @@ def test_corrections_are_offered_only_where_there_are_some(
     drift = {"distance_mm": band, "times_s": [0.0, 60.0], "specimen_spread": 0.0}
     found = {"robot": "r", "feasible": True, "drift": [drift], "wires": {}, "warnings": []}
     assert stored(Pose, tmp_path, "pose.json", found).next_step().startswith(begins)
+    for kind in ("misfit", "not-converged"):
+        contradicted = found | {"warnings": [{"kind": kind, "text": "The readings contradict the joint values."}]}
+        assert stored(Pose, tmp_path, "pose.json", contradicted).next_step().startswith("check the log's columns")
     (tmp_path / "corrections.csv").unlink()
     alone = stored(Pose, tmp_path, "pose.json", found).next_step()
     assert alone.startswith("wirebayes calibrate" if end else "another pose or payload")

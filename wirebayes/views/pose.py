@@ -57,6 +57,10 @@ class Pose(Result[PoseJson | PoseHistoryJson]):
         return html_table(repr(self), ["time, s", "drift, mm", "90 % interval"], rows, self.messages)
 
 
+# kinds of warnings that say that readings and joint values contradict one another: corrections lead anywhere then
+_CONTRADICTED = ("misfit", "not-converged")
+
+
 def _mm(value: float | None) -> str:
     """A distance; what rounding of numbers leaves of none is none."""
     return figure(value if value is None else round(value, 6))
@@ -67,6 +71,8 @@ def _after_pose(found: PoseJson | PoseHistoryJson, folder: Path, given: Given) -
     lost = "drift" in found and not any(known_at_the_end(drift) for drift in found["drift"])
     corrections = folder / "corrections.csv"
     if corrections.is_file():
+        if any(warning["kind"] in _CONTRADICTED for warning in found["warnings"]):
+            return "check the log's columns, signs and units, the payload and the standard errors"
         if lost:
             where = f"the column held of {folder / 'poses.csv'} says where the platform is lost"
             return f"check joint values or poses, their units and the payload; {where}"
