@@ -100,6 +100,18 @@ def test_an_effect_that_grows_with_the_square_of_its_amplitude_is_not_promised_b
     assert power.smallest_seen([(0.1, 0, 0.9), (0.3, 1, None)]) == (1, None)
 
 
+def test_an_effect_that_saturates_is_not_promised_to_be_seen_at_some_size() -> None:
+    """Beyond the largest probe the share of what is needed grows as it did before; far beyond nothing is said."""
+    root = [(step, k, 2.0 * step**0.5) for k, step in enumerate((1.0, 3.0))]  # half of what is needed at 1
+    assert power.smallest_seen(root) == (1, pytest.approx(4.0))
+    linear = [(step, k, 5.0) for k, step in enumerate((1.0, 3.0))]
+    assert power.smallest_seen(linear) == (1, pytest.approx(5.0))
+    for needed, found in ((8.9, pytest.approx(8.9)), (9.1, None)):
+        assert power.smallest_seen([(1.0, 0, needed), (3.0, 1, needed)]) == (1, found)
+    assert power.smallest_seen([(1.0, 0, 2.0), (3.0, 1, 6.1)]) == (1, None)  # it shows no more at three than at one
+    assert power.smallest_seen([(1.0, 0, None), (3.0, 1, 4.0)]) == (1, None)
+
+
 def test_no_amplitude_is_promised_that_the_effect_cannot_have(monkeypatch: pytest.MonkeyPatch) -> None:
     """A share of superposition of three does not exist, an ageing of three does; both would be seen."""
     monkeypatch.setattr(power, "amplitude_80", lambda null, trial, k, threshold: 3.0)

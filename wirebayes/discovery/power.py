@@ -18,6 +18,7 @@ from wirebayes.wire.effect import Amplitude, Effect, HoldContext
 from wirebayes.wire.protocol import Control
 
 Cosines = dict[tuple[str, str], float]  # of the angles between the signatures of two effects, without sign
+FARTHEST = 3.0  # times the largest probe, which is three standard deviations of the prior: nobody expects so much
 ALIKE = 0.95  # |cos| from which names form a group: an effect of δ = 10 then differs from its twin by δ = 3 only
 
 
@@ -112,7 +113,8 @@ def smallest_seen(rungs: Sequence[tuple[float, int, float | None]]) -> tuple[int
     """The probe and the amplitude at which an effect begins to be seen, by probes at rising amplitudes.
 
     It lies below the first probe whose own amplitude would be seen and above the one before; between the two, how
-    strongly it shows is taken to follow a power of the amplitude.
+    strongly it shows is taken to follow a power of the amplitude. Beyond the last probe that power goes on, up to
+    `FARTHEST`: a delay of the first reading can take no more than what relaxes in a hold.
 
     Parameters
     ----------
@@ -124,8 +126,24 @@ def smallest_seen(rungs: Sequence[tuple[float, int, float | None]]) -> tuple[int
         if seen is not None and seen <= step:
             return k, seen if below is None else _between(below, (step, seen))
         below = (step, seen)
-    _, k, seen = rungs[-1]
-    return k, seen
+    _, k, _ = rungs[-1]
+    return k, _beyond(rungs)
+
+
+def _beyond(rungs: Sequence[tuple[float, int, float | None]]) -> float | None:
+    """Where the share of what is needed to be seen passes one beyond the last probe; None where it does not, or far."""
+    last, _, seen = rungs[-1]
+    if seen is None or len(rungs) == 1:  # a form that is linear has one probe
+        return seen
+    before, _, seen_before = rungs[-2]
+    if seen_before is None:
+        return None
+    share, share_before = last / seen, before / seen_before
+    power = np.log(share / share_before) / np.log(last / before)
+    if power <= 0.0:
+        return None
+    amplitude = float(last * share ** (-1.0 / power))
+    return amplitude if amplitude <= FARTHEST * last else None
 
 
 def _between(below: tuple[float, float | None], above: tuple[float, float]) -> float:
