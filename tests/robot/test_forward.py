@@ -9,6 +9,7 @@ from wirebayes.robot.mechanics.description import GRAVITY
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.robot.motion import downhill, equilibria, forward, inverse, outcome
 from wirebayes.robot.motion.balance import balance_at, tensions_at
+from wirebayes.robot.motion.saddle import off_saddle
 
 from . import cases
 
@@ -472,9 +473,9 @@ def test_a_stiffness_that_has_overflowed_gives_no_step_and_spoils_no_other():
     rng = np.random.default_rng(0)
     H, gradient = rng.normal(size=(3, 3, 3)), rng.normal(size=(3, 3))
     level, floor = np.ones(3), np.zeros(3)
-    alone = downhill._off_saddle(H[..., [0, 2]], gradient[:, [0, 2]], level[:2], floor[:2])
+    alone = off_saddle(H[..., [0, 2]], gradient[:, [0, 2]], level[:2], floor[:2])
     H[1, 2, 1] = np.inf
-    step = downhill._off_saddle(H, gradient, level, floor)
+    step = off_saddle(H, gradient, level, floor)
     assert np.isnan(step[:, 1]).all()
     np.testing.assert_allclose(step[:, [0, 2]], alone)
 

@@ -16,9 +16,10 @@ from functools import cached_property
 import numpy as np
 
 from wirebayes.numeric.typing import Array
+from wirebayes.wire.away_from_bench import steady_hold
 from wirebayes.wire.bent_strain import bent, strain_of
 from wirebayes.wire.creep import Creep
-from wirebayes.wire.effect import HoldContext, Placed, steady_hold
+from wirebayes.wire.effect import HoldContext, Placed
 from wirebayes.wire.model import Model
 from wirebayes.wire.walk import Theta
 

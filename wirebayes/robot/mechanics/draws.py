@@ -19,7 +19,8 @@ from wirebayes.robot.mechanics.statics import geometry
 from wirebayes.robot.mechanics.wires import Wires
 from wirebayes.sentences import lasting, short
 from wirebayes.wire import laws
-from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed, steady_hold
+from wirebayes.wire.away_from_bench import steady_hold
+from wirebayes.wire.effect import OF_THE_BENCH, Effect, Placed
 
 CORE = ("k1", "B", "U", "k2", "N")
 DIFFER = ("k1", "B", "k2")  # what a stated spread lets differ from specimen to specimen

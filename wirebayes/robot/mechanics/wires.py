@@ -11,8 +11,9 @@ import numpy as np
 
 from wirebayes.numeric.typing import Floats, Indices
 from wirebayes.wire import laws
+from wirebayes.wire.away_from_bench import steady_hold
 from wirebayes.wire.bent_strain import bent, strain_of
-from wirebayes.wire.effect import Effect, HoldContext, Placed, steady_hold
+from wirebayes.wire.effect import Effect, HoldContext, Placed
 from wirebayes.wire.fresh import FreshSample
 from wirebayes.wire.inverse import inverse
 from wirebayes.wire.model import Model

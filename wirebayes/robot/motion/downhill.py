@@ -5,7 +5,6 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from wirebayes.numeric import cholesky
-from wirebayes.numeric.batches import batch_first
 from wirebayes.numeric.rows import joined_rows, last_axis_of
 from wirebayes.numeric.typing import Bools, Floats, Indices, Ints
 from wirebayes.robot.mechanics import rotation as turning
@@ -14,6 +13,7 @@ from wirebayes.robot.mechanics.description import GRAVITY, Robot
 from wirebayes.robot.mechanics.wires import Wires, energy, tension
 from wirebayes.robot.motion.balance import in_metres
 from wirebayes.robot.motion.outcome import FOUND, NO_EQUILIBRIUM, NOT_CONVERGED, NOT_HELD
+from wirebayes.robot.motion.saddle import off_saddle
 
 _GOING_ON = -1  # of a case that is still being solved
 _CHUNK, _QUICK = 2048, 7
@@ -338,7 +338,7 @@ def _downhill_or_off_saddle(robot: Robot, cases: _Cases) -> tuple[Floats, Bools]
     saddle = np.flatnonzero(~positive)
     if saddle.size:
         level, floor = cases.level[saddle], cases.floor[saddle]
-        step[:, saddle] = _off_saddle(damped[..., saddle], gradient[:, saddle], level, floor)
+        step[:, saddle] = off_saddle(damped[..., saddle], gradient[:, saddle], level, floor)
     return step, positive
 
 
@@ -348,37 +348,6 @@ def _calmer(cases: _Cases, step: _Step, new: "_Point", noise: Floats) -> Floats:
     as_predicted = cases.at.energy - new.energy > 0.5 * predicted - noise
     less = np.where(cases.damping < 2e-5, 0.0, cases.damping / 100)
     return np.where(as_predicted, less, cases.damping)
-
-
-def _off_saddle(H: Floats, gradient: Floats, level: Floats, floor: Floats) -> Floats:
-    """Newton's step with every curvature taken as positive: away from a saddle, twice as far each time.
-
-    Shifting the whole Hessian until it is positive instead takes ever smaller steps the nearer the saddle is.
-
-    Parameters
-    ----------
-    H : (d, d, n) array
-        Only the upper triangle is read.
-    gradient : (d, n) array
-    level : (n,) array
-        The stiffness if every wire were taut; less than its rounding is none.
-    floor : (n,) array
-        Force below which none can be trusted: it leads nowhere.
-
-    Returns
-    -------
-    (d, n) array
-        NaN where the stiffness has overflowed: no step from there is better.
-    """
-    finite = np.isfinite(H).all((0, 1))
-    known = np.where(finite, H, 0.0)
-    curvature, along = np.linalg.eigh(batch_first(known), UPLO="U")
-    slope = np.einsum("nij,in->nj", along, gradient)
-    slope = np.where(np.abs(slope) > floor[:, None], slope, 0.0)
-    least = np.finfo(float).eps * level[:, None]
-    stiffness = np.maximum(np.abs(curvature), least)
-    step = -np.einsum("nij,nj->in", along, slope / stiffness)
-    return np.where(finite, step, np.nan)
 
 
 @dataclass(frozen=True)
