@@ -182,7 +182,7 @@ def test_the_command_goes_on_from_a_calibration_or_refuses_it(fitted, session_cs
     calibrated = read_json(done / "calibration.json")["with_creep_model"]["reference_error_mm"]
     np.testing.assert_allclose(known["reference_error_mm"]["mean"], calibrated["mean"])
     np.testing.assert_allclose(known["reference_error_mm"]["sd"], calibrated["sd"])
-    assert "goes on where a calibration of 5 holds and 150 s ended" in (out / "report.html").read_text()
+    assert "goes on where a calibration of 5 holds and 2.5 min ended" in (out / "report.html").read_text()
     capsys.readouterr()
     astray = tmp_path / "astray"
     shutil.copytree(done, astray)
