@@ -108,7 +108,8 @@ def test_an_effect_that_saturates_is_not_promised_to_be_seen_at_some_size() -> N
     assert power.smallest_seen(linear) == (1, pytest.approx(5.0))
     for needed, found in ((8.9, pytest.approx(8.9)), (9.1, None)):
         assert power.smallest_seen([(1.0, 0, needed), (3.0, 1, needed)]) == (1, found)
-    assert power.smallest_seen([(1.0, 0, 2.0), (3.0, 1, 6.1)]) == (1, None)  # it shows no more at three than at one
+    for needed in (6.0 - 1e-9, 6.1):  # it shows hardly more at three than at one, or less
+        assert power.smallest_seen([(1.0, 0, 2.0), (3.0, 1, needed)]) == (1, None)
     assert power.smallest_seen([(1.0, 0, None), (3.0, 1, 4.0)]) == (1, None)
 
 

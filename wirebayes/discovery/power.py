@@ -139,11 +139,12 @@ def _beyond(rungs: Sequence[tuple[float, int, float | None]]) -> float | None:
     if seen_before is None:
         return None
     share, share_before = last / seen, before / seen_before
-    power = np.log(share / share_before) / np.log(last / before)
-    if power <= 0.0:
+    missing = -np.log(share)
+    gained = np.log(share / share_before)
+    if missing * np.log(last / before) > gained * np.log(FARTHEST):
         return None
-    amplitude = float(last * share ** (-1.0 / power))
-    return amplitude if amplitude <= FARTHEST * last else None
+    power = gained / np.log(last / before)
+    return float(last * np.exp(missing / power))
 
 
 def _between(below: tuple[float, float | None], above: tuple[float, float]) -> float:
