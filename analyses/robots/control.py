@@ -68,9 +68,9 @@ def intervals(fits, count):
                 state = fresh(robot.legs, line.count)
                 if loaded_s:
                     state = HoldCreep(wires, state, load).advance(loaded_s, load)
-                still, ahead = control.after_calibration(robot, wires, state, x, R, times)
                 cells = []
-                for error in (still, ahead):
+                for schedule in control.calibrated_schedules(robot, wires, state, x, R):
+                    error = control.error(robot, wires, schedule, x, R, times, state)
                     found = [control.longest_interval(error, t) for t in tolerances]
                     cells.append(" ".join(f"{v:9.3g}" if np.isfinite(v) else f"{'> 1e5':>9s}" for v in found))
                 print(f"{line_name:15s} {name:14s} {'1 h' if loaded_s else 'new':7s} {cells[0]}   {cells[1]}")

@@ -30,12 +30,18 @@ def test_a_controller_that_knows_everything_holds_the_pose(name):
     assert blind.distance_m[0, 2] > 1e-3
 
 
+def _after_calibration(robot, wires, carried, x, R, times):
+    """Pose error of joints held still, and of commands that foresee the mean creep, from a calibration on."""
+    schedules = control.calibrated_schedules(robot, wires, carried, x, R)
+    return [control.error(robot, wires, schedule, x, R, times, carried) for schedule in schedules]
+
+
 def test_foreseeing_creep_helps_uncertain_wires():
     robot = schema.read_robot_file("cogiro-desk")
     wires = draws.for_robot(robot, _line(100), 0.05, np.random.default_rng(0))
     x, R = robot.home_m, np.eye(3)
     state = fresh(robot.legs, 100)
-    still, ahead = control.after_calibration(robot, wires, state, x, R, np.array([0.0, 60.0, 600.0]))
+    still, ahead = _after_calibration(robot, wires, state, x, R, np.array([0.0, 60.0, 600.0]))
     assert still.distance_m[:, 0].max() < 1e-9
     assert np.median(ahead.distance_m[:, 2]) < 0.4 * np.median(still.distance_m[:, 2])
     assert control.longest_interval(ahead, 1e-3) >= control.longest_interval(still, 1e-3)
@@ -48,8 +54,8 @@ def test_loaded_wires_drift_less_after_a_calibration():
     tau = np.repeat(inverse.tensions(robot, x[None], R[None]).T, 20, 1)
     loaded = HoldCreep(wires, fresh(robot.legs, 20), tau).advance(3600.0, tau)
     times = np.array([0.0, 60.0])
-    new, _ = control.after_calibration(robot, wires, fresh(robot.legs, 20), x, R, times)
-    old, _ = control.after_calibration(robot, wires, loaded, x, R, times)
+    new, _ = _after_calibration(robot, wires, fresh(robot.legs, 20), x, R, times)
+    old, _ = _after_calibration(robot, wires, loaded, x, R, times)
     assert old.distance_m[:, 0].max() < 1e-9
     assert np.median(old.distance_m[:, 1]) < 0.5 * np.median(new.distance_m[:, 1])
 
@@ -146,7 +152,7 @@ def test_a_pose_followed_until_it_leaves_its_limits_lasts_as_long_as_one_followe
     at, state = (robot.home_m, np.eye(3)), fresh(robot.legs, 20)
     times = np.array([0.0, 10.0, 60.0, 600.0])
     schedules = control.calibrated_schedules(robot, wires, state, *at)
-    whole = control.after_calibration(robot, wires, state, *at, times)
+    whole = _after_calibration(robot, wires, state, *at, times)
     limits = control.Limits(*at, limit_m)
     for schedule, error, most in zip(schedules, whole, looks, strict=True):
         shares = []

@@ -60,7 +60,7 @@ class Projected:
     along, square : (n, k, m)
         Of each signature with the residual and with itself; infinite where the parameters take all of a signature.
     whole : (n, k, m)
-        The same of each with itself wherever they take how much.
+        Of each signature with itself, however much of it the parameters take.
     smooth_along, smooth_square : (n, k, q) and (n, k, q, q) for each process
         Of its smooth functions with the residual and with each other.
     form : Functions

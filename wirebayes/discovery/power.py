@@ -124,7 +124,10 @@ def smallest_seen(rungs: Sequence[tuple[float, int, float | None]]) -> tuple[int
     below: tuple[float, float | None] | None = None
     for step, k, seen in rungs:
         if seen is not None and seen <= step:
-            return k, seen if below is None else _between(below, (step, seen))
+            if below is None:
+                return k, seen
+            amplitude, needed = below
+            return k, step if needed is None else _by_power((amplitude, needed), (step, seen))
         below = (step, seen)
     _, k, _ = rungs[-1]
     return k, _beyond(rungs)
@@ -138,22 +141,25 @@ def _beyond(rungs: Sequence[tuple[float, int, float | None]]) -> float | None:
     before, _, seen_before = rungs[-2]
     if seen_before is None:
         return None
-    share, share_before = last / seen, before / seen_before
-    missing = -np.log(share)
-    gained = np.log(share / share_before)
+    missing = np.log(seen / last)
+    gained = np.log(last / before) - np.log(seen / seen_before)
     if missing * np.log(last / before) > gained * np.log(FARTHEST):
         return None
-    power = gained / np.log(last / before)
-    return float(last * np.exp(missing / power))
+    return _by_power((before, seen_before), (last, seen))
 
 
-def _between(below: tuple[float, float | None], above: tuple[float, float]) -> float:
-    """Where the share of what is needed to be seen, step over amplitude, passes one."""
-    (low, too_weak), (high, enough) = below, above
-    if too_weak is None:
-        return high
-    missing, beyond = np.log(too_weak / low), np.log(high / enough)
-    return float(low * (high / low) ** (missing / (missing + beyond)))
+def _by_power(first: tuple[float, float], second: tuple[float, float]) -> float:
+    """Where the share of what is needed to be seen passes one, if it follows a power of the amplitude.
+
+    Parameters
+    ----------
+    first, second : (float, float)
+        Of two probes the amplitude, and the amplitude that would be seen; that share is one over the other.
+    """
+    (low, needed_at_low), (high, needed_at_high) = first, second
+    missing = np.log(needed_at_low / low)
+    gained = missing + np.log(high / needed_at_high)
+    return float(low * (high / low) ** (missing / gained))
 
 
 def similarity(expansions: Sequence[Expansion], trials: Sequence[Probe], ratios: Sequence[float]) -> Cosines:

@@ -243,34 +243,6 @@ def lasting_within(
     return Lasting(np.inf, float(walk.live.mean()))
 
 
-def after_calibration(
-    robot: Robot, wires: Wires, carried: CreepState, position_m: Floats, rotation: Floats, times_s: Floats
-) -> tuple[PoseError, PoseError]:
-    """Error that grows from a perfect calibration on, after a load history: held still, and with the creep compensated.
-
-    Parameters
-    ----------
-    robot : Robot
-    wires : Wires
-        ``n`` draws.
-    carried : CreepState
-        Creep of the load history; the command at the calibration restarts the wires' clocks.
-    position_m, rotation : (3,), (3, 3) arrays
-    times_s : (t,) array
-        Since the calibration.
-
-    Returns
-    -------
-    still, foreseen : PoseError
-        As the schedules of `calibrated_schedules` command.
-    """
-    still, foreseen = (
-        error(robot, wires, schedule, position_m, rotation, times_s, carried)
-        for schedule in calibrated_schedules(robot, wires, carried, position_m, rotation)
-    )
-    return still, foreseen
-
-
 def calibrated_schedules(
     robot: Robot, wires: Wires, carried: CreepState, position_m: Floats, rotation: Floats
 ) -> tuple[Schedule, Schedule]:
@@ -278,8 +250,13 @@ def calibrated_schedules(
 
     Parameters
     ----------
-    robot, wires, carried, position_m, rotation
-        As for `after_calibration`.
+    robot : Robot
+    wires : Wires
+        ``n`` draws.
+    carried : CreepState
+        What the load history left in the wires; the command at the calibration restarts their clocks.
+    position_m : (3,) array
+    rotation : (3, 3) array
 
     Returns
     -------

@@ -38,7 +38,7 @@ class CreepingHold:
     error_m : (n, w) array or float
         What the zero-tension lengths before creep are beyond what the joint values say.
     needed : float
-        Share of the draws of whom it is worth going on: it is not once more of them have fallen.
+        The hold is followed while at least this share of the draws have not fallen.
 
     Attributes
     ----------

@@ -178,7 +178,7 @@ def _step(
     leash = _STRAY * (trusted + _apart_m(robot, near, predicted))
     there = forward.solve_equilibrium(robot, wires, solvable, offset, *near, leash_m=leash)
     _let_go(robot, wires, there, lengths)
-    near_prediction = _apart_m(robot, (there.position_m, there.rotation), predicted) <= trusted
+    near_prediction = _apart_m(robot, there.poses, predicted) <= trusted
     held = there.found & believed & near_prediction
     return there, np.asarray(held)
 
