@@ -13,12 +13,16 @@ unexport PYTHONDONTWRITEBYTECODE
 # A process a core; the tests of a file share fits and stay together. More than four would wait for the longest file.
 SIDE_BY_SIDE := -n logical --maxprocesses 4 --dist loadfile
 
-.PHONY: mutants run test test-full lowest coverage lint calibration discover-benchmark benchmark outputs figures docs dist clean
+.PHONY: mutants run test suite test-full lowest coverage lint style types calibration discover-benchmark benchmark outputs figures docs dist clean
 
 run: .venv/run.stamp
 	$(BIN)/wirebayes reproduce --output out/reproduce
 
-test: lint
+# Types are checked beside the tests: one process by itself would leave the other cores idle for a minute.
+test: style
+	$(MAKE) --no-print-directory --jobs 2 types suite
+
+suite: .venv/test.stamp
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "not slow and not browser"
 
 test-full: lint .venv/app.stamp
@@ -38,9 +42,13 @@ coverage: lint
 	$(BIN)/python -m analyses.project.lines_run
 	$(BIN)/coverage report --skip-covered --show-missing
 
-lint: .venv/test.stamp
+lint: style types
+
+style: .venv/test.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet .
+
+types: .venv/test.stamp
 	$(BIN)/mypy
 
 calibration: .venv/run.stamp
@@ -78,16 +86,23 @@ dist: .venv/release.stamp
 	$(BIN)/python -m build --outdir dist
 	$(BIN)/python -m twine check --strict dist/*
 
-# What is installed follows pyproject.toml and constraints.txt; a stamp is left only by an install that worked.
-.venv/run.stamp: $(INPUTS)
+# What is installed follows pyproject.toml and constraints.txt; a stamp is left only by an install that worked. Every
+# core compiles what was installed: pip would use one.
+define install
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or later is needed" if sys.version_info < (3, 11) else 0)'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e "$(1)"
+	$(BIN)/python -m compileall -qq -j 0 .venv/lib wirebayes || true # packages may carry files of other Pythons
 	touch $@
+endef
 
-.venv/%.stamp: .venv/run.stamp
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[$*]"
-	touch $@
+.venv/run.stamp: $(INPUTS)
+	$(call install,.)
+
+# With an extra comes what every command needs.
+.venv/%.stamp: $(INPUTS)
+	$(call install,.[$*])
+	touch .venv/run.stamp
 
 clean:
 	rm -rf .venv out build dist docs/_build docs/api docs/commands wirebayes.egg-info
